@@ -1,0 +1,1 @@
+//! What was wanted, what is there, what follows: project, inventory, plan.

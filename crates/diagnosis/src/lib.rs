@@ -1,0 +1,1 @@
+//! Frames in, findings out: where, why and what to do.

@@ -1,0 +1,1 @@
+//! MainDevice, segment and diagnosis in virtual time.

@@ -1,0 +1,1 @@
+//! Network cards, clocks and capture files: the only crate that touches them.

@@ -1,0 +1,1 @@
+//! The EtherCAT MainDevice: exchange engine, procedures, cyclic process data.

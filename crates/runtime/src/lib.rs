@@ -1,0 +1,1 @@
+//! Threads, selectors and recorders: what joins the cores to a real interface.

@@ -1,0 +1,1 @@
+//! A virtual EtherCAT segment: controllers, wires and the ways in which they break.
