@@ -1,0 +1,1 @@
+//! Mailbox messages: the header, CoE, abort codes.

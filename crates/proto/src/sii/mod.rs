@@ -1,0 +1,1 @@
+//! The SII image (the SubDevice's EEPROM): parse and build.

@@ -1,0 +1,1 @@
+//! Application layer states: which transitions exist, and what the status codes mean.

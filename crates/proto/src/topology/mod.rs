@@ -1,0 +1,1 @@
+//! Which way a frame goes: tree, check order, delays.
