@@ -1,1 +1,7 @@
-//! What was wanted, what is there, what follows: project, inventory, plan.
+//! What was wanted, what is there, what follows.
+//!
+//! Three nouns: a [`project`] is what the user wrote, an [`inventory`] is what was found, a [`plan`]
+//! is what follows: addresses, FMMUs, frames, expected working counters. Diagnosis compares them.
+//! [`fault`] holds the names that segment, diagnosis and score share.
+
+pub mod fault;
