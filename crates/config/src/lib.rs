@@ -5,3 +5,4 @@
 //! [`fault`] holds the names that segment, diagnosis and score share.
 
 pub mod fault;
+pub mod identity;

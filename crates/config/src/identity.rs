@@ -1,0 +1,164 @@
+//! Who a SubDevice is, and when two identities count as the same.
+//!
+//! Reference: SII words 8..15, object 0x1018; the comparison modes are those of the ESI attribute
+//! `CheckRevisionNo` (ETG.2000).
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// The four numbers that identify a SubDevice.
+#[derive(
+    Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default, Serialize, Deserialize,
+    schemars::JsonSchema,
+)]
+pub struct Identity {
+    /// Vendor, given by the technology group.
+    pub vendor_id: u32,
+    /// Product, given by the vendor.
+    pub product_code: u32,
+    /// Revision: high word = revision, low word = variant, by common practice.
+    pub revision: u32,
+    /// Serial number; 0 = none given.
+    pub serial: u32,
+}
+
+/// How a found revision is compared with the planned one.
+#[derive(
+    Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum RevisionRule {
+    /// Any revision will do.
+    Any,
+    /// The same number (`EQ`).
+    #[default]
+    Equal,
+    /// The same or a higher number (`EQ_OR_G`).
+    EqualOrGreater,
+    /// The same low word (`LW_EQ`).
+    LowWordEqual,
+    /// The same low word, and the same or a higher high word (`LW_EQ_HW_EQ_OR_G`).
+    LowWordEqualHighWordEqualOrGreater,
+    /// The same high word (`HW_EQ`).
+    HighWordEqual,
+    /// The same or a higher high word (`HW_EQ_OR_G`).
+    HighWordEqualOrGreater,
+}
+
+impl RevisionRule {
+    /// Whether a device of revision `found` may stand where `planned` was planned.
+    #[must_use]
+    pub const fn accepts(self, planned: u32, found: u32) -> bool {
+        let (low, high) = (planned & 0xFFFF, planned >> 16);
+        let (found_low, found_high) = (found & 0xFFFF, found >> 16);
+        match self {
+            Self::Any => true,
+            Self::Equal => found == planned,
+            Self::EqualOrGreater => found >= planned,
+            Self::LowWordEqual => found_low == low,
+            Self::LowWordEqualHighWordEqualOrGreater => found_low == low && found_high >= high,
+            Self::HighWordEqual => found_high == high,
+            Self::HighWordEqualOrGreater => found_high >= high,
+        }
+    }
+}
+
+/// In what a found identity differs from the planned one.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Mismatch {
+    /// Another vendor.
+    Vendor,
+    /// Another product.
+    Product,
+    /// A revision that the rule does not accept.
+    Revision,
+    /// Another serial number.
+    Serial,
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Vendor => "vendor",
+            Self::Product => "product code",
+            Self::Revision => "revision",
+            Self::Serial => "serial number",
+        })
+    }
+}
+
+impl Identity {
+    /// Compares what was planned (`self`) with what was `found`; `None` when it fits.
+    ///
+    /// A planned serial number of 0 is not compared.
+    #[must_use]
+    pub fn mismatch(&self, found: &Self, rule: RevisionRule) -> Option<Mismatch> {
+        if self.vendor_id != found.vendor_id {
+            Some(Mismatch::Vendor)
+        } else if self.product_code != found.product_code {
+            Some(Mismatch::Product)
+        } else if !rule.accepts(self.revision, found.revision) {
+            Some(Mismatch::Revision)
+        } else if self.serial != 0 && self.serial != found.serial {
+            Some(Mismatch::Serial)
+        } else {
+            None
+        }
+    }
+}
+
+impl fmt::Display for Identity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { vendor_id, product_code, revision, serial } = self;
+        write!(f, "vendor 0x{vendor_id:08X}, product 0x{product_code:08X}")?;
+        write!(f, ", revision 0x{revision:08X}")?;
+        if *serial != 0 {
+            write!(f, ", serial {serial}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use RevisionRule::*;
+
+    // proves: HC-03 partial
+    #[test]
+    fn revisions_are_compared_by_rule() {
+        let planned = 0x0012_0003;
+        let table = [
+            (Any, 0, true),
+            (Equal, 0x0012_0003, true),
+            (Equal, 0x0013_0003, false),
+            (EqualOrGreater, 0x0013_0000, true),
+            (EqualOrGreater, 0x0012_0002, false),
+            (LowWordEqual, 0x0001_0003, true),
+            (LowWordEqual, 0x0012_0004, false),
+            (LowWordEqualHighWordEqualOrGreater, 0x0013_0003, true),
+            (LowWordEqualHighWordEqualOrGreater, 0x0011_0003, false),
+            (HighWordEqual, 0x0012_0009, true),
+            (HighWordEqual, 0x0013_0003, false),
+            (HighWordEqualOrGreater, 0x0013_0000, true),
+            (HighWordEqualOrGreater, 0x0011_0003, false),
+        ];
+        for (rule, found, expected) in table {
+            assert_eq!(rule.accepts(planned, found), expected, "{rule:?} 0x{found:08X}");
+        }
+    }
+
+    #[test]
+    fn the_first_difference_is_named() {
+        let planned = Identity { vendor_id: 2, product_code: 5, revision: 7, serial: 9 };
+        assert_eq!(planned.mismatch(&planned, Equal), None);
+        let check = |found: Identity| planned.mismatch(&found, Equal);
+        assert_eq!(check(Identity { vendor_id: 3, ..planned }), Some(Mismatch::Vendor));
+        assert_eq!(check(Identity { product_code: 3, ..planned }), Some(Mismatch::Product));
+        assert_eq!(check(Identity { revision: 3, ..planned }), Some(Mismatch::Revision));
+        assert_eq!(check(Identity { serial: 3, ..planned }), Some(Mismatch::Serial));
+        let any_serial = Identity { serial: 0, ..planned };
+        assert_eq!(any_serial.mismatch(&planned, Equal), None);
+    }
+}
