@@ -253,10 +253,11 @@ impl Forest {
         let node = self.nodes.len();
         let (mut entry, times, mut basis) = self.entry_of(node, seen);
         let is_convention = matches!(basis, EntryBasis::PortAOpen | EntryBasis::LastInFrameOrder);
-        if is_convention && self.growing.is_empty() && !self.roots.is_empty() {
-            if let Some(other) = entry_above(seen.open, self.roots.len()) {
-                (entry, basis) = (other, EntryBasis::OnlyPlace);
-            }
+        if is_convention
+            && self.growing.is_empty()
+            && let Some(other) = entry_above(seen.open, self.roots.len())
+        {
+            (entry, basis) = (other, EntryBasis::OnlyPlace);
         }
         if basis == EntryBasis::LastInFrameOrder {
             self.doubts.push(Doubt::Entry { node, taken: entry });
@@ -288,7 +289,7 @@ impl Forest {
             self.errors.push(TopologyError::NoOpenPort { node });
             return (Port::A, None, EntryBasis::NoOpenPort);
         };
-        let Some(last) = open.last() else {
+        let Some(last) = open.next_back() else {
             return (first, None, EntryBasis::OnlyPort);
         };
         match entry_by_time(seen) {

@@ -67,8 +67,8 @@ pub struct Processing {
 
 /// The way of a frame from the card that sends it to the card it arrives at.
 ///
-/// It is the way of a frame that nothing happens to; see [`Route::destroyed_by`] for wiring on which
-/// no frame gets home. Controllers and links are indices into the [`Tree`] it was made for.
+/// It is the way of a frame that nothing happens to; see [`Route::destroyed_by`] for wiring on
+/// which no frame gets home. Controllers and links are indices into the [`Tree`] it was made for.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Route {
     path: Path,
@@ -156,8 +156,8 @@ impl Route {
                 });
             }
             port = port.next();
-            // The port it came in at is open, so one round is enough.
-            if port == received || link_at(End::Controller(node, port)).is_some() {
+            // The port it came in at is open, so this ends after one round at the latest.
+            if link_at(End::Controller(node, port)).is_some() {
                 return port;
             }
         }
@@ -175,7 +175,8 @@ impl Route {
         &self.hops
     }
 
-    /// The card where the frame arrives: in an intact ring the other one. `None` if it never leaves.
+    /// The card where the frame arrives: in an intact ring the other one. `None` if it never
+    /// leaves.
     #[must_use]
     pub fn arrives_at(&self) -> Option<Path> {
         self.hops.last().and_then(|hop| match hop.to {

@@ -3,7 +3,7 @@
 //! A [`Tree`] is built from a description ([`Tree::from_wiring`]) or found from what was seen
 //! ([`derive`](super::derive())); equal lines give equal trees. Its controllers are indices from 0,
 //! in the order of whoever built it; the order in which a frame is processed is
-//! [`Tree::order`]. Rings and their halves are in [`ring`].
+//! [`Tree::order`]. Rings and their halves are in `tree/ring.rs`.
 //! Reference: S1 chapter 3; read [`wiring`](super::wiring) first.
 
 mod ring;

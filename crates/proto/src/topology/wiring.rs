@@ -1,9 +1,10 @@
 //! Ends and links, and the way through one controller.
 //!
 //! A link joins two ends: ports of controllers, or cards of the MainDevice. Inside a controller the
-//! frame goes round the ring 0 → processing unit → 3 → 1 → 2 → 0 and skips closed ports, so the port
-//! a frame came in at decides which other ports it meets before the processing unit and which
-//! after. That rule is here; everything else about a frame's way follows from it.
+//! frame goes round in the port order of [`port`](crate::port) and skips closed ports; the
+//! processing unit sits between port A and the port after it. So the port a frame came in at decides
+//! which other ports it meets before the processing unit and which after. That rule is here;
+//! everything else about a frame's way follows from it.
 //! Reference: S1 chapter 3 (frame processing order).
 
 use std::fmt;

@@ -52,7 +52,8 @@ fn a_coupler_a_junction_and_two_branches_measure_as_on_the_bench() {
 fn a_junction_with_four_ports_measures_as_on_the_bench() {
     let (tree, delays) = from_reference(&[
         at(&[(A, 3_493_061_450), (B, 3_493_064_460)]), // EK1100
-        at(&[(A, 3_493_293_220), (D, 3_493_294_570), (B, 3_493_295_650), (C, 3_493_295_940)]), // EK1122
+        // EK1122
+        at(&[(A, 3_493_293_220), (D, 3_493_294_570), (B, 3_493_295_650), (C, 3_493_295_940)]),
         at(&[(A, 3_485_337_450), (B, 3_485_337_760)]), // EK1914
         at(&[(A, 0)]),                                 // EL1008
         at(&[(A, 0)]),                                 // EK1101
@@ -60,6 +61,31 @@ fn a_junction_with_four_ports_measures_as_on_the_bench() {
     ]);
     assert_eq!(delays, [0, 145, 665, 820, 2035, 2720]);
     assert_eq!(tree.children(1).collect::<Vec<_>>(), [(D, 2), (B, 4), (C, 5)]);
+}
+
+// Read from a real EK1100, EL2828, EL2889 (ethercrab's recordings), leftovers of closed ports and
+// all: "hoff" and "Verl" are pieces of the vendor's name.
+// proves: DC-07 partial, ESC-13 partial
+#[test]
+fn leftovers_in_times_of_closed_ports_change_nothing() {
+    let hoff = u32::from_le_bytes(*b"hoff");
+    let verl = u32::from_le_bytes(*b"Verl");
+    let received = [
+        at(&[(A, 0x041B_2492), (B, 0x041B_26EA), (C, 0), (D, verl)]),
+        at(&[(A, 0x04C5_F1D8), (B, 0x04C5_F30E), (C, 0), (D, verl)]),
+        at(&[(A, 0x0439_936B), (B, hoff), (C, 0), (D, verl)]),
+    ];
+    let open = [&[A, B][..], &[A, B], &[A]];
+    let seen: Vec<SeenController> = open
+        .into_iter()
+        .zip(received)
+        .map(|(open, received)| SeenController { received, ..SeenController::open_at(open) })
+        .collect();
+    let tree = derive(&seen).unwrap();
+    assert!((0..3).all(|node| !tree.is_reversed(node)));
+    let delays = Delays::measure(&tree, Path::A, &received, Span::ZERO).unwrap();
+    let from_reference = [0, 1, 2].map(|node| delays.of(node).unwrap().from_reference);
+    assert_eq!(from_reference, [0, 145, 300].map(Span::ns));
 }
 
 const FIRST: Wired = Wired { on: End::MainDevice(Path::A), entry: A };
@@ -105,6 +131,7 @@ fn receive_times_may_wrap_between_two_ports() {
     assert_eq!(hops(&line, &times, Span::ZERO), [None, Some(150)]);
 }
 
+// proves: DC-03 partial
 #[test]
 fn a_controller_without_a_clock_is_part_of_the_cable() {
     let line = [FIRST, on(0, B), on(1, B), on(2, B)];

@@ -148,6 +148,15 @@ fn a_ring_closed_in_the_middle_leaves_units_to_the_frames_of_card_b() {
 }
 
 #[test]
+fn a_reversed_controller_on_a_closed_ring_is_processed_by_frames_of_card_b() {
+    let reversed = Wired { entry: B, ..on(1, B) };
+    let tree = Tree::from_wiring(&[FIRST, reversed, on(2, A)], Some((2, B))).unwrap();
+    assert!(Route::intact(&tree).order().eq([0, 2]));
+    assert!(Route::of(&tree, Path::B, &[]).order().eq([1]));
+    assert_eq!(tree.order(), [0, 2, 1], "while the ring is open");
+}
+
+#[test]
 fn two_closed_ports_a_on_one_way_destroy_every_frame() {
     let reversed = |end: Wired| Wired { entry: B, ..end };
     let one = Tree::from_wiring(&[FIRST, reversed(on(1, B))], None).unwrap();

@@ -133,10 +133,12 @@ struct Draw {
     clock_offset: u32,
 }
 
-/// Lines of up to `most` controllers, each hung on a free port of any earlier one. Of all, about one
-/// in `reversed_in` is entered at a port other than 0; none if that is 0.
+/// Lines of up to `most` controllers, each hung on a free port of any earlier one. About one in
+/// `reversed_in` is entered at a port other than 0; none if that is 0.
 pub(super) fn any_line(most: usize, reversed_in: usize) -> impl Strategy<Value = Line> {
-    let draw = (any::<usize>(), 0..4usize, any::<usize>(), 1..3_000u16, any::<u32>()).prop_map(
+    // Clocks that wrap while the frame is under way are as likely as others.
+    let offset = prop_oneof![any::<u32>(), u32::MAX - 200_000..=u32::MAX];
+    let draw = (any::<usize>(), 0..4usize, any::<usize>(), 1..3_000u16, offset).prop_map(
         move |(on, port, entry, delay, clock_offset)| Draw {
             on,
             port,

@@ -10,7 +10,7 @@ use crate::topology::delay::Delays;
 use crate::topology::derive::{EntryBasis, Reconstruction, SeenController, derive};
 use crate::topology::route::{Leg, Route};
 use crate::topology::tree::{Tree, Wired};
-use crate::topology::wiring::End;
+use crate::topology::wiring::{End, Link};
 
 fn port(number: usize) -> Port {
     Port::from_index(number).unwrap()
@@ -149,7 +149,8 @@ proptest! {
             }
             for port in Port::ALL {
                 let here = End::Controller(node, port);
-                let link = tree.links().iter().position(|l| l.upstream == here || l.downstream == here);
+                let plugged = |link: &Link| link.upstream == here || link.downstream == here;
+                let link = tree.links().iter().position(plugged);
                 prop_assert_eq!(tree.link_at(here), link);
                 prop_assert_eq!(tree.is_open(node, port), link.is_some());
                 if let Some(there) = tree.opposite(here) {
@@ -287,7 +288,9 @@ proptest! {
                 let broken = joined.link_at(End::Controller(new(far), far_port)).unwrap();
                 Route::of(&joined, path, &[broken])
             });
-            let ends = |route: &Route| route.hops().iter().map(|h| (h.from, h.to)).collect::<Vec<_>>();
+            let ends = |route: &Route| -> Vec<(End, End)> {
+                route.hops().iter().map(|hop| (hop.from, hop.to)).collect()
+            };
             prop_assert_eq!(ends(&alone), ends(&cut));
             prop_assert_eq!(alone.processing(), cut.processing());
         }

@@ -1,9 +1,11 @@
 //! Rings: the port that leads to card B, the two halves of a broken ring, and how they join.
 //!
 //! In the intact ring a frame of card A is processed by all and arrives at card B; one of card B
-//! only passes through. Where the ring is cut, each card reaches its half, and the half on card B
-//! is processed from the cut outwards, which is the order of the intact ring.
-//! Reference: S1 chapter 9 (redundancy); what a frame meets is left to [`Route`](super::super::Route).
+//! only passes through. (A reversed controller on the ring swaps the two: frames of card A pass it
+//! by, those of card B are processed there.) Where the ring is cut, each card reaches its half,
+//! and the half on card B is processed from the cut outwards, which is the order of the intact ring.
+//! Reference: S1 chapter 9 (redundancy). What a frame meets is for
+//! [`Route`](crate::topology::Route) to say.
 
 use super::{Node, Tree, Wired, WiringError};
 use crate::address::Path;
@@ -38,7 +40,7 @@ impl Tree {
     ///
     /// The wiring is legal (S1: "port B of the last two-port device or port C of the last coupler")
     /// only where a frame of card A then still passes every processing unit; whether it does is
-    /// asked of [`Route::unprocessed`](super::super::Route::unprocessed).
+    /// asked of [`Route::unprocessed`](crate::topology::Route::unprocessed).
     ///
     /// # Errors
     /// [`WiringError`] when there is no such controller, or the port or card B is in use.
