@@ -180,8 +180,9 @@ impl FmmuConfig {
 }
 
 impl fmt::Display for FmmuConfig {
-    /// `0x01000000, 4 bytes, at 0x1100, writes, on` for whole bytes; with bits, `0x00010011 bit 3 to
-    /// 0x00010013 bit 0, at 0x0F01 bit 1, writes, on`; `off` for one that was never set up.
+    /// `0x01000000, 4 bytes, at 0x1100, writes, on` for whole bytes; with bits,
+    /// `0x00010011 bit 3 to 0x00010013 bit 0, at 0x0F01 bit 1, writes, on`; `off` for one that was
+    /// never set up.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.length == 0 && !self.active {
             return f.write_str("off");

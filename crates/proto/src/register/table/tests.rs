@@ -91,6 +91,50 @@ fn reset_values_fit_and_counters_start_at_zero() {
     assert_eq!(DL_CONTROL.reset, Some(u64::from(DlControl::RESET.value())));
 }
 
+/// Table 1 of S2, the overview of the address space, as address, length, count.
+const OVERVIEW: &str = "
+    0000 1 1, 0001 1 1, 0002 2 1, 0004 1 1, 0005 1 1, 0006 1 1, 0007 1 1, 0008 2 1, 0010 2 1,
+    0012 2 1, 0020 1 1, 0021 1 1, 0030 1 1, 0031 1 1, 0040 1 1, 0041 1 1, 0100 4 1, 0108 2 1,
+    0110 2 1, 0120 2 1, 0130 2 1, 0134 2 1, 0138 1 1, 0139 1 1, 0140 1 1, 0141 1 1, 0142 2 1,
+    0144 2 1, 014E 2 1, 0150 1 1, 0151 1 1, 0152 2 1, 0158 2 1, 015C 2 1, 0180 1 1, 0181 1 1,
+    0182 2 1, 0184 2 1, 0188 2 1, 018E 2 1, 0190 1 1, 0191 1 1, 0192 2 1, 0198 2 1, 019C 2 1,
+    0200 2 1, 0204 4 1, 020A 4 1, 0210 2 1, 0220 4 1, 0300 2 4, 0308 1 4, 030C 1 1, 030D 1 1,
+    030E 2 1, 0310 1 4, 0314 1 4, 0320 2 4, 0340 1 1, 0341 2 1, 0400 2 1, 0410 2 1, 0412 2 1,
+    0420 2 1, 0440 2 1, 0442 1 1, 0443 1 1, 0444 1 1, 0448 1 1, 0500 1 1, 0501 1 1, 0502 2 1,
+    0504 4 1, 0508 8 1, 0510 2 1, 0512 1 1, 0513 1 1, 0514 2 1, 0516 1 1, 0517 1 1, 0518 1 4,
+    0600 16 16, 0800 8 16, 0900 4 4, 0910 8 1, 0918 8 1, 0920 8 1, 0928 4 1, 092C 4 1, 0930 2 1,
+    0932 2 1, 0934 1 1, 0935 1 1, 0936 1 1, 0938 2 1, 0940 4 1, 0944 4 1, 0950 8 1, 0958 8 1,
+    0980 1 1, 0981 1 1, 0982 2 1, 0984 1 1, 0986 1 1, 098C 1 1, 098D 1 1, 098E 1 1, 098F 1 1,
+    0990 8 1, 0998 8 1, 09A0 4 1, 09A4 4 1, 09A8 1 1, 09A9 1 1, 09AA 1 1, 09AB 1 1, 09AC 1 1,
+    09AD 1 1, 09AE 1 1, 09AF 1 1, 09B0 8 1, 09B8 8 1, 09C0 8 1, 09C8 8 1, 09D0 8 1, 09D8 8 1,
+    09E0 8 1, 09E8 8 1, 09F0 4 1, 09F8 4 1, 09FC 4 1, 0F00 4 1, 0F08 4 1, 0F10 8 1, 0F18 8 1,
+    0F80 128 1";
+
+/// The controller-specific area, 0x0E00 to 0x0EFF, is one line in the overview and left out here.
+// proves: HW-21 partial
+#[test]
+fn no_register_of_the_data_sheet_is_missing() {
+    let expected: Vec<(u16, u16, u16)> = OVERVIEW
+        .split(',')
+        .map(|entry| {
+            let [address, len, count] = entry.split_whitespace().collect::<Vec<_>>()[..] else {
+                panic!("{entry:?} is not address, length, count");
+            };
+            (
+                u16::from_str_radix(address, 16).unwrap(),
+                len.parse().unwrap(),
+                count.parse().unwrap(),
+            )
+        })
+        .collect();
+    let found: Vec<(u16, u16, u16)> = ALL
+        .iter()
+        .filter(|register| !(0x0E00..0x0F00).contains(&register.address.0))
+        .map(|register| (register.address.0, register.len, register.count()))
+        .collect();
+    assert_eq!(found, expected);
+}
+
 /// Address and length of registers that frames on real networks read and write, from captures and
 /// manuals; and, from the requirement rows, those of the error counters.
 // proves: HW-08 partial, HW-13 partial, HW-21 partial, ESC-15 partial
