@@ -1,1 +1,3 @@
 //! Mailbox messages: the header, CoE, abort codes.
+
+pub mod abort_code;
