@@ -269,3 +269,6 @@ impl CoeError {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod captures;
