@@ -123,10 +123,9 @@ impl Reader {
             };
             match self.walk.step(kind, len) {
                 Step::End | Step::EmptyHeaders => self.done = true,
-                // The header behind the data will be needed in any case.
-                Step::Category { end, .. } => {
-                    self.wanted = end.value().saturating_add(HEADER_WORDS);
-                }
+                // The data are wanted together with the header behind them, which the next round
+                // looks for.
+                Step::Category { .. } => {}
             }
         }
     }

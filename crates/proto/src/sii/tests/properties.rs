@@ -176,6 +176,7 @@ proptest! {
             let at = words.start.byte();
             prop_assert_eq!(at, reader.bytes().len());
             let end = (at + 2 * chunk).min(built.len());
+            prop_assert!(at < end, "word {} is asked for, behind the end", words.start);
             reader.supply(&built[at..end]);
         }
         prop_assert!(reader.bytes().len() <= built.len());

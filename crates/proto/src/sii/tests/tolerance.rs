@@ -115,10 +115,11 @@ fn zeros_in_place_of_the_end_marker_are_no_categories() {
     let zeros = [&bytes[..end], &[0; 400]].concat();
     assert_eq!(oddities(&zeros), [((end / 2) as u32, OddityKind::EmptyHeaders)]);
     assert_eq!(Image::parse(&zeros).unwrap().categories, image.categories);
-    // A few empty headers may stand between categories, and are kept.
-    let some = [&bytes[..end], &[0; 12], &[0xFF, 0xFF]].concat();
-    assert_eq!(oddities(&some), []);
-    assert_eq!(Image::parse(&some).unwrap().categories.len(), image.categories.len() + 3);
+    // Seven empty headers may stand between categories, and are kept; the eighth is one too many.
+    let empty = |headers| [&bytes[..end], [0; 4].repeat(headers).as_slice(), &[0xFF; 2]].concat();
+    assert_eq!(oddities(&empty(7)), []);
+    assert_eq!(Image::parse(&empty(7)).unwrap().categories.len(), image.categories.len() + 7);
+    assert_eq!(oddities(&empty(8)), [((end / 2) as u32, OddityKind::EmptyHeaders)]);
 }
 
 #[test]
@@ -160,6 +161,11 @@ fn texts_that_are_not_there_are_said() {
     let missing = |index| OddityKind::StringMissing { index: StringIndex(index), count: 0 };
     assert_eq!(oddities(&with_categories(&bytes)), [(0x42, missing(1)), (0x49, missing(9))]);
     assert_eq!(Image::parse(&with_categories(&bytes)).unwrap().group(), None);
+    // The second operation mode has a description that is not there, the first has neither.
+    let mut modes = [0; 48];
+    modes[24 + 19] = 4;
+    let bytes = [&[60, 0, 24, 0], modes.as_slice(), &[0xFF, 0xFF]].concat();
+    assert_eq!(oddities(&with_categories(&bytes)), [(0x42 + 12 + 9, missing(4))]);
 }
 
 #[test]
