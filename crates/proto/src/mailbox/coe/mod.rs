@@ -1,0 +1,17 @@
+//! CoE, the CAN application protocol over EtherCAT: objects, SDO transfer, SDO information,
+//! emergencies.
+//!
+//! [`Message`] is what follows the mailbox header; the codecs serve both ends, MainDevice and
+//! SubDevice. Read first: ETG.1000.6 §5.6; for object types and entries ETG.1020.
+
+pub mod data_type;
+pub mod emergency;
+pub mod information;
+pub mod message;
+pub mod object;
+pub mod sdo;
+
+pub use data_type::DataType;
+pub use emergency::{Emergency, EmergencyClass, ErrorRegister};
+pub use message::{COE_HEADER_LEN, CoeError, Header, Message, Service};
+pub use object::{ObjectAddress, ObjectIndex};
