@@ -5,23 +5,8 @@
 
 use std::fmt;
 
+pub use linesman_proto::sii::Identity;
 use serde::{Deserialize, Serialize};
-
-/// The four numbers that identify a SubDevice.
-#[derive(
-    Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default, Serialize, Deserialize,
-    schemars::JsonSchema,
-)]
-pub struct Identity {
-    /// Vendor, given by the technology group.
-    pub vendor_id: u32,
-    /// Product, given by the vendor.
-    pub product_code: u32,
-    /// Revision: high word = revision, low word = variant, by common practice.
-    pub revision: u32,
-    /// Serial number; 0 = none given.
-    pub serial: u32,
-}
 
 /// How a found revision is compared with the planned one.
 #[derive(
@@ -88,36 +73,35 @@ impl fmt::Display for Mismatch {
     }
 }
 
-impl Identity {
-    /// Compares what was planned (`self`) with what was `found`; `None` when it fits.
-    ///
-    /// A planned serial number of 0 is not compared.
-    #[must_use]
-    pub fn mismatch(&self, found: &Self, rule: RevisionRule) -> Option<Mismatch> {
-        if self.vendor_id != found.vendor_id {
-            Some(Mismatch::Vendor)
-        } else if self.product_code != found.product_code {
-            Some(Mismatch::Product)
-        } else if !rule.accepts(self.revision, found.revision) {
-            Some(Mismatch::Revision)
-        } else if self.serial != 0 && self.serial != found.serial {
-            Some(Mismatch::Serial)
-        } else {
-            None
-        }
+/// Compares what was `planned` with what was `found`; `None` when it fits.
+///
+/// A planned serial number of 0 is not compared.
+#[must_use]
+pub fn mismatch(planned: &Identity, found: &Identity, rule: RevisionRule) -> Option<Mismatch> {
+    if planned.vendor_id != found.vendor_id {
+        Some(Mismatch::Vendor)
+    } else if planned.product_code != found.product_code {
+        Some(Mismatch::Product)
+    } else if !rule.accepts(planned.revision, found.revision) {
+        Some(Mismatch::Revision)
+    } else if planned.serial_number != 0 && planned.serial_number != found.serial_number {
+        Some(Mismatch::Serial)
+    } else {
+        None
     }
 }
 
-impl fmt::Display for Identity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { vendor_id, product_code, revision, serial } = self;
-        write!(f, "vendor 0x{vendor_id:08X}, product 0x{product_code:08X}")?;
-        write!(f, ", revision 0x{revision:08X}")?;
-        if *serial != 0 {
-            write!(f, ", serial {serial}")?;
-        }
-        Ok(())
+/// An identity as people compare it: in hexadecimal, the serial number only when there is one.
+#[must_use]
+pub fn text(identity: &Identity) -> String {
+    let Identity { vendor_id, product_code, revision, serial_number } = identity;
+    let mut text = format!(
+        "vendor 0x{vendor_id:08X}, product 0x{product_code:08X}, revision 0x{revision:08X}"
+    );
+    if *serial_number != 0 {
+        text.push_str(&format!(", serial {serial_number}"));
     }
+    text
 }
 
 #[cfg(test)]
@@ -151,14 +135,14 @@ mod tests {
 
     #[test]
     fn the_first_difference_is_named() {
-        let planned = Identity { vendor_id: 2, product_code: 5, revision: 7, serial: 9 };
-        assert_eq!(planned.mismatch(&planned, Equal), None);
-        let check = |found: Identity| planned.mismatch(&found, Equal);
+        let planned = Identity { vendor_id: 2, product_code: 5, revision: 7, serial_number: 9 };
+        assert_eq!(mismatch(&planned, &planned, Equal), None);
+        let check = |found: Identity| mismatch(&planned, &found, Equal);
         assert_eq!(check(Identity { vendor_id: 3, ..planned }), Some(Mismatch::Vendor));
         assert_eq!(check(Identity { product_code: 3, ..planned }), Some(Mismatch::Product));
         assert_eq!(check(Identity { revision: 3, ..planned }), Some(Mismatch::Revision));
-        assert_eq!(check(Identity { serial: 3, ..planned }), Some(Mismatch::Serial));
-        let any_serial = Identity { serial: 0, ..planned };
-        assert_eq!(any_serial.mismatch(&planned, Equal), None);
+        assert_eq!(check(Identity { serial_number: 3, ..planned }), Some(Mismatch::Serial));
+        let any_serial = Identity { serial_number: 0, ..planned };
+        assert_eq!(mismatch(&any_serial, &planned, Equal), None);
     }
 }

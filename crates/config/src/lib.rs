@@ -4,5 +4,10 @@
 //! is what follows: addresses, FMMUs, frames, expected working counters. Diagnosis compares them.
 //! [`fault`] holds the names that segment, diagnosis and score share.
 
+pub mod attachment;
 pub mod fault;
 pub mod identity;
+pub mod inventory;
+pub mod plan;
+pub mod profile;
+pub mod project;

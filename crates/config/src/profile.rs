@@ -1,0 +1,107 @@
+//! What a type of SubDevice needs from its MainDevice: mailbox, SyncManagers, process data.
+//!
+//! It is made from the SII image, which the device itself carries.
+
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::register::{SmControl, SmMode};
+use linesman_proto::sii::{Direction, Image, MailboxPair, Protocols, SyncManagerKind};
+
+/// A SyncManager for process data.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ProcessSyncManager {
+    /// Which SyncManager, 0..=15.
+    pub index: u8,
+    /// Which way the data flow.
+    pub direction: Direction,
+    /// Where the buffer begins.
+    pub start: RegisterAddress,
+    /// Bytes of process data; 0 when nothing is mapped by default.
+    pub len: u16,
+    /// Control byte of register 0x0804 + 8 × index.
+    pub control: SmControl,
+}
+
+/// The mailbox and the SyncManagers that serve it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Mailbox {
+    /// Where it lies.
+    pub areas: MailboxPair,
+    /// What it speaks.
+    pub protocols: Protocols,
+    /// Whether the device takes whole objects in one transfer.
+    pub complete_access: bool,
+}
+
+/// What a SubDevice needs.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct DeviceProfile {
+    /// Order designation, such as "EL2004".
+    pub type_name: String,
+    /// Full name.
+    pub name: String,
+    /// Mailbox, if it has one.
+    pub mailbox: Option<Mailbox>,
+    /// SyncManagers for process data, in order of their numbers.
+    pub process: Vec<ProcessSyncManager>,
+    /// Must not be addressed by LRW; LRD and LWR instead.
+    pub no_lrw: bool,
+    /// The controller mirrors AL control in AL status: no firmware, no codes, no acknowledge bit.
+    pub device_emulation: bool,
+    /// Current from the E-bus in mA; negative supplies. `None`: not said.
+    pub ebus_current_ma: Option<i16>,
+}
+
+impl DeviceProfile {
+    /// What an SII image says.
+    #[must_use]
+    pub fn from_sii(image: &Image) -> Self {
+        let general = image.general();
+        let text = |text: Option<&str>| text.unwrap_or_default().to_owned();
+        Self {
+            type_name: text(image.order()),
+            name: text(image.name()),
+            mailbox: image.mailbox().map(|areas| Mailbox {
+                areas: *areas,
+                protocols: image.protocols,
+                complete_access: general.is_some_and(|general| general.coe.complete_access()),
+            }),
+            process: process_sync_managers(image),
+            no_lrw: general.is_some_and(|general| general.flags.no_lrw()),
+            device_emulation: image.configuration.device_emulation(),
+            ebus_current_ma: image.ebus_current_ma(),
+        }
+    }
+
+    /// Bytes of process data in one direction.
+    #[must_use]
+    pub fn process_len(&self, direction: Direction) -> usize {
+        let mine = self.process.iter().filter(|manager| manager.direction == direction);
+        mine.map(|manager| usize::from(manager.len)).sum()
+    }
+}
+
+fn process_sync_managers(image: &Image) -> Vec<ProcessSyncManager> {
+    (0..)
+        .zip(image.sync_managers())
+        .filter_map(|(index, record)| {
+            let direction = match record.kind {
+                SyncManagerKind::Outputs => Direction::Outputs,
+                SyncManagerKind::Inputs => Direction::Inputs,
+                SyncManagerKind::Unused
+                | SyncManagerKind::MailboxOut
+                | SyncManagerKind::MailboxIn
+                | SyncManagerKind::Other(_) => return None,
+            };
+            let control = SmControl(record.control);
+            // A mailbox-mode SyncManager is never process data, whatever its kind claims.
+            if control.mode() == SmMode::Mailbox {
+                return None;
+            }
+            let mapped = image.pdo_bits(index, direction).div_ceil(8);
+            // Some images bear no PDOs; then the record's own length is all there is.
+            let has_pdos = image.pdos(direction).next().is_some();
+            let len = if has_pdos { u16::try_from(mapped).ok()? } else { record.length };
+            Some(ProcessSyncManager { index, direction, start: record.start, len, control })
+        })
+        .collect()
+}
