@@ -127,6 +127,7 @@ mod tests {
 
     proptest! {
         /// Pieces that matter, in any order and cut anywhere, are judged as `locate` judges them.
+        // proves: FRM-01 partial
         #[test]
         fn the_kernel_keeps_what_locate_finds(
             pieces in proptest::collection::vec(0..8_usize, 0..6),

@@ -30,6 +30,20 @@ pub enum ListenFilter {
 /// a program on this host sends past the queue ([`SocketOptions::bypass_queue`]), or through a
 /// driver of its own, are not shown by the kernel; their answers are.
 ///
+/// It cannot send, and does not hand out its socket:
+///
+/// ```compile_fail,E0599
+/// # fn listening(listener: &mut linesman_link::socket::Listener) {
+/// listener.send_batch([&[0_u8; 60][..]]);
+/// # }
+/// ```
+/// ```compile_fail,E0277
+/// # fn listening(listener: &linesman_link::socket::Listener) {
+/// fn socket_of(_: impl std::os::fd::AsFd) {}
+/// socket_of(listener);
+/// # }
+/// ```
+///
 /// [`SocketOptions::bypass_queue`]: super::SocketOptions::bypass_queue
 pub struct Listener {
     receiver: Receiver,

@@ -67,6 +67,9 @@ unsafe impl Send for RawSocket {}
 impl RawSocket {
     /// Opens the interface with this name.
     ///
+    /// Until the interface is [operational](crate::interface::OperationalState::Up), which may be
+    /// a second after its link came up, the kernel takes frames and throws them away.
+    ///
     /// # Errors
     /// When the interface is missing, down or no Ethernet one, the process lacks the right, or an
     /// option is refused.
