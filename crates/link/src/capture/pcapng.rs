@@ -376,14 +376,17 @@ fn skip(order: ByteOrder, window: &mut Window, length: u32) -> Result<(), Damage
         let (least, most) = (BLOCK_OVERHEAD, u32::MAX);
         return Err(Damage::BlockLength { what: WHAT, length, least, most });
     }
-    let padded = u64::from(length).next_multiple_of(4);
-    let skipped = window.skip(padded - 4);
-    if skipped < padded - 4 || !window.fill(4) {
+    let start = window.offset();
+    let before_last = u64::from(length).next_multiple_of(4) - 4;
+    let skipped = window.skip(before_last);
+    if skipped < before_last || !window.fill(4) {
         let present = skipped as usize + window.view().len();
+        window.end_at(start);
         return Err(cut_off(WHAT, length, present));
     }
     let last = order.u32_at(window.view(), 0);
     if last != length {
+        window.end_at(start);
         return Err(Damage::LengthsDiffer { first: length, last });
     }
     window.pass(4);

@@ -169,12 +169,21 @@ impl<W: Write> PcapngWriter<W> {
         self.finish_block()
     }
 
+    /// Writes out what the sink holds, so that a reader of the growing file sees it.
+    ///
+    /// # Errors
+    /// When the sink fails.
+    pub fn flush(&mut self) -> Result<(), CaptureWriteError> {
+        self.sink.flush()?;
+        Ok(())
+    }
+
     /// Writes out what the sink holds and gives it back.
     ///
     /// # Errors
     /// When the sink fails.
     pub fn finish(mut self) -> Result<W, CaptureWriteError> {
-        self.sink.flush()?;
+        self.flush()?;
         Ok(self.sink)
     }
 

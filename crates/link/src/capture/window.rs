@@ -32,6 +32,12 @@ impl Window {
         self.offset
     }
 
+    /// Has the end of the capture told at `offset`, where the block began that turned out damaged
+    /// after a part of it was passed.
+    pub(super) fn end_at(&mut self, offset: u64) {
+        self.offset = offset;
+    }
+
     /// What the stream failed with, if it ended by a failure.
     pub(super) fn take_fault(&mut self) -> Option<io::Error> {
         self.fault.take()
