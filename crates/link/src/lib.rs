@@ -1,1 +1,15 @@
 //! Network cards, clocks and capture files: the only crate that touches them.
+//!
+//! Read first: [`capture`] for files, [`clock`] for time, [`interface`] for the cards there are,
+//! [`socket`] for frames on them, [`host`] for what the host itself does wrong.
+
+#![deny(unsafe_code)]
+
+pub mod capture;
+pub mod clock;
+pub mod direction;
+pub mod error;
+pub mod host;
+pub mod interface;
+pub mod socket;
+pub mod unix_time;

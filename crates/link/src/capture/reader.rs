@@ -1,0 +1,341 @@
+//! Reading a capture, frame by frame, whatever its format.
+//!
+//! Nothing is allocated per frame: a frame's bytes are borrowed from the reader's buffer until the
+//! next one is asked for. A damaged first block is an error; a later damage ends the capture, and
+//! [`CaptureReader::end`] tells where and why.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use flate2::read::MultiGzDecoder;
+
+use super::cooked;
+use super::end::{CaptureEnd, Damage};
+use super::error::{CaptureError, CaptureErrorKind};
+use super::fcs;
+use super::frame::{
+    CaptureFormat, CaptureInterface, CaptureInterfaceId, CaptureSection, CapturedFrame,
+    FrameDirection, FrameNumber, SkippedLinkType,
+};
+use super::link_type::LinkType;
+use super::pcap::{self, Pcap};
+use super::pcapng::{self, Item, Pcapng};
+use super::window::Window;
+use crate::unix_time::UnixTime;
+
+/// Longest frame that is read, in bytes; the limit of Wireshark too.
+pub(super) const MAX_FRAME_LEN: u32 = 262_144;
+
+/// A capture file that is being read.
+pub struct CaptureReader {
+    window: Window,
+    format: Format,
+    section: CaptureSection,
+    interfaces: Vec<CaptureInterface>,
+    frames: u64,
+    skipped: Vec<SkippedLinkType>,
+    end: Option<CaptureEnd>,
+}
+
+enum Format {
+    Pcap(Pcap),
+    Pcapng(Pcapng),
+}
+
+/// A frame as the formats find it: where in the window's buffer it is, and what is told of it.
+pub(super) struct Record {
+    pub(super) at: usize,
+    pub(super) len: usize,
+    pub(super) original_len: u32,
+    pub(super) interface: CaptureInterfaceId,
+    pub(super) time: Option<UnixTime>,
+    pub(super) direction: FrameDirection,
+    pub(super) fcs_len: u8,
+    pub(super) crc_error: bool,
+}
+
+impl CaptureReader {
+    /// Opens a pcapng or pcap file, gzip-compressed or not; its bytes tell, not its name.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is no capture, or is damaged in its first block.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, CaptureError> {
+        let path = path.as_ref();
+        let refuse = |kind| CaptureError::at_start(path, kind);
+        let file = File::open(path).map_err(|error| {
+            let missing = error.kind() == io::ErrorKind::NotFound;
+            refuse(if missing {
+                CaptureErrorKind::Missing
+            } else {
+                CaptureErrorKind::Refused(error)
+            })
+        })?;
+        if file.metadata().is_ok_and(|metadata| metadata.is_dir()) {
+            return Err(refuse(CaptureErrorKind::Directory));
+        }
+        Self::from_source(path, file)
+    }
+
+    /// Reads a capture from `source`, which errors call `name`.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn from_source(
+        name: impl Into<PathBuf>,
+        source: impl Read + Send + 'static,
+    ) -> Result<Self, CaptureError> {
+        let file = name.into();
+        Self::begin(Window::new(Box::new(source)), Compression::MayBe)
+            .map_err(|kind| CaptureError::at_start(&file, kind))
+    }
+
+    fn begin(mut window: Window, compression: Compression) -> Result<Self, CaptureErrorKind> {
+        window.fill(4);
+        let start = window.view();
+        if let (Compression::MayBe, [0x1F, 0x8B, ..]) = (compression, start) {
+            let packed = MultiGzDecoder::new(window);
+            return Self::begin(Window::new(Box::new(packed)), Compression::Unpacked);
+        }
+        let Some(&magic) = start.first_chunk::<4>() else {
+            return Err(too_short(&mut window));
+        };
+        let mut interfaces = Vec::new();
+        let mut section = CaptureSection::default();
+        let format = if u32::from_be_bytes(magic) == pcapng::SECTION {
+            let (file, first) = Pcapng::open(&mut window)
+                .map_err(|damage| first_block(&mut window, CaptureFormat::Pcapng, damage))?;
+            section = first;
+            Format::Pcapng(file)
+        } else if let Some((order, resolution)) = pcap::recognize(magic) {
+            let (file, interface) = Pcap::open(&mut window, order, resolution)
+                .map_err(|damage| first_block(&mut window, CaptureFormat::Pcap, damage))?;
+            interfaces.push(interface);
+            Format::Pcap(file)
+        } else {
+            return Err(unknown_format(&mut window));
+        };
+        let skipped = Vec::new();
+        Ok(Self { window, format, section, interfaces, frames: 0, skipped, end: None })
+    }
+
+    /// The next frame that can carry EtherCAT; `None` at the end, which [`end`](Self::end) then
+    /// describes.
+    #[inline]
+    pub fn next_frame(&mut self) -> Option<CapturedFrame<'_>> {
+        if self.end.is_some() {
+            return None;
+        }
+        loop {
+            let item = match &mut self.format {
+                Format::Pcap(file) => {
+                    file.next(&mut self.window).map(|record| record.map(Item::Frame))
+                }
+                Format::Pcapng(file) => file.next(&mut self.window, &mut self.interfaces),
+            };
+            let record = match item {
+                Ok(Some(item)) => {
+                    self.frames += 1;
+                    match item {
+                        Item::Frame(record) => record,
+                        Item::Numbered => continue,
+                    }
+                }
+                Ok(None) => {
+                    self.finish(None);
+                    return None;
+                }
+                Err(damage) => {
+                    self.finish(Some(damage));
+                    return None;
+                }
+            };
+            let link_type = self.interfaces[record.interface.0 as usize].link_type;
+            let Some(shape) = Shape::of(&record, link_type, &mut self.window) else {
+                self.count_skipped(link_type);
+                continue;
+            };
+            return Some(CapturedFrame {
+                number: FrameNumber(self.frames),
+                time: record.time,
+                interface: record.interface,
+                host_interface: shape.host_interface,
+                link_type,
+                direction: shape.direction,
+                original_len: record.original_len,
+                truncated: (record.len as u64) < u64::from(record.original_len),
+                fcs: shape.fcs,
+                bytes: self.window.passed(shape.at, shape.len),
+            });
+        }
+    }
+
+    /// The kind of file.
+    #[must_use]
+    pub fn format(&self) -> CaptureFormat {
+        match self.format {
+            Format::Pcap(_) => CaptureFormat::Pcap,
+            Format::Pcapng(_) => CaptureFormat::Pcapng,
+        }
+    }
+
+    /// What the file says about its maker.
+    #[must_use]
+    pub fn section(&self) -> &CaptureSection {
+        &self.section
+    }
+
+    /// The interfaces that were described so far.
+    #[must_use]
+    pub fn interfaces(&self) -> &[CaptureInterface] {
+        &self.interfaces
+    }
+
+    /// Frames that were passed over so far because of their link type, one entry for each type.
+    #[must_use]
+    pub fn skipped(&self) -> &[SkippedLinkType] {
+        &self.skipped
+    }
+
+    /// How the capture ended; `None` before [`next_frame`](Self::next_frame) gave `None`.
+    #[must_use]
+    pub fn end(&self) -> Option<&CaptureEnd> {
+        self.end.as_ref()
+    }
+
+    fn count_skipped(&mut self, link_type: LinkType) {
+        match self.skipped.iter_mut().find(|skipped| skipped.link_type == link_type) {
+            Some(skipped) => skipped.frames += 1,
+            None => self.skipped.push(SkippedLinkType { link_type, frames: 1 }),
+        }
+    }
+
+    #[cold]
+    fn finish(&mut self, damage: Option<Damage>) {
+        // A stream that fails looks cut off; why it failed says more.
+        let damage = match self.window.take_fault() {
+            Some(fault) => Some(Damage::Unreadable { text: fault.to_string() }),
+            None => damage,
+        };
+        let (offset, frames) = (self.window.offset(), self.frames);
+        self.end = Some(CaptureEnd { damage, offset, frames });
+    }
+}
+
+/// Whether the bytes may still turn out to be compressed: a capture is packed once at most.
+#[derive(Clone, Copy)]
+enum Compression {
+    MayBe,
+    Unpacked,
+}
+
+/// The Ethernet frame in a record.
+struct Shape {
+    at: usize,
+    len: usize,
+    direction: FrameDirection,
+    host_interface: Option<u32>,
+    fcs: Option<bool>,
+}
+
+impl Shape {
+    #[inline]
+    fn of(record: &Record, link_type: LinkType, window: &mut Window) -> Option<Self> {
+        match link_type {
+            LinkType::Ethernet => Some(Self::ethernet(record, window)),
+            LinkType::LinuxCooked => {
+                Self::cooked(record, cooked::rebuild(window.passed(record.at, record.len)))
+            }
+            LinkType::LinuxCooked2 => {
+                Self::cooked(record, cooked::rebuild2(window.passed(record.at, record.len)))
+            }
+            LinkType::Other(_) => None,
+        }
+    }
+
+    #[inline]
+    fn ethernet(record: &Record, window: &mut Window) -> Self {
+        let mut shape = Self {
+            at: record.at,
+            len: record.len,
+            direction: record.direction,
+            host_interface: None,
+            fcs: record.crc_error.then_some(false),
+        };
+        if record.fcs_len != 0 {
+            shape.take_fcs_off(record, window);
+        }
+        shape
+    }
+
+    /// Takes off what there is of the check sequence: a truncated frame has only a part of it, or
+    /// nothing.
+    fn take_fcs_off(&mut self, record: &Record, window: &mut Window) {
+        let fcs_len = usize::from(record.fcs_len);
+        let without = (record.original_len as usize).saturating_sub(fcs_len);
+        if record.len >= record.original_len as usize {
+            if fcs_len == fcs::FCS_LEN && self.fcs.is_none() {
+                self.fcs = fcs::intact(window.passed(record.at, record.len));
+            }
+            self.len = record.len.saturating_sub(fcs_len);
+        } else {
+            self.len = record.len.min(without);
+        }
+    }
+
+    fn cooked(record: &Record, cooked: Option<cooked::Cooked>) -> Option<Self> {
+        let cooked = cooked?;
+        Some(Self {
+            at: record.at + cooked.start,
+            len: record.len - cooked.start,
+            direction: match record.direction {
+                FrameDirection::Unknown => cooked.direction,
+                FrameDirection::Incoming | FrameDirection::Outgoing => record.direction,
+            },
+            host_interface: cooked.host_interface,
+            fcs: record.crc_error.then_some(false),
+        })
+    }
+}
+
+fn too_short(window: &mut Window) -> CaptureErrorKind {
+    match (window.take_fault(), window.view()) {
+        (Some(fault), _) => CaptureErrorKind::Unreadable(fault),
+        (None, []) => CaptureErrorKind::Empty,
+        (None, start) => CaptureErrorKind::NotACapture { start: start.to_vec() },
+    }
+}
+
+fn first_block(window: &mut Window, format: CaptureFormat, damage: Damage) -> CaptureErrorKind {
+    match window.take_fault() {
+        Some(fault) => CaptureErrorKind::Unreadable(fault),
+        None => CaptureErrorKind::FirstBlock { format, damage },
+    }
+}
+
+/// Names the formats that people mistake for a capture, with the way out.
+fn unknown_format(window: &mut Window) -> CaptureErrorKind {
+    const EDITCAP: &str = "convert it with `editcap -F pcapng OLD NEW.pcapng`";
+    const UNPACK: &str = "unpack it first; only gzip is unpacked here";
+    const KNOWN: [(&[u8], &str, &str); 12] = [
+        (b"GMBU", "a Microsoft Network Monitor capture", EDITCAP),
+        (b"RTSS", "a Microsoft Network Monitor capture", EDITCAP),
+        (b"snoop\0\0\0", "a snoop capture", EDITCAP),
+        (b"\x34\xCD\xB2\xA1", "a patched variant of pcap", EDITCAP),
+        (b"\xA1\xB2\xCD\x34", "a patched variant of pcap", EDITCAP),
+        (b"\x28\xB5\x2F\xFD", "compressed by zstd", UNPACK),
+        (b"\x04\x22\x4D\x18", "compressed by lz4", UNPACK),
+        (b"\xFD7zXZ\0", "compressed by xz", UNPACK),
+        (b"BZh", "compressed by bzip2", UNPACK),
+        (b"PK\x03\x04", "a zip archive", UNPACK),
+        (b"\x1F\x8B", "compressed twice", UNPACK),
+        (b"<?xml", "an XML file", "name the capture, not its description"),
+    ];
+    window.fill(8);
+    let bytes = window.view();
+    let known = KNOWN.iter().find(|(magic, _, _)| bytes.starts_with(magic));
+    match known {
+        Some(&(_, name, advice)) => CaptureErrorKind::OtherFormat { name, advice },
+        None => CaptureErrorKind::NotACapture { start: bytes[..bytes.len().min(8)].to_vec() },
+    }
+}

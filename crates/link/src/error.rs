@@ -1,0 +1,111 @@
+//! Why a network card cannot be used, or cannot be used any longer.
+
+use std::io;
+use std::path::PathBuf;
+
+/// A failed use of a network card. Its text names the card, what was tried, and what to do next.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// There is no such interface.
+    #[error(
+        "{interface}: there is no such network interface, there are: {}. Do: choose one of them \
+         (`linesman interfaces` tells which are suitable)",
+        list(.present)
+    )]
+    Missing {
+        /// The name that was asked for.
+        interface: String,
+        /// The names there are.
+        present: Vec<String>,
+    },
+    /// The interface is switched off.
+    #[error("{interface}: the interface is down. Do: `sudo ip link set {interface} up`")]
+    Down {
+        /// Its name.
+        interface: String,
+    },
+    /// The interface went away while it was used.
+    #[error(
+        "{interface}: the interface is gone (unplugged, renamed, or its driver was unloaded). Do: \
+         bring it back, then start again"
+    )]
+    Vanished {
+        /// The name it had.
+        interface: String,
+    },
+    /// The interface carries no Ethernet frames.
+    #[error(
+        "{interface}: no Ethernet interface (hardware type {hardware_type}, expected 1). Do: choose \
+         an Ethernet card (`linesman interfaces`)"
+    )]
+    NotEthernet {
+        /// Its name.
+        interface: String,
+        /// Its hardware type, `ARPHRD_…` of Linux.
+        hardware_type: u16,
+    },
+    /// Raw sockets need a capability that this process lacks.
+    #[error(
+        "{interface}: no right to open a raw socket. Do: `sudo setcap cap_net_raw+ep {}` once, or \
+         start with sudo",
+        .binary.display()
+    )]
+    NoPrivilege {
+        /// The name of the interface.
+        interface: String,
+        /// The program that needs the capability.
+        binary: PathBuf,
+    },
+    /// A frame is longer than the interface can send.
+    #[error(
+        "{interface}: sending a frame of {len} bytes, expected at most {}: the MTU is {mtu}, \
+         EtherCAT needs 1500. Do: `sudo ip link set {interface} mtu 1500`",
+        .mtu + 14
+    )]
+    FrameTooLong {
+        /// The name of the interface.
+        interface: String,
+        /// Length of the frame without check sequence, in bytes.
+        len: usize,
+        /// Longest payload of the interface, in bytes.
+        mtu: u32,
+    },
+    /// A frame has not even an Ethernet header.
+    #[error("{interface}: sending a frame of {len} bytes, expected at least 14")]
+    FrameTooShort {
+        /// The name of the interface.
+        interface: String,
+        /// Its length in bytes.
+        len: usize,
+    },
+    /// The operating system refused something else.
+    #[error("{interface}: {doing}: {source}")]
+    System {
+        /// The name of the interface, or `network interfaces` for all.
+        interface: String,
+        /// What was tried.
+        doing: &'static str,
+        /// Why not.
+        source: io::Error,
+    },
+}
+
+impl LinkError {
+    pub(crate) fn system(
+        interface: &str,
+        doing: &'static str,
+        source: impl Into<io::Error>,
+    ) -> Self {
+        Self::System { interface: interface.to_owned(), doing, source: source.into() }
+    }
+
+    /// For what concerns no interface in particular.
+    pub(crate) fn all(doing: &'static str, source: impl Into<io::Error>) -> Self {
+        Self::system("network interfaces", doing, source)
+    }
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}

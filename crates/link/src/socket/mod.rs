@@ -1,0 +1,19 @@
+//! Raw Ethernet sockets of Linux: one that exchanges EtherCAT frames, one that only listens.
+//!
+//! Reference: packet(7). Both work in batches, on buffers that are laid out once: [`Batch`] holds
+//! what was received, each frame with its time and direction. Which frames are copies of sent ones
+//! the kernel tells (`PACKET_OUTGOING`); it is never guessed from their bytes.
+
+mod batch;
+mod filter;
+mod listener;
+mod packet;
+mod raw;
+mod receiver;
+mod wait;
+
+pub use batch::{Batch, ReceivedFrame, StampSource};
+pub use listener::{ListenFilter, Listener};
+pub use raw::{RawSocket, Sent, SocketOptions};
+pub use receiver::SocketCounters;
+pub use wait::{Ready, Waitable, wait_any};

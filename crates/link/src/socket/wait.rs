@@ -1,0 +1,66 @@
+//! Waiting for frames on one socket or several, until a deadline.
+//!
+//! Reference: ppoll(2).
+
+use linesman_proto::time::Instant;
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::io::Errno;
+
+use crate::clock::{HostClock, timespec};
+use crate::error::LinkError;
+
+/// Why a wait ended.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Ready {
+    /// There is something to fetch, or an error that fetching reports.
+    Readable,
+    /// The deadline passed.
+    Deadline,
+    /// A signal came: look whether to stop, and wait again.
+    Interrupted,
+}
+
+pub(super) mod sealed {
+    use super::super::receiver::Receiver;
+
+    /// What to wait for. Its content is known to this room only: sockets are never handed out.
+    pub struct Polled<'a>(pub(in super::super) &'a Receiver);
+
+    /// Gives what to wait for.
+    pub trait Pollable {
+        #[doc(hidden)]
+        fn polled(&self) -> Polled<'_>;
+    }
+}
+
+/// A socket that can be waited for.
+pub trait Waitable: sealed::Pollable {}
+
+/// Waits until one of `sockets` has something to fetch, at most until `deadline`;
+/// [`Instant::MAX`] waits without end.
+///
+/// A thread without real-time scheduling may wake up to 50 µs late, see
+/// [`tighten_timers`](crate::clock::tighten_timers).
+///
+/// # Errors
+/// When the kernel refuses to wait.
+pub fn wait_any<const N: usize>(
+    sockets: [&dyn Waitable; N],
+    clock: &HostClock,
+    deadline: Instant,
+) -> Result<Ready, LinkError> {
+    let receivers = sockets.map(|socket| socket.polled().0);
+    let mut polled =
+        receivers.map(|receiver| PollFd::from_borrowed_fd(receiver.socket(), PollFlags::IN));
+    let left = timespec(deadline.since(clock.now()).as_nanos());
+    let timeout = (deadline != Instant::MAX).then_some(&left);
+    match poll(&mut polled, timeout) {
+        Ok(0) => Ok(Ready::Deadline),
+        Ok(_) => Ok(Ready::Readable),
+        Err(Errno::INTR) => Ok(Ready::Interrupted),
+        Err(error) => {
+            let names = receivers.map(|receiver| receiver.name()).join("+");
+            Err(LinkError::system(&names, "waiting for frames", error))
+        }
+    }
+}
