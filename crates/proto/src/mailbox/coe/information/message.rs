@@ -206,8 +206,12 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_answer_and_a_tiny_mailbox_come_to_an_end() {
+    fn odd_mailboxes_and_empty_answers_are_served() {
         assert_eq!(Fragments::new(Answer::Entry, &[], 128).count(), 1);
+        // No index of a list is torn apart by a mailbox of odd length.
+        let first = Fragments::new(Answer::List, &[0; 100], 53).next().unwrap();
+        let Body::Answer { fragment, .. } = first.body else { panic!("{first:?}") };
+        assert_eq!(fragment.len(), 40);
         assert_eq!(Fragments::new(Answer::Entry, &[1, 2, 3], 0).count(), 2);
     }
 }
