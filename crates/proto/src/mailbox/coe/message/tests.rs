@@ -1,4 +1,4 @@
-//! CoE messages as bytes: tables from the specification and from captures, properties, hostile bytes.
+//! CoE messages as bytes: tables from specification and captures, properties, hostile bytes.
 
 use proptest::prelude::*;
 
