@@ -1,7 +1,7 @@
 //! The messages of SDO information, and the cutting of answers into fragments.
 //!
-//! Reference: ETG.1000.6, SDO information. Behind the CoE header: opcode (7 bits) and "incomplete" (1
-//! bit), a reserved byte, number of fragments left (u16), then what the opcode asks for.
+//! Reference: ETG.1000.6, SDO information. Behind the CoE header: opcode (7 bits) and "incomplete"
+//! (1 bit), a reserved byte, number of fragments left (u16), then what the opcode asks for.
 
 use super::description::ValueInfo;
 use super::list::ListKind;
