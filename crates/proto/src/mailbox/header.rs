@@ -87,7 +87,8 @@ impl Header {
     /// ```
     /// # use linesman_proto::mailbox::coe::{Message, ObjectAddress, sdo};
     /// # use linesman_proto::mailbox::{Counter, Header, MailboxType};
-    /// let upload = sdo::Request::Upload { object: ObjectAddress::new(0x1018, 1), complete: false };
+    /// let object = ObjectAddress::new(0x1018, 1);
+    /// let upload = sdo::Request::Upload { object, complete: false };
     /// let mut buffer = [0; 128];
     /// let len = Header::new(MailboxType::Coe, Counter::FIRST, 0)
     ///     .write_message(&mut buffer, |body| Message::SdoRequest(upload).write(body))?;

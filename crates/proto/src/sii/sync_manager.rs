@@ -1,7 +1,7 @@
 //! Category 41, SyncManager: where each buffer lies by default and what it is for, 8 bytes each.
 //!
-//! Reference: ETG.2010; S2 on registers 0x0800..0x087F, whose first bytes the record repeats. Record
-//! *n* belongs to SyncManager *n*.
+//! Reference: ETG.2010; S2 on registers 0x0800..=0x087F, whose first bytes the record repeats.
+//! Record *n* belongs to SyncManager *n*.
 
 use crate::address::RegisterAddress;
 

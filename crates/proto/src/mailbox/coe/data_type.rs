@@ -1,7 +1,7 @@
 //! Data types of objects, of PDO entries, and of the SII.
 //!
-//! Reference: ETG.1020 (base data types), ETG.1000.6 §5.6.7; names as ESI files spell them. Types
-//! without a fixed length (texts, structures) have no bit size.
+//! Reference: ETG.1020 (base data types), ETG.1000.6, object dictionary; names as ESI files spell
+//! them. Types without a fixed length (texts, structures) have no bit size.
 
 use std::fmt;
 

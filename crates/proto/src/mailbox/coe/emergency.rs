@@ -1,6 +1,6 @@
 //! Emergencies: a SubDevice reports an error without being asked.
 //!
-//! Reference: ETG.1000.6 §5.6.3; the classes of codes are those of CiA 301. Code (u16), error
+//! Reference: ETG.1000.6, Emergency; the classes of codes are those of CiA 301. Code (u16), error
 //! register (u8), five bytes of the vendor.
 
 use super::message::CoeError;

@@ -1,7 +1,7 @@
 //! The CoE header and the message behind it.
 //!
-//! Reference: ETG.1000.6 §5.6.1. The header is one word: number of the PDO (bits 0..=8, 0 for SDOs)
-//! and service (bits 12..=15).
+//! Reference: ETG.1000.6, CoE header. The header is one word: number of the PDO (bits 0..=8, 0 for
+//! SDOs) and service (bits 12..=15).
 
 use super::emergency::Emergency;
 use super::information;

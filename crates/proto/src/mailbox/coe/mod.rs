@@ -2,7 +2,7 @@
 //! emergencies.
 //!
 //! [`Message`] is what follows the mailbox header; the codecs serve both ends, MainDevice and
-//! SubDevice. Read first: ETG.1000.6 §5.6; for object types and entries ETG.1020.
+//! SubDevice. Read first: ETG.1000.6, CoE; for object types and entries ETG.1020.
 
 pub mod data_type;
 pub mod emergency;

@@ -1,6 +1,6 @@
 //! How an object is addressed, and the indices every EtherCAT device shares.
 //!
-//! Reference: ETG.1000.6 §5.6.7 (object dictionary), ETG.1020.
+//! Reference: ETG.1000.6, object dictionary, ETG.1020.
 
 use std::fmt;
 

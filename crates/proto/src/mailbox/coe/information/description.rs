@@ -1,7 +1,7 @@
 //! What an object and its entries are.
 //!
-//! Reference: ETG.1000.6 §5.6.3.5 (object) and §5.6.3.7 (entry). Names run to the end of the answer,
-//! without a terminating zero.
+//! Reference: ETG.1000.6, SDO information: object description, entry description. Names run to the
+//! end of the answer, without a terminating zero.
 
 use std::borrow::Cow;
 

@@ -1,7 +1,7 @@
 //! Lists of objects.
 //!
-//! Reference: ETG.1000.6 §5.6.3.3. The answer: kind of list (u16), then indices (u16 each), or for
-//! kind 0 the lengths of the five lists.
+//! Reference: ETG.1000.6, SDO information: object list. The answer: kind of list (u16), then
+//! indices (u16 each), or for kind 0 the lengths of the five lists.
 
 use super::super::message::CoeError;
 use super::super::object::ObjectIndex;

@@ -1,7 +1,7 @@
 //! The messages of SDO information, and the cutting of answers into fragments.
 //!
-//! Reference: ETG.1000.6 §5.6.3. Behind the CoE header: opcode (7 bits) and "incomplete" (1 bit), a
-//! reserved byte, number of fragments left (u16), then what the opcode asks for.
+//! Reference: ETG.1000.6, SDO information. Behind the CoE header: opcode (7 bits) and "incomplete"
+//! (1 bit), a reserved byte, number of fragments left (u16), then what the opcode asks for.
 
 use super::description::ValueInfo;
 use super::list::ListKind;
@@ -206,8 +206,12 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_answer_and_a_tiny_mailbox_come_to_an_end() {
+    fn odd_mailboxes_and_empty_answers_are_served() {
         assert_eq!(Fragments::new(Answer::Entry, &[], 128).count(), 1);
+        // No index of a list is torn apart by a mailbox of odd length.
+        let first = Fragments::new(Answer::List, &[0; 100], 53).next().unwrap();
+        let Body::Answer { fragment, .. } = first.body else { panic!("{first:?}") };
+        assert_eq!(fragment.len(), 40);
         assert_eq!(Fragments::new(Answer::Entry, &[1, 2, 3], 0).count(), 2);
     }
 }

@@ -3,8 +3,8 @@
 //! Questions fit into one message. Answers may come in fragments, whatever they are about, and only
 //! the first of them says what it is: so a [`Message`] carries the bytes of its fragment, and the
 //! bytes of all fragments together are an [`ObjectList`], an [`ObjectDescription`] or an
-//! [`EntryDescription`]. The other way round, [`Fragments`] cuts an answer. Reference: ETG.1000.6
-//! §5.6.3.
+//! [`EntryDescription`]. The other way round, [`Fragments`] cuts an answer. Reference: ETG.1000.6,
+//! SDO information.
 
 pub mod description;
 pub mod list;

@@ -1,6 +1,6 @@
 //! The end of an SDO transfer that failed.
 //!
-//! Reference: ETG.1000.6 §5.6.2.7. Command 0x80, address of the object, 32-bit code.
+//! Reference: ETG.1000.6, Abort SDO transfer. Command 0x80, address of the object, 32-bit code.
 
 use super::command::{SDO_LEN, specifier};
 use crate::mailbox::coe::message::CoeError;

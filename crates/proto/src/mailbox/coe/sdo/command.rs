@@ -1,6 +1,6 @@
 //! The first byte of an SDO message: command specifier in the upper three bits, switches below.
 //!
-//! Reference: ETG.1000.6 §5.6.2.
+//! Reference: ETG.1000.6, SDO.
 
 /// Length of an SDO's command, address and four bytes, without the CoE header: no SDO message but a
 /// normal one or a segment is longer, and none is shorter.

@@ -2,7 +2,7 @@
 //!
 //! Up to four bytes go *expedited* within the first message; more go *normal*, announced by their
 //! size, with as many bytes as fit into the mailbox; the rest follows in *segments*, each answered
-//! with the same toggle bit. Reference: ETG.1000.6 §5.6.2. What is written here follows the CoE
+//! with the same toggle bit. Reference: ETG.1000.6, SDO. What is written here follows the CoE
 //! header.
 
 pub mod abort;

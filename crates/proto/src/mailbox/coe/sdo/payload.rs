@@ -1,6 +1,6 @@
 //! What SDO messages carry: the first message of a transfer, and the segments that follow.
 //!
-//! Reference: ETG.1000.6 §5.6.2. The layouts are the same in both directions; only the specifiers in
+//! Reference: ETG.1000.6, SDO. The layouts are the same in both directions; only the specifiers in
 //! the upper three bits of the command differ.
 
 use super::command::{COMPLETE, SDO_LEN, TOGGLE};

@@ -1,7 +1,8 @@
 //! What the MainDevice asks.
 //!
-//! Reference: ETG.1000.6 §5.6.2. Client command specifiers: 0 download segment, 1 download, 2 upload,
-//! 3 upload segment; 4 is an [`Abort`](super::Abort), 5 and 6 (block transfer) EtherCAT does not use.
+//! Reference: ETG.1000.6, SDO. Client command specifiers: 0 download segment, 1 download, 2
+//! upload, 3 upload segment; 4 is an [`Abort`](super::Abort), 5 and 6 (block transfer) EtherCAT
+//! does not use.
 
 use super::command::{COMPLETE, SDO_LEN, TOGGLE, specifier};
 use super::payload::{First, Initial, Segment};

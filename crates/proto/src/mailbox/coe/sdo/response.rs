@@ -1,6 +1,6 @@
 //! What a SubDevice answers.
 //!
-//! Reference: ETG.1000.6 §5.6.2. Server command specifiers: 0 upload segment, 1 download segment, 2
+//! Reference: ETG.1000.6, SDO. Server command specifiers: 0 upload segment, 1 download segment, 2
 //! upload, 3 download; 4 is an [`Abort`](super::Abort).
 
 use super::command::{COMPLETE, SDO_LEN, TOGGLE, specifier};
