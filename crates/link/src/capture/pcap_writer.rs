@@ -1,7 +1,7 @@
 //! Writing pcap with times in nanoseconds, for tools that read nothing newer.
 //!
 //! Reference: draft-ietf-opsawg-pcap. One interface, no direction, seconds in 32 bits: whoever can,
-//! writes pcapng. Ten numbers are put down by hand, because the serializer of `pcap-parser`
+//! writes pcapng. The few numbers are put down by hand, because the serializer of `pcap-parser`
 //! allocates for each frame.
 
 use std::io::Write;
