@@ -106,6 +106,11 @@ impl LinkError {
     }
 }
 
+/// Where this program lies, for those who are to give it rights.
+pub(crate) fn this_program() -> PathBuf {
+    std::env::current_exe().unwrap_or_else(|_| PathBuf::from("linesman"))
+}
+
 fn list(names: &[String]) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }

@@ -1,7 +1,8 @@
 //! Network cards, clocks and capture files: the only crate that touches them.
 //!
 //! Read first: [`capture`] for files, [`clock`] for time, [`interface`] for the cards there are,
-//! [`socket`] for frames on them, [`host`] for what the host itself does wrong.
+//! [`socket`] for frames on them, [`host`] for what the host itself does wrong, [`real_time`] for what
+//! a cycle asks of it.
 
 #![deny(unsafe_code)]
 
@@ -11,5 +12,6 @@ pub mod direction;
 pub mod error;
 pub mod host;
 pub mod interface;
+pub mod real_time;
 pub mod socket;
 pub mod unix_time;

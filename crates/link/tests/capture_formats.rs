@@ -13,7 +13,7 @@ use linesman_link::capture::{
     CaptureFormat, CaptureReader, LinkType, RunClock, SkippedLinkType, TimeResolution,
 };
 use linesman_link::direction::FrameDirection;
-use support::{Maker, drain, ethercat, read};
+use support::{Maker, drain, ethercat, read, tshark};
 
 const BOTH: [Maker; 2] = [Maker { big: false }, Maker { big: true }];
 
@@ -97,6 +97,61 @@ fn pcapng_with_sections_interfaces_and_all_packet_blocks() {
         assert!(frames[2].truncated && frames[3].truncated);
         assert_eq!(frames[3].bytes, ethercat(4, 64));
         assert_eq!(end.frames, 7);
+    }
+}
+
+/// Gives one byte at a time, as a pipe may.
+struct Dribble(std::io::Cursor<Vec<u8>>);
+
+impl std::io::Read for Dribble {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let len = buffer.len().min(1);
+        self.0.read(&mut buffer[..len])
+    }
+}
+
+#[test]
+fn a_source_that_gives_one_byte_at_a_time_gives_the_same_frames() {
+    let m = BOTH[0];
+    let mut pcapng = [m.section(), m.interface(1, 0, &[])].concat();
+    let mut pcap = m.pcap_header(0xA1B2_C3D4, 0, 1);
+    for seed in 0..5 {
+        let flags = m.option(2, &m.u32(1));
+        pcapng.extend(m.packet(0, seed.into(), 60, &ethercat(seed, 60), &[flags]));
+        pcap.extend(m.pcap_frame(seed.into(), 0, 60, &ethercat(seed, 60)));
+    }
+    for file in [pcapng, pcap] {
+        let source = Dribble(std::io::Cursor::new(file.clone()));
+        let dribbled = drain(CaptureReader::from_source("pipe", source).unwrap());
+        assert_eq!(dribbled, read(&file).unwrap());
+        assert_eq!(dribbled.0.len(), 5);
+    }
+}
+
+/// Some writers do not count the padding into the length of a block, and Wireshark takes it so.
+#[test]
+fn a_block_length_that_leaves_out_the_padding_is_taken() {
+    for maker in BOTH {
+        let mut file = [maker.section(), maker.interface(1, 0, &[])].concat();
+        for seed in 0..4 {
+            let bytes = ethercat(seed, 61 + usize::from(seed));
+            let padded = maker.packet(0, seed.into(), bytes.len() as u32, &bytes, &[]);
+            let len = maker.u32(32 + bytes.len() as u32);
+            let last = padded.len() - 4;
+            file.extend([&padded[..4], &len, &padded[8..last], &len].concat());
+        }
+        let (frames, end) = read(&file).unwrap();
+        assert!(end.complete(), "{end}");
+        assert_eq!(end.offset, file.len() as u64);
+        let lengths: Vec<_> = frames.iter().map(|frame| frame.bytes.len()).collect();
+        assert_eq!(lengths, [61, 62, 63, 64]);
+        assert!((0..).zip(&frames).all(|(seed, frame)| frame.bytes[11] == seed));
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("unpadded.pcapng");
+        std::fs::write(&path, &file).unwrap();
+        let Some((lines, complaints)) = tshark(&path, &["frame.len"]) else { return };
+        assert_eq!((lines.len(), complaints.as_str()), (4, ""));
     }
 }
 

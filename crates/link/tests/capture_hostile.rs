@@ -116,6 +116,12 @@ fn a_later_damage_is_told_with_its_place() {
             [m.u32(0x7777).as_slice(), &m.u32(16), &[0; 4], &m.u32(20)].concat(),
             Damage::LengthsDiffer { first: 16, last: 20 },
         ),
+        // The library would not look at the last length of these two.
+        ([&m.section()[..24], &m.u32(32)].concat(), Damage::LengthsDiffer { first: 28, last: 32 }),
+        (
+            [&m.block(3, &m.u32(0))[..12], &m.u32(20)].concat(),
+            Damage::LengthsDiffer { first: 16, last: 20 },
+        ),
         (m.block(0x0A0D_0D0A, &[7; 16]), Damage::ByteOrder { mark: 0x0707_0707 }),
     ];
     for (tail, damage) in rows {
@@ -135,11 +141,12 @@ fn what_cannot_be_opened_says_what_was_expected_and_what_to_do() {
         fs::write(&path, bytes).unwrap();
         path
     };
-    let rows: [(std::path::PathBuf, &str); 10] = [
+    let rows: [(std::path::PathBuf, &str); 11] = [
         (named("empty.pcapng", b""), "the file is empty, expected a pcapng or pcap capture"),
         (named("ten", b"0123456789"), "received 8 bytes: 30 31 32 33 34 35 36 37"),
         (named("three", b"\x0A\x0D\x0D"), "received 3 bytes: 0a 0d 0d"),
         (named("cut.pcapng", &sample()[..20]), "a section header of 28 bytes is cut off after 20"),
+        (named("five", &sample()[..5]), "a section header of 28 bytes is cut off after 5"),
         (named("cut.pcap", b"\xD4\xC3\xB2\xA1\x02\0"), "the file header of 24 bytes is cut off"),
         (named("old", b"GMBU\0\0\0\0"), "editcap -F pcapng"),
         (named("packed", b"\x28\xB5\x2F\xFDabcdefgh"), "compressed by zstd"),

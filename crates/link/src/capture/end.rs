@@ -95,7 +95,7 @@ pub enum Damage {
     },
     /// The file could not be read on, or not be unpacked.
     Unreadable {
-        /// The operating system's, or the decompressor's, words.
+        /// The operating system's, the decompressor's or the parser's words.
         text: String,
     },
 }

@@ -1,14 +1,17 @@
 //! Writing pcap with times in nanoseconds, for tools that read nothing newer.
 //!
 //! Reference: draft-ietf-opsawg-pcap. One interface, no direction, seconds in 32 bits: whoever can,
-//! writes pcapng.
+//! writes pcapng. The few numbers are put down by hand, because the serializer of `pcap-parser`
+//! allocates for each frame.
 
 use std::io::Write;
 
 use super::error::CaptureWriteError;
+use super::fcs::FCS_LEN;
 use super::link_type::LinkType;
-use super::pcap;
+use super::pcap::{FCS_LEN_PRESENT, MAJOR_VERSION};
 use super::pcapng_writer::FrameToWrite;
+use super::reader::MAX_FRAME_LEN;
 
 /// A pcap capture that is being written. The bytes depend on the arguments alone.
 pub struct PcapWriter<W: Write> {
@@ -26,7 +29,7 @@ impl<W: Write> PcapWriter<W> {
         link_type: LinkType,
         with_fcs: bool,
     ) -> Result<Self, CaptureWriteError> {
-        sink.write_all(&pcap::file_header(link_type, with_fcs))?;
+        sink.write_all(&file_header(link_type, with_fcs))?;
         Ok(Self { sink })
     }
 
@@ -67,4 +70,18 @@ impl<W: Write> PcapWriter<W> {
         self.flush()?;
         Ok(self.sink)
     }
+}
+
+/// The file header: little-endian, nanoseconds, no limit to a frame.
+fn file_header(link_type: LinkType, with_fcs: bool) -> [u8; 24] {
+    const MAGIC_NANOS: u32 = 0xA1B2_3C4D;
+    const MINOR_VERSION: u16 = 4;
+    let fcs = if with_fcs { FCS_LEN_PRESENT | (FCS_LEN as u32 / 2) << 28 } else { 0 };
+    let mut header = [0; 24];
+    header[0..4].copy_from_slice(&MAGIC_NANOS.to_le_bytes());
+    header[4..6].copy_from_slice(&MAJOR_VERSION.to_le_bytes());
+    header[6..8].copy_from_slice(&MINOR_VERSION.to_le_bytes());
+    header[16..20].copy_from_slice(&MAX_FRAME_LEN.to_le_bytes());
+    header[20..24].copy_from_slice(&(u32::from(link_type.number()) | fcs).to_le_bytes());
+    header
 }

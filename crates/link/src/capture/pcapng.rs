@@ -1,8 +1,28 @@
 //! The pcapng format: blocks, of which some carry frames.
 //!
-//! Reference: draft-ietf-opsawg-pcapng, section 3 (how blocks lie) and 4 (each kind). Blocks that
-//! carry no frames are passed over unread, however long; a section starts the numbering of its
-//! interfaces anew and may change the byte order.
+//! Reference: draft-ietf-opsawg-pcapng, section 3 (how blocks lie) and 4 (each kind). `pcap-parser`
+//! reads the blocks and their options; what is here makes whole blocks of a stream, and does what
+//! that library does not:
+//!
+//! * it passes over blocks that carry no frames unread, however long, so that they need no memory;
+//! * it compares the two lengths of each block, and finds a frame that is longer than its block,
+//!   which the library takes for a block that is cut off;
+//! * it takes blocks whose length leaves out the padding, and the obsolete packet block;
+//! * it stops at the end mark of options, and minds their byte order;
+//! * it keeps time stamps of any step, offset and century (the library: seconds in 32 bits).
+//!
+//! The library lists the options of a block, with 32 bytes for each: a block that is made to do harm,
+//! of nothing but empty options, takes up to 13 times its own length while it is read.
+
+use pcap_parser::PcapError;
+use pcap_parser::nom::IResult;
+use pcap_parser::pcapng::{
+    BOM_MAGIC, CB_MAGIC, DCB_MAGIC, EPB_MAGIC, IDB_MAGIC, ISB_MAGIC, SHB_MAGIC, SJE_MAGIC,
+    SPB_MAGIC, parse_enhancedpacketblock_be, parse_enhancedpacketblock_le,
+    parse_interfacedescriptionblock_be, parse_interfacedescriptionblock_le,
+    parse_interfacestatisticsblock_be, parse_interfacestatisticsblock_le, parse_sectionheaderblock,
+    parse_simplepacketblock_be, parse_simplepacketblock_le,
+};
 
 use super::byte_order::ByteOrder;
 use super::end::Damage;
@@ -10,33 +30,30 @@ use super::frame::{
     CaptureInterface, CaptureInterfaceId, CaptureSection, FrameDirection, TimeResolution,
 };
 use super::link_type::LinkType;
-use super::pcapng_options::{FrameOptions, InterfaceOptions, Options};
+use super::pcapng_options::{FrameOptions, InterfaceOptions, drops, section};
 use super::reader::{MAX_FRAME_LEN, Record};
 use super::window::Window;
 use crate::unix_time::UnixTime;
 
-/// Types of blocks (section 4, and the list of reserved types in section 11.1).
-pub(super) const SECTION: u32 = 0x0A0D_0D0A;
-pub(super) const INTERFACE: u32 = 1;
+/// Type of the packet block of drafts before 2011.
 const OBSOLETE_PACKET: u32 = 2;
-const SIMPLE_PACKET: u32 = 3;
-pub(super) const STATISTICS: u32 = 5;
-pub(super) const ENHANCED_PACKET: u32 = 6;
-const JOURNAL_ENTRY: u32 = 9;
-const CUSTOM: [u32; 2] = [0x0000_0BAD, 0x4000_0BAD];
-
-/// What stands behind the length of a section header, to tell the byte order.
-pub(super) const BYTE_ORDER_MARK: u32 = 0x1A2B_3C4D;
+/// What a section header is called, and the least length it needs, in bytes.
+const SECTION_HEADER: (&str, u32) = ("a section header", 28);
 /// Longest block that is taken as a whole, in bytes; the limit of Wireshark too.
 const MAX_BLOCK_LEN: u32 = 16 * 1024 * 1024;
 /// Type, and length at the start and the end: what every block has, in bytes.
 const BLOCK_OVERHEAD: u32 = 12;
 /// A hostile file must not fill memory with interfaces.
 const MAX_INTERFACES: u32 = 4096;
+/// Where in a packet block the frame begins: an enhanced one, and a simple one.
+const ENHANCED_DATA: usize = 28;
+const SIMPLE_DATA: usize = 12;
 
 /// The state of reading a pcapng file.
 pub(super) struct Pcapng {
     order: ByteOrder,
+    /// What the present section says about its maker.
+    pub(super) section: CaptureSection,
     /// Where in `interfaces` those of the present section begin.
     section_start: usize,
     interfaces: Vec<Interface>,
@@ -58,124 +75,106 @@ pub(super) enum Item {
     Frame(Record),
     /// Something that counts as a frame in Wireshark without being one.
     Numbered,
+    /// Anything else.
+    Other,
 }
 
 impl Pcapng {
     /// Reads the first section header.
-    pub(super) fn open(window: &mut Window) -> Result<(Self, CaptureSection), Damage> {
-        let mut file = Self { order: ByteOrder::Little, section_start: 0, interfaces: Vec::new() };
-        let section = file.section(window)?;
-        Ok((file, section))
+    pub(super) fn open(window: &mut Window) -> Result<Self, Damage> {
+        let mut file = Self {
+            order: byte_order(window)?,
+            section: CaptureSection::default(),
+            section_start: 0,
+            interfaces: Vec::new(),
+        };
+        file.next(window, &mut Vec::new())?;
+        Ok(file)
     }
 
-    /// The next frame or the like; `None` at the end. Interfaces that are met on the way are
-    /// added to `described`.
+    /// What the next block gives; `None` at the end. An interface that it describes is added to
+    /// `described`.
     #[inline]
     pub(super) fn next(
         &mut self,
         window: &mut Window,
         described: &mut Vec<CaptureInterface>,
     ) -> Result<Option<Item>, Damage> {
-        loop {
-            if !window.fill(8) {
-                return match window.view().len() {
-                    0 => Ok(None),
-                    present => Err(cut_off("a block", BLOCK_OVERHEAD, present)),
-                };
-            }
-            let header = &window.view()[..8];
-            let (kind, length) = (self.order.u32_at(header, 0), self.order.u32_at(header, 4));
-            match kind {
-                ENHANCED_PACKET => {
-                    let record = self.enhanced(window, length, described)?;
-                    return Ok(Some(Item::Frame(record)));
-                }
-                SIMPLE_PACKET => {
-                    let record = self.simple(window, length)?;
-                    return Ok(Some(Item::Frame(record)));
-                }
-                OBSOLETE_PACKET => {
-                    let record = self.obsolete(window, length, described)?;
-                    return Ok(Some(Item::Frame(record)));
-                }
-                SECTION => {
-                    self.section(window)?;
-                }
-                INTERFACE => self.interface(window, length, described)?,
-                STATISTICS => self.statistics(window, length, described)?,
-                _ => {
-                    skip(self.order, window, length)?;
-                    if kind == JOURNAL_ENTRY || CUSTOM.contains(&kind) {
-                        return Ok(Some(Item::Numbered));
-                    }
-                }
-            }
+        if !window.fill(8) {
+            return match window.view().len() {
+                0 => Ok(None),
+                present => Err(cut_off("a block", BLOCK_OVERHEAD, present)),
+            };
         }
+        let kind = self.order.u32_at(window.view(), 0);
+        let Some((what, least)) = taken_whole(kind) else {
+            self.skip(window)?;
+            let numbered = matches!(kind, SJE_MAGIC | CB_MAGIC | DCB_MAGIC);
+            return Ok(Some(if numbered { Item::Numbered } else { Item::Other }));
+        };
+        if kind == SHB_MAGIC {
+            self.order = byte_order(window)?;
+        }
+        let len = self.whole(window, what, least)?;
+        let mut drops = None;
+        if kind == OBSOLETE_PACKET {
+            drops = modernize(self.order, window.view_mut());
+        }
+        let block = &window.view()[..len];
+        let mut item = Item::Other;
+        match kind {
+            EPB_MAGIC | OBSOLETE_PACKET => {
+                item = Item::Frame(self.enhanced(block, drops, described)?);
+            }
+            SPB_MAGIC => item = Item::Frame(self.simple(block)?),
+            SHB_MAGIC => self.begin_section(block)?,
+            IDB_MAGIC => self.interface(block, described)?,
+            _ => self.statistics(block, described)?,
+        }
+        let at = window.pass(len);
+        if let Item::Frame(record) = &mut item {
+            record.at += at;
+        }
+        Ok(Some(item))
     }
 
-    fn section(&mut self, window: &mut Window) -> Result<CaptureSection, Damage> {
-        const WHAT: &str = "a section header";
-        const LEAST: u32 = 28;
-        if !window.fill(12) {
-            return Err(cut_off(WHAT, LEAST, window.view().len()));
-        }
-        let header = &window.view()[..12];
-        let mark = [header[8], header[9], header[10], header[11]];
-        let orders = [ByteOrder::Little, ByteOrder::Big];
-        let Some(order) = orders.into_iter().find(|order| order.u32(mark) == BYTE_ORDER_MARK)
-        else {
-            return Err(Damage::ByteOrder { mark: u32::from_be_bytes(mark) });
-        };
-        let length = order.u32_at(header, 4);
-        let block = whole(order, window, WHAT, length, LEAST)?;
-        let (major, minor) = (order.u16_at(block, 12), order.u16_at(block, 14));
+    fn begin_section(&mut self, block: &[u8]) -> Result<(), Damage> {
+        let header = read(parse_sectionheaderblock(block))?;
+        let (major, minor) = (header.major_version, header.minor_version);
         if major != 1 {
             return Err(Damage::Version { major, minor });
         }
-        let mut section = CaptureSection::default();
-        for option in Options::new(order, &block[24..block.len() - 4]) {
-            match option.code {
-                2 => section.hardware = option.text(),
-                3 => section.operating_system = option.text(),
-                4 => section.application = option.text(),
-                _ => {}
-            }
-        }
-        let len = block.len();
-        window.pass(len);
-        self.order = order;
+        self.section = section(&header.options);
         self.section_start = self.interfaces.len();
-        Ok(section)
+        Ok(())
     }
 
     fn interface(
         &mut self,
-        window: &mut Window,
-        length: u32,
+        block: &[u8],
         described: &mut Vec<CaptureInterface>,
     ) -> Result<(), Damage> {
         if self.interfaces.len() >= MAX_INTERFACES as usize {
             return Err(Damage::TooManyInterfaces { most: MAX_INTERFACES });
         }
-        let order = self.order;
-        let block = whole(order, window, "an interface description", length, 20)?;
-        let link_type = LinkType::from_number(order.u16_at(block, 8));
-        let snap_len = order.u32_at(block, 12);
-        let options = InterfaceOptions::read(Options::new(order, &block[16..block.len() - 4]));
-        let len = block.len();
-        window.pass(len);
+        let block = read(match self.order {
+            ByteOrder::Little => parse_interfacedescriptionblock_le(block),
+            ByteOrder::Big => parse_interfacedescriptionblock_be(block),
+        })?;
+        let options = InterfaceOptions::read(self.order, &block.options);
         self.interfaces.push(Interface {
             resolution: options.resolution,
             offset_nanos: i128::from(options.offset_s) * 1_000_000_000,
             fcs_len: options.fcs_len,
-            snap_len,
+            snap_len: block.snaplen,
             drops: 0,
         });
         described.push(CaptureInterface {
             name: options.name,
             description: options.description,
-            link_type,
-            snap_len: (snap_len != 0).then_some(snap_len),
+            // 16 bits in the file.
+            link_type: LinkType::from_number(block.linktype.0 as u16),
+            snap_len: (block.snaplen != 0).then_some(block.snaplen),
             resolution: options.resolution,
             drops: None,
         });
@@ -183,85 +182,66 @@ impl Pcapng {
     }
 
     /// Interface statistics: drops of the card and of the operating system, up to this block.
-    fn statistics(
-        &mut self,
-        window: &mut Window,
-        length: u32,
-        described: &mut [CaptureInterface],
-    ) -> Result<(), Damage> {
-        let order = self.order;
-        let block = whole(order, window, "interface statistics", length, 24)?;
-        let interface = order.u32_at(block, 8);
-        let mut drops: Option<u64> = None;
-        for option in Options::new(order, &block[20..block.len() - 4]) {
-            if let (5 | 7, Some(count)) = (option.code, option.u64()) {
-                drops = Some(drops.unwrap_or(0).saturating_add(count));
-            }
-        }
-        let len = block.len();
-        window.pass(len);
+    fn statistics(&self, block: &[u8], described: &mut [CaptureInterface]) -> Result<(), Damage> {
+        let block = read(match self.order {
+            ByteOrder::Little => parse_interfacestatisticsblock_le(block),
+            ByteOrder::Big => parse_interfacestatisticsblock_be(block),
+        })?;
         let described_here = described.get_mut(self.section_start..).unwrap_or_default();
-        if let (Some(drops), Some(interface)) = (drops, described_here.get_mut(interface as usize))
-        {
-            interface.drops = interface.drops.max(Some(drops));
+        if let Some(interface) = described_here.get_mut(block.if_id as usize) {
+            interface.drops = interface.drops.max(drops(self.order, &block.options));
         }
         Ok(())
     }
 
+    /// A frame with all that can be told of it. `drops` are the frames lost before it, where that
+    /// stands outside of the options.
     #[inline]
     fn enhanced(
         &mut self,
-        window: &mut Window,
-        length: u32,
+        block: &[u8],
+        drops: Option<u64>,
         described: &mut [CaptureInterface],
     ) -> Result<Record, Damage> {
-        let order = self.order;
-        let block = whole(order, window, "an enhanced packet", length, 32)?;
-        let interface = order.u32_at(block, 8);
-        let packet = Packet::read(order, block)?;
-        let id = self.find(interface)?;
-        self.count_drops(id, packet.options.drops, described);
-        Ok(self.record(window, id, &packet))
-    }
-
-    /// The packet block of drafts before 2011: as the enhanced one, with 16 bits for the interface
-    /// and 16 for the drops before it.
-    fn obsolete(
-        &mut self,
-        window: &mut Window,
-        length: u32,
-        described: &mut [CaptureInterface],
-    ) -> Result<Record, Damage> {
-        const DROPS_UNKNOWN: u16 = 0xFFFF;
-        let order = self.order;
-        let block = whole(order, window, "an obsolete packet", length, 32)?;
-        let (interface, drops) = (order.u16_at(block, 8), order.u16_at(block, 10));
-        let packet = Packet::read(order, block)?;
-        let id = self.find(interface.into())?;
-        if drops != DROPS_UNKNOWN {
-            self.count_drops(id, drops.into(), described);
-        }
-        Ok(self.record(window, id, &packet))
+        // Checked before, because the library would wait for the rest of such a frame.
+        check_frame_len(self.order.u32_at(block, 20), block.len() - 4 - ENHANCED_DATA)?;
+        let packet = read(match self.order {
+            ByteOrder::Little => parse_enhancedpacketblock_le(block),
+            ByteOrder::Big => parse_enhancedpacketblock_be(block),
+        })?;
+        let id = self.find(packet.if_id)?;
+        let options = FrameOptions::read(self.order, &packet.options);
+        self.count_drops(id, drops.unwrap_or(options.drops), described);
+        let interface = &self.interfaces[id];
+        let ticks = u64::from(packet.ts_high) << 32 | u64::from(packet.ts_low);
+        let nanos = interface.resolution.nanos(ticks) + interface.offset_nanos;
+        Ok(Record {
+            at: ENHANCED_DATA,
+            len: packet.caplen as usize,
+            original_len: packet.origlen,
+            interface: CaptureInterfaceId(id as u32),
+            time: Some(UnixTime::from_nanos(nanos)),
+            direction: options.direction,
+            fcs_len: options.fcs_len.unwrap_or(interface.fcs_len),
+            crc_error: options.crc_error,
+        })
     }
 
     /// A frame of the section's first interface, without time, cut to that interface's limit.
-    fn simple(&mut self, window: &mut Window, length: u32) -> Result<Record, Damage> {
-        let order = self.order;
-        let block = whole(order, window, "a simple packet", length, 16)?;
-        let original_len = order.u32_at(block, 8);
-        let block_len = block.len();
+    fn simple(&self, block: &[u8]) -> Result<Record, Damage> {
+        let packet = read(match self.order {
+            ByteOrder::Little => parse_simplepacketblock_le(block),
+            ByteOrder::Big => parse_simplepacketblock_be(block),
+        })?;
         let id = self.find(0)?;
         let interface = &self.interfaces[id];
         let limit = if interface.snap_len == 0 { u32::MAX } else { interface.snap_len };
-        let captured = original_len.min(limit);
-        let most = (block_len as u32 - 16).min(MAX_FRAME_LEN);
-        if captured > most {
-            return Err(Damage::FrameLength { captured, most });
-        }
+        let captured = packet.origlen.min(limit);
+        check_frame_len(captured, packet.data.len())?;
         Ok(Record {
-            at: window.pass(block_len) + 12,
+            at: SIMPLE_DATA,
             len: captured as usize,
-            original_len,
+            original_len: packet.origlen,
             interface: CaptureInterfaceId(id as u32),
             time: None,
             direction: FrameDirection::Unknown,
@@ -293,104 +273,106 @@ impl Pcapng {
         }
     }
 
+    /// Brings the whole block to the front of the window, and gives how long it is there. A length
+    /// that leaves out the padding, as some writers have it, is put right in place.
     #[inline]
-    fn record(&self, window: &mut Window, id: usize, packet: &Packet) -> Record {
-        let interface = &self.interfaces[id];
-        let nanos = interface.resolution.nanos(packet.ticks) + interface.offset_nanos;
-        Record {
-            at: window.pass(packet.block_len) + PACKET_DATA,
-            len: packet.captured as usize,
-            original_len: packet.original_len,
-            interface: CaptureInterfaceId(id as u32),
-            time: Some(UnixTime::from_nanos(nanos)),
-            direction: packet.options.direction,
-            fcs_len: packet.options.fcs_len.unwrap_or(interface.fcs_len),
-            crc_error: packet.options.crc_error,
+    fn whole(&self, window: &mut Window, what: &'static str, least: u32) -> Result<usize, Damage> {
+        let length = self.order.u32_at(window.view(), 4);
+        if length < least || length > MAX_BLOCK_LEN {
+            return Err(Damage::BlockLength { what, length, least, most: MAX_BLOCK_LEN });
         }
+        let len = length.next_multiple_of(4) as usize;
+        if !window.fill(len) {
+            return Err(cut_off(what, length, window.view().len()));
+        }
+        let last = self.order.u32_at(window.view(), len - 4);
+        if last != length {
+            return Err(Damage::LengthsDiffer { first: length, last });
+        }
+        if length as usize != len {
+            self.order.put_u32(window.view_mut(), 4, len as u32);
+            self.order.put_u32(window.view_mut(), len - 4, len as u32);
+        }
+        Ok(len)
+    }
+
+    /// Passes over a block of any length.
+    fn skip(&self, window: &mut Window) -> Result<(), Damage> {
+        const WHAT: &str = "a block";
+        let length = self.order.u32_at(window.view(), 4);
+        if length < BLOCK_OVERHEAD {
+            let (least, most) = (BLOCK_OVERHEAD, u32::MAX);
+            return Err(Damage::BlockLength { what: WHAT, length, least, most });
+        }
+        let before_last = u64::from(length).next_multiple_of(4) - 4;
+        let skipped = window.skip(before_last);
+        if skipped < before_last || !window.fill(4) {
+            return Err(cut_off(WHAT, length, skipped as usize + window.view().len()));
+        }
+        let last = self.order.u32_at(window.view(), 0);
+        if last != length {
+            return Err(Damage::LengthsDiffer { first: length, last });
+        }
+        window.pass(4);
+        Ok(())
     }
 }
 
-/// Where in an enhanced, or obsolete, packet block the frame begins.
-const PACKET_DATA: usize = 28;
-
-/// What enhanced and obsolete packet blocks have in common.
-struct Packet {
-    ticks: u64,
-    captured: u32,
-    original_len: u32,
-    options: FrameOptions,
-    block_len: usize,
-}
-
-impl Packet {
-    #[inline]
-    fn read(order: ByteOrder, block: &[u8]) -> Result<Self, Damage> {
-        let [high, low, captured, original_len] =
-            [12, 16, 20, 24].map(|at| order.u32_at(block, at));
-        let end = block.len() - 4;
-        let most = ((end - PACKET_DATA) as u32).min(MAX_FRAME_LEN);
-        if captured > most {
-            return Err(Damage::FrameLength { captured, most });
-        }
-        // The block's length is a multiple of four, so the padded frame ends in it too.
-        let options = PACKET_DATA + (captured as usize).next_multiple_of(4);
-        Ok(Self {
-            ticks: u64::from(high) << 32 | u64::from(low),
-            captured,
-            original_len,
-            options: FrameOptions::read(Options::new(order, &block[options..end])),
-            block_len: block.len(),
-        })
-    }
-}
-
-/// The whole block in front of the window, padded to a multiple of four as some writers do not say
-/// in its length. The window stays where it is, so that a damage is reported at the block's start.
+/// What a block is called that is taken as a whole, and the least length it needs, in bytes.
 #[inline]
-fn whole<'w>(
-    order: ByteOrder,
-    window: &'w mut Window,
-    what: &'static str,
-    length: u32,
-    least: u32,
-) -> Result<&'w [u8], Damage> {
-    if length < least || length > MAX_BLOCK_LEN {
-        return Err(Damage::BlockLength { what, length, least, most: MAX_BLOCK_LEN });
+const fn taken_whole(kind: u32) -> Option<(&'static str, u32)> {
+    match kind {
+        EPB_MAGIC => Some(("an enhanced packet", 32)),
+        SPB_MAGIC => Some(("a simple packet", 16)),
+        OBSOLETE_PACKET => Some(("an obsolete packet", 32)),
+        SHB_MAGIC => Some(SECTION_HEADER),
+        IDB_MAGIC => Some(("an interface description", 20)),
+        ISB_MAGIC => Some(("interface statistics", 24)),
+        _ => None,
     }
-    let len = length.next_multiple_of(4) as usize;
-    if !window.fill(len) {
-        return Err(cut_off(what, length, window.view().len()));
-    }
-    let block = &window.view()[..len];
-    let last = order.u32_at(block, len - 4);
-    if last != length {
-        return Err(Damage::LengthsDiffer { first: length, last });
-    }
-    Ok(block)
 }
 
-/// Passes over a block of any length.
-fn skip(order: ByteOrder, window: &mut Window, length: u32) -> Result<(), Damage> {
-    const WHAT: &str = "a block";
-    if length < BLOCK_OVERHEAD {
-        let (least, most) = (BLOCK_OVERHEAD, u32::MAX);
-        return Err(Damage::BlockLength { what: WHAT, length, least, most });
+/// The byte order that a section header tells: that of its own length, too.
+fn byte_order(window: &mut Window) -> Result<ByteOrder, Damage> {
+    if !window.fill(12) {
+        let (what, least) = SECTION_HEADER;
+        return Err(cut_off(what, least, window.view().len()));
     }
-    let start = window.offset();
-    let before_last = u64::from(length).next_multiple_of(4) - 4;
-    let skipped = window.skip(before_last);
-    if skipped < before_last || !window.fill(4) {
-        let present = skipped as usize + window.view().len();
-        window.end_at(start);
-        return Err(cut_off(WHAT, length, present));
+    match ByteOrder::Big.u32_at(window.view(), 8) {
+        BOM_MAGIC => Ok(ByteOrder::Big),
+        mark if mark.swap_bytes() == BOM_MAGIC => Ok(ByteOrder::Little),
+        mark => Err(Damage::ByteOrder { mark }),
     }
-    let last = order.u32_at(window.view(), 0);
-    if last != length {
-        window.end_at(start);
-        return Err(Damage::LengthsDiffer { first: length, last });
-    }
-    window.pass(4);
-    Ok(())
+}
+
+/// What the library read. With both lengths of the block and that of the frame in order, nothing is
+/// known that it would refuse.
+#[inline]
+fn read<'b, B>(parsed: IResult<&'b [u8], B, PcapError<&'b [u8]>>) -> Result<B, Damage> {
+    parsed.map(|(_, block)| block).map_err(|_| Damage::Unreadable {
+        text: "a block is not built as the format says".to_owned(),
+    })
+}
+
+/// Makes the packet block of drafts before 2011 the enhanced one that took its place, and gives
+/// the frames lost before it. They differ in one word: here, 16 bits for the interface, 16 for the
+/// drops.
+fn modernize(order: ByteOrder, block: &mut [u8]) -> Option<u64> {
+    const DROPS_UNKNOWN: u32 = 0xFFFF;
+    let word = order.u32_at(block, 8);
+    let (interface, drops) = match order {
+        ByteOrder::Little => (word & 0xFFFF, word >> 16),
+        ByteOrder::Big => (word >> 16, word & 0xFFFF),
+    };
+    order.put_u32(block, 0, EPB_MAGIC);
+    order.put_u32(block, 8, interface);
+    (drops != DROPS_UNKNOWN).then_some(drops.into())
+}
+
+#[inline]
+fn check_frame_len(captured: u32, room: usize) -> Result<(), Damage> {
+    let most = (room as u32).min(MAX_FRAME_LEN);
+    if captured > most { Err(Damage::FrameLength { captured, most }) } else { Ok(()) }
 }
 
 fn cut_off(what: &'static str, expected: u32, present: usize) -> Damage {

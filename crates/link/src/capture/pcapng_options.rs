@@ -1,72 +1,27 @@
-//! Options at the end of pcapng blocks, and what is taken from them.
+//! What is taken from the options of pcapng blocks.
 //!
-//! Reference: draft-ietf-opsawg-pcapng, section 3.5 and the option tables of each block. Options
-//! that are cut off, or of a length that theirs never is, are left out: they never carry a frame.
+//! Reference: draft-ietf-opsawg-pcapng, section 3.5 and the option tables of each block.
+//! `pcap-parser` takes them apart, but reads on behind the end mark and takes every number for
+//! little-endian. Options that are cut off, or of a length that theirs never is, are left out: they
+//! never carry a frame.
+
+use pcap_parser::pcapng::{OptionCode, PcapNGOption};
 
 use super::byte_order::ByteOrder;
-use super::frame::{FrameDirection, TimeResolution};
+use super::frame::{CaptureSection, FrameDirection, TimeResolution};
 
-/// Option codes that mean the same in every block.
-const END: u16 = 0;
-
-/// Options of a block, one after the other.
-#[derive(Clone, Copy)]
-pub(super) struct Options<'a> {
-    order: ByteOrder,
-    rest: &'a [u8],
-}
-
-/// An option: its code and its value without padding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct PcapngOption<'a> {
-    pub(super) code: u16,
-    pub(super) value: &'a [u8],
-    order: ByteOrder,
-}
-
-impl<'a> Options<'a> {
-    pub(super) fn new(order: ByteOrder, bytes: &'a [u8]) -> Self {
-        Self { order, rest: bytes }
-    }
-}
-
-impl<'a> Iterator for Options<'a> {
-    type Item = PcapngOption<'a>;
-
-    #[inline]
-    fn next(&mut self) -> Option<Self::Item> {
-        let (header, rest) = self.rest.split_first_chunk::<4>()?;
-        let code = self.order.u16([header[0], header[1]]);
-        let len = usize::from(self.order.u16([header[2], header[3]]));
-        if code == END {
-            return None;
+/// Options of a section header block (section 4.1).
+pub(super) fn section(options: &[PcapNGOption<'_>]) -> CaptureSection {
+    let mut section = CaptureSection::default();
+    for option in before_the_end(options) {
+        match option.code {
+            OptionCode::ShbHardware => section.hardware = text(option),
+            OptionCode::ShbOs => section.operating_system = text(option),
+            OptionCode::ShbUserAppl => section.application = text(option),
+            _ => {}
         }
-        let value = rest.get(..len)?;
-        self.rest = rest.get(len.next_multiple_of(4)..).unwrap_or_default();
-        Some(PcapngOption { code, value, order: self.order })
     }
-}
-
-impl PcapngOption<'_> {
-    /// The value as text, without what does not belong there. Its length is bounded by 16 bits.
-    pub(super) fn text(&self) -> Option<String> {
-        let text = String::from_utf8_lossy(self.value);
-        let text = text.trim_end_matches('\0');
-        let clean = || text.chars().filter(|c| !c.is_control());
-        (!text.is_empty()).then(|| clean().collect())
-    }
-
-    pub(super) fn byte(&self) -> Option<u8> {
-        self.value.first().copied()
-    }
-
-    pub(super) fn u32(&self) -> Option<u32> {
-        Some(self.order.u32(self.value.try_into().ok()?))
-    }
-
-    pub(super) fn u64(&self) -> Option<u64> {
-        Some(self.order.u64(self.value.try_into().ok()?))
-    }
+    section
 }
 
 /// Options of an interface description block (section 4.2).
@@ -81,7 +36,10 @@ pub(super) struct InterfaceOptions {
 }
 
 impl InterfaceOptions {
-    pub(super) fn read(options: Options<'_>) -> Self {
+    /// Of the option `if_fcslen`, which the library has no name for.
+    const FCS_LEN: OptionCode = OptionCode(13);
+
+    pub(super) fn read(order: ByteOrder, options: &[PcapNGOption<'_>]) -> Self {
         let mut read = Self {
             name: None,
             description: None,
@@ -89,16 +47,18 @@ impl InterfaceOptions {
             offset_s: 0,
             fcs_len: 0,
         };
-        for option in options {
+        for option in before_the_end(options) {
             match option.code {
-                2 => read.name = option.text(),
-                3 => read.description = option.text(),
-                9 => {
-                    let value = option.byte();
+                OptionCode::IfName => read.name = text(option),
+                OptionCode::IfDescription => read.description = text(option),
+                OptionCode::IfTsresol => {
+                    let value = byte(option);
                     read.resolution = value.map_or(read.resolution, TimeResolution::from_option);
                 }
-                13 => read.fcs_len = option.byte().map_or(0, fcs_bytes),
-                14 => read.offset_s = option.u64().map_or(0, u64::cast_signed),
+                Self::FCS_LEN => read.fcs_len = byte(option).map_or(0, fcs_bytes),
+                OptionCode::IfTsoffset => {
+                    read.offset_s = number(order, option).map_or(0, u64::cast_signed);
+                }
                 _ => {}
             }
         }
@@ -123,13 +83,18 @@ pub(super) struct FrameOptions {
 }
 
 impl FrameOptions {
+    /// Of the option `epb_flags`, which the library has no name for.
+    const FLAGS: OptionCode = OptionCode(2);
+    /// Of the option `epb_dropcount`, which the library has no name for.
+    const DROP_COUNT: OptionCode = OptionCode(4);
+
     #[inline]
-    pub(super) fn read(options: Options<'_>) -> Self {
+    pub(super) fn read(order: ByteOrder, options: &[PcapNGOption<'_>]) -> Self {
         let mut read = Self::default();
-        for option in options {
+        for option in before_the_end(options) {
             match option.code {
-                2 => read.take_flags(option.u32().unwrap_or(0)),
-                4 => read.drops = option.u64().unwrap_or(0),
+                Self::FLAGS => read.take_flags(option.as_u32_le().map_or(0, |n| order.u32(n))),
+                Self::DROP_COUNT => read.drops = number(order, option).unwrap_or(0),
                 _ => {}
             }
         }
@@ -149,21 +114,66 @@ impl FrameOptions {
     }
 }
 
+/// Drops of the card and of the operating system, from the options of an interface statistics block
+/// (section 4.6); `None` when it does not say.
+pub(super) fn drops(order: ByteOrder, options: &[PcapNGOption<'_>]) -> Option<u64> {
+    before_the_end(options)
+        .filter(|option| matches!(option.code, OptionCode::IsbIfDrop | OptionCode::IsbOsDrop))
+        .filter_map(|option| number(order, option))
+        .reduce(u64::saturating_add)
+}
+
+#[inline]
+fn before_the_end<'o, 'b>(
+    options: &'o [PcapNGOption<'b>],
+) -> impl Iterator<Item = &'o PcapNGOption<'b>> {
+    options.iter().take_while(|option| option.code != OptionCode::EndOfOpt)
+}
+
+/// The value as text, without what does not belong there. Its length is bounded by 16 bits.
+fn text(option: &PcapNGOption<'_>) -> Option<String> {
+    let text = String::from_utf8_lossy(option.as_bytes().ok()?);
+    let text = text.trim_end_matches('\0');
+    let clean = || text.chars().filter(|c| !c.is_control());
+    (!text.is_empty()).then(|| clean().collect())
+}
+
+fn byte(option: &PcapNGOption<'_>) -> Option<u8> {
+    option.as_bytes().ok()?.first().copied()
+}
+
+fn number(order: ByteOrder, option: &PcapNGOption<'_>) -> Option<u64> {
+    Some(order.u64(option.as_u64_le().ok()?))
+}
+
 #[cfg(test)]
 mod tests {
+    use pcap_parser::pcapng::{Block, parse_block_le};
+
     use super::*;
+
+    /// What an interface description with these bytes for options says.
+    fn interface(options: &[u8]) -> InterfaceOptions {
+        let len = (20 + options.len() as u32).to_le_bytes();
+        let block = [&[1, 0, 0, 0], &len, &[1, 0, 0, 0, 0, 0, 0, 0][..], options, &len].concat();
+        let (_, Block::InterfaceDescription(block)) = parse_block_le(&block).unwrap() else {
+            panic!("an interface description");
+        };
+        InterfaceOptions::read(ByteOrder::Little, &block.options)
+    }
 
     #[test]
     fn options_end_at_the_end_mark_or_where_they_are_cut() {
-        let bytes = [2, 0, 3, 0, b'a', b'b', b'c', 0, 9, 0, 1, 0, 9, 0, 0, 0, 0, 0, 0, 0, 2, 0];
-        for len in 0..bytes.len() {
-            let options = Options::new(ByteOrder::Little, &bytes[..len]);
-            let expected = usize::from(len >= 7) + usize::from(len >= 13);
-            assert_eq!(options.count(), expected, "of {len} bytes");
+        let bytes = [2, 0, 3, 0, b'a', b'b', b'c', 0, 9, 0, 1, 0, 9, 0, 0, 0, 0, 0, 0, 0, 3, 0, 1];
+        // Behind the end mark, a description; a block's length is a multiple of four.
+        let bytes = [bytes.as_slice(), &[0, b'x', 0, 0, 0]].concat();
+        for len in (0..=bytes.len()).step_by(4) {
+            let read = interface(&bytes[..len]);
+            assert_eq!(read.name.as_deref(), (len >= 7).then_some("abc"), "of {len} bytes");
+            let nanoseconds = read.resolution == TimeResolution::NANOSECOND;
+            assert_eq!(nanoseconds, len >= 13, "of {len} bytes");
+            assert_eq!(read.description, None, "of {len} bytes");
         }
-        let read = InterfaceOptions::read(Options::new(ByteOrder::Little, &bytes));
-        assert_eq!(read.name.as_deref(), Some("abc"));
-        assert_eq!(read.resolution, TimeResolution::NANOSECOND);
     }
 
     #[test]

@@ -1,14 +1,17 @@
 //! Writing pcapng: one section, any number of interfaces, times in nanoseconds.
 //!
 //! Reference: draft-ietf-opsawg-pcapng, section 4. The bytes depend on the arguments alone: always
-//! little-endian, no clock, no host name.
+//! little-endian, no clock, no host name. The encoder is a page of our own, because those of
+//! `pcap-parser` and `pcap-file` allocate for each frame, which recording beside a cycle must not,
+//! and would save less than the half of it.
 
 use std::io::Write;
+
+use pcap_parser::pcapng::{BOM_MAGIC, EPB_MAGIC, IDB_MAGIC, ISB_MAGIC, SHB_MAGIC};
 
 use super::error::CaptureWriteError;
 use super::frame::{CaptureInterfaceId, FrameDirection};
 use super::link_type::LinkType;
-use super::pcapng::{BYTE_ORDER_MARK, ENHANCED_PACKET, INTERFACE, SECTION, STATISTICS};
 use super::reader::MAX_FRAME_LEN;
 use crate::unix_time::UnixTime;
 
@@ -85,8 +88,8 @@ impl<W: Write> PcapngWriter<W> {
     /// When the sink fails.
     pub fn new(sink: W, application: &str) -> Result<Self, CaptureWriteError> {
         let mut writer = Self { sink, interfaces: Vec::new(), block: Vec::with_capacity(2048) };
-        writer.begin(SECTION);
-        writer.put(BYTE_ORDER_MARK.to_le_bytes());
+        writer.begin(SHB_MAGIC);
+        writer.put(BOM_MAGIC.to_le_bytes());
         writer.put(1_u16.to_le_bytes());
         writer.put(0_u16.to_le_bytes());
         // The section's length is not known when it begins.
@@ -106,7 +109,7 @@ impl<W: Write> PcapngWriter<W> {
         interface: &InterfaceToWrite<'_>,
     ) -> Result<CaptureInterfaceId, CaptureWriteError> {
         const NANOSECONDS: u8 = 9;
-        self.begin(INTERFACE);
+        self.begin(IDB_MAGIC);
         self.put(interface.link_type.number().to_le_bytes());
         self.put(0_u16.to_le_bytes());
         self.put(MAX_FRAME_LEN.to_le_bytes());
@@ -129,7 +132,7 @@ impl<W: Write> PcapngWriter<W> {
         let (captured, original_len) = frame.lengths()?;
         let time = u64::try_from(frame.time.as_nanos())
             .map_err(|_| CaptureWriteError::Time { time: frame.time })?;
-        self.begin(ENHANCED_PACKET);
+        self.begin(EPB_MAGIC);
         self.put(frame.interface.0.to_le_bytes());
         self.put(((time >> 32) as u32).to_le_bytes());
         self.put((time as u32).to_le_bytes());
@@ -159,7 +162,7 @@ impl<W: Write> PcapngWriter<W> {
     ) -> Result<(), CaptureWriteError> {
         self.check(interface)?;
         let nanos = u64::try_from(time.as_nanos()).map_err(|_| CaptureWriteError::Time { time })?;
-        self.begin(STATISTICS);
+        self.begin(ISB_MAGIC);
         self.put(interface.0.to_le_bytes());
         self.put(((nanos >> 32) as u32).to_le_bytes());
         self.put((nanos as u32).to_le_bytes());

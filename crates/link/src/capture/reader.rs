@@ -1,14 +1,16 @@
 //! Reading a capture, frame by frame, whatever its format.
 //!
-//! Nothing is allocated per frame: a frame's bytes are borrowed from the reader's buffer until the
-//! next one is asked for. A damaged first block is an error; a later damage ends the capture, and
+//! A frame's bytes are borrowed from the reader's buffer until the next one is asked for; nothing is
+//! allocated but a short list for the options of a frame that has some. A damaged first block is an error; a later damage ends the capture, and
 //! [`CaptureReader::end`] tells where and why.
 
 use std::fs::File;
 use std::io::{self, Read};
+use std::mem;
 use std::path::{Path, PathBuf};
 
 use flate2::read::MultiGzDecoder;
+use pcap_parser::pcapng::SHB_MAGIC;
 
 use super::cooked;
 use super::end::{CaptureEnd, Damage};
@@ -19,8 +21,8 @@ use super::frame::{
     FrameDirection, FrameNumber, SkippedLinkType,
 };
 use super::link_type::LinkType;
-use super::pcap::{self, Pcap};
-use super::pcapng::{self, Item, Pcapng};
+use super::pcap::Pcap;
+use super::pcapng::{Item, Pcapng};
 use super::window::Window;
 use crate::unix_time::UnixTime;
 
@@ -100,20 +102,25 @@ impl CaptureReader {
         let Some(&magic) = start.first_chunk::<4>() else {
             return Err(too_short(&mut window));
         };
+        if let Some((name, advice)) = other_format(&mut window) {
+            return Err(CaptureErrorKind::OtherFormat { name, advice });
+        }
         let mut interfaces = Vec::new();
         let mut section = CaptureSection::default();
-        let format = if u32::from_be_bytes(magic) == pcapng::SECTION {
-            let (file, first) = Pcapng::open(&mut window)
+        let format = if u32::from_le_bytes(magic) == SHB_MAGIC {
+            let mut file = Pcapng::open(&mut window)
                 .map_err(|damage| first_block(&mut window, CaptureFormat::Pcapng, damage))?;
-            section = first;
+            section = mem::take(&mut file.section);
             Format::Pcapng(file)
-        } else if let Some((order, resolution)) = pcap::recognize(magic) {
-            let (file, interface) = Pcap::open(&mut window, order, resolution)
+        } else {
+            let opened = Pcap::open(&mut window)
                 .map_err(|damage| first_block(&mut window, CaptureFormat::Pcap, damage))?;
+            let Some((file, interface)) = opened else {
+                let start = window.view().iter().take(8).copied().collect();
+                return Err(CaptureErrorKind::NotACapture { start });
+            };
             interfaces.push(interface);
             Format::Pcap(file)
-        } else {
-            return Err(unknown_format(&mut window));
         };
         let skipped = Vec::new();
         Ok(Self { window, format, section, interfaces, frames: 0, skipped, end: None })
@@ -127,6 +134,7 @@ impl CaptureReader {
             return None;
         }
         loop {
+            let start = self.window.offset();
             let item = match &mut self.format {
                 Format::Pcap(file) => {
                     file.next(&mut self.window).map(|record| record.map(Item::Frame))
@@ -134,22 +142,22 @@ impl CaptureReader {
                 Format::Pcapng(file) => file.next(&mut self.window, &mut self.interfaces),
             };
             let record = match item {
-                Ok(Some(item)) => {
+                Ok(Some(Item::Frame(record))) => record,
+                Ok(Some(Item::Numbered)) => {
                     self.frames += 1;
-                    match item {
-                        Item::Frame(record) => record,
-                        Item::Numbered => continue,
-                    }
+                    continue;
                 }
+                Ok(Some(Item::Other)) => continue,
                 Ok(None) => {
-                    self.finish(None);
+                    self.finish(start, None);
                     return None;
                 }
                 Err(damage) => {
-                    self.finish(Some(damage));
+                    self.finish(start, Some(damage));
                     return None;
                 }
             };
+            self.frames += 1;
             let link_type = self.interfaces[record.interface.0 as usize].link_type;
             let Some(shape) = Shape::of(&record, link_type, &mut self.window) else {
                 self.count_skipped(link_type);
@@ -211,14 +219,13 @@ impl CaptureReader {
     }
 
     #[cold]
-    fn finish(&mut self, damage: Option<Damage>) {
+    fn finish(&mut self, offset: u64, damage: Option<Damage>) {
         // A stream that fails looks cut off; why it failed says more.
         let damage = match self.window.take_fault() {
             Some(fault) => Some(Damage::Unreadable { text: fault.to_string() }),
             None => damage,
         };
-        let (offset, frames) = (self.window.offset(), self.frames);
-        self.end = Some(CaptureEnd { damage, offset, frames });
+        self.end = Some(CaptureEnd { damage, offset, frames: self.frames });
     }
 }
 
@@ -314,7 +321,7 @@ fn first_block(window: &mut Window, format: CaptureFormat, damage: Damage) -> Ca
 }
 
 /// Names the formats that people mistake for a capture, with the way out.
-fn unknown_format(window: &mut Window) -> CaptureErrorKind {
+fn other_format(window: &mut Window) -> Option<(&'static str, &'static str)> {
     const EDITCAP: &str = "convert it with `editcap -F pcapng OLD NEW.pcapng`";
     const UNPACK: &str = "unpack it first; only gzip is unpacked here";
     const KNOWN: [(&[u8], &str, &str); 12] = [
@@ -332,10 +339,6 @@ fn unknown_format(window: &mut Window) -> CaptureErrorKind {
         (b"<?xml", "an XML file", "name the capture, not its description"),
     ];
     window.fill(8);
-    let bytes = window.view();
-    let known = KNOWN.iter().find(|(magic, _, _)| bytes.starts_with(magic));
-    match known {
-        Some(&(_, name, advice)) => CaptureErrorKind::OtherFormat { name, advice },
-        None => CaptureErrorKind::NotACapture { start: bytes[..bytes.len().min(8)].to_vec() },
-    }
+    let known = KNOWN.iter().find(|(magic, _, _)| window.view().starts_with(magic));
+    known.map(|&(_, name, advice)| (name, advice))
 }

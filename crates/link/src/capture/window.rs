@@ -1,7 +1,9 @@
 //! A window over a stream of bytes: what a reader is looking at, in one piece.
 //!
 //! It copies only when a piece lies across the end of the buffer, and it grows only while the
-//! stream really delivers, so that a length field that lies costs nothing.
+//! stream really delivers, so that a length field that lies costs nothing. The readers of
+//! `pcap-parser` have a window too, but it cannot be written to, forgets why a stream failed, and
+//! their first read must bring the whole first block, which a pipe need not.
 
 use std::io::{self, Read};
 
@@ -32,12 +34,6 @@ impl Window {
         self.offset
     }
 
-    /// Has the end of the capture told at `offset`, where the block began that turned out damaged
-    /// after a part of it was passed.
-    pub(super) fn end_at(&mut self, offset: u64) {
-        self.offset = offset;
-    }
-
     /// What the stream failed with, if it ended by a failure.
     pub(super) fn take_fault(&mut self) -> Option<io::Error> {
         self.fault.take()
@@ -47,6 +43,12 @@ impl Window {
     #[inline]
     pub(super) fn view(&self) -> &[u8] {
         &self.buffer[self.start..self.end]
+    }
+
+    /// What is in the window now, to be put right in place.
+    #[inline]
+    pub(super) fn view_mut(&mut self) -> &mut [u8] {
+        &mut self.buffer[self.start..self.end]
     }
 
     /// Widens the window to at least `len` bytes; `false` when the stream ends before.

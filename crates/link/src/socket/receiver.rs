@@ -2,7 +2,6 @@
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::path::PathBuf;
 
 use rustix::io::Errno;
 use rustix::net::sockopt;
@@ -10,7 +9,7 @@ use rustix::net::sockopt;
 use super::batch::{Batch, Wanted};
 use super::packet;
 use crate::clock::HostClock;
-use crate::error::LinkError;
+use crate::error::{LinkError, this_program};
 use crate::interface::netlink::Netlink;
 use crate::interface::{self, Interface, InterfaceKind};
 
@@ -63,10 +62,9 @@ impl Receiver {
             return Err(LinkError::Down { interface: name.to_owned() });
         }
         let socket = packet::open().map_err(|error| match error.raw_os_error() {
-            Some(libc::EPERM | libc::EACCES) => LinkError::NoPrivilege {
-                interface: name.to_owned(),
-                binary: std::env::current_exe().unwrap_or_else(|_| PathBuf::from("linesman")),
-            },
+            Some(libc::EPERM | libc::EACCES) => {
+                LinkError::NoPrivilege { interface: name.to_owned(), binary: this_program() }
+            }
             _ => LinkError::system(name, "opening a packet socket", error),
         })?;
         let counters = SocketCounters::default();
