@@ -1,0 +1,3 @@
+//! Tests of the controller through frames.
+
+pub(super) mod rig;
