@@ -37,7 +37,7 @@ pub enum Verdict {
 /// An EtherCAT controller with the device behind it.
 #[derive(Debug)]
 pub struct Controller {
-    core: Core,
+    pub(super) core: Core,
     firmware: Box<dyn Firmware>,
     powered: bool,
     /// The supply went and the signals of the device do not know yet.
@@ -99,6 +99,9 @@ impl Controller {
     /// The same, long ago: the SII is loaded and the device has started. For a line that was on
     /// before the run began.
     pub fn power_on_before(&mut self, at: Instant, signals: &mut Signals) {
+        if std::mem::take(&mut self.going_dark) {
+            self.firmware.stop(signals);
+        }
         self.power_on(at);
         while !self.core.loaded && self.core.sii.done_at().is_some() {
             self.finish_sii(at, signals);
@@ -173,7 +176,7 @@ impl Controller {
         .min()
     }
 
-    fn reschedule(&mut self) {
+    pub(super) fn reschedule(&mut self) {
         let dark = self.going_dark.then_some(Instant::ZERO);
         self.next = dark.or(self.due().map(|(at, _)| at)).unwrap_or(Instant::MAX);
     }
@@ -290,6 +293,7 @@ impl Controller {
         self.advance(at, signals);
         if self.samples {
             self.firmware.sample(at, &mut Pdi { core: &mut self.core, signals, now: at });
+            self.core.rescheduled = true;
         }
         let verdict = self.core.process(at, frame);
         if std::mem::take(&mut self.core.rescheduled) {

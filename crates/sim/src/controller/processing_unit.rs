@@ -167,7 +167,8 @@ impl Core {
         } else if effect.reads {
             (self.read(header.ado, data, effect.ors), false)
         } else {
-            (false, self.write(header.ado, data, true))
+            let latches = matches!(command, Command::Bwr | Command::Fpwr);
+            (false, self.write(header.ado, data, latches))
         };
         command.increment(read, write)
     }
@@ -320,7 +321,7 @@ impl Core {
         }
         let good = intact && whole;
         let passing = self.passing;
-        self.rescheduled = good && (passing.touched != 0 || !self.shadow.is_empty());
+        self.rescheduled |= good && (passing.touched != 0 || !self.shadow.is_empty());
         if passing.touched != 0 {
             self.settle_sync_managers(passing.touched, good, when + frame.duration());
         }

@@ -330,11 +330,8 @@ mod tests {
 
     #[test]
     fn the_checksum_of_real_devices() {
-        let table: [(&[u8], u8); 3] = [
-            (&[0x00, 0x0D], 0x46),
-            (&[0x04, 0x01, 0, 0, 0, 0, 0xFF], 0xE2),
-            (&[0x09, 0, 0, 0, 0x08], 0x10),
-        ];
+        let table: [(&[u8], u8); 2] =
+            [(&[0x00, 0x0D], 0x46), (&[0x04, 0x01, 0, 0, 0, 0, 0xFF], 0xE2)];
         for (start, expected) in table {
             let mut area = [0; 14];
             area[..start.len()].copy_from_slice(start);
