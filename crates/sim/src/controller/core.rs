@@ -174,7 +174,15 @@ impl Core {
         self.memory.put(at(&r::ESC_TYPE), &information.to_bytes());
     }
 
+    /// Registers that do not start at 0. The receive times of ports that are not there hold whatever
+    /// was left in them: nobody may use those.
     fn put_reset_values(&mut self) {
+        const LEFTOVER: &[u8; 4] = b"left";
+        for port in Port::ALL {
+            if self.hardware.ports[port] == PortKind::Absent {
+                self.memory.put(usize::from(r::RECEIVE_TIME.of_port(port).0), LEFTOVER);
+            }
+        }
         let memory = &mut self.memory;
         memory.set_u32(&r::DL_CONTROL, DlControl::RESET.0);
         memory.set_u16(&r::AL_CONTROL, AlControl::default().0);
@@ -442,6 +450,10 @@ impl Core {
     /// The processor stops serving the controller, or serves it again.
     pub(super) fn set_processor_stuck(&mut self, stuck: bool, when: Instant) {
         self.processor_stuck = stuck;
+        if !stuck {
+            // What happened meanwhile is still to be served.
+            self.call_firmware(when);
+        }
         self.retime_pdi_watchdog(when);
     }
 

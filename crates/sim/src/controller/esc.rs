@@ -321,6 +321,13 @@ impl Controller {
         &mut *self.firmware
     }
 
+    /// The device's processor stops serving the controller at `at`, or serves it again: events stay
+    /// unanswered meanwhile and the PDI watchdog runs out.
+    pub fn set_processor_stuck(&mut self, at: Instant, stuck: bool) {
+        self.core.set_processor_stuck(stuck, at);
+        self.reschedule();
+    }
+
     /// The content of its EEPROM.
     #[must_use]
     pub fn sii(&self) -> &[u8] {

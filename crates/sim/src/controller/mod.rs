@@ -1,9 +1,9 @@
 //! The EtherCAT controller with the device behind it.
 //!
-//! [`Controller`] is what the wire talks to. Inside, one file per concern: [`processing_unit`]
-//! executes datagrams, [`access`] finds the memory behind an address, `fmmu` and `sync_manager`
-//! map and guard it, [`register_write`] does what written registers ask for, [`pdi`] is the view
-//! from the other side.
+//! [`Controller`] is what the wire talks to. Inside, one file per concern: `processing_unit`
+//! executes datagrams, `access` finds the memory behind an address, `fmmu` and `sync_manager` map
+//! and guard it, `register_write` does what written registers ask for, [`pdi`] is the view from the
+//! other side.
 //!
 //! Read first: S1 chapters 3 (frame processing), 7 (FMMU), 8 (SyncManager), 11 (SII), 14 (error
 //! counters), 17.3 (write protection); S2 for each register.
@@ -33,4 +33,4 @@ pub use posted::{CountKind, PortEvent};
 pub use sii::{LOAD_TIME, PROGRAMMING_TIME, READ_TIME, STARTUP_DELAY, WRITE_TIME};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -133,3 +133,102 @@ fn fetch(
     bytes[..ram.len()].copy_from_slice(ram);
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::controller::tests::rig::{Bench, hardware, sii};
+    use linesman_proto::register::SmControl;
+    use linesman_proto::time::Span;
+
+    fn area(sync_manager: u8, at: u16, first: u32, count: u32) -> DigitalArea {
+        let signals = (first..first + count).map(SignalId).collect();
+        DigitalArea { sync_manager, at: RegisterAddress(at), signals }
+    }
+
+    fn bench(outputs: Vec<DigitalArea>, inputs: Vec<DigitalArea>) -> Bench {
+        Bench::with(hardware(), sii(true), Box::new(Emulated::new(outputs, inputs)))
+    }
+
+    fn high(bench: &Bench) -> u16 {
+        (0..16).fold(0, |bits, signal| {
+            bits | u16::from(bench.signals.is_high(SignalId(signal))) << signal
+        })
+    }
+
+    #[test]
+    fn eight_outputs_follow_their_register_in_op() {
+        let mut bench = bench(vec![area(0, 0x0F00, 0, 8)], vec![]);
+        bench.guard(0, 0x0F00, 1, SmControl::OUTPUTS_WITHOUT_EVENT);
+        bench.write(0x0F00, &[0xA5]);
+        assert_eq!(high(&bench), 0, "not in INIT");
+        for state in [2, 4] {
+            bench.write(0x0120, &[state, 0]);
+            assert_eq!(high(&bench), 0);
+        }
+        bench.write(0x0120, &[8, 0]);
+        assert_eq!(high(&bench), 0xA5);
+        bench.write(0x0F00, &[0x0F]);
+        assert_eq!(high(&bench), 0x0F);
+        bench.wait(Span::ms(101));
+        assert_eq!(high(&bench), 0, "the watchdog");
+        bench.write(0x0F00, &[0x33]);
+        assert_eq!(high(&bench), 0x33);
+        bench.write(0x0120, &[4, 0]);
+        assert_eq!(high(&bench), 0);
+        bench.write(0x0120, &[8, 0]);
+        assert_eq!(high(&bench), 0x33);
+        bench.controller.power_off(bench.now);
+        bench.wait(Span::us(1));
+        assert_eq!(high(&bench), 0, "no supply");
+    }
+
+    #[test]
+    fn sixteen_outputs_come_through_two_registers_or_a_buffer() {
+        let two = vec![area(0, 0x0F00, 0, 8), area(1, 0x0F01, 8, 8)];
+        let mut split = bench(two, vec![]);
+        split.guard(0, 0x0F00, 1, SmControl::OUTPUTS_WITHOUT_EVENT);
+        split.guard(1, 0x0F01, 1, SmControl::OUTPUTS_WITHOUT_EVENT);
+        split.write(0x0120, &[8, 0]);
+        split.write(0x0F00, &[0x34, 0x12]);
+        assert_eq!(high(&split), 0x1234);
+
+        let mut buffered = bench(vec![area(0, 0x1000, 0, 16)], vec![]);
+        buffered.guard(0, 0x1000, 2, SmControl::OUTPUTS);
+        buffered.write(0x0120, &[8, 0]);
+        assert_eq!(high(&buffered), 0, "nothing came yet");
+        buffered.write(0x1000, &[0x34]);
+        assert_eq!(high(&buffered), 0, "half of it");
+        buffered.write(0x1001, &[0x12]);
+        assert_eq!(high(&buffered), 0x1234);
+    }
+
+    #[test]
+    fn inputs_are_taken_when_a_frame_begins() {
+        let inputs = vec![area(0, 0x1000, 0, 4), area(1, 0x1010, 4, 12)];
+        let mut bench = bench(vec![], inputs);
+        bench.guard(0, 0x1000, 1, SmControl::INPUTS_WITHOUT_EVENT);
+        bench.guard(1, 0x1010, 2, SmControl::INPUTS_WITHOUT_EVENT);
+        for (signal, value) in [(0, 1), (2, -7), (4, 1), (15, 1)] {
+            bench.signals.set(SignalId(signal), value);
+        }
+        assert_eq!(bench.byte(0x1000), 0b0101);
+        assert_eq!(bench.word(0x1010), 1 | 1 << 11);
+        bench.signals.set(SignalId(0), 0);
+        assert_eq!(bench.byte(0x1000), 0b0100);
+        // Before anything is set up the bits lie in the RAM all the same.
+        bench.write(0x0806, &[0]);
+        assert_eq!(bench.byte(0x1000), 0b0100);
+    }
+
+    #[test]
+    fn a_set_up_that_does_not_fit_breaks_nothing() {
+        let mut bench = bench(vec![area(0, 0x0F03, 0, 16)], vec![area(1, 0xFFFF, 0, 16)]);
+        bench.guard(0, 0x1000, 1, SmControl::OUTPUTS);
+        bench.guard(1, 0x1000, 1, SmControl::INPUTS);
+        bench.write(0x0120, &[8, 0]);
+        bench.write(0x0F03, &[0xFF]);
+        bench.write(0x1000, &[0xFF]);
+        assert_eq!(high(&bench), 0x00FF, "the bits there are");
+    }
+}

@@ -20,8 +20,9 @@ pub trait Firmware: Debug + Send {
     /// for a datagram the end of its frame. Returns the next wake-up, if one is wanted; it replaces
     /// the one before. A wake-up that is not after `now` comes 1 µs after it.
     ///
-    /// It is called when an AL event bit gets set (masked or not), when a SyncManager was written,
-    /// when the outputs at 0x0F00 were written, and when device emulation changed AL status.
+    /// It is called once after [`Firmware::start`], then when an AL event bit gets set (masked or
+    /// not), when a SyncManager was written, when the outputs at 0x0F00 were written, and when
+    /// device emulation changed AL status.
     fn run(&mut self, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant>;
 
     /// Whether [`Firmware::sample`] is wanted. Asked once, after [`Firmware::start`].

@@ -227,7 +227,7 @@ fn loading_after_power_on_is_tried_twice() {
 
 /// Images of real devices load and read back through the interface.
 #[test]
-#[allow(clippy::disallowed_methods)]
+#[allow(clippy::disallowed_methods, clippy::disallowed_macros)]
 fn images_of_real_devices() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     let data = std::env::var("LINESMAN_DATA").unwrap_or(format!("{root}/../shared/data"));
