@@ -1,0 +1,391 @@
+//! The controller with the device behind it, as the wire sees it.
+//!
+//! Read first: S1 chapter 3. Time is an argument everywhere; between two calls everything that was
+//! due happens in the order of its time ([`Controller::advance`]). A call with an earlier time than
+//! one before finds the controller as the later one left it.
+
+use linesman_proto::address::{DeviceId, RegisterAddress, StationAddress};
+use linesman_proto::port::Port;
+use linesman_proto::register::{self as r, AlStatus, DlStatus, ErrorCounter, ErrorCounters};
+use linesman_proto::state::AlStatusCode;
+use linesman_proto::time::{Instant, Span};
+
+use super::clock::LocalClock;
+use super::core::Core;
+use super::memory::at;
+use super::pdi::Pdi;
+use super::posted::{Happening, PortEvent};
+use super::sii::Outcome;
+use crate::device::{Firmware, Signals};
+use crate::frame::WireFrame;
+use crate::hardware::Hardware;
+
+/// A wake-up is at least this much later than the call that asked for it.
+const SHORTEST_NAP: Span = Span::us(1);
+
+/// What becomes of a frame behind the processing unit.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[must_use]
+pub enum Verdict {
+    /// It goes on.
+    Forward,
+    /// It ends here: a frame that circulates, or one without EtherCAT where those are not wanted.
+    /// The unit has counted it.
+    Destroy,
+}
+
+/// An EtherCAT controller with the device behind it.
+#[derive(Debug)]
+pub struct Controller {
+    pub(super) core: Core,
+    firmware: Box<dyn Firmware>,
+    powered: bool,
+    /// The supply went and the signals of the device do not know yet.
+    going_dark: bool,
+    samples: bool,
+    /// When something is due next; [`Instant::MAX`] for nothing.
+    next: Instant,
+}
+
+/// What can be due. Of things due at the same instant the first in this list comes first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum Due {
+    Port,
+    Loops,
+    LoopsReturn,
+    Sii,
+    ProcessDataWatchdog,
+    PdiWatchdog,
+    Reset,
+    Firmware,
+}
+
+impl Controller {
+    /// A controller without power. `sii` is the content of its EEPROM; empty means that there is
+    /// none.
+    #[must_use]
+    pub fn new(
+        id: DeviceId,
+        hardware: Hardware,
+        clock: LocalClock,
+        firmware: Box<dyn Firmware>,
+        sii: Vec<u8>,
+    ) -> Self {
+        Self {
+            core: Core::new(id, hardware, clock, sii),
+            firmware,
+            powered: false,
+            going_dark: false,
+            samples: false,
+            next: Instant::MAX,
+        }
+    }
+
+    // ---- power ----
+
+    /// The supply comes: registers as after a reset, no links, counters 0, station address 0, INIT.
+    /// The SII is loaded [`STARTUP_DELAY`](super::STARTUP_DELAY) later, and then the device starts;
+    /// until then process-data RAM cannot be reached. Links come with posted events.
+    pub fn power_on(&mut self, at: Instant) {
+        self.powered = true;
+        self.samples = false;
+        while let Some(first) = self.core.queue.next_at().filter(|first| *first < at) {
+            self.core.queue.pop_until(first);
+        }
+        self.core.start(at);
+        self.reschedule();
+    }
+
+    /// The same, long ago: the SII is loaded and the device has started. For a line that was on
+    /// before the run began.
+    pub fn power_on_before(&mut self, at: Instant, signals: &mut Signals) {
+        if std::mem::take(&mut self.going_dark) {
+            self.firmware.stop(signals);
+        }
+        self.power_on(at);
+        while !self.core.loaded && self.core.sii.done_at().is_some() {
+            self.finish_sii(at, signals);
+        }
+        self.reschedule();
+    }
+
+    /// The supply goes: nothing is known any more, all loops are closed. Its outputs are no longer
+    /// driven from the next [`Controller::advance`] on.
+    pub fn power_off(&mut self, at: Instant) {
+        if self.powered {
+            self.powered = false;
+            self.going_dark = true;
+            self.core.power_off();
+            self.next = at;
+        }
+    }
+
+    /// Whether it has power.
+    #[must_use]
+    pub fn is_powered(&self) -> bool {
+        self.powered
+    }
+
+    // ---- time ----
+
+    /// Everything that happens by itself up to and at `now`: posted port events in the order of
+    /// time, loops, SII, watchdogs, wake-ups of the device.
+    #[inline]
+    pub fn advance(&mut self, now: Instant, signals: &mut Signals) {
+        if self.next <= now {
+            self.catch_up(now, signals);
+        }
+    }
+
+    fn catch_up(&mut self, now: Instant, signals: &mut Signals) {
+        if std::mem::take(&mut self.going_dark) {
+            self.firmware.stop(signals);
+        }
+        if !self.powered {
+            while self.core.queue.pop_until(now).is_some() {}
+        }
+        while let Some((at, due)) = self.due().filter(|(at, _)| *at <= now) {
+            self.serve(at, due, signals);
+        }
+        self.reschedule();
+    }
+
+    /// When something will happen by itself, if anything will.
+    #[must_use]
+    pub fn next_event(&self) -> Option<Instant> {
+        (self.next != Instant::MAX).then_some(self.next)
+    }
+
+    fn due(&self) -> Option<(Instant, Due)> {
+        let core = &self.core;
+        if !self.powered {
+            return None;
+        }
+        [
+            (core.queue.next_at(), Due::Port),
+            (core.loops_change_at, Due::Loops),
+            (core.loops_return.map(|(at, _)| at), Due::LoopsReturn),
+            (core.sii.done_at(), Due::Sii),
+            (core.process_data_watchdog.expires(), Due::ProcessDataWatchdog),
+            (core.pdi_watchdog.expires(), Due::PdiWatchdog),
+            (core.reset_at, Due::Reset),
+            (core.firmware_at, Due::Firmware),
+        ]
+        .into_iter()
+        .filter_map(|(at, due)| Some((at?, due)))
+        .min()
+    }
+
+    pub(super) fn reschedule(&mut self) {
+        let dark = self.going_dark.then_some(Instant::ZERO);
+        self.next = dark.or(self.due().map(|(at, _)| at)).unwrap_or(Instant::MAX);
+    }
+
+    fn serve(&mut self, at: Instant, due: Due, signals: &mut Signals) {
+        let core = &mut self.core;
+        match due {
+            Due::Port => {
+                if let Some((_, happening)) = core.queue.pop_until(at) {
+                    core.happens(happening, at);
+                }
+            }
+            Due::Loops => core.change_loops(),
+            Due::LoopsReturn => core.return_loops(),
+            Due::Sii => self.finish_sii(at, signals),
+            Due::ProcessDataWatchdog => core.expire_process_data_watchdog(at),
+            Due::PdiWatchdog => core.expire_pdi_watchdog(),
+            Due::Reset => {
+                self.samples = false;
+                self.firmware.stop(signals);
+                core.start(at);
+            }
+            Due::Firmware => self.run_firmware(at, signals),
+        }
+    }
+
+    fn finish_sii(&mut self, at: Instant, signals: &mut Signals) {
+        let core = &mut self.core;
+        let starting = !core.started;
+        match core.sii.finish(&mut core.memory) {
+            Outcome::None => return,
+            Outcome::Loaded => core.loaded = true,
+            Outcome::NotLoaded => {}
+        }
+        core.refresh_dl_status();
+        if starting {
+            core.started = true;
+            self.firmware.start(at, &mut Pdi { core, signals, now: at });
+            self.samples = self.firmware.samples();
+            core.call_firmware(at);
+        }
+    }
+
+    fn run_firmware(&mut self, at: Instant, signals: &mut Signals) {
+        self.core.firmware_at = None;
+        if self.core.processor_stuck {
+            return;
+        }
+        let mut pdi = Pdi { core: &mut self.core, signals, now: at };
+        if let Some(wake) = self.firmware.run(at, &mut pdi) {
+            self.core.call_firmware(wake.max(at + SHORTEST_NAP));
+        }
+    }
+
+    // ---- the wire's side ----
+
+    /// The wire tells what a port sees; it happens when [`Controller::advance`] reaches `at`.
+    pub fn post(&mut self, at: Instant, event: PortEvent) {
+        self.core.queue.push(at, Happening::Posted(event));
+        if self.powered {
+            self.next = self.next.min(at);
+        }
+    }
+
+    /// Whether the loop of a port is open, as of the last [`Controller::advance`]: frames leave and
+    /// enter here. Port A is open when all are closed.
+    #[inline]
+    #[must_use]
+    pub fn is_open(&self, port: Port) -> bool {
+        self.powered && self.core.loops.is_open(port)
+    }
+
+    /// Whether the loop of a port will be open at `at`, as far as events posted so far tell, without
+    /// going there: for a frame that comes back while others are still to come.
+    #[must_use]
+    pub fn is_open_at(&self, port: Port, at: Instant) -> bool {
+        if at < self.next {
+            return self.is_open(port);
+        }
+        self.powered && self.core.loops_at(at).is_open(port)
+    }
+
+    /// Whether a frame that passes port A has come round the wrong way: the loop of port A is closed
+    /// and its mode is auto or auto close. Such frames may pass once.
+    #[must_use]
+    pub fn port_zero_closes_ring(&self) -> bool {
+        self.core.loops.port_zero_closes_ring()
+    }
+
+    /// The first bit of a frame reaches a port from outside at `at`, whether its loop is open or
+    /// closed. Call it before [`Controller::process`] for the port the frame came by.
+    #[inline]
+    pub fn enters(&mut self, at: Instant, port: Port, frame: &WireFrame) {
+        if self.powered {
+            self.core.enters(at, port, frame);
+            if let Some(first) = self.core.queue.next_at() {
+                self.next = self.next.min(first);
+            }
+        }
+    }
+
+    /// The processing unit: executes the datagrams of a frame in place. `at` is when its first bit
+    /// enters the unit. What a good frame wrote takes effect before this returns; loops, the device
+    /// and whatever else it sets going follow at the frame's end, with [`Controller::advance`].
+    pub fn process(
+        &mut self,
+        at: Instant,
+        frame: &mut WireFrame,
+        signals: &mut Signals,
+    ) -> Verdict {
+        if !self.powered {
+            return Verdict::Destroy;
+        }
+        self.advance(at, signals);
+        if self.samples {
+            self.firmware.sample(at, &mut Pdi { core: &mut self.core, signals, now: at });
+            self.core.rescheduled = true;
+        }
+        let verdict = self.core.process(at, frame);
+        if std::mem::take(&mut self.core.rescheduled) {
+            self.reschedule();
+        }
+        verdict
+    }
+
+    // ---- for the segment, faults and tests ----
+
+    /// Which controller it is.
+    #[must_use]
+    pub fn id(&self) -> DeviceId {
+        self.core.id
+    }
+
+    /// What it is made of.
+    #[must_use]
+    pub fn hardware(&self) -> &Hardware {
+        &self.core.hardware
+    }
+
+    /// The device behind it: for faults that make it misbehave.
+    pub fn firmware_mut(&mut self) -> &mut dyn Firmware {
+        &mut *self.firmware
+    }
+
+    /// The device's processor stops serving the controller at `at`, or serves it again: events stay
+    /// unanswered meanwhile and the PDI watchdog runs out.
+    pub fn set_processor_stuck(&mut self, at: Instant, stuck: bool) {
+        self.core.set_processor_stuck(stuck, at);
+        self.reschedule();
+    }
+
+    /// The content of its EEPROM.
+    #[must_use]
+    pub fn sii(&self) -> &[u8] {
+        self.core.sii.image()
+    }
+
+    /// A byte of a register, without any effect of reading it; 0 where there is none.
+    #[must_use]
+    pub fn register(&self, address: RegisterAddress) -> u8 {
+        self.core.memory.bytes().get(usize::from(address.0)).copied().unwrap_or(0)
+    }
+
+    /// DL status, 0x0110.
+    #[must_use]
+    pub fn dl_status(&self) -> DlStatus {
+        DlStatus(self.core.memory.u16(&r::DL_STATUS))
+    }
+
+    /// AL status, 0x0130.
+    #[must_use]
+    pub fn al_status(&self) -> AlStatus {
+        AlStatus(self.core.memory.u16(&r::AL_STATUS))
+    }
+
+    /// AL status code, 0x0134.
+    #[must_use]
+    pub fn al_code(&self) -> AlStatusCode {
+        AlStatusCode(self.core.memory.u16(&r::AL_STATUS_CODE))
+    }
+
+    /// Configured station address, 0x0010.
+    #[must_use]
+    pub fn station_address(&self) -> StationAddress {
+        StationAddress(self.core.memory.u16(&r::STATION_ADDRESS))
+    }
+
+    /// All error counters. Those of ports and kinds it does not have read 0.
+    #[must_use]
+    pub fn error_counters(&self) -> ErrorCounters {
+        let start = at(&r::RX_ERROR_COUNTER);
+        let bytes = &self.core.memory.bytes()[start..start + ErrorCounters::LEN];
+        ErrorCounters::from_bytes(bytes, ErrorCounters::START)
+    }
+
+    /// Gives a counter a value, as history does: old errors, noise at power-on. A counter that the
+    /// hardware does not have stays 0.
+    pub fn set_counter(&mut self, counter: ErrorCounter, value: u8) {
+        self.core.set_counter(counter.address(), value);
+    }
+
+    /// What the local clock shows, in ns.
+    #[must_use]
+    pub fn local_time(&self, at: Instant) -> u64 {
+        self.core.clock.local(at)
+    }
+
+    /// Changes the speed of the local clock, without a jump.
+    pub fn set_drift(&mut self, at: Instant, ppb: i64) {
+        self.core.clock.change_speed(at, ppb);
+    }
+}

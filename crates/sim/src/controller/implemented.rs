@@ -1,0 +1,211 @@
+//! Which registers a type of controller has: the register table, less what this segment does not
+//! do.
+//!
+//! What is not named here is not there: a read or write of it adds nothing to the working counter,
+//! as in a controller that lacks it. Reference: S2 1.3, column "availability".
+
+use linesman_proto::register::{self as r, Access, ControllerType, Features, Register, Unit};
+
+use super::memory::Rights;
+use crate::hardware::{Hardware, PortKind};
+
+/// What every controller has.
+const ALWAYS: &[Register] = &[
+    r::ESC_TYPE,
+    r::ESC_REVISION,
+    r::ESC_BUILD,
+    r::FMMU_COUNT,
+    r::SYNC_MANAGER_COUNT,
+    r::RAM_SIZE,
+    r::PORT_DESCRIPTOR,
+    r::ESC_FEATURES,
+    r::STATION_ADDRESS,
+    r::STATION_ALIAS,
+    r::REGISTER_WRITE_ENABLE,
+    r::REGISTER_WRITE_PROTECTION,
+    r::ESC_WRITE_ENABLE,
+    r::ESC_WRITE_PROTECTION,
+    r::ESC_RESET_ECAT,
+    r::DL_CONTROL,
+    r::PHYSICAL_READ_WRITE_OFFSET,
+    r::DL_STATUS,
+    r::AL_CONTROL,
+    r::AL_STATUS,
+    r::AL_STATUS_CODE,
+    r::PDI_CONTROL,
+    r::ESC_CONFIGURATION_A0,
+    r::PDI_CONFIGURATION,
+    r::SYNC_LATCH_CONFIGURATION,
+    r::PDI_CONFIGURATION_EXTENDED,
+    r::ECAT_EVENT_MASK,
+    r::AL_EVENT_MASK,
+    r::ECAT_EVENT_REQUEST,
+    r::AL_EVENT_REQUEST,
+    r::RX_ERROR_COUNTER,
+    r::PROCESSING_UNIT_ERROR_COUNTER,
+    r::PDI_ERROR_COUNTER,
+    r::LOST_LINK_COUNTER,
+    r::WATCHDOG_DIVIDER,
+    r::WATCHDOG_TIME_PDI,
+    r::WATCHDOG_TIME_PROCESS_DATA,
+    r::WATCHDOG_STATUS_PROCESS_DATA,
+    r::WATCHDOG_COUNTER_PROCESS_DATA,
+    r::WATCHDOG_COUNTER_PDI,
+    r::SII_ACCESS_ECAT,
+    r::SII_ACCESS_PDI,
+    r::SII_CONTROL_STATUS,
+    r::SII_ADDRESS,
+    r::SII_DATA,
+    r::FMMU,
+    r::SYNC_MANAGER,
+    r::DIGITAL_OUTPUT,
+    r::USER_RAM,
+];
+
+/// What comes with distributed clocks. The difference (0x092C) and what the loop makes of it
+/// (0x0932) are not computed, and so are not there; neither are the SYNC and latch units.
+const DISTRIBUTED_CLOCK: &[Register] = &[
+    r::RECEIVE_TIME,
+    r::SYSTEM_TIME,
+    r::RECEIVE_TIME_PROCESSING_UNIT,
+    r::SYSTEM_TIME_OFFSET,
+    r::SYSTEM_TIME_DELAY,
+    r::SPEED_COUNTER_START,
+    r::DIFFERENCE_FILTER_DEPTH,
+    r::SPEED_FILTER_DEPTH,
+];
+
+/// Where a write is a command, beside those that clear (whose access says so).
+const LIVE: &[Register] = &[
+    r::REGISTER_WRITE_ENABLE,
+    r::ESC_WRITE_ENABLE,
+    r::ESC_RESET_ECAT,
+    r::SII_ACCESS_ECAT,
+    r::SII_CONTROL_STATUS,
+    r::RECEIVE_TIME,
+    r::SYSTEM_TIME,
+];
+
+/// Where the moment decides whether a write is taken. The other registers marked `r/(w)` in the
+/// table depend on settings that this segment does not have.
+const CONDITIONAL: &[Register] =
+    &[r::AL_CONTROL, r::SII_CONTROL_STATUS, r::SII_ADDRESS, r::SII_DATA, r::SYNC_MANAGER];
+
+/// Fills in the rights of every register byte that `hardware` has.
+pub(super) fn fill(hardware: &Hardware, rights: &mut [u8]) {
+    for register in ALWAYS {
+        add(register, hardware, rights);
+    }
+    if hardware.counting.forwarded {
+        add(&r::FORWARDED_RX_ERROR_COUNTER, hardware, rights);
+    }
+    if has_configuration_a5(hardware) {
+        add(&r::ESC_CONFIGURATION_A5, hardware, rights);
+    }
+    if Features(hardware.features).distributed_clocks() {
+        for register in DISTRIBUTED_CLOCK {
+            add(register, hardware, rights);
+        }
+    }
+}
+
+/// Whether SII word 5 goes to 0x0142.
+pub(super) fn has_configuration_a5(hardware: &Hardware) -> bool {
+    matches!(
+        ControllerType(hardware.controller_type),
+        ControllerType::ET1100 | ControllerType::ET1200
+    )
+}
+
+fn add(register: &Register, hardware: &Hardware, rights: &mut [u8]) {
+    let among = |list: &[Register]| list.iter().any(|other| other.address == register.address);
+    let (live, conditional) = (among(LIVE), among(CONDITIONAL));
+    for index in (0..register.count()).filter(|index| has_member(register, *index, hardware)) {
+        let Some(address) = register.at(index) else { continue };
+        for offset in 0..width(register, hardware) {
+            let access = register.ecat_access(offset);
+            let mut byte = 0;
+            if access.reads() {
+                byte |= Rights::READ;
+            }
+            if access.writes() {
+                byte |= Rights::WRITE;
+                if conditional && access == Access::ReadWriteIf {
+                    byte |= Rights::CONDITIONAL;
+                }
+                if live || access == Access::ReadClear {
+                    byte |= Rights::LIVE;
+                }
+            }
+            rights[usize::from(address.0 + offset)] |= byte;
+        }
+    }
+}
+
+/// Whether the hardware has this member of a family.
+fn has_member(register: &Register, index: u16, hardware: &Hardware) -> bool {
+    match register.repeat.map(|repeat| repeat.unit) {
+        None => true,
+        Some(Unit::Fmmu) => index < u16::from(hardware.fmmus),
+        Some(Unit::SyncManager) => index < u16::from(hardware.sync_managers),
+        Some(Unit::Port) => hardware.ports.0[usize::from(index)] != PortKind::Absent,
+    }
+}
+
+/// Bytes of the register: clocks of 32 bits have the low half of long times only.
+fn width(register: &Register, hardware: &Hardware) -> u16 {
+    let long_time = [r::SYSTEM_TIME, r::RECEIVE_TIME_PROCESSING_UNIT, r::SYSTEM_TIME_OFFSET]
+        .iter()
+        .any(|other| other.address == register.address);
+    if long_time && !Features(hardware.features).clock_64_bit() { 4 } else { register.len }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::rig;
+    use super::*;
+
+    fn right(hardware: &Hardware, address: usize) -> u8 {
+        Rights::of(hardware).byte(address)
+    }
+
+    // proves: HW-29 partial
+    #[test]
+    fn registers_come_with_the_hardware() {
+        let full = rig::hardware();
+        assert_eq!(right(&full, 0x0000), Rights::READ);
+        assert_eq!(right(&full, 0x0010), Rights::READ | Rights::WRITE);
+        assert_eq!(right(&full, 0x0300), Rights::READ | Rights::WRITE | Rights::LIVE);
+        assert_eq!(right(&full, 0x000A), 0, "reserved");
+        assert_eq!(right(&full, 0x0510), 0, "PHY management is not done");
+        assert_eq!(right(&full, 0x092C), 0, "the difference is not computed");
+
+        let mut small = full.clone();
+        small.counting.forwarded = false;
+        small.ports.0[2] = PortKind::Absent;
+        small.ports.0[3] = PortKind::Absent;
+        small.fmmus = 3;
+        small.sync_managers = 4;
+        small.features = 0;
+        for gone in [0x0308, 0x0304, 0x0307, 0x0312, 0x0630, 0x0820, 0x0900, 0x0910] {
+            assert_ne!(right(&full, gone), 0, "0x{gone:04X}");
+            assert_eq!(right(&small, gone), 0, "0x{gone:04X}");
+        }
+        small.features = 0x0004;
+        assert_ne!(right(&small, 0x0913), 0);
+        assert_eq!(right(&small, 0x0914), 0, "a 32-bit clock");
+        assert_ne!(right(&full, 0x0917), 0);
+    }
+
+    #[test]
+    fn a_sync_manager_is_written_by_its_rules() {
+        let rights = Rights::of(&rig::hardware());
+        let both = Rights::READ | Rights::WRITE;
+        for offset in 0..5 {
+            assert_eq!(rights.byte(0x0810 + offset), both | Rights::CONDITIONAL);
+        }
+        assert_eq!(rights.byte(0x0815), Rights::READ, "status");
+        assert_eq!(rights.byte(0x0816), both, "activate");
+        assert_eq!(rights.byte(0x0817), Rights::READ, "PDI control");
+    }
+}

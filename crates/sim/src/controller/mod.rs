@@ -1,0 +1,36 @@
+//! The EtherCAT controller with the device behind it.
+//!
+//! [`Controller`] is what the wire talks to. Inside, one file per concern: `processing_unit`
+//! executes datagrams, `access` finds the memory behind an address, `fmmu` and `sync_manager` map
+//! and guard it, `register_write` does what written registers ask for, [`pdi`] is the view from the
+//! other side.
+//!
+//! Read first: S1 chapters 3 (frame processing), 7 (FMMU), 8 (SyncManager), 11 (SII), 14 (error
+//! counters), 17.3 (write protection); S2 for each register.
+
+mod access;
+mod clock;
+mod core;
+mod esc;
+mod event;
+mod fmmu;
+mod implemented;
+mod loops;
+mod memory;
+pub mod pdi;
+mod posted;
+mod processing_unit;
+mod register_write;
+mod shadow;
+mod sii;
+mod sync_manager;
+mod watchdog;
+
+pub use clock::LocalClock;
+pub use esc::{Controller, Verdict};
+pub use pdi::Pdi;
+pub use posted::{CountKind, PortEvent};
+pub use sii::{LOAD_TIME, PROGRAMMING_TIME, READ_TIME, STARTUP_DELAY, WRITE_TIME};
+
+#[cfg(test)]
+pub(crate) mod tests;

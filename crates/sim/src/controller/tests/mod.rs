@@ -1,0 +1,15 @@
+//! Tests of the controller through frames: what a MainDevice sees of it.
+
+mod application;
+mod clock;
+mod commands;
+mod damage;
+mod fmmu;
+mod frames;
+mod memory;
+mod ports;
+mod properties;
+pub(crate) mod rig;
+mod sii;
+mod sync_manager;
+mod watchdog;

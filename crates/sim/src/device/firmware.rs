@@ -1,0 +1,52 @@
+//! The seam between a controller and what is behind it.
+//!
+//! The controller calls; firmware answers through the [`Pdi`] it is handed. Everything happens at
+//! an instant that is an argument, so that the same frames at the same times give the same bytes.
+
+use std::fmt::Debug;
+
+use linesman_proto::time::Instant;
+
+use super::signal::Signals;
+use crate::controller::Pdi;
+
+/// What is behind a controller: a processor with its software, or plain inputs and outputs.
+pub trait Firmware: Debug + Send {
+    /// The supply is there and the controller has tried to load the SII
+    /// ([`Pdi::sii_load_ok`] says how that went). Whatever was before is forgotten.
+    fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>);
+
+    /// Something happened on the EtherCAT side, or the wake-up time came. `now` is when that was:
+    /// for a datagram the end of its frame. Returns the next wake-up, if one is wanted; it replaces
+    /// the one before. A wake-up that is not after `now` comes 1 µs after it.
+    ///
+    /// It is called once after [`Firmware::start`], then when an AL event bit gets set (masked or
+    /// not), when a SyncManager was written, when the outputs at 0x0F00 were written, and when
+    /// device emulation changed AL status.
+    fn run(&mut self, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant>;
+
+    /// Whether [`Firmware::sample`] is wanted. Asked once, after [`Firmware::start`].
+    fn samples(&self) -> bool {
+        false
+    }
+
+    /// A frame begins: controllers that drive inputs themselves latch them now (S1, digital I/O,
+    /// input sampling at start of frame). Called only where [`Firmware::samples`] asks for it.
+    fn sample(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// The supply is gone: outputs are no longer driven. Nothing else can be done any more.
+    fn stop(&mut self, _signals: &mut Signals) {}
+}
+
+/// Nothing behind the controller: couplers and junctions. AL status follows AL control when the SII
+/// says "device emulation"; otherwise no request is ever answered.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct NoFirmware;
+
+impl Firmware for NoFirmware {
+    fn start(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    fn run(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) -> Option<Instant> {
+        None
+    }
+}

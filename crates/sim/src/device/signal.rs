@@ -1,0 +1,74 @@
+//! Electrical signals between devices: outputs of one terminal wired to inputs of another.
+
+/// A signal: a wire between terminals, by its number in [`Signals`].
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub struct SignalId(pub u32);
+
+/// All signals of a segment with their present values.
+///
+/// A digital signal is 0 or 1; what the number of an analogue one means (digits, mV, …) is agreed
+/// between the devices that share it.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub struct Signals(Vec<i32>);
+
+impl Signals {
+    /// `count` signals, all 0.
+    #[must_use]
+    pub fn new(count: usize) -> Self {
+        Self(vec![0; count])
+    }
+
+    /// One more signal, 0 at first.
+    pub fn add(&mut self) -> SignalId {
+        self.0.push(0);
+        SignalId((self.0.len() - 1) as u32)
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Its value; 0 for a signal that does not exist: an open input reads low.
+    #[must_use]
+    pub fn value(&self, signal: SignalId) -> i32 {
+        self.0.get(signal.0 as usize).copied().unwrap_or(0)
+    }
+
+    /// Drives it. A signal that does not exist goes nowhere.
+    pub fn set(&mut self, signal: SignalId, value: i32) {
+        if let Some(slot) = self.0.get_mut(signal.0 as usize) {
+            *slot = value;
+        }
+    }
+
+    /// Whether a digital signal is high.
+    #[must_use]
+    pub fn is_high(&self, signal: SignalId) -> bool {
+        self.value(signal) != 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_keep_what_they_are_driven_to() {
+        let mut signals = Signals::new(1);
+        let added = signals.add();
+        assert_eq!((added, signals.len()), (SignalId(1), 2));
+        signals.set(added, -7);
+        assert_eq!((signals.value(added), signals.is_high(added)), (-7, true));
+        assert!(!signals.is_high(SignalId(0)));
+        signals.set(SignalId(9), 1);
+        assert_eq!(signals.value(SignalId(9)), 0, "a signal that leads nowhere reads low");
+    }
+}

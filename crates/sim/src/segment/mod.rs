@@ -1,0 +1,1 @@
+//! A whole network: controllers, wires, the cards of the MainDevice.
