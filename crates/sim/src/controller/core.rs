@@ -10,6 +10,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::clock::{LocalClock, RunningClock};
 use super::fmmu::Fmmus;
+use super::implemented;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
 use super::posted::{CountKind, Happening, PortEvent, Queue};
@@ -91,7 +92,7 @@ impl Core {
         Self {
             id,
             memory: Memory::new(&hardware),
-            rights: Rights::of(&hardware),
+            rights: Rights::of(&hardware, false),
             loops: Loops::new(&hardware),
             queue: Queue::default(),
             fmmus: Fmmus::new(),
@@ -130,6 +131,7 @@ impl Core {
         self.clock = RunningClock::new(self.quartz, now);
         self.powered_at = now;
         self.loaded = false;
+        self.rights = Rights::of(&self.hardware, false);
         self.started = false;
         self.irq = 0;
         self.process_data_watchdog.stop();
@@ -174,12 +176,12 @@ impl Core {
         self.memory.put(at(&r::ESC_TYPE), &information.to_bytes());
     }
 
-    /// Registers that do not start at 0. The receive times of ports that are not there hold whatever
-    /// was left in them: nobody may use those.
+    /// Registers that do not start at 0. Receive times hold whatever was left in them, as real ones
+    /// hold letters: those of ports that no frame passes must not be used.
     fn put_reset_values(&mut self) {
         const LEFTOVER: &[u8; 4] = b"left";
-        for port in Port::ALL {
-            if self.hardware.ports[port] == PortKind::Absent {
+        if Features(self.hardware.features).distributed_clocks() {
+            for port in Port::ALL {
                 self.memory.put(usize::from(r::RECEIVE_TIME.of_port(port).0), LEFTOVER);
             }
         }
@@ -210,6 +212,18 @@ impl Core {
         (self.loops_change_at, self.loops_return, self.reset_at) = (None, None, None);
         self.firmware_at = None;
         self.irq = 0;
+    }
+
+    /// The configuration area was loaded: what depends on it follows.
+    pub(super) fn loaded(&mut self) {
+        const DEACTIVATED: u8 = 0;
+        self.loaded = true;
+        let a0 = self.memory.u8(&r::ESC_CONFIGURATION_A0);
+        let a5 = self.memory.u16(&r::ESC_CONFIGURATION_A5);
+        let time_loop = implemented::has_time_loop(&self.hardware, a0, a5);
+        self.rights = Rights::of(&self.hardware, time_loop);
+        // Without an interface nobody triggers its watchdog, as the EK1100 shows.
+        self.pdi_watchdog_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
     }
 
     /// Calls the device behind at `when`, or earlier if it was to be called earlier anyway.
@@ -465,7 +479,8 @@ impl Core {
             let divider = self.divider();
             self.pdi_watchdog.trigger(when, self.powered_at, divider, time);
         }
-        if !self.processor_stuck || time == WatchdogTime::OFF {
+        let served = !self.processor_stuck && self.memory.u8(&r::PDI_CONTROL) != 0;
+        if served || time == WatchdogTime::OFF {
             self.pdi_watchdog_ok = true;
             self.refresh_dl_status();
         }

@@ -208,7 +208,7 @@ impl Controller {
         let starting = !core.started;
         match core.sii.finish(&mut core.memory) {
             Outcome::None => return,
-            Outcome::Loaded => core.loaded = true,
+            Outcome::Loaded => core.loaded(),
             Outcome::NotLoaded => {}
         }
         core.refresh_dl_status();
