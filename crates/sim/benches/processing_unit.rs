@@ -1,6 +1,6 @@
 //! How long a controller takes for a datagram: what a segment of many devices is made of.
 //!
-//! Time per frame through one processing unit; each frame carries one datagram.
+//! Time per frame through one processing unit; each frame carries one datagram unless said.
 
 use std::hint::black_box;
 
@@ -52,10 +52,17 @@ fn hardware() -> Hardware {
 }
 
 fn frame(command: Command, address: DatagramAddress, data: &[u8]) -> WireFrame {
+    frame_of(1, command, address, data)
+}
+
+/// A frame with `count` equal datagrams.
+fn frame_of(count: u8, command: Command, address: DatagramAddress, data: &[u8]) -> WireFrame {
     let mut buffer = vec![0; 1_514];
     let mut builder = FrameBuilder::new(&mut buffer, MacAddress::default());
-    let slot = builder.push(command, 0, address, data.len()).expect("the data fit");
-    slot.copy_from_slice(data);
+    for index in 0..count {
+        let slot = builder.push(command, index, address, data.len()).expect("the data fit");
+        slot.copy_from_slice(data);
+    }
     let len = builder.finish();
     buffer.truncate(len);
     WireFrame { bytes: buffer, damage: Damage::default(), number: 0 }
@@ -91,6 +98,10 @@ fn processing_unit(criterion: &mut Criterion) {
         ("BRD AL status", frame(Command::Brd, physical(0, r::AL_STATUS.address), &[0; 2])),
         ("FPRD hit", frame(Command::Fprd, physical(STATION, r::AL_STATUS.address), &[0; 6])),
         ("FPRD miss", frame(Command::Fprd, physical(0x2000, r::AL_STATUS.address), &[0; 6])),
+        (
+            "51 x FPRD miss",
+            frame_of(51, Command::Fprd, physical(0x2000, r::AL_STATUS.address), &[0; 6]),
+        ),
         ("LRW mapped", frame(Command::Lrw, logical(0x1000), &[0; 16])),
         ("LRW mapped, 1 KB", frame(Command::Lrw, logical(0x0E00), &[0; 1_024])),
         ("LRW unmapped", frame(Command::Lrw, logical(0x8000), &[0; 1_024])),

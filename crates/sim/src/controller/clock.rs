@@ -1,8 +1,14 @@
-//! The local clock of a controller: a quartz that is a little off, counting from power-on.
+//! The local clock of a controller, a quartz that is a little off and counts from power-on; the
+//! receive times it takes, and the system time made of it.
 //!
 //! Reference: S1 chapter 9 (distributed clocks), S2 2.15.
 
+use linesman_proto::port::Port;
+use linesman_proto::register as r;
 use linesman_proto::time::Instant;
+
+use super::core::{Core, Passing};
+use crate::hardware::PortKind;
 
 /// How a controller's quartz behaves.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
@@ -45,6 +51,34 @@ impl RunningClock {
     /// Changes its speed at an instant without a jump.
     pub(super) fn change_speed(&mut self, at: Instant, ppb: i64) {
         *self = Self::new(LocalClock { start: self.local(at), ppb }, at);
+    }
+}
+
+impl Core {
+    /// The frame that just passed wrote to 0x0900: its receive times are kept, those of ports that
+    /// it has not reached yet when it does.
+    pub(super) fn latch_receive_times(&mut self) {
+        let Passing { number, began, .. } = self.passing;
+        self.latched = Some(number);
+        let local = self.clock.local(began);
+        self.memory.set_u64(&r::RECEIVE_TIME_PROCESSING_UNIT, local);
+        for port in Port::ALL {
+            let (frame, when) = self.entered[port];
+            if frame == number && self.hardware.ports[port] != PortKind::Absent {
+                self.latch_receive_time(port, when);
+            }
+        }
+    }
+
+    pub(super) fn latch_receive_time(&mut self, port: Port, when: Instant) {
+        let local = self.clock.local(when) as u32;
+        let address = usize::from(r::RECEIVE_TIME.of_port(port).0);
+        self.memory.put(address, &local.to_le_bytes());
+    }
+
+    /// The local copy of the system time.
+    pub(super) fn system_time(&self, when: Instant) -> u64 {
+        self.clock.local(when).wrapping_add(self.memory.u64(&r::SYSTEM_TIME_OFFSET))
     }
 }
 

@@ -1,27 +1,26 @@
-//! The controller without the device behind it: its parts, and what they do to each other.
+//! The controller without the device behind it: its parts, and how they start.
+//!
+//! Reference: S2 chapter 2 (identity), the reset values in each register's chapter.
 
-use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::address::DeviceId;
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
-    self as r, AlControl, AlStatus, DlControl, DlStatus, ErrorCounter, EscInformation, Features,
-    FmmuConfig, PortDescriptor, PortType, WatchdogDivider, WatchdogTime,
+    self as r, AlControl, AlStatus, DlControl, EscInformation, Features, FmmuConfig,
+    PortDescriptor, PortType, WatchdogDivider, WatchdogTime,
 };
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::time::Instant;
 
 use super::clock::{LocalClock, RunningClock};
 use super::fmmu::Fmmus;
+use super::implemented;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
-use super::posted::{CountKind, Happening, PortEvent, Queue};
+use super::posted::Queue;
 use super::shadow::Shadow;
 use super::sii::Sii;
 use super::sync_manager::{self, SyncManagers};
 use super::watchdog::Watchdog;
-use crate::frame::WireFrame;
 use crate::hardware::{Hardware, PortKind};
-
-/// How long loop modes hold that were set for temporary use ("approximately one second", S2 2.4.1).
-const TEMPORARY_LOOPS: Span = Span::s(1);
 
 /// All that a MainDevice sees.
 #[derive(Debug)]
@@ -51,7 +50,7 @@ pub(super) struct Core {
     pub(super) irq: u16,
     pub(super) process_data_watchdog: Watchdog,
     pub(super) pdi_watchdog: Watchdog,
-    pdi_watchdog_ok: bool,
+    pub(super) pdi_watchdog_ok: bool,
     /// The processor behind the controller has stopped serving it.
     pub(super) processor_stuck: bool,
     /// When written loop modes take effect: at the end of the frame that wrote them.
@@ -59,15 +58,15 @@ pub(super) struct Core {
     /// When temporary loop modes end, and the byte that returns.
     pub(super) loops_return: Option<(Instant, u8)>,
     /// The last loss of a link that was reported for each port.
-    link_lost_at: PortMap<Option<Instant>>,
+    pub(super) link_lost_at: PortMap<Option<Instant>>,
     pub(super) reset_at: Option<Instant>,
     reset_frame: u64,
     /// When the device behind is to be called.
     pub(super) firmware_at: Option<Instant>,
     /// The last frame whose first bit came in by each port, and when.
-    entered: PortMap<(u64, Instant)>,
+    pub(super) entered: PortMap<(u64, Instant)>,
     /// The frame whose receive times are being latched.
-    latched: Option<u64>,
+    pub(super) latched: Option<u64>,
     pub(super) passing: Passing,
 }
 
@@ -91,7 +90,7 @@ impl Core {
         Self {
             id,
             memory: Memory::new(&hardware),
-            rights: Rights::of(&hardware),
+            rights: Rights::of(&hardware, false),
             loops: Loops::new(&hardware),
             queue: Queue::default(),
             fmmus: Fmmus::new(),
@@ -130,6 +129,7 @@ impl Core {
         self.clock = RunningClock::new(self.quartz, now);
         self.powered_at = now;
         self.loaded = false;
+        self.rights = Rights::of(&self.hardware, false);
         self.started = false;
         self.irq = 0;
         self.process_data_watchdog.stop();
@@ -174,12 +174,12 @@ impl Core {
         self.memory.put(at(&r::ESC_TYPE), &information.to_bytes());
     }
 
-    /// Registers that do not start at 0. The receive times of ports that are not there hold whatever
-    /// was left in them: nobody may use those.
+    /// Registers that do not start at 0. Receive times hold whatever was left in them, as real ones
+    /// hold letters: those of ports that no frame passes must not be used.
     fn put_reset_values(&mut self) {
         const LEFTOVER: &[u8; 4] = b"left";
-        for port in Port::ALL {
-            if self.hardware.ports[port] == PortKind::Absent {
+        if Features(self.hardware.features).distributed_clocks() {
+            for port in Port::ALL {
                 self.memory.put(usize::from(r::RECEIVE_TIME.of_port(port).0), LEFTOVER);
             }
         }
@@ -212,181 +212,22 @@ impl Core {
         self.irq = 0;
     }
 
+    /// The configuration area was loaded: what depends on it follows.
+    pub(super) fn loaded(&mut self) {
+        const DEACTIVATED: u8 = 0;
+        self.loaded = true;
+        let a0 = self.memory.u8(&r::ESC_CONFIGURATION_A0);
+        let a5 = self.memory.u16(&r::ESC_CONFIGURATION_A5);
+        let time_loop = implemented::has_time_loop(&self.hardware, a0, a5);
+        self.rights = Rights::of(&self.hardware, time_loop);
+        // Without an interface nobody triggers its watchdog, as the EK1100 shows.
+        self.pdi_watchdog_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
+    }
+
     /// Calls the device behind at `when`, or earlier if it was to be called earlier anyway.
     pub(super) fn call_firmware(&mut self, when: Instant) {
         self.firmware_at = Some(self.firmware_at.map_or(when, |at| at.min(when)));
     }
-
-    // ---- ports ----
-
-    pub(super) fn happens(&mut self, happening: Happening, when: Instant) {
-        match happening {
-            Happening::Posted(PortEvent::Count { port, kind }) => self.count(port, kind, when),
-            Happening::Posted(PortEvent::Link { port, up }) => {
-                if !up {
-                    self.count(port, CountKind::LostLink, when);
-                }
-                self.loops.apply(happening);
-                self.refresh_dl_status();
-            }
-            Happening::GoodFrame(_) => {
-                self.loops.apply(happening);
-                self.refresh_dl_status();
-            }
-        }
-    }
-
-    /// Moves a counter, if the rules let it move.
-    pub(super) fn count(&mut self, port: Port, kind: CountKind, when: Instant) {
-        let counts = self.loops.is_open(port) || self.hardware.counting.counts_when_closed;
-        let (counter, counts) = match kind {
-            CountKind::SymbolError => (ErrorCounter::PhysicalLayer(port), counts),
-            CountKind::InvalidFrame => (ErrorCounter::InvalidFrame(port), counts),
-            CountKind::ForwardedError => (ErrorCounter::Forwarded(port), counts),
-            CountKind::ProcessingUnitError => (ErrorCounter::ProcessingUnit, true),
-            CountKind::LostLink => {
-                let again = self.link_lost_at[port].replace(when) == Some(when);
-                (ErrorCounter::LostLink(port), self.loops.counts_lost_link(port) && !again)
-            }
-        };
-        if counts {
-            self.increment(counter.address());
-        }
-    }
-
-    /// One more, up to 255. Counters that the controller does not have stay at 0.
-    pub(super) fn increment(&mut self, address: RegisterAddress) {
-        let address = usize::from(address.0);
-        if self.rights.byte(address) & Rights::READ != 0 {
-            let counter = &mut self.memory.bytes_mut()[address];
-            *counter = counter.saturating_add(1);
-        }
-    }
-
-    /// Gives a counter a value, if the controller has it.
-    pub(super) fn set_counter(&mut self, address: RegisterAddress, value: u8) {
-        let address = usize::from(address.0);
-        if self.rights.byte(address) & Rights::READ != 0 {
-            self.memory.bytes_mut()[address] = value;
-        }
-    }
-
-    /// Written loop modes take effect.
-    pub(super) fn change_loops(&mut self) {
-        self.loops_change_at = None;
-        self.loops.rewrite(DlControl(self.memory.u32(&r::DL_CONTROL)));
-        self.refresh_dl_status();
-    }
-
-    /// The loop byte of DL control was written, in a frame that ended at `end`; `before` is what it
-    /// was.
-    pub(super) fn loops_written(&mut self, before: DlControl, end: Instant) {
-        let control = DlControl(self.memory.u32(&r::DL_CONTROL));
-        self.loops_change_at = Some(end);
-        self.loops_return = match (control.temporary(), self.loops_return) {
-            (false, _) => None,
-            (true, Some((_, byte))) => Some((end + TEMPORARY_LOOPS, byte)),
-            (true, None) => Some((end + TEMPORARY_LOOPS, before.to_bytes()[1])),
-        };
-    }
-
-    /// Temporary loop modes end: the former ones return.
-    pub(super) fn return_loops(&mut self) {
-        let Some((_, byte)) = self.loops_return.take() else { return };
-        let control = self.returned_loops(byte);
-        self.memory.set_u32(&r::DL_CONTROL, control.0);
-        self.change_loops();
-    }
-
-    /// DL control once its loop byte is `byte` again.
-    fn returned_loops(&self, byte: u8) -> DlControl {
-        let control = DlControl(self.memory.u32(&r::DL_CONTROL)).with_temporary(false);
-        let [low, _, high, highest] = control.to_bytes();
-        DlControl::from_bytes([low, byte, high, highest])
-    }
-
-    /// The loops as they will be at `when`, as far as is known now.
-    pub(super) fn loops_at(&self, when: Instant) -> Loops {
-        let mut loops = self.loops;
-        let written = DlControl(self.memory.u32(&r::DL_CONTROL));
-        let mut rewrites = [
-            self.loops_change_at.map(|at| (at, written)),
-            self.loops_return.map(|(at, byte)| (at, self.returned_loops(byte))),
-        ]
-        .into_iter()
-        .flatten()
-        .filter(|(at, _)| *at <= when)
-        .peekable();
-        for (at, happening) in self.queue.until(when) {
-            while let Some((_, control)) = rewrites.next_if(|(rewrite, _)| *rewrite < at) {
-                loops.rewrite(control);
-            }
-            loops.apply(happening);
-        }
-        for (_, control) in rewrites {
-            loops.rewrite(control);
-        }
-        loops
-    }
-
-    /// DL status as it is now.
-    fn dl_status(&self) -> DlStatus {
-        /// Bits of 0x0141 for enhanced link detection: all ports, each port.
-        const LINK_DETECTION: u8 = 0b1111_0010;
-        let detection = self.memory.u8(&r::ESC_CONFIGURATION_A0) & LINK_DETECTION != 0;
-        let base = DlStatus::default()
-            .with_pdi(self.loaded, self.pdi_watchdog_ok)
-            .with_enhanced_link_detection(detection);
-        self.loops.status(base)
-    }
-
-    /// Shows a change in DL status, and tells of it.
-    pub(super) fn refresh_dl_status(&mut self) {
-        let status = self.dl_status().0;
-        if self.memory.u16(&r::DL_STATUS) != status {
-            self.memory.set_u16(&r::DL_STATUS, status);
-            self.raise_ecat_events(r::EcatEvents::DL_STATUS);
-        }
-    }
-
-    /// The first bit of a frame comes in.
-    pub(super) fn enters(&mut self, when: Instant, port: Port, frame: &WireFrame) {
-        self.entered[port] = (frame.number, when);
-        if self.latched == Some(frame.number) && self.loops.is_open(port) {
-            self.latch_receive_time(port, when);
-        }
-        if self.loops.waits_for_frame(port) && frame.damage.is_intact() {
-            self.queue.push(when + frame.duration(), Happening::GoodFrame(port));
-        }
-    }
-
-    /// The frame that just passed wrote to 0x0900: its receive times are kept, those of ports that
-    /// it has not reached yet when it does.
-    pub(super) fn latch_receive_times(&mut self) {
-        let Passing { number, began, .. } = self.passing;
-        self.latched = Some(number);
-        let local = self.clock.local(began);
-        self.memory.set_u64(&r::RECEIVE_TIME_PROCESSING_UNIT, local);
-        for port in Port::ALL {
-            let (frame, when) = self.entered[port];
-            if frame == number && self.hardware.ports[port] != PortKind::Absent {
-                self.latch_receive_time(port, when);
-            }
-        }
-    }
-
-    fn latch_receive_time(&mut self, port: Port, when: Instant) {
-        let local = self.clock.local(when) as u32;
-        let address = usize::from(r::RECEIVE_TIME.of_port(port).0);
-        self.memory.put(address, &local.to_le_bytes());
-    }
-
-    /// The local copy of the system time.
-    pub(super) fn system_time(&self, when: Instant) -> u64 {
-        self.clock.local(when).wrapping_add(self.memory.u64(&r::SYSTEM_TIME_OFFSET))
-    }
-
-    // ---- configuration ----
 
     pub(super) fn configure_fmmus(&mut self) {
         let memory = &self.memory;
@@ -414,67 +255,5 @@ impl Core {
         if step == SEQUENCE.len() {
             self.reset_at = Some(end);
         }
-    }
-
-    // ---- watchdogs ----
-
-    fn divider(&self) -> WatchdogDivider {
-        WatchdogDivider(self.memory.u16(&r::WATCHDOG_DIVIDER))
-    }
-
-    /// Fresh outputs came.
-    pub(super) fn trigger_process_data_watchdog(&mut self, when: Instant) {
-        let time = WatchdogTime(self.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA));
-        let divider = self.divider();
-        self.process_data_watchdog.trigger(when, self.powered_at, divider, time);
-        self.memory.set_u16(&r::WATCHDOG_STATUS_PROCESS_DATA, 1);
-    }
-
-    pub(super) fn expire_process_data_watchdog(&mut self, when: Instant) {
-        self.process_data_watchdog.stop();
-        self.memory.set_u16(&r::WATCHDOG_STATUS_PROCESS_DATA, 0);
-        self.increment(r::WATCHDOG_COUNTER_PROCESS_DATA.address);
-        self.raise_al_events(r::AlEvents::PROCESS_DATA_WATCHDOG, when);
-    }
-
-    /// Divider or times were written: what runs, runs anew; time 0 switches off, and off means "not
-    /// expired" (S2 2.10.5).
-    pub(super) fn retime_watchdogs(&mut self, when: Instant) {
-        let off = self.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA) == 0;
-        if off || self.process_data_watchdog.is_running() {
-            self.trigger_process_data_watchdog(when);
-        }
-        self.retime_pdi_watchdog(when);
-    }
-
-    /// The processor stops serving the controller, or serves it again.
-    pub(super) fn set_processor_stuck(&mut self, stuck: bool, when: Instant) {
-        self.processor_stuck = stuck;
-        if !stuck {
-            // What happened meanwhile is still to be served.
-            self.call_firmware(when);
-        }
-        self.retime_pdi_watchdog(when);
-    }
-
-    /// While it is served, the PDI watchdog is triggered all the time.
-    fn retime_pdi_watchdog(&mut self, when: Instant) {
-        self.pdi_watchdog.stop();
-        let time = WatchdogTime(self.memory.u16(&r::WATCHDOG_TIME_PDI));
-        if self.processor_stuck && self.pdi_watchdog_ok {
-            let divider = self.divider();
-            self.pdi_watchdog.trigger(when, self.powered_at, divider, time);
-        }
-        if !self.processor_stuck || time == WatchdogTime::OFF {
-            self.pdi_watchdog_ok = true;
-            self.refresh_dl_status();
-        }
-    }
-
-    pub(super) fn expire_pdi_watchdog(&mut self) {
-        self.pdi_watchdog.stop();
-        self.pdi_watchdog_ok = false;
-        self.increment(r::WATCHDOG_COUNTER_PDI.address);
-        self.refresh_dl_status();
     }
 }

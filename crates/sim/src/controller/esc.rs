@@ -35,6 +35,11 @@ pub enum Verdict {
 }
 
 /// An EtherCAT controller with the device behind it.
+///
+/// For each frame the wire calls [`enters`](Self::enters) at the port it comes by and, where its way
+/// leads past port A, [`process`](Self::process). It posts what ports and the unit see of *damage*
+/// ([`CountKind`](super::CountKind)); what is wrong with the content of an intact frame the unit
+/// counts itself, and lost links the controller counts when their loss is posted.
 #[derive(Debug)]
 pub struct Controller {
     pub(super) core: Core,
@@ -48,7 +53,7 @@ pub struct Controller {
 }
 
 /// What can be due. Of things due at the same instant the first in this list comes first.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Due {
     Port,
     Loops,
@@ -144,10 +149,14 @@ impl Controller {
         if !self.powered {
             while self.core.queue.pop_until(now).is_some() {}
         }
-        while let Some((at, due)) = self.due().filter(|(at, _)| *at <= now) {
+        loop {
+            let (at, due) = self.due();
+            if at > now || at == Instant::MAX {
+                self.next = at;
+                break;
+            }
             self.serve(at, due, signals);
         }
-        self.reschedule();
     }
 
     /// When something will happen by itself, if anything will.
@@ -156,29 +165,33 @@ impl Controller {
         (self.next != Instant::MAX).then_some(self.next)
     }
 
-    fn due(&self) -> Option<(Instant, Due)> {
+    /// What is due first, and when; [`Instant::MAX`] for nothing.
+    fn due(&self) -> (Instant, Due) {
         let core = &self.core;
+        let mut first = (Instant::MAX, Due::Firmware);
         if !self.powered {
-            return None;
+            return first;
         }
-        [
-            (core.queue.next_at(), Due::Port),
-            (core.loops_change_at, Due::Loops),
-            (core.loops_return.map(|(at, _)| at), Due::LoopsReturn),
-            (core.sii.done_at(), Due::Sii),
-            (core.process_data_watchdog.expires(), Due::ProcessDataWatchdog),
-            (core.pdi_watchdog.expires(), Due::PdiWatchdog),
-            (core.reset_at, Due::Reset),
-            (core.firmware_at, Due::Firmware),
-        ]
-        .into_iter()
-        .filter_map(|(at, due)| Some((at?, due)))
-        .min()
+        let mut consider = |at: Option<Instant>, due: Due| {
+            if let Some(at) = at
+                && at < first.0
+            {
+                first = (at, due);
+            }
+        };
+        consider(core.queue.next_at(), Due::Port);
+        consider(core.loops_change_at, Due::Loops);
+        consider(core.loops_return.map(|(at, _)| at), Due::LoopsReturn);
+        consider(core.sii.done_at(), Due::Sii);
+        consider(core.process_data_watchdog.expires(), Due::ProcessDataWatchdog);
+        consider(core.pdi_watchdog.expires(), Due::PdiWatchdog);
+        consider(core.reset_at, Due::Reset);
+        consider(core.firmware_at, Due::Firmware);
+        first
     }
 
     pub(super) fn reschedule(&mut self) {
-        let dark = self.going_dark.then_some(Instant::ZERO);
-        self.next = dark.or(self.due().map(|(at, _)| at)).unwrap_or(Instant::MAX);
+        self.next = if self.going_dark { Instant::ZERO } else { self.due().0 };
     }
 
     fn serve(&mut self, at: Instant, due: Due, signals: &mut Signals) {
@@ -208,7 +221,7 @@ impl Controller {
         let starting = !core.started;
         match core.sii.finish(&mut core.memory) {
             Outcome::None => return,
-            Outcome::Loaded => core.loaded = true,
+            Outcome::Loaded => core.loaded(),
             Outcome::NotLoaded => {}
         }
         core.refresh_dl_status();

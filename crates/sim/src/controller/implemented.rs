@@ -62,10 +62,10 @@ const ALWAYS: &[Register] = &[
     r::USER_RAM,
 ];
 
-/// What comes with distributed clocks. The difference (0x092C) and what the loop makes of it
-/// (0x0932) are not computed, and so are not there; neither are the SYNC and latch units.
-const DISTRIBUTED_CLOCK: &[Register] = &[
-    r::RECEIVE_TIME,
+/// What the time loop control unit of distributed clocks has. The difference (0x092C) and what the
+/// loop makes of it (0x0932) are not computed, and so are not there; neither are the SYNC and latch
+/// units.
+const TIME_LOOP: &[Register] = &[
     r::SYSTEM_TIME,
     r::RECEIVE_TIME_PROCESSING_UNIT,
     r::SYSTEM_TIME_OFFSET,
@@ -91,8 +91,9 @@ const LIVE: &[Register] = &[
 const CONDITIONAL: &[Register] =
     &[r::AL_CONTROL, r::SII_CONTROL_STATUS, r::SII_ADDRESS, r::SII_DATA, r::SYNC_MANAGER];
 
-/// Fills in the rights of every register byte that `hardware` has.
-pub(super) fn fill(hardware: &Hardware, rights: &mut [u8]) {
+/// Fills in the rights of every register byte that `hardware` has. `time_loop` says whether the time
+/// loop control unit is on.
+pub(super) fn fill(hardware: &Hardware, time_loop: bool, rights: &mut [u8]) {
     for register in ALWAYS {
         add(register, hardware, rights);
     }
@@ -103,10 +104,21 @@ pub(super) fn fill(hardware: &Hardware, rights: &mut [u8]) {
         add(&r::ESC_CONFIGURATION_A5, hardware, rights);
     }
     if Features(hardware.features).distributed_clocks() {
-        for register in DISTRIBUTED_CLOCK {
+        add(&r::RECEIVE_TIME, hardware, rights);
+        for register in TIME_LOOP.iter().filter(|_| time_loop) {
             add(register, hardware, rights);
         }
     }
+}
+
+/// Whether the time loop control unit is on, by the configuration from the SII. ET1100 and ET1200
+/// switch it off to save power when neither SYNC nor latch unit is wanted and A5 does not ask for
+/// it; receive times are there all the same (S2 2.6.2, 2.6.3).
+pub(super) fn has_time_loop(hardware: &Hardware, a0: u8, a5: u16) -> bool {
+    const SYNC_OR_LATCH_UNIT: u8 = 0b1100;
+    const TIME_LOOP_UNIT: u16 = 1 << 8;
+    let wanted = a0 & SYNC_OR_LATCH_UNIT != 0 || a5 & TIME_LOOP_UNIT != 0;
+    wanted || !has_configuration_a5(hardware)
 }
 
 /// Whether SII word 5 goes to 0x0142.
@@ -148,6 +160,8 @@ fn has_member(register: &Register, index: u16, hardware: &Hardware) -> bool {
         None => true,
         Some(Unit::Fmmu) => index < u16::from(hardware.fmmus),
         Some(Unit::SyncManager) => index < u16::from(hardware.sync_managers),
+        // Receive times are read for all four, whatever is in them.
+        Some(Unit::Port) if register.address == r::RECEIVE_TIME.address => true,
         Some(Unit::Port) => hardware.ports.0[usize::from(index)] != PortKind::Absent,
     }
 }
@@ -166,7 +180,7 @@ mod tests {
     use super::*;
 
     fn right(hardware: &Hardware, address: usize) -> u8 {
-        Rights::of(hardware).byte(address)
+        Rights::of(hardware, true).byte(address)
     }
 
     // proves: HW-29 partial
@@ -191,6 +205,8 @@ mod tests {
             assert_ne!(right(&full, gone), 0, "0x{gone:04X}");
             assert_eq!(right(&small, gone), 0, "0x{gone:04X}");
         }
+        assert_ne!(Rights::of(&full, false).byte(0x090C), 0, "receive times are always there");
+        assert_eq!(Rights::of(&full, false).byte(0x0910), 0, "the time loop is switched off");
         small.features = 0x0004;
         assert_ne!(right(&small, 0x0913), 0);
         assert_eq!(right(&small, 0x0914), 0, "a 32-bit clock");
@@ -199,7 +215,7 @@ mod tests {
 
     #[test]
     fn a_sync_manager_is_written_by_its_rules() {
-        let rights = Rights::of(&rig::hardware());
+        let rights = Rights::of(&rig::hardware(), true);
         let both = Rights::READ | Rights::WRITE;
         for offset in 0..5 {
             assert_eq!(rights.byte(0x0810 + offset), both | Rights::CONDITIONAL);

@@ -113,9 +113,9 @@ impl Rights {
     /// What is written is not what it holds then: a write is a command.
     pub(super) const LIVE: u8 = 1 << 3;
 
-    pub(super) fn of(hardware: &Hardware) -> Self {
+    pub(super) fn of(hardware: &Hardware, time_loop: bool) -> Self {
         let mut rights = vec![0; RAM].into_boxed_slice();
-        implemented::fill(hardware, &mut rights);
+        implemented::fill(hardware, time_loop, &mut rights);
         Self(rights)
     }
 

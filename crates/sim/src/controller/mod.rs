@@ -18,6 +18,7 @@ mod implemented;
 mod loops;
 mod memory;
 pub mod pdi;
+mod port;
 mod posted;
 mod processing_unit;
 mod register_write;

@@ -1,11 +1,13 @@
-//! A watchdog: a time that runs out unless it is triggered.
+//! The watchdogs: times that run out unless they are triggered.
 //!
 //! Read first: S2 2.10. Ticks run by themselves since power-on; a watchdog of n ticks expires at
 //! the first tick that is at least n ticks behind its trigger, that is between n and n + 1 ticks
 //! later.
 
-use linesman_proto::register::{WatchdogDivider, WatchdogTime};
-use linesman_proto::time::Instant;
+use linesman_proto::register::{self as r, WatchdogDivider, WatchdogTime};
+use linesman_proto::time::{Instant, Span};
+
+use super::core::Core;
 
 /// One watchdog.
 #[derive(Clone, Copy, Default, Debug)]
@@ -38,8 +40,71 @@ impl Watchdog {
         self.expires = time.span(divider).map(|span| {
             let tick = divider.tick().as_nanos();
             let earliest = (at + span).since(ticks_since).as_nanos();
-            ticks_since + linesman_proto::time::Span::ns(earliest.next_multiple_of(tick))
+            ticks_since + Span::ns(earliest.next_multiple_of(tick))
         });
+    }
+}
+
+impl Core {
+    fn divider(&self) -> WatchdogDivider {
+        WatchdogDivider(self.memory.u16(&r::WATCHDOG_DIVIDER))
+    }
+
+    /// Fresh outputs came.
+    pub(super) fn trigger_process_data_watchdog(&mut self, when: Instant) {
+        let time = WatchdogTime(self.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA));
+        let divider = self.divider();
+        self.process_data_watchdog.trigger(when, self.powered_at, divider, time);
+        self.memory.set_u16(&r::WATCHDOG_STATUS_PROCESS_DATA, 1);
+    }
+
+    pub(super) fn expire_process_data_watchdog(&mut self, when: Instant) {
+        self.process_data_watchdog.stop();
+        self.memory.set_u16(&r::WATCHDOG_STATUS_PROCESS_DATA, 0);
+        self.increment(r::WATCHDOG_COUNTER_PROCESS_DATA.address);
+        self.raise_al_events(r::AlEvents::PROCESS_DATA_WATCHDOG, when);
+    }
+
+    /// Divider or times were written: what runs, runs anew; time 0 switches off, and off means "not
+    /// expired" (S2 2.10.5).
+    pub(super) fn retime_watchdogs(&mut self, when: Instant) {
+        let off = self.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA) == 0;
+        if off || self.process_data_watchdog.is_running() {
+            self.trigger_process_data_watchdog(when);
+        }
+        self.retime_pdi_watchdog(when);
+    }
+
+    /// The processor stops serving the controller, or serves it again.
+    pub(super) fn set_processor_stuck(&mut self, stuck: bool, when: Instant) {
+        self.processor_stuck = stuck;
+        if !stuck {
+            // What happened meanwhile is still to be served.
+            self.call_firmware(when);
+        }
+        self.retime_pdi_watchdog(when);
+    }
+
+    /// While it is served, the PDI watchdog is triggered all the time.
+    pub(super) fn retime_pdi_watchdog(&mut self, when: Instant) {
+        self.pdi_watchdog.stop();
+        let time = WatchdogTime(self.memory.u16(&r::WATCHDOG_TIME_PDI));
+        if self.processor_stuck && self.pdi_watchdog_ok {
+            let divider = self.divider();
+            self.pdi_watchdog.trigger(when, self.powered_at, divider, time);
+        }
+        let served = !self.processor_stuck && self.memory.u8(&r::PDI_CONTROL) != 0;
+        if served || time == WatchdogTime::OFF {
+            self.pdi_watchdog_ok = true;
+            self.refresh_dl_status();
+        }
+    }
+
+    pub(super) fn expire_pdi_watchdog(&mut self) {
+        self.pdi_watchdog.stop();
+        self.pdi_watchdog_ok = false;
+        self.increment(r::WATCHDOG_COUNTER_PDI.address);
+        self.refresh_dl_status();
     }
 }
 
@@ -56,7 +121,7 @@ mod tests {
         ) {
             let (divider, time) = (WatchdogDivider(divider), WatchdogTime(time));
             let since = Instant::from_nanos(since);
-            let at = since + linesman_proto::time::Span::ns(after);
+            let at = since + Span::ns(after);
             let mut watchdog = Watchdog::default();
             watchdog.trigger(at, since, divider, time);
             let expires = watchdog.expires().unwrap();

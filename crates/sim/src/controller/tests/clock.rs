@@ -45,7 +45,8 @@ fn a_frame_is_timed_at_each_port_it_enters() {
     assert_eq!(u32_at(&mut bench, 0x0900), local as u32);
     assert_eq!(u32_at(&mut bench, 0x0904), local as u32 + 1_000);
     assert_eq!(u32_at(&mut bench, 0x0908), local as u32 + 3_000);
-    assert_eq!(u32_at(&mut bench, 0x090C), 0, "port D: what was left there");
+    let left = u32::from_le_bytes(*b"left");
+    assert_eq!(u32_at(&mut bench, 0x090C), left, "port D: what was left there");
     assert_eq!(u64_at(&mut bench, 0x0918), local + 50);
     // Frames that latch nothing change nothing; nor do ports that the next one does not pass.
     go_round(&mut bench, Command::Brd, 1_001);
@@ -145,6 +146,32 @@ fn quartzes_differ() {
     controller.power_off(second);
     controller.power_on(second + Span::ms(1));
     assert_eq!(controller.local_time(second + Span::ms(1)), 5);
+}
+
+/// As an EL1004 shows it: clocks are there, the time loop is switched off to save power.
+#[test]
+fn the_time_loop_is_on_when_the_sii_wants_it() {
+    // 0x0141, A5 (word 5), type of controller, whether the time loop is there
+    let table = [
+        (0x01, 0x0000, 0x11, false),
+        (0x05, 0x0000, 0x11, true),
+        (0x08, 0x0000, 0x12, true),
+        (0x00, 0x0100, 0x11, true),
+        (0x00, 0x0000, 0x04, true),
+    ];
+    for (a0, a5, controller_type, there) in table {
+        let mut hardware = hardware();
+        hardware.controller_type = controller_type;
+        let mut image = sii(false);
+        image[1] = a0;
+        image[10..12].copy_from_slice(&u16::to_le_bytes(a5));
+        let mut bench = Bench::with(hardware, image, Box::new(NoFirmware));
+        for ado in [0x0910, 0x0918, 0x0920, 0x0928, 0x0930] {
+            assert_eq!(bench.read(ado, 2).is_some(), there, "0x{ado:04X}, A0 0x{a0:02X}");
+        }
+        assert!(bench.read(0x090C, 4).is_some(), "receive times are always there");
+        assert_eq!(bench.exchange(Command::Bwr, at(0, 0x0900), &[0; 4]).1, 1);
+    }
 }
 
 #[test]

@@ -48,9 +48,10 @@ pub(crate) fn hardware() -> Hardware {
     }
 }
 
-/// An SII with a configuration area that is not checked, and words 8 to 15 that count up.
+/// An SII with a configuration area that is not checked, and words 8 to 15 that count up. The SYNC
+/// unit is on, and with it the time loop.
 pub(crate) fn sii(device_emulation: bool) -> Vec<u8> {
-    let mut image = vec![0x05, u8::from(device_emulation), 0, 0, 0, 0, 0, 0];
+    let mut image = vec![0x05, 0x04 | u8::from(device_emulation), 0, 0, 0, 0, 0, 0];
     image.extend([0xCD, 0xAB, 0, 0, 0, 0, 0xA4, 0x88]);
     image.extend((8u16..16).flat_map(u16::to_le_bytes));
     image

@@ -3,7 +3,8 @@
 use linesman_proto::register::{AlEvents, SmControl};
 use linesman_proto::time::Span;
 
-use super::rig::Bench;
+use super::rig::{Bench, hardware, sii};
+use crate::device::NoFirmware;
 
 fn outputs(bench: &mut Bench) {
     assert_eq!(bench.write(0x1000, &[1; 4]), 1);
@@ -97,6 +98,16 @@ fn counters_are_cleared_together() {
         bench.write(address, &[7]);
         assert_eq!(bench.read(0x0442, 2).unwrap(), [0, 0]);
     }
+}
+
+/// As an EK1100 shows it: DL status 0x..31, no interface, no watchdog.
+#[test]
+fn without_an_interface_its_watchdog_is_not_ok() {
+    let mut image = sii(true);
+    image[0] = 0;
+    let mut bench = Bench::with(hardware(), image, Box::new(NoFirmware));
+    assert_eq!(bench.word(0x0110) & 3, 1);
+    assert_eq!(bench.byte(0x0443), 0);
 }
 
 #[test]

@@ -1,0 +1,160 @@
+//! What happens at the ports: links come and go, loops open and close, counters count.
+//!
+//! Read first: S1 chapter 3 (loops) and 14 (error counters); S2 2.4 and 2.9.
+
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::port::Port;
+use linesman_proto::register::{self as r, DlControl, DlStatus, ErrorCounter};
+use linesman_proto::time::{Instant, Span};
+
+use super::core::Core;
+use super::loops::Loops;
+use super::memory::Rights;
+use super::posted::{CountKind, Happening, PortEvent};
+use crate::frame::WireFrame;
+
+/// How long loop modes hold that were set for temporary use ("approximately one second", S2 2.4.1).
+const TEMPORARY_LOOPS: Span = Span::s(1);
+
+impl Core {
+    pub(super) fn happens(&mut self, happening: Happening, when: Instant) {
+        match happening {
+            Happening::Posted(PortEvent::Count { port, kind }) => self.count(port, kind, when),
+            Happening::Posted(PortEvent::Link { port, up }) => {
+                if !up {
+                    self.count(port, CountKind::LostLink, when);
+                }
+                self.loops.apply(happening);
+                self.refresh_dl_status();
+            }
+            Happening::GoodFrame(_) => {
+                self.loops.apply(happening);
+                self.refresh_dl_status();
+            }
+        }
+    }
+
+    /// Moves a counter, if the rules let it move.
+    pub(super) fn count(&mut self, port: Port, kind: CountKind, when: Instant) {
+        let counts = self.loops.is_open(port) || self.hardware.counting.counts_when_closed;
+        let (counter, counts) = match kind {
+            CountKind::SymbolError => (ErrorCounter::PhysicalLayer(port), counts),
+            CountKind::InvalidFrame => (ErrorCounter::InvalidFrame(port), counts),
+            CountKind::ForwardedError => (ErrorCounter::Forwarded(port), counts),
+            CountKind::ProcessingUnitError => (ErrorCounter::ProcessingUnit, true),
+            CountKind::LostLink => {
+                let again = self.link_lost_at[port].replace(when) == Some(when);
+                (ErrorCounter::LostLink(port), self.loops.counts_lost_link(port) && !again)
+            }
+        };
+        if counts {
+            self.increment(counter.address());
+        }
+    }
+
+    /// One more, up to 255. Counters that the controller does not have stay at 0.
+    pub(super) fn increment(&mut self, address: RegisterAddress) {
+        let address = usize::from(address.0);
+        if self.rights.byte(address) & Rights::READ != 0 {
+            let counter = &mut self.memory.bytes_mut()[address];
+            *counter = counter.saturating_add(1);
+        }
+    }
+
+    /// Gives a counter a value, if the controller has it.
+    pub(super) fn set_counter(&mut self, address: RegisterAddress, value: u8) {
+        let address = usize::from(address.0);
+        if self.rights.byte(address) & Rights::READ != 0 {
+            self.memory.bytes_mut()[address] = value;
+        }
+    }
+
+    /// Written loop modes take effect.
+    pub(super) fn change_loops(&mut self) {
+        self.loops_change_at = None;
+        self.loops.rewrite(DlControl(self.memory.u32(&r::DL_CONTROL)));
+        self.refresh_dl_status();
+    }
+
+    /// The loop byte of DL control was written, in a frame that ended at `end`; `before` is what it
+    /// was.
+    pub(super) fn loops_written(&mut self, before: DlControl, end: Instant) {
+        let control = DlControl(self.memory.u32(&r::DL_CONTROL));
+        self.loops_change_at = Some(end);
+        self.loops_return = match (control.temporary(), self.loops_return) {
+            (false, _) => None,
+            (true, Some((_, byte))) => Some((end + TEMPORARY_LOOPS, byte)),
+            (true, None) => Some((end + TEMPORARY_LOOPS, before.to_bytes()[1])),
+        };
+    }
+
+    /// Temporary loop modes end: the former ones return.
+    pub(super) fn return_loops(&mut self) {
+        let Some((_, byte)) = self.loops_return.take() else { return };
+        let control = self.returned_loops(byte);
+        self.memory.set_u32(&r::DL_CONTROL, control.0);
+        self.change_loops();
+    }
+
+    /// DL control once its loop byte is `byte` again.
+    fn returned_loops(&self, byte: u8) -> DlControl {
+        let control = DlControl(self.memory.u32(&r::DL_CONTROL)).with_temporary(false);
+        let [low, _, high, highest] = control.to_bytes();
+        DlControl::from_bytes([low, byte, high, highest])
+    }
+
+    /// The loops as they will be at `when`, as far as is known now.
+    pub(super) fn loops_at(&self, when: Instant) -> Loops {
+        let mut loops = self.loops;
+        let written = DlControl(self.memory.u32(&r::DL_CONTROL));
+        let mut rewrites = [
+            self.loops_change_at.map(|at| (at, written)),
+            self.loops_return.map(|(at, byte)| (at, self.returned_loops(byte))),
+        ]
+        .into_iter()
+        .flatten()
+        .filter(|(at, _)| *at <= when)
+        .peekable();
+        for (at, happening) in self.queue.until(when) {
+            while let Some((_, control)) = rewrites.next_if(|(rewrite, _)| *rewrite < at) {
+                loops.rewrite(control);
+            }
+            loops.apply(happening);
+        }
+        for (_, control) in rewrites {
+            loops.rewrite(control);
+        }
+        loops
+    }
+
+    /// DL status as it is now.
+    pub(super) fn dl_status(&self) -> DlStatus {
+        /// Bits of 0x0141 for enhanced link detection: all ports, each port.
+        const LINK_DETECTION: u8 = 0b1111_0010;
+        let detection = self.memory.u8(&r::ESC_CONFIGURATION_A0) & LINK_DETECTION != 0;
+        let base = DlStatus::default()
+            .with_pdi(self.loaded, self.pdi_watchdog_ok)
+            .with_enhanced_link_detection(detection);
+        self.loops.status(base)
+    }
+
+    /// Shows a change in DL status, and tells of it.
+    pub(super) fn refresh_dl_status(&mut self) {
+        let status = self.dl_status().0;
+        if self.memory.u16(&r::DL_STATUS) != status {
+            self.memory.set_u16(&r::DL_STATUS, status);
+            self.raise_ecat_events(r::EcatEvents::DL_STATUS);
+        }
+    }
+
+    /// The first bit of a frame comes in.
+    pub(super) fn enters(&mut self, when: Instant, port: Port, frame: &WireFrame) {
+        self.entered[port] = (frame.number, when);
+        if self.latched == Some(frame.number) && self.loops.is_open(port) {
+            self.latch_receive_time(port, when);
+        }
+        if self.loops.waits_for_frame(port) && frame.damage.is_intact() {
+            self.queue.push(when + frame.duration(), Happening::GoodFrame(port));
+        }
+    }
+}
