@@ -6,6 +6,7 @@
 
 pub mod finding;
 pub mod line;
+pub mod locate;
 pub mod observe;
 pub mod report;
 pub mod rule;
