@@ -1,1 +1,11 @@
 //! Frames in, findings out: where, why and what to do.
+//!
+//! [`observe`] pairs what went out with what came back, [`line`] is what is known of the network,
+//! each [`rule`] looks at the line for one kind of trouble, [`finding`] gives conditions a life, and
+//! [`report`] is the answer as people and programs read it. [`Engine`] drives them all.
+
+pub mod finding;
+pub mod line;
+pub mod observe;
+pub mod report;
+pub mod rule;

@@ -1,1 +1,7 @@
 //! MainDevice, segment and diagnosis in virtual time.
+//!
+//! [`verdict`] holds what was said against what was done; [`drawing`] shows the line.
+
+pub mod drawing;
+pub mod story;
+pub mod verdict;

@@ -28,7 +28,7 @@ pub use describe::{Description, Piece, Reading, by_name, decode, describe, piece
 pub use dl_control::{DlControl, LoopMode};
 pub use dl_status::{DlStatus, PortState};
 pub use entry::{Access, Field, Form, Register, Repeat, Unit};
-pub use error_counters::{ErrorCounter, ErrorCounters, RxErrors};
+pub use error_counters::{ClearGroup, ErrorCounter, ErrorCounters, RxErrors};
 pub use event::{AlEvents, EcatEvents};
 pub use fmmu::{FmmuConfig, FmmuOverlap};
 pub use information::{ControllerType, EscInformation, Features, PortDescriptor, PortType};

@@ -1,0 +1,205 @@
+//! Error counters of one controller over time: the first reading is history, rises count.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::port::Port;
+use linesman_proto::register::{ClearGroup, Difference, ErrorCounter, ErrorCounters, Total};
+use linesman_proto::time::Instant;
+
+use super::Seen;
+
+/// How many rises of one counter are kept; older ones are forgotten, the total stays.
+pub const RISES_KEPT: usize = 32;
+
+/// All counters of one controller.
+#[derive(Clone, Default, Debug)]
+pub struct CounterHistory {
+    tracks: BTreeMap<ErrorCounter, CounterTrack>,
+    /// The latest value of each.
+    last: ErrorCounters,
+    /// Falls without a write that was seen: the line has another reader, or the supply was gone.
+    clears: u32,
+}
+
+/// One counter over time.
+#[derive(Clone, Debug)]
+pub struct CounterTrack {
+    /// The first reading.
+    pub first: Seen<u8>,
+    /// The latest reading.
+    pub last: Seen<u8>,
+    /// Rises together, through clears.
+    pub total: Total,
+    /// The latest rises, oldest first, at most [`RISES_KEPT`].
+    pub rises: VecDeque<Rise>,
+}
+
+/// A rise of a counter between two readings.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Rise {
+    /// The reading before it.
+    pub before: u8,
+    /// The reading after it.
+    pub after: u8,
+    /// By how much it certainly rose, and whether that is exact.
+    pub difference: Difference,
+    /// When the reading before was made; the rise happened between the two.
+    pub after_time: Instant,
+    /// When it was read.
+    pub at: Instant,
+    /// The number of the frame that showed it.
+    pub frame: Option<u64>,
+}
+
+impl CounterHistory {
+    /// Takes the counters that `data`, read from `start` on, cover. Says whether any rose or fell.
+    pub fn record(
+        &mut self,
+        start: RegisterAddress,
+        data: &[u8],
+        at: Instant,
+        frame: Option<u64>,
+    ) -> bool {
+        self.record_counters(&ErrorCounters::from_bytes(data, start), at, frame)
+    }
+
+    /// Takes a reading of some counters. Says whether any of them rose or fell, or is new.
+    ///
+    /// Where one counter of a group fell, all that were read with it count as cleared.
+    pub fn record_counters(
+        &mut self,
+        reading: &ErrorCounters,
+        at: Instant,
+        frame: Option<u64>,
+    ) -> bool {
+        let mut fell = [false; ClearGroup::ALL.len()];
+        for (counter, value) in reading.iter() {
+            let group = counter.clear_group() as usize;
+            if self.last.value(counter).is_some_and(|last| value < last) {
+                fell[group] = true;
+            }
+        }
+        self.clears += fell.iter().filter(|fell| **fell).count() as u32;
+        let mut news = false;
+        for (counter, value) in reading.iter() {
+            let group = counter.clear_group() as usize;
+            *self.last.slot(counter) = Some(value);
+            let track = self.tracks.entry(counter).or_insert_with(|| {
+                news = true;
+                CounterTrack {
+                    first: Seen::new(value, at, frame),
+                    last: Seen::new(value, at, frame),
+                    total: Total::default(),
+                    rises: VecDeque::new(),
+                }
+            });
+            news |= track.record(value, fell[group], at, frame);
+        }
+        news
+    }
+
+    /// Notes that a write cleared a group on purpose: the next readings count from 0.
+    pub fn note_clear(&mut self, group: ClearGroup) {
+        for counter in ErrorCounter::ALL {
+            if counter.clear_group() != group {
+                continue;
+            }
+            if let Some(track) = self.tracks.get_mut(&counter) {
+                track.total.note_own_clear();
+                track.last.value = 0;
+            }
+            let slot = self.last.slot(counter);
+            if slot.is_some() {
+                *slot = Some(0);
+            }
+        }
+    }
+
+    /// Counts all values of the next readings as rises from 0: for an observation without earlier
+    /// values, whose counters are judged as they stand.
+    pub fn assume_zero_before(&mut self, at: Instant) {
+        let zeros = ErrorCounters::from_bytes(&[0; ErrorCounters::LEN], ErrorCounters::START);
+        self.record_counters(&zeros, at, None);
+    }
+
+    /// One counter over time; `None` when it was never read.
+    #[must_use]
+    pub fn track(&self, counter: ErrorCounter) -> Option<&CounterTrack> {
+        self.tracks.get(&counter)
+    }
+
+    /// All counters that were read, in order of addresses within their kind.
+    pub fn tracks(&self) -> impl Iterator<Item = (ErrorCounter, &CounterTrack)> {
+        self.tracks.iter().map(|(counter, track)| (*counter, track))
+    }
+
+    /// By how much a counter rose since its first reading, through clears; 0 when never read.
+    #[must_use]
+    pub fn rise(&self, counter: ErrorCounter) -> u64 {
+        self.tracks.get(&counter).map_or(0, |track| track.total.rise())
+    }
+
+    /// Whether any counter of a port rose: invalid frames or physical-layer errors.
+    #[must_use]
+    pub fn port_rose(&self, port: Port) -> bool {
+        self.rise(ErrorCounter::InvalidFrame(port)) + self.rise(ErrorCounter::PhysicalLayer(port))
+            > 0
+    }
+
+    /// Whether any counter was read at all.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        !self.tracks.is_empty()
+    }
+
+    /// How often a group of counters fell without a write that was seen.
+    #[must_use]
+    pub const fn foreign_clears(&self) -> u32 {
+        self.clears
+    }
+
+    /// The latest value of each counter.
+    #[must_use]
+    pub const fn last(&self) -> &ErrorCounters {
+        &self.last
+    }
+}
+
+impl CounterTrack {
+    fn record(&mut self, value: u8, cleared: bool, at: Instant, frame: Option<u64>) -> bool {
+        let before = self.last;
+        let difference =
+            if cleared { self.total.record_after_clear(value) } else { self.total.record(value) };
+        // The time of the latest reading matters even when nothing changed: a later rise happened
+        // after it.
+        self.last = Seen::new(value, at, frame);
+        let Some(difference) = difference else { return false };
+        if difference.rise > 0 {
+            if self.rises.len() == RISES_KEPT {
+                self.rises.pop_front();
+            }
+            self.rises.push_back(Rise {
+                before: before.value,
+                after: value,
+                difference,
+                after_time: before.at,
+                at,
+                frame,
+            });
+        }
+        difference.rise > 0 || difference.cleared
+    }
+
+    /// The first rise that is still kept.
+    #[must_use]
+    pub fn first_rise(&self) -> Option<&Rise> {
+        self.rises.front()
+    }
+
+    /// The latest rise.
+    #[must_use]
+    pub fn last_rise(&self) -> Option<&Rise> {
+        self.rises.back()
+    }
+}

@@ -1,0 +1,163 @@
+//! What is known of one network, and what its registers read over time.
+//!
+//! Frames teach it, or an observation file fills it in directly; rules only look at it. Everything
+//! keeps when and by which frame it was learnt, so that a finding can point there.
+
+pub mod counters;
+pub mod device;
+pub mod host;
+pub mod traffic;
+
+use linesman_config::project::Project;
+use linesman_proto::address::{DeviceId, Network, Position, StationAddress};
+use linesman_proto::port::Port;
+use linesman_proto::time::Instant;
+use linesman_proto::topology::{End, Link, Tree};
+
+pub use counters::{CounterHistory, CounterTrack, Rise};
+pub use device::{AlChange, AlHistory, Device, DlChange, DlHistory, Planned, SeenIdentity};
+pub use host::{CardHistory, HostHistory};
+pub use traffic::Traffic;
+
+/// Something that was learnt, with when and from which frame.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Seen<T> {
+    /// What.
+    pub value: T,
+    /// When.
+    pub at: Instant,
+    /// The number of the frame that showed it; `None` when it came by another way, such as an
+    /// observation file.
+    pub frame: Option<u64>,
+}
+
+impl<T> Seen<T> {
+    /// Learnt at `at` from the frame `frame`.
+    pub const fn new(value: T, at: Instant, frame: Option<u64>) -> Self {
+        Self { value, at, frame }
+    }
+}
+
+/// A network as far as it is known.
+#[derive(Clone, Debug, Default)]
+pub struct Line {
+    /// Which network.
+    pub network: Network,
+    /// Its controllers; the index is the identity.
+    pub devices: Vec<Device>,
+    /// How they are wired when all is well: planned, or as first seen whole. Node *n* is device *n*.
+    pub tree: Option<Tree>,
+    /// Whether the tree comes from a project or an observation file, not from what was seen.
+    pub tree_is_planned: bool,
+    /// What the host noticed.
+    pub host: HostHistory,
+    /// Frames and datagrams.
+    pub traffic: Traffic,
+    /// The time of the latest frame or observation.
+    pub now: Instant,
+    revision: u64,
+}
+
+impl Line {
+    /// A network of which nothing is known.
+    #[must_use]
+    pub fn new(network: Network) -> Self {
+        Self { network, ..Self::default() }
+    }
+
+    /// A network as it was planned: names, identities and wiring. A plan whose wiring contradicts
+    /// itself gives no tree.
+    #[must_use]
+    pub fn planned(network: Network, project: &Project) -> Self {
+        let devices = project.devices.iter().enumerate().map(|(index, planned)| {
+            let id = DeviceId(index as u32);
+            let mut device = Device::new(id);
+            device.name = Some(planned.name.clone());
+            device.type_name = Some(planned.type_name.clone()).filter(|name| !name.is_empty());
+            device.planned = Some(Planned {
+                identity: planned.identity(),
+                rule: planned.rule(),
+                station: planned.station(id),
+            });
+            device
+        });
+        let devices = devices.collect();
+        let tree = project.tree().ok();
+        let tree_is_planned = tree.is_some();
+        Self { network, devices, tree, tree_is_planned, ..Self::default() }
+    }
+
+    /// A number that grows whenever something was learnt that a rule may want to look at.
+    #[must_use]
+    pub const fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// Notes that something was learnt.
+    pub const fn touch(&mut self) {
+        self.revision += 1;
+    }
+
+    /// A controller.
+    #[must_use]
+    pub fn device(&self, id: DeviceId) -> Option<&Device> {
+        self.devices.get(id.index())
+    }
+
+    /// A controller, to be taught.
+    pub fn device_mut(&mut self, id: DeviceId) -> Option<&mut Device> {
+        self.devices.get_mut(id.index())
+    }
+
+    /// Adds a controller and gives it the next identity.
+    pub fn add_device(&mut self) -> DeviceId {
+        let id = DeviceId(self.devices.len() as u32);
+        self.devices.push(Device::new(id));
+        self.touch();
+        id
+    }
+
+    /// The controller that answers to a station address.
+    #[must_use]
+    pub fn by_station(&self, station: StationAddress) -> Option<DeviceId> {
+        let mut all = self.devices.iter();
+        all.find(|device| device.station == Some(station)).map(|device| device.id)
+    }
+
+    /// The controller at a position of the line as it is now.
+    #[must_use]
+    pub fn by_position(&self, position: Position) -> Option<DeviceId> {
+        let mut all = self.devices.iter();
+        all.find(|device| device.position == Some(position)).map(|device| device.id)
+    }
+
+    /// What people call a controller: `7 (EL2004)`, or `7` where no name is known.
+    #[must_use]
+    pub fn label(&self, id: DeviceId) -> String {
+        match self.device(id).and_then(Device::best_name) {
+            Some(name) => format!("{} ({name})", id.no()),
+            None => id.no().to_string(),
+        }
+    }
+
+    /// The links of the tree with controllers by identity; empty without a tree.
+    pub fn links(&self) -> impl Iterator<Item = Link<DeviceId>> + '_ {
+        let links = self.tree.iter().flat_map(|tree| tree.links());
+        links.map(|link| link.map(|node| DeviceId(node as u32)))
+    }
+
+    /// The far end of a port by the tree; `None` where nothing is wired or no tree is known.
+    #[must_use]
+    pub fn opposite(&self, id: DeviceId, port: Port) -> Option<End<DeviceId>> {
+        let tree = self.tree.as_ref().filter(|tree| id.index() < tree.len())?;
+        let end = tree.opposite(End::Controller(id.index(), port))?;
+        Some(end.map(|node| DeviceId(node as u32)))
+    }
+
+    /// How many controllers there are at least: the planned ones do not count until they answer.
+    #[must_use]
+    pub fn device_count(&self) -> usize {
+        let answered = self.devices.iter().filter(|device| device.answered.is_some()).count();
+        answered.max(usize::from(self.traffic.broadcast_answers))
+    }
+}

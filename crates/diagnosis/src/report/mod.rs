@@ -1,0 +1,214 @@
+//! The answer, `linesman.diagnosis/1`: what the command line prints with `--json`.
+//!
+//! Times are ns since the start of the run; numbers above 2^53 are written as strings, since not
+//! every reader of JSON keeps them.
+
+pub mod number;
+
+use linesman_config::fault::{Class, FaultName};
+use serde::{Deserialize, Serialize};
+
+pub use crate::finding::{EvidenceKind, Severity};
+pub use number::Number;
+
+/// Name and version of the format.
+pub const SCHEMA: &str = "linesman.diagnosis/1";
+
+/// A whole diagnosis.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Diagnosis {
+    /// `linesman.diagnosis/1`.
+    pub schema: String,
+    /// Name and version of the program.
+    pub tool: String,
+    /// When the run began, RFC 3339; `null` when no clock says.
+    pub start: Option<String>,
+    /// The clock behind all times.
+    pub clock: String,
+    /// What was looked at.
+    pub source: String,
+    /// Whether the input could be read to its end.
+    pub complete: bool,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The network as a whole.
+    pub network: NetworkReport,
+    /// What is wrong, worst first.
+    pub findings: Vec<FindingReport>,
+}
+
+/// What it all comes to.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// The line was seen at work, and no error or warning was found.
+    Healthy,
+    /// There is, or was, an error or a warning.
+    Faulty,
+    /// Too little was seen to say so.
+    Inconclusive,
+}
+
+/// The network in numbers.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NetworkReport {
+    /// Controllers: the largest of answers to a broadcast, stations that answered, positions seen.
+    pub devices: Number,
+    /// The highest state a SubDevice was in: `INIT`, `BOOT`, `PREOP`, `SAFEOP`, `OP`.
+    pub al_state_highest: Option<String>,
+    /// Datagrams judged, each request once.
+    pub datagrams: Number,
+    /// Datagrams whose frame never came back, or came back with working counter 0 from an address
+    /// where an answer was expected.
+    pub unanswered: Number,
+    /// EtherCAT frames seen, both directions.
+    pub frames: Number,
+    /// Frames that went out and did not come back.
+    pub lost: Number,
+    /// Frames that were seen with a wrong check sequence.
+    pub damaged: Number,
+}
+
+/// Something that is, or was, wrong.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FindingReport {
+    /// Unique in this run: `F1`, `F2`.
+    pub id: String,
+    /// The rule's code, for `linesman explain`.
+    pub code: String,
+    /// The rule's name.
+    pub name: String,
+    /// How bad.
+    pub severity: Severity,
+    /// Who is called.
+    pub class: Class,
+    /// Its life.
+    pub state: FindingState,
+    /// When it began.
+    pub opened_ns: Number,
+    /// When it was certain.
+    pub confirmed_ns: Option<Number>,
+    /// When it was over.
+    pub closed_ns: Option<Number>,
+    /// Where.
+    pub place: PlaceReport,
+    /// Why.
+    pub cause: FaultName,
+    /// How sure, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub confidence: f64,
+    /// What else it may be.
+    pub alternatives: Vec<AlternativeReport>,
+    /// What shows it.
+    pub evidence: Vec<EvidenceReport>,
+    /// What to do.
+    pub actions: Vec<String>,
+    /// What follows from it.
+    pub consequences: Vec<FindingReport>,
+}
+
+/// The life of a finding.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FindingState {
+    /// Seen, not certain yet.
+    Opened,
+    /// Certain.
+    Confirmed,
+    /// Over.
+    Closed,
+}
+
+/// A place.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum PlaceReport {
+    /// A link between two ports.
+    Link {
+        /// The network.
+        network: u8,
+        /// The end nearer the MainDevice.
+        a: EndReport,
+        /// The far end; `null` when it was never seen.
+        b: Option<EndReport>,
+        /// The direction in trouble; `null` when not known.
+        direction: Option<DirectionReport>,
+    },
+    /// A controller.
+    Device {
+        /// The network.
+        network: u8,
+        /// Its number, from 1.
+        no: u32,
+    },
+    /// The network.
+    Network {
+        /// Which.
+        network: u8,
+    },
+    /// The computer.
+    Host,
+}
+
+/// An end of a link.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EndReport {
+    /// The controller, from 1; 0 is the MainDevice.
+    pub no: u32,
+    /// Its port, A to D; of the MainDevice its card, A or B.
+    pub port: char,
+}
+
+/// A direction of a link.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DirectionReport {
+    /// Away from the MainDevice.
+    AToB,
+    /// Towards it.
+    BToA,
+    /// Both.
+    Both,
+}
+
+/// Another explanation.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AlternativeReport {
+    /// Why.
+    pub cause: FaultName,
+    /// Where, if elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<PlaceReport>,
+    /// How sure, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub confidence: f64,
+}
+
+/// What shows it.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EvidenceReport {
+    /// Where it comes from.
+    pub kind: EvidenceKind,
+    /// When.
+    pub time_ns: Option<Number>,
+    /// The frame's number, from 1.
+    pub frame: Option<Number>,
+    /// The controller, from 1; 0 is the MainDevice.
+    pub no: Option<u32>,
+    /// The port, A to D.
+    pub port: Option<char>,
+    /// The register's address.
+    pub register: Option<u16>,
+    /// Its value before.
+    pub before: Option<Number>,
+    /// Its value after.
+    pub after: Option<Number>,
+    /// In words.
+    pub text: String,
+}

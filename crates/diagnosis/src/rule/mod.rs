@@ -1,0 +1,76 @@
+//! The rules: each one file, whose doc comment is its manual page.
+//!
+//! A rule is a pure function of the line. It is asked whenever something was learnt, and says all
+//! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
+
+use linesman_config::fault::Class;
+use linesman_proto::time::Instant;
+
+use crate::finding::{Condition, Severity};
+use crate::line::Line;
+
+/// What a rule is: shown by `linesman explain CODE`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct RulePage {
+    /// `H1xx` hardware, `S2xx` software, `C3xx` configuration, `T4xx` timing, `X5xx` host.
+    pub code: &'static str,
+    /// Short name, lower case with hyphens.
+    pub name: &'static str,
+    /// How bad its conditions usually are.
+    pub severity: Severity,
+    /// Who is called.
+    pub class: Class,
+    /// The source file of the rule: its doc comment is the manual page. Given by `include_str!`.
+    pub source: &'static str,
+}
+
+impl RulePage {
+    /// The manual page: the doc comment at the head of the rule's file, in Markdown.
+    #[must_use]
+    pub fn manual(&self) -> String {
+        let doc = self.source.lines().take_while(|line| line.starts_with("//!"));
+        let mut text = String::new();
+        for line in doc {
+            let line = line.trim_start_matches("//!");
+            text.push_str(line.strip_prefix(' ').unwrap_or(line));
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// A rule.
+#[derive(Clone, Copy, Debug)]
+pub struct Rule {
+    /// Its pages, one for each code it gives.
+    pub pages: &'static [RulePage],
+    /// Looks at the line and adds all conditions that hold or held.
+    pub judge: fn(&View<'_>, &mut Vec<Condition>),
+}
+
+/// What a rule may look at.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// What is known of the network.
+    pub line: &'a Line,
+    /// The time of the latest frame or observation.
+    pub now: Instant,
+    /// Whether the input is at its end: nothing more will come that could settle an open question.
+    pub has_ended: bool,
+}
+
+/// All rules, causes before what may follow from them.
+pub const RULES: &[Rule] = &[
+    // Hardware, configuration and host: frame errors, links, devices.
+    //
+    // The network as a whole, working counters and states.
+    //
+];
+
+/// The manual: every page of every rule, by code.
+#[must_use]
+pub fn catalogue() -> Vec<&'static RulePage> {
+    let mut pages: Vec<_> = RULES.iter().flat_map(|rule| rule.pages).collect();
+    pages.sort_by_key(|page| page.code);
+    pages
+}

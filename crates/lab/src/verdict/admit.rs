@@ -1,0 +1,361 @@
+//! What the evidence of a fault allows: the fault itself, and what looks the same on the wire.
+//!
+//! Each entry that is not the injected fault has its reason. The table knows the cause and the
+//! wiring, nothing of any rule of the diagnosis.
+
+use linesman_config::fault::FaultName::{self, *};
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::topology::{End, Tree};
+
+use super::site::{Site, named};
+
+/// A fault as it was injected, and what became of it.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Truth {
+    /// What it is.
+    pub name: FaultName,
+    /// Where it sits; several for one that acts on several places at once.
+    pub places: Vec<TruthPlace>,
+    /// The AL status code that a refusing device gives.
+    pub al_code: Option<u16>,
+}
+
+/// Where a fault sits.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum TruthPlace {
+    /// One direction of a link, from sender to receiver.
+    Hop(End<DeviceId>, End<DeviceId>),
+    /// Both directions of a link.
+    Link(End<DeviceId>, End<DeviceId>),
+    /// A SubDevice.
+    Device(DeviceId),
+    /// A card of the MainDevice.
+    Host(Path),
+}
+
+/// What could be observed, beside the fault itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a> {
+    /// The wiring; node *n* is device *n*.
+    pub tree: &'a Tree,
+    /// Whether the card's own counters were read.
+    pub host_counters: bool,
+    /// Whether all that fell silent has answered again: what it remembers tells a cut from a
+    /// restart.
+    pub answered_again: bool,
+}
+
+/// A claim that the evidence allows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Admitted {
+    /// The cause that may be named.
+    pub cause: FaultName,
+    /// The place that goes with it.
+    pub site: Site,
+    /// Why it cannot be told from the injected fault; `None` for the injected fault itself.
+    pub why: Option<&'static str>,
+}
+
+const SILENT: &str = "whoever hangs behind a cut and whoever has no power are equally silent, and \
+                      the neighbour's port sees no signal in both cases";
+const SYMBOLS: &str = "a receiver sees symbol errors; whether the sender, the cable, the plug, its \
+                       own input or interference made them is not in the symbols";
+const CARD: &str = "the last hop is checked by the card only, and the first one begins in it";
+const LAST_HOP: &str = "on the last hop a card counts bad frames but no symbols";
+const UNCOUNTED: &str = "without the card's counters frames that the card drops just do not come \
+                         back";
+const MII: &str = "between its PHY and its controller the receiver may spoil what came clean";
+const ONCE: &str = "each opening of a flapping contact is an open link";
+const RESTART: &str = "a dip of a supply and a short time without power are the same to a device";
+const SHARED: &str = "one device of a supply looks the same from outside as a supply of one device";
+const CODE: &str = "the status code that the device gives says so itself";
+const ALL_LINKS: &str = "interference that couples into several links has no single link as place";
+
+/// All that an honest diagnosis may say about `truth`; the injected fault comes first.
+#[must_use]
+pub fn admitted(truth: &Truth, scene: &Scene<'_>) -> Vec<Admitted> {
+    let mut set = Set { scene, entries: Vec::new() };
+    for place in &truth.places {
+        set.place(truth, *place);
+    }
+    if truth.name == EmcNoise && truth.places.len() > 1 {
+        set.add(EmcNoise, Site::Network, Some(ALL_LINKS));
+    }
+    set.entries
+}
+
+struct Set<'a> {
+    scene: &'a Scene<'a>,
+    entries: Vec<Admitted>,
+}
+
+impl Set<'_> {
+    fn add(&mut self, cause: FaultName, site: Site, why: Option<&'static str>) {
+        self.entries.push(Admitted { cause, site, why });
+    }
+
+    fn place(&mut self, truth: &Truth, place: TruthPlace) {
+        let tree = self.scene.tree;
+        let name = truth.name;
+        match place {
+            TruthPlace::Link(one, other) => {
+                self.add(name, Site::link(tree, one, other), None);
+                match name {
+                    LinkOpen => self.open(one, other),
+                    LinkFlapping => {
+                        self.add(LinkOpen, Site::link(tree, one, other), Some(ONCE));
+                        self.open(one, other);
+                    }
+                    CableDegraded | EmcNoise => {
+                        self.symbols(one, other);
+                        self.symbols(other, one);
+                    }
+                    _ => {}
+                }
+            }
+            TruthPlace::Hop(from, to) => {
+                self.add(name, Site::hop(tree, from, to), None);
+                match name {
+                    TransmitterDamaged => self.end(name, from, None),
+                    ReceiverDamaged => self.end(name, to, None),
+                    _ => {}
+                }
+                match name {
+                    DeviceInternal => {
+                        self.end(name, from, None);
+                        self.clean(from, to);
+                    }
+                    CableDegraded | EmcNoise | TransmitterDamaged | ReceiverDamaged => {
+                        self.symbols(from, to);
+                    }
+                    NicDamaged => self.card(from, to),
+                    _ => {}
+                }
+            }
+            TruthPlace::Device(id) => {
+                self.add(name, Site::Device(id), None);
+                self.device(truth, id);
+            }
+            TruthPlace::Host(path) => {
+                self.add(name, Site::Host, None);
+                let card = End::MainDevice(path);
+                if let Some(far) = opposite(tree, card) {
+                    if name == NicDamaged {
+                        self.card(card, far);
+                        self.card(far, card);
+                    }
+                }
+            }
+        }
+    }
+
+    /// A claim that names the device or card at `end` instead of the link.
+    fn end(&mut self, cause: FaultName, end: End<DeviceId>, why: Option<&'static str>) {
+        match end {
+            End::MainDevice(_) => self.add(cause, Site::Host, why),
+            End::Controller(id, _) => self.add(cause, Site::Device(id), why),
+        }
+    }
+
+    /// No signal between two ends.
+    fn open(&mut self, one: End<DeviceId>, other: End<DeviceId>) {
+        let tree = self.scene.tree;
+        let Site::Link { b: Some(End::Controller(behind, _)), .. } = Site::link(tree, one, other)
+        else {
+            return;
+        };
+        // In a ring both neighbours of a dead device see it; a cut shows at two live ends.
+        if tree.closes_at().is_none() && !self.scene.answered_again {
+            self.add(DeviceOff, Site::Device(behind), Some(SILENT));
+            self.add(SupplyOff, Site::Device(behind), Some(SILENT));
+        }
+    }
+
+    /// Symbol errors on what `from` sends and `to` receives.
+    fn symbols(&mut self, from: End<DeviceId>, to: End<DeviceId>) {
+        let hop = Site::hop(self.scene.tree, from, to);
+        for cause in [CableDegraded, EmcNoise, TransmitterDamaged, ReceiverDamaged] {
+            self.add(cause, hop, Some(SYMBOLS));
+        }
+        self.end(TransmitterDamaged, from, Some(SYMBOLS));
+        self.end(ReceiverDamaged, to, Some(SYMBOLS));
+        self.card(from, to);
+    }
+
+    /// Bad frames with clean symbols from `from` to `to`.
+    fn clean(&mut self, from: End<DeviceId>, to: End<DeviceId>) {
+        self.end(DeviceInternal, to, Some(MII));
+        self.card(from, to);
+    }
+
+    /// What cannot be told where one of the ends is a card.
+    fn card(&mut self, from: End<DeviceId>, to: End<DeviceId>) {
+        let hop = Site::hop(self.scene.tree, from, to);
+        let host = |end| matches!(end, End::MainDevice(_));
+        if !host(from) && !host(to) {
+            return;
+        }
+        for cause in [NicDamaged, CableDegraded, EmcNoise, TransmitterDamaged, ReceiverDamaged] {
+            self.add(cause, hop, Some(CARD));
+            self.end(cause, from, Some(CARD));
+            self.end(cause, to, Some(CARD));
+        }
+        if host(to) {
+            self.add(DeviceInternal, hop, Some(LAST_HOP));
+            self.end(DeviceInternal, from, Some(LAST_HOP));
+            if !self.scene.host_counters {
+                self.add(HostDrops, Site::Host, Some(UNCOUNTED));
+            }
+        }
+    }
+
+    fn device(&mut self, truth: &Truth, id: DeviceId) {
+        let tree = self.scene.tree;
+        match truth.name {
+            DeviceOff | SupplyOff | BrownOut => {
+                for cause in [DeviceOff, SupplyOff, BrownOut] {
+                    let why = if cause == SupplyOff || truth.name == SupplyOff {
+                        SHARED
+                    } else {
+                        RESTART
+                    };
+                    // A dip is over by its nature: one that lasts is no dip.
+                    if cause != BrownOut || self.scene.answered_again {
+                        self.add(cause, Site::Device(id), Some(why));
+                    }
+                }
+                if let (Some(above), false) = (Site::above(tree, id), self.scene.answered_again) {
+                    self.add(LinkOpen, above, Some(SILENT));
+                    self.add(DeviceOff, above, Some(SILENT));
+                }
+            }
+            DeviceInternal => {
+                let node = id.index();
+                for port in linesman_proto::port::Port::ALL {
+                    let from = End::Controller(id, port);
+                    if let Some(to) = opposite(tree, from) {
+                        self.add(DeviceInternal, Site::hop(tree, from, to), None);
+                        self.clean(from, to);
+                    }
+                }
+                debug_assert!(node < tree.len());
+            }
+            TransmitterDamaged | ReceiverDamaged => {
+                for port in linesman_proto::port::Port::ALL {
+                    let here = End::Controller(id, port);
+                    if let Some(far) = opposite(tree, here) {
+                        match truth.name {
+                            TransmitterDamaged => self.symbols(here, far),
+                            _ => self.symbols(far, here),
+                        }
+                    }
+                }
+            }
+            InitRefused => {
+                if truth.al_code.is_some_and(is_configuration) {
+                    self.add(ConfigMismatch, Site::Device(id), Some(CODE));
+                }
+                if truth.al_code == Some(0x001B) {
+                    self.add(WatchdogStarved, Site::Device(id), Some(CODE));
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// AL status codes that blame what the MainDevice configured: mailbox and process data
+/// SyncManagers, mappings, watchdog. Reference: ETG.1000.6, AL status codes.
+fn is_configuration(code: u16) -> bool {
+    matches!(code, 0x0014 | 0x0016 | 0x0017 | 0x001C..=0x001F | 0x0021..=0x0026 | 0x0060 | 0x0070)
+}
+
+/// The other end of the link at `end`.
+fn opposite(tree: &Tree, end: End<DeviceId>) -> Option<End<DeviceId>> {
+    tree.opposite(end.map(DeviceId::index)).map(named)
+}
+
+#[cfg(test)]
+mod tests {
+    use linesman_proto::port::Port::{A, B, C};
+    use linesman_proto::topology::Wired;
+
+    use super::super::{Claim, Grade, Way, matches};
+    use super::*;
+
+    /// A coupler with two terminals on B and a box on C.
+    fn tree() -> Tree {
+        let on = |node, port| Wired { on: End::Controller(node, port), entry: A };
+        let first = Wired { on: End::MainDevice(Path::A), entry: A };
+        Tree::from_wiring(&[first, on(0, B), on(1, B), on(0, C)], None).unwrap()
+    }
+
+    fn end(node: u32, port: linesman_proto::port::Port) -> End<DeviceId> {
+        End::Controller(DeviceId(node), port)
+    }
+
+    fn truth(name: FaultName, place: TruthPlace) -> Truth {
+        Truth { name, places: vec![place], al_code: None }
+    }
+
+    fn grade(truth: &Truth, host_counters: bool, cause: FaultName, site: Site) -> Grade {
+        let tree = tree();
+        let scene = Scene { tree: &tree, host_counters, answered_again: false };
+        matches(truth, &scene, Claim { cause, site }).cause
+    }
+
+    #[test]
+    fn a_cut_may_be_a_dead_neighbour_but_no_other() {
+        let cut = truth(LinkOpen, TruthPlace::Link(end(0, B), end(1, A)));
+        let link = Site::Link { a: end(0, B), b: Some(end(1, A)), way: None };
+        assert_eq!(grade(&cut, true, LinkOpen, link), Grade::Exact);
+        let unseen = Site::Link { a: end(0, B), b: None, way: None };
+        assert_eq!(grade(&cut, true, LinkOpen, unseen), Grade::Exact);
+        assert!(matches!(
+            grade(&cut, true, DeviceOff, Site::Device(DeviceId(1))),
+            Grade::Admitted(_)
+        ));
+        for (cause, site) in [
+            (DeviceOff, Site::Device(DeviceId(2))),
+            (DeviceOff, Site::Device(DeviceId(0))),
+            (LinkOpen, Site::Link { a: end(1, B), b: Some(end(2, A)), way: None }),
+            (CableDegraded, link),
+        ] {
+            assert_eq!(grade(&cut, true, cause, site), Grade::Wrong, "{cause} at {site}");
+        }
+    }
+
+    #[test]
+    fn noise_must_be_in_the_right_direction() {
+        let noise = truth(EmcNoise, TruthPlace::Hop(end(3, A), end(0, C)));
+        let site = |way| Site::Link { a: end(0, C), b: Some(end(3, A)), way };
+        assert_eq!(grade(&noise, true, EmcNoise, site(Some(Way::BToA))), Grade::Exact);
+        assert_eq!(grade(&noise, true, EmcNoise, site(Some(Way::AToB))), Grade::Wrong);
+        let cable = grade(&noise, true, CableDegraded, site(Some(Way::BToA)));
+        assert!(matches!(cable, Grade::Admitted(_)));
+        assert_eq!(grade(&noise, true, DeviceInternal, site(Some(Way::BToA))), Grade::Wrong);
+        assert_eq!(grade(&noise, true, NicDamaged, Site::Host), Grade::Wrong);
+    }
+
+    #[test]
+    fn the_last_hop_needs_the_cards_counters() {
+        let card = End::MainDevice(Path::A);
+        let inner = truth(DeviceInternal, TruthPlace::Hop(end(0, A), card));
+        let first = Site::Device(DeviceId(0));
+        assert_eq!(grade(&inner, true, DeviceInternal, first), Grade::Exact);
+        assert!(grade(&inner, true, NicDamaged, Site::Host).is_right());
+        assert!(!grade(&inner, true, HostDrops, Site::Host).is_right());
+        assert!(grade(&inner, false, HostDrops, Site::Host).is_right());
+    }
+
+    #[test]
+    fn a_refusal_may_be_called_what_its_code_says() {
+        let mut refusal = truth(InitRefused, TruthPlace::Device(DeviceId(2)));
+        let here = Site::Device(DeviceId(2));
+        refusal.al_code = Some(0x001D);
+        assert!(grade(&refusal, true, ConfigMismatch, here).is_right());
+        refusal.al_code = Some(0x0001);
+        assert!(!grade(&refusal, true, ConfigMismatch, here).is_right());
+        assert_eq!(grade(&refusal, true, InitRefused, here), Grade::Exact);
+    }
+}

@@ -1,0 +1,78 @@
+//! Holding a verdict against the truth.
+//!
+//! A verdict is right when it names what was injected. It is *admitted* when it names something
+//! that the same evidence allows: no reading on a live line tells a cut cable from a dead neighbour.
+//! What is admitted follows from physics ([`admit`]), never from what the diagnosis likes to say.
+
+pub mod admit;
+pub mod site;
+
+use linesman_config::fault::FaultName;
+
+pub use admit::{Admitted, Scene, Truth};
+pub use site::{Site, Way};
+
+/// What a diagnosis says: one cause at one place.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Claim {
+    /// The cause.
+    pub cause: FaultName,
+    /// Where.
+    pub site: Site,
+}
+
+/// How well a claim fits.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Grade {
+    /// It is not so, and the evidence says it is not.
+    Wrong,
+    /// The evidence allows it, with the reason why.
+    Admitted(&'static str),
+    /// It is what was injected.
+    Exact,
+}
+
+impl Grade {
+    /// Whether an honest diagnosis may say it.
+    #[must_use]
+    pub fn is_right(self) -> bool {
+        self != Self::Wrong
+    }
+}
+
+/// How well a claim fits a fault, place and cause apart.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub struct Match {
+    /// The place, whatever the cause.
+    pub place: Grade,
+    /// Cause and place together.
+    pub cause: Grade,
+}
+
+impl Match {
+    /// Nothing fits.
+    pub const NONE: Self = Self { place: Grade::Wrong, cause: Grade::Wrong };
+
+    /// Whether place and cause are right or admitted.
+    #[must_use]
+    pub fn is_right(self) -> bool {
+        self.cause.is_right()
+    }
+}
+
+/// How well `claim` fits `truth`.
+#[must_use]
+pub fn matches(truth: &Truth, scene: &Scene<'_>, claim: Claim) -> Match {
+    let mut best = Match::NONE;
+    for Admitted { cause, site, why } in admit::admitted(truth, scene) {
+        if !site.covers(claim.site) {
+            continue;
+        }
+        let grade = why.map_or(Grade::Exact, Grade::Admitted);
+        best.place = best.place.max(grade);
+        if cause == claim.cause {
+            best.cause = best.cause.max(grade);
+        }
+    }
+    best
+}
