@@ -205,7 +205,7 @@ impl Segment {
 
     /// What the segment is called.
     #[must_use]
-    pub fn name(&self) -> &str {
+    pub fn title(&self) -> &str {
         &self.name
     }
 
@@ -228,7 +228,7 @@ impl Segment {
 
     /// What a device is called; empty for one that was never planned.
     #[must_use]
-    pub fn device_name(&self, device: DeviceId) -> &str {
+    pub fn name(&self, device: DeviceId) -> &str {
         self.names.get(device.index()).map_or("", String::as_str)
     }
 

@@ -2,9 +2,10 @@
 
 use std::fmt::Debug;
 
-use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::Instant;
-use linesman_proto::topology::Direction;
+use linesman_proto::topology::route::Direction;
+
+use crate::device::Refusal;
 
 /// One direction of a link: a line that symbols travel along.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -82,7 +83,7 @@ pub enum Change {
         /// Which.
         node: usize,
         /// The state that it does not go to, and the code it gives.
-        refusal: Option<(AlState, AlStatusCode)>,
+        refusal: Option<Refusal>,
     },
 }
 

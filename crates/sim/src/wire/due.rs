@@ -163,7 +163,7 @@ impl World {
     }
 
     /// The place of a link in the truth log.
-    pub(super) fn link_place(&self, index: usize) -> Place {
+    pub(crate) fn link_place(&self, index: usize) -> Place {
         let link = &self.links[index];
         Place::Link(self.name_end(link.upstream), self.name_end(link.downstream))
     }

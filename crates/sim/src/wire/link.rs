@@ -141,11 +141,7 @@ impl Link {
     /// The end that sends on a line and the one that receives.
     #[must_use]
     pub const fn from_to(&self, downstream: bool) -> (End, End) {
-        if downstream {
-            (self.upstream, self.downstream)
-        } else {
-            (self.downstream, self.upstream)
-        }
+        if downstream { (self.upstream, self.downstream) } else { (self.downstream, self.upstream) }
     }
 }
 

@@ -3,13 +3,12 @@
 use std::collections::VecDeque;
 
 use linesman_proto::port::{Port, PortMap};
-use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::Instant;
 
 use super::change::Line;
 use super::history::History;
 use crate::controller::Controller;
-use crate::device::Signals;
+use crate::device::{Refusal, Signals};
 use crate::truth::FaultId;
 
 /// What happens to a controller and cannot be posted to it.
@@ -17,7 +16,7 @@ use crate::truth::FaultId;
 pub(super) enum Act {
     Off,
     On,
-    Refuse(Option<(AlState, AlStatusCode)>),
+    Refuse(Option<Refusal>),
 }
 
 /// A fault inside that waits for a frame.
@@ -68,14 +67,10 @@ impl Node {
             match act {
                 Act::Off => self.controller.power_off(at),
                 Act::On => self.controller.power_on(at),
-                Act::Refuse(refusal) => self.refuse(refusal),
+                Act::Refuse(refusal) => self.controller.refuse(at, refusal),
             }
         }
         self.controller.advance(now, signals);
-    }
-
-    fn refuse(&mut self, refusal: Option<(AlState, AlStatusCode)>) {
-        let _ = (self.controller.firmware_mut(), refusal);
     }
 
     /// A glitch that spoils a frame which passes at `at`, if one waits.

@@ -44,7 +44,10 @@ pub(crate) enum Outcome {
 /// What a line did to a frame.
 enum Crossing {
     /// Its first bit is at the receiver at this instant; whether the line spoiled it.
-    Through { at: Instant, spoiled: bool },
+    Through {
+        at: Instant,
+        spoiled: bool,
+    },
     Lost,
 }
 
@@ -283,11 +286,11 @@ impl World {
             self.post(node, end, traveller.spoiled_by, event);
         }
         let controller = &mut self.nodes[node].controller;
-        let errors = r::ECAT_PROCESSING_UNIT_ERROR_COUNTER.address;
+        let errors = r::PROCESSING_UNIT_ERROR_COUNTER.address;
         controller.advance(at, &mut self.signals);
         let before = controller.register(errors);
         let verdict = controller.process(at, &mut traveller.frame, &mut self.signals);
-        if controller.register(errors) != before {
+        if controller.register(errors) > before {
             let id = controller.id();
             self.truth.content_moves(id, ErrorCounter::ProcessingUnit);
             let effect = Effect::ContentRefused { frame: traveller.frame.number };

@@ -10,7 +10,7 @@ use super::due::Agenda;
 use super::link::{Ambush, CABLE_NS_PER_M, Hit, Link};
 use super::node::{Act, Glitch, Node};
 use crate::controller::{Controller, CountKind, PortEvent};
-use crate::device::Signals;
+use crate::device::{Refusal, Signals};
 use crate::fault::Running;
 use crate::hardware::PortKind;
 use crate::segment::card::Card;
@@ -37,7 +37,7 @@ pub(crate) struct World {
     pub(crate) horizon: Instant,
     /// An upper bound of the time that a frame of no length takes through all of it, twice.
     round: Span,
-    pub(super) frames: u64,
+    pub(crate) frames: u64,
 }
 
 impl World {
@@ -264,7 +264,7 @@ impl World {
             Change::Refuse { node, refusal } => {
                 self.nodes[node].refused_by = refusal.map(|_| fault);
                 self.nodes[node].act_at(at, Act::Refuse(refusal));
-                if let Some((_, code)) = refusal {
+                if let Some(Refusal { code, .. }) = refusal {
                     let place = Place::Device(self.id(node));
                     let effect = Effect::StateRefused { code: code.0 };
                     self.truth.effect(at, Some(fault), place, effect);
