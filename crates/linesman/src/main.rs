@@ -9,6 +9,8 @@ mod command;
 mod exit;
 mod failure;
 mod output;
+#[cfg(test)]
+mod text;
 mod version;
 
 use std::process::ExitCode;

@@ -6,6 +6,7 @@
 mod page;
 
 use linesman_config::fault::FaultName;
+use linesman_diagnosis::rule::{self, RulePage};
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::register::{self, Description};
@@ -63,13 +64,19 @@ fn pages(word: &str) -> Vec<Page> {
     if let Some(number) = number(word) {
         return numbered(number);
     }
+    let findings = rule::catalogue().into_iter().filter(|page| is_about(page, word));
     let state = AlState::ALL.into_iter().find(|state| state.name().eq_ignore_ascii_case(word));
     let fault = word.to_ascii_lowercase().parse::<FaultName>().ok();
-    let mut pages = Vec::new();
+    let mut pages: Vec<Page> = findings.map(page::finding).collect();
     pages.extend(state.map(page::state));
     pages.extend(fault.map(page::fault));
     pages.extend(named_register(word));
     pages
+}
+
+/// Whether a finding's page is meant, by code or by name.
+fn is_about(page: &RulePage, word: &str) -> bool {
+    page.code.eq_ignore_ascii_case(word) || page.name.eq_ignore_ascii_case(word)
 }
 
 /// A number and how it was written.
@@ -136,9 +143,13 @@ fn near(word: &str) -> Vec<String> {
     let has = |name: &str| wanted.len() > 2 && name.to_ascii_lowercase().contains(&wanted);
     let faults = FaultName::ALL.iter().map(|fault| fault.name()).filter(|name| has(name));
     let registers = register::ALL.iter().map(|register| register.name).filter(|name| has(name));
+    let findings = rule::catalogue().into_iter();
+    let findings = findings
+        .filter(|page| has(page.name) || page.code.to_ascii_lowercase().starts_with(&wanted));
     let codes = status_code::ALL.iter().filter(|code| has(code.name));
-    faults
-        .map(str::to_owned)
+    findings
+        .map(|page| format!("{} ({})", page.code, page.name))
+        .chain(faults.map(str::to_owned))
         .chain(registers.map(|name| format!("`{name}`")))
         .chain(codes.map(|entry| format!("0x{:04X} ({})", entry.code.value(), entry.name)))
         .take(MOST_SUGGESTIONS)

@@ -1,6 +1,7 @@
 //! `linesman schema`: the JSON schema of each file and output.
 
 use linesman_config::project::Project;
+use linesman_diagnosis::report::Diagnosis;
 use schemars::{Schema, schema_for};
 
 use super::interfaces;
@@ -21,6 +22,8 @@ pub(crate) struct Arguments {
 pub(crate) enum Name {
     /// What was planned (TOML)
     Project,
+    /// `diagnose --json`
+    Diagnosis,
     /// `interfaces --json`
     Interfaces,
     /// What every command with --json prints when nothing could be judged
@@ -36,6 +39,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 fn schema(name: Name) -> Schema {
     match name {
         Name::Project => schema_for!(Project),
+        Name::Diagnosis => schema_for!(Diagnosis),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Error => schema_for!(ErrorReport),
     }

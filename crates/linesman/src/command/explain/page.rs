@@ -1,6 +1,8 @@
 //! One page of explanation.
 
 use linesman_config::fault::{Class, FaultName};
+use linesman_diagnosis::finding::Severity;
+use linesman_diagnosis::rule::RulePage;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::register::{Description, Field, Form, Unit};
 use linesman_proto::state::{AlState, AlStatusCode};
@@ -16,6 +18,8 @@ pub(super) struct Page {
 enum Part {
     /// A paragraph.
     Text(String),
+    /// A line that stays as it is: Markdown knows better.
+    Line(String),
     /// A heading with one thing behind it.
     Fact(&'static str, String),
     /// A heading with a list beneath.
@@ -58,6 +62,16 @@ impl Page {
         let mut text = format!("{}\n", paint.bold(&self.title));
         for part in &self.parts {
             match part {
+                Part::Line(words) if words.starts_with('#') => {
+                    text.push_str(&format!(
+                        "  {}\n",
+                        paint.bold(words.trim_start_matches(['#', ' ']))
+                    ));
+                }
+                Part::Line(words) => {
+                    text.push_str(format!("  {words}").trim_end());
+                    text.push('\n');
+                }
                 Part::Text(words) => text.push_str(&wrapped("  ", words, width)),
                 Part::Fact(name, words) => {
                     let head = format!("  {:<11}", format!("{name}:"));
@@ -73,6 +87,22 @@ impl Page {
         }
         text
     }
+}
+
+/// A page about a finding: the manual page of its rule.
+pub(super) fn finding(page: &RulePage) -> Page {
+    let severity = match page.severity {
+        Severity::Info => "info",
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    };
+    let class = class(page.class);
+    let title = format!("Finding {} {} ({severity}, {class})", page.code, page.name);
+    let mut result = Page::new(title);
+    for line in page.manual().trim().lines() {
+        result.parts.push(Part::Line(line.to_owned()));
+    }
+    result
 }
 
 /// A page about an AL status code.
@@ -196,12 +226,15 @@ pub(super) fn state(state: AlState) -> Page {
 
 /// A page about a fault name.
 pub(super) fn fault(fault: FaultName) -> Page {
-    let class = match fault.class() {
+    Page::new(format!("Fault {fault}")).text(fault.meaning()).fact("class", class(fault.class()))
+}
+
+const fn class(class: Class) -> &'static str {
+    match class {
         Class::Hardware => "hardware",
         Class::Software => "software",
         Class::Configuration => "configuration",
         Class::Timing => "timing",
         Class::Host => "host",
-    };
-    Page::new(format!("Fault {fault}")).text(fault.meaning()).fact("class", class)
+    }
 }
