@@ -1,3 +1,82 @@
-//! Developer commands.
+//! Developer commands, run as `cargo xtask COMMAND`.
+//!
+//! `test` is everything that is checked, in one command; `tidy` holds the house rules; `features`
+//! writes `FEATURES.md` from the annotations on tests; `fuzz` and `interop` run those two alone.
 
-fn main() {}
+mod annotation;
+mod features;
+mod files;
+mod requirements;
+mod test;
+mod tidy;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use clap::{Parser, Subcommand};
+
+#[derive(Parser)]
+#[command(name = "cargo xtask", about = "Developer commands of Linesman")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Check everything, with a summary at the end
+    Test(test::Options),
+    /// Check the house rules
+    Tidy,
+    /// Write FEATURES.md from the annotations on tests
+    Features {
+        /// Fail if it is not up to date, write nothing
+        #[arg(long)]
+        check: bool,
+    },
+    /// Fuzz every target
+    Fuzz {
+        /// How long, per target
+        #[arg(long, default_value_t = 300)]
+        seconds: u64,
+    },
+    /// Run the foreign MainDevices against the virtual segment (root, Linux)
+    Interop,
+}
+
+fn main() -> ExitCode {
+    match run(Arguments::parse().command) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Runs one command; `false` when something that it checks is not as it should be.
+fn run(command: Command) -> Result<bool> {
+    let root = root()?;
+    match command {
+        Command::Test(options) => test::run(&root, &options),
+        Command::Tidy => tidy::run(&root),
+        Command::Features { check } => features::run(&root, check),
+        Command::Fuzz { seconds } => test::run(&root, &test::Options::only("fuzz", Some(seconds))),
+        Command::Interop => test::run(&root, &test::Options::only("interop", None)),
+    }
+}
+
+/// The root of the project: where `ARCHITECTURE.md` is, above this crate.
+fn root() -> Result<PathBuf> {
+    let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let root = here.parent().context("this crate has no folder above it")?;
+    if !root.join("ARCHITECTURE.md").exists() {
+        bail!(
+            "{} is not the root of the project; was it moved since xtask was built? Build it again",
+            root.display()
+        );
+    }
+    Ok(root.to_path_buf())
+}

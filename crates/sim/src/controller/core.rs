@@ -53,6 +53,8 @@ pub(super) struct Core {
     pub(super) pdi_watchdog_ok: bool,
     /// The processor behind the controller has stopped serving it.
     pub(super) processor_stuck: bool,
+    /// AL status does not copy AL control although device emulation is on: a fault.
+    pub(super) emulation_suspended: bool,
     /// When written loop modes take effect: at the end of the frame that wrote them.
     pub(super) loops_change_at: Option<Instant>,
     /// When temporary loop modes end, and the byte that returns.
@@ -109,6 +111,7 @@ impl Core {
             pdi_watchdog: Watchdog::default(),
             pdi_watchdog_ok: true,
             processor_stuck: false,
+            emulation_suspended: false,
             loops_change_at: None,
             loops_return: None,
             link_lost_at: PortMap::default(),

@@ -16,7 +16,7 @@ use super::memory::at;
 use super::pdi::Pdi;
 use super::posted::{Happening, PortEvent};
 use super::sii::Outcome;
-use crate::device::{Firmware, Signals};
+use crate::device::{Firmware, Refusal, Signals};
 use crate::frame::WireFrame;
 use crate::hardware::Hardware;
 
@@ -338,6 +338,15 @@ impl Controller {
     /// unanswered meanwhile and the PDI watchdog runs out.
     pub fn set_processor_stuck(&mut self, at: Instant, stuck: bool) {
         self.core.set_processor_stuck(stuck, at);
+        self.reschedule();
+    }
+
+    /// The device refuses a step from `at` on, or `None`: no longer. Where the controller emulates
+    /// the device, it leaves AL control to [`Firmware`] meanwhile, without 0x0141 saying so.
+    pub fn refuse(&mut self, at: Instant, refusal: Option<Refusal>) {
+        self.firmware.refuse(refusal);
+        self.core.emulation_suspended = refusal.is_some();
+        self.core.call_firmware(at);
         self.reschedule();
     }
 

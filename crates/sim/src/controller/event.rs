@@ -68,9 +68,11 @@ impl Core {
         }
     }
 
-    /// Whether there is no processor that answers requests: AL status copies AL control.
+    /// Whether there is no processor that answers requests: AL status copies AL control. A fault can
+    /// suspend that (and 0x0141 does not show it).
     pub(super) fn emulates_device(&self) -> bool {
-        self.memory.u8(&r::ESC_CONFIGURATION_A0) & DEVICE_EMULATION != 0
+        !self.emulation_suspended
+            && self.memory.u8(&r::ESC_CONFIGURATION_A0) & DEVICE_EMULATION != 0
     }
 
     /// Whether the MainDevice may write AL control: not before the last request was taken.

@@ -7,9 +7,9 @@
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::{DIGITAL_OUTPUT, SyncManagerConfig};
-use linesman_proto::state::{AlState, StateValue};
 use linesman_proto::time::Instant;
 
+use super::application_layer::{ApplicationLayer, Refusal};
 use super::firmware::Firmware;
 use super::signal::{SignalId, Signals};
 use crate::controller::Pdi;
@@ -31,11 +31,24 @@ impl DigitalArea {
     }
 }
 
+/// A word that is taken as a whole, such as a coding switch.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct WordArea {
+    /// The SyncManager that guards it.
+    pub sync_manager: u8,
+    /// Where it lies in process-data RAM, two bytes.
+    pub at: RegisterAddress,
+    /// Its value: the low 16 bits of the signal.
+    pub signal: SignalId,
+}
+
 /// A device without a processor.
 #[derive(Clone, Default, Debug)]
 pub struct Emulated {
     outputs: Vec<DigitalArea>,
     inputs: Vec<DigitalArea>,
+    words: Vec<WordArea>,
+    application_layer: ApplicationLayer,
     /// The bytes of one area, kept for its memory.
     bytes: Vec<u8>,
 }
@@ -45,12 +58,18 @@ impl Emulated {
     #[must_use]
     pub fn new(outputs: Vec<DigitalArea>, inputs: Vec<DigitalArea>) -> Self {
         let longest = outputs.iter().chain(&inputs).map(DigitalArea::len).max().unwrap_or(0);
-        Self { outputs, inputs, bytes: vec![0; longest] }
+        Self { outputs, inputs, bytes: vec![0; longest], ..Self::default() }
+    }
+
+    /// The same device with words that it takes.
+    #[must_use]
+    pub fn with_words(self, words: Vec<WordArea>) -> Self {
+        Self { words, ..self }
     }
 
     fn drive_outputs(&mut self, pdi: &mut Pdi<'_>) {
         let expired = pdi.watchdog_expired();
-        let operational = pdi.al_status().state() == StateValue::Known(AlState::Op);
+        let operational = ApplicationLayer::is_operational(pdi);
         for area in &self.outputs {
             let bytes = &mut self.bytes[..area.len()];
             let guard = pdi.sync_manager(area.sync_manager);
@@ -70,12 +89,19 @@ impl Firmware for Emulated {
     }
 
     fn run(&mut self, _now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
+        if self.application_layer.refuses() && !pdi.emulates_device() {
+            self.application_layer.serve_unchecked(pdi);
+        }
         self.drive_outputs(pdi);
         None
     }
 
+    fn refuse(&mut self, refusal: Option<Refusal>) {
+        self.application_layer.refuse(refusal);
+    }
+
     fn samples(&self) -> bool {
-        !self.inputs.is_empty()
+        !self.inputs.is_empty() || !self.words.is_empty()
     }
 
     fn sample(&mut self, _now: Instant, pdi: &mut Pdi<'_>) {
@@ -85,15 +111,11 @@ impl Firmware for Emulated {
             for (channel, signal) in area.signals.iter().enumerate() {
                 bytes[channel / 8] |= u8::from(pdi.signals().is_high(*signal)) << (channel % 8);
             }
-            let guard = pdi.sync_manager(area.sync_manager);
-            if guard.is_some_and(|guard| is_buffered(&guard)) {
-                // Less than a whole buffer is a set-up that does not fit the device.
-                pdi.write_sync_manager(area.sync_manager, bytes);
-            } else {
-                let end = area.at.0.saturating_add(bytes.len() as u16);
-                let ram = pdi.ram_mut(area.at.0..end);
-                ram.copy_from_slice(&bytes[..ram.len()]);
-            }
+            put(area.sync_manager, area.at, bytes, pdi);
+        }
+        for word in &self.words {
+            let value = pdi.signals().value(word.signal) as u16;
+            put(word.sync_manager, word.at, &value.to_le_bytes(), pdi);
         }
     }
 
@@ -107,6 +129,19 @@ impl Firmware for Emulated {
 /// Whether accesses go through buffers: not for a SyncManager that is off, or of one byte.
 fn is_buffered(guard: &SyncManagerConfig) -> bool {
     guard.is_active() && guard.length > 1
+}
+
+/// Puts input bytes where they belong.
+fn put(sync_manager: u8, at: RegisterAddress, bytes: &[u8], pdi: &mut Pdi<'_>) {
+    let guard = pdi.sync_manager(sync_manager);
+    if guard.is_some_and(|guard| is_buffered(&guard)) {
+        // Less than a whole buffer is a set-up that does not fit the device.
+        pdi.write_sync_manager(sync_manager, bytes);
+    } else {
+        let end = at.0.saturating_add(bytes.len() as u16);
+        let ram = pdi.ram_mut(at.0..end);
+        ram.copy_from_slice(&bytes[..ram.len()]);
+    }
 }
 
 /// Fetches the output bytes; false when none have come yet.
@@ -139,6 +174,7 @@ mod tests {
     use super::*;
     use crate::controller::tests::rig::{Bench, hardware, sii};
     use linesman_proto::register::SmControl;
+    use linesman_proto::state::{AlState, AlStatusCode};
     use linesman_proto::time::Span;
 
     fn area(sync_manager: u8, at: u16, first: u32, count: u32) -> DigitalArea {
@@ -219,6 +255,39 @@ mod tests {
         // Before anything is set up the bits lie in the RAM all the same.
         bench.write(0x0806, &[0]);
         assert_eq!(bench.byte(0x1000), 0b0100);
+    }
+
+    #[test]
+    fn told_to_refuse_a_step_it_answers_as_a_device_with_a_processor() {
+        let mut bench = bench(vec![area(0, 0x0F00, 0, 8)], vec![]);
+        bench.write(0x0120, &[2, 0]);
+        let refusal =
+            Refusal { transition_to: AlState::SafeOp, code: AlStatusCode::INVALID_SYNC_MANAGER };
+        bench.controller.refuse(bench.now, Some(refusal));
+        bench.write(0x0120, &[4, 0]);
+        assert_eq!((bench.word(0x0130), bench.word(0x0134)), (0x12, 0x0017));
+        assert_eq!(bench.byte(0x0141) & 1, 1, "it says that it emulates the device all the same");
+        bench.write(0x0120, &[4, 0]);
+        assert_eq!(bench.word(0x0130), 0x12, "not heard without acknowledgement");
+        bench.write(0x0120, &[0x12, 0]);
+        assert_eq!((bench.word(0x0130), bench.word(0x0134)), (2, 0));
+        bench.write(0x0120, &[4, 0]);
+        bench.write(0x0120, &[1, 0]);
+        assert_eq!(bench.word(0x0130), 1, "INIT is always heard");
+        bench.controller.refuse(bench.now, None);
+        for state in [2, 4, 8] {
+            bench.write(0x0120, &[state, 0]);
+            assert_eq!(bench.word(0x0130), u16::from(state));
+        }
+    }
+
+    #[test]
+    fn a_coding_switch_is_a_word_in_the_ram() {
+        let word = WordArea { sync_manager: 0, at: RegisterAddress(0x1000), signal: SignalId(3) };
+        let emulated = Emulated::default().with_words(vec![word]);
+        let mut bench = Bench::with(hardware(), sii(true), Box::new(emulated));
+        bench.signals.set(SignalId(3), 0x1234);
+        assert_eq!(bench.word(0x1000), 0x1234);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::fmt::Debug;
 
 use linesman_proto::time::Instant;
 
+use super::application_layer::Refusal;
 use super::signal::Signals;
 use crate::controller::Pdi;
 
@@ -34,12 +35,18 @@ pub trait Firmware: Debug + Send {
     /// input sampling at start of frame). Called only where [`Firmware::samples`] asks for it.
     fn sample(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
 
+    /// From now on a step into the state that `refusal` names is refused with its code; `None` ends
+    /// that. It outlives a restart. Faults go through
+    /// [`Controller::refuse`](crate::controller::Controller::refuse), which also makes a controller
+    /// with device emulation leave the answer to this side.
+    fn refuse(&mut self, refusal: Option<Refusal>);
+
     /// The supply is gone: outputs are no longer driven. Nothing else can be done any more.
     fn stop(&mut self, _signals: &mut Signals) {}
 }
 
-/// Nothing behind the controller: couplers and junctions. AL status follows AL control when the SII
-/// says "device emulation"; otherwise no request is ever answered.
+/// Nothing at all behind the controller. AL status follows AL control when the SII says "device
+/// emulation"; otherwise, and while it is to refuse, no request is ever answered.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct NoFirmware;
 
@@ -49,4 +56,6 @@ impl Firmware for NoFirmware {
     fn run(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) -> Option<Instant> {
         None
     }
+
+    fn refuse(&mut self, _refusal: Option<Refusal>) {}
 }

@@ -19,9 +19,9 @@ pub use address::Addresses;
 use super::{Cyclic, Line, Seen};
 use crate::observe::{Exchange, FrameCopy};
 
-/// Registers from here on are optional: without distributed clocks, or without a mailbox message
-/// to fetch, nobody answers there, and nothing is wrong.
-const FIRST_OPTIONAL: RegisterAddress = RegisterAddress(0x0900);
+/// Registers from here on are optional: without so many FMMUs and SyncManagers, without distributed
+/// clocks, or without a mailbox message to fetch, nobody answers there, and nothing is wrong.
+const FIRST_OPTIONAL: RegisterAddress = RegisterAddress(0x0600);
 /// Process RAM begins here: mailboxes and process data.
 const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
 /// Most logical datagrams that are followed.

@@ -6,7 +6,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::rig::{Bench, hardware, sii};
 use crate::controller::Pdi;
-use crate::device::{Firmware, NoFirmware, Signals};
+use crate::device::{Firmware, NoFirmware, Refusal, Signals};
 
 #[test]
 fn al_control_waits_until_the_last_request_was_taken() {
@@ -71,6 +71,8 @@ impl Firmware for Diary {
         pdi.signals_mut().set(crate::device::SignalId(0), self.calls.len() as i32);
         self.every.map(|every| now + every)
     }
+
+    fn refuse(&mut self, _refusal: Option<Refusal>) {}
 
     fn stop(&mut self, signals: &mut Signals) {
         signals.set(crate::device::SignalId(0), -1);

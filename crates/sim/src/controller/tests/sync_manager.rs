@@ -1,4 +1,4 @@
-//! SyncManagers from both sides: sessions, denials, buffers, events.
+//! SyncManagers from both sides: procedures, denials, buffers, events.
 
 use linesman_proto::command::Command;
 use linesman_proto::register::{AlEvents, SmControl, SmStatus};

@@ -1,0 +1,6 @@
+//! Answers as people read them: what the JSON says, in words and by names.
+
+pub(crate) mod diagnosis;
+pub(crate) mod finding;
+pub(crate) mod names;
+pub(crate) mod quantity;

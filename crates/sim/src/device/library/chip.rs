@@ -1,0 +1,117 @@
+//! The controllers that devices are made with.
+//!
+//! References: data sheets of ET1100 and ET1200 and of the IP core for programmable logic (numbers
+//! of FMMUs and SyncManagers, RAM, features at 0x0008); delays are those that were measured on real
+//! lines: 145 to 155 ns from terminal to terminal, about 500 ns over a short cable.
+
+use linesman_proto::port::PortMap;
+use linesman_proto::time::Span;
+
+use crate::hardware::{CountingProfile, Hardware, PortKind, Timing};
+
+/// A controller without its ports.
+#[derive(Debug)]
+pub(super) struct Chip {
+    controller_type: u8,
+    revision: u8,
+    build: u16,
+    fmmus: u8,
+    sync_managers: u8,
+    ram_kib: u8,
+    features: u16,
+    counting: CountingProfile,
+    timing: Timing,
+}
+
+/// Distributed clocks of 64 bits, low jitter and enhanced link detection, separate forwarded errors.
+const FULL: u16 = 0x00FC;
+/// The same without anything that is about E-bus.
+const WITHOUT_EBUS: u16 = 0x00CC;
+
+const TIMING: Timing = Timing {
+    forward: Span::ns(130),
+    process: Span::ns(150),
+    ebus_crossing: Span::ns(20),
+    mii_crossing: Span::ns(400),
+    ebus_loss_detection: Span::us(2),
+    mii_loss_detection: Span::us(15),
+    ebus_link_up: Span::us(500),
+    mii_link_up: Span::ms(1_500),
+};
+
+const COUNTING: CountingProfile = CountingProfile {
+    forwarded: true,
+    remakes_symbol_errors: false,
+    counts_when_closed: false,
+    counts_missing_start: true,
+};
+
+/// The large one: up to four ports, used in couplers, junctions and terminals with a processor.
+pub(super) const ET1100: Chip = Chip {
+    controller_type: 0x11,
+    revision: 0,
+    build: 2,
+    fmmus: 8,
+    sync_managers: 8,
+    ram_kib: 8,
+    features: FULL,
+    counting: COUNTING,
+    timing: TIMING,
+};
+
+/// The small one: two ports and a third, for simple terminals.
+pub(super) const ET1200: Chip = Chip {
+    controller_type: 0x12,
+    revision: 0,
+    build: 1,
+    fmmus: 3,
+    sync_managers: 4,
+    ram_kib: 1,
+    features: FULL,
+    counting: COUNTING,
+    timing: Timing { forward: Span::ns(125), process: Span::ns(145), ..TIMING },
+};
+
+/// Programmable logic with the IP core: it makes symbol errors anew when it forwards a bad frame.
+pub(super) const IP_CORE: Chip = Chip {
+    controller_type: 0x04,
+    revision: 3,
+    build: 0x0300,
+    fmmus: 8,
+    sync_managers: 8,
+    ram_kib: 8,
+    features: WITHOUT_EBUS,
+    counting: CountingProfile { remakes_symbol_errors: true, ..COUNTING },
+    timing: Timing { forward: Span::ns(160), process: Span::ns(180), ..TIMING },
+};
+
+/// The first generation: four FMMUs and SyncManagers, and no counters of forwarded errors.
+pub(super) const ESC20: Chip = Chip {
+    controller_type: 0x02,
+    revision: 1,
+    build: 0,
+    fmmus: 4,
+    sync_managers: 4,
+    ram_kib: 4,
+    features: 0x0004,
+    counting: CountingProfile { forwarded: false, ..COUNTING },
+    timing: Timing { forward: Span::ns(150), process: Span::ns(170), ..TIMING },
+};
+
+impl Chip {
+    /// The controller with these ports.
+    pub(super) fn with_ports(&self, ports: PortMap<PortKind>) -> Hardware {
+        Hardware {
+            controller_type: self.controller_type,
+            revision: self.revision,
+            build: self.build,
+            fmmus: self.fmmus,
+            sync_managers: self.sync_managers,
+            ram_kib: self.ram_kib,
+            features: self.features,
+            ports,
+            counting: self.counting,
+            timing: self.timing,
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! `proves: ID[, ID] [partial[: reason]]`: which test shows which row.
+//!
+//! In Rust it is a `//` comment directly above `#[test]`, in a story a line of its head, in an
+//! interop program a `#` comment above the check. One `partial` in an annotation makes all of its
+//! rows partial: a full claim has a line of its own.
+
+use crate::files::TextFile;
+
+/// One row that one test claims to show.
+#[derive(Clone, Debug, Eq, PartialEq)]
+pub(crate) struct Claim {
+    pub(crate) id: String,
+    pub(crate) extent: Extent,
+    pub(crate) surface: Surface,
+    /// From the root.
+    pub(crate) path: String,
+    /// From 1.
+    pub(crate) line: usize,
+    /// The test's name.
+    pub(crate) test: String,
+}
+
+/// How much of the row is claimed.
+#[derive(Clone, Debug, Eq, PartialEq)]
+pub(crate) enum Extent {
+    /// Its acceptance case is asserted.
+    Full,
+    /// A part, and which one or what is missing, if said.
+    Partial(Option<String>),
+}
+
+/// Where a test stands.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Surface {
+    /// Beside the code.
+    Unit,
+    /// Through what others can call or run: `tests/` of a crate, a story, an interop check.
+    Public,
+}
+
+/// Finds every annotation of the project; the second list is what is wrong with them.
+pub(crate) fn claims(files: &[TextFile]) -> (Vec<Claim>, Vec<String>) {
+    let mut claims = Vec::new();
+    let mut errors = Vec::new();
+    for file in files {
+        let language = match file.path.split('/').next() {
+            // This crate speaks about annotations; it carries none.
+            Some("xtask") => continue,
+            Some("scenarios") if file.path.ends_with(".md") => Language::Story,
+            Some("interop") if file.path.ends_with(".py") => Language::Python,
+            _ if file.is_rust() => Language::Rust,
+            _ => continue,
+        };
+        read(file, language, &mut claims, &mut errors);
+    }
+    (claims, errors)
+}
+
+#[derive(Clone, Copy, Eq, PartialEq)]
+enum Language {
+    Rust,
+    Python,
+    Story,
+}
+
+impl Language {
+    fn marker(self) -> &'static str {
+        match self {
+            Self::Rust => "// proves:",
+            Self::Python => "# proves:",
+            Self::Story => "proves:",
+        }
+    }
+
+    /// What a line that continues the annotation begins with.
+    fn continuation(self) -> Option<&'static str> {
+        match self {
+            Self::Rust => Some("// "),
+            Self::Python => Some("# "),
+            Self::Story => None,
+        }
+    }
+}
+
+fn read(file: &TextFile, language: Language, claims: &mut Vec<Claim>, errors: &mut Vec<String>) {
+    let lines: Vec<&str> = file.text.lines().map(str::trim).collect();
+    let surface = match language {
+        Language::Rust if !is_integration_test(&file.path) => Surface::Unit,
+        Language::Rust | Language::Python | Language::Story => Surface::Public,
+    };
+    for (index, line) in lines.iter().enumerate() {
+        let Some(first) = line.strip_prefix(language.marker()) else { continue };
+        let mut text = first.trim().to_owned();
+        let mut next = index + 1;
+        while let (Some(line), Some(mark)) = (lines.get(next), language.continuation()) {
+            // Another annotation may follow at once; it is read on its own.
+            if line.starts_with(language.marker()) {
+                next += 1;
+                while lines.get(next).is_some_and(|line| line.starts_with(mark)) {
+                    next += 1;
+                }
+                break;
+            }
+            let Some(more) = line.strip_prefix(mark) else { break };
+            text.push(' ');
+            text.push_str(more.trim());
+            next += 1;
+        }
+        let at = format!("{}:{}", file.path, index + 1);
+        let test = match language {
+            Language::Story => Some(story_name(&file.path)),
+            Language::Rust => rust_test(&lines[next..]),
+            Language::Python => python_check(&lines[next..]),
+        };
+        let Some(test) = test else {
+            errors.push(format!("{at}: no test follows the annotation"));
+            continue;
+        };
+        match parse(&text) {
+            Err(why) => errors.push(format!("{at}: {why}")),
+            Ok((ids, extent)) => claims.extend(ids.into_iter().map(|id| Claim {
+                id,
+                extent: extent.clone(),
+                surface,
+                path: file.path.clone(),
+                line: index + 1,
+                test: test.clone(),
+            })),
+        }
+    }
+}
+
+fn is_integration_test(path: &str) -> bool {
+    let mut parts = path.split('/');
+    parts.next() == Some("crates") && parts.nth(1) == Some("tests")
+}
+
+fn story_name(path: &str) -> String {
+    path.trim_start_matches("scenarios/").trim_end_matches(".md").to_owned()
+}
+
+/// The name of the function under `#[test]`, which must come before anything else.
+fn rust_test(lines: &[&str]) -> Option<String> {
+    let mut is_test = false;
+    for line in lines {
+        if line.starts_with("#[test]") {
+            is_test = true;
+        } else if let Some(rest) = line.strip_prefix("fn ") {
+            let end = rest.find(['(', '<'])?;
+            return is_test.then(|| rest[..end].to_owned());
+        } else if !(line.starts_with("#[") || line.starts_with("//")) {
+            return None;
+        }
+    }
+    None
+}
+
+fn python_check(lines: &[&str]) -> Option<String> {
+    let line = lines.iter().find(|line| !line.starts_with('@') && !line.starts_with('#'))?;
+    let rest = line.strip_prefix("def ")?;
+    Some(rest[..rest.find('(')?].to_owned())
+}
+
+/// Reads what stands behind the marker.
+fn parse(text: &str) -> Result<(Vec<String>, Extent), String> {
+    let (head, reason) = match text.split_once("partial:") {
+        Some((head, reason)) => (head, Some(reason.trim())),
+        None => (text, None),
+    };
+    let mut ids = Vec::new();
+    let mut partial = reason.is_some();
+    for word in head.split([',', ' ']).filter(|word| !word.is_empty()) {
+        if word == "partial" {
+            partial = true;
+        } else if is_id(word) {
+            ids.push(word.to_owned());
+        } else {
+            return Err(format!(
+                "{word:?} is neither a row nor `partial`; expected `ID[, ID] [partial[: reason]]`"
+            ));
+        }
+    }
+    if ids.is_empty() {
+        return Err("no row is named".to_owned());
+    }
+    let reason = reason.filter(|reason| !reason.is_empty()).map(str::to_owned);
+    Ok((ids, if partial { Extent::Partial(reason) } else { Extent::Full }))
+}
+
+fn is_id(word: &str) -> bool {
+    word.split_once('-').is_some_and(|(prefix, number)| {
+        !prefix.is_empty()
+            && prefix.bytes().all(|byte| byte.is_ascii_uppercase())
+            && number.len() == 2
+            && number.bytes().all(|byte| byte.is_ascii_digit())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(path: &str, text: &str) -> TextFile {
+        TextFile { path: path.to_owned(), text: text.to_owned() }
+    }
+
+    fn of(path: &str, text: &str) -> (Vec<(String, Extent, String)>, usize) {
+        let (claims, errors) = claims(&[file(path, text)]);
+        let claims = claims.into_iter().map(|claim| (claim.id, claim.extent, claim.test)).collect();
+        (claims, errors.len())
+    }
+
+    #[test]
+    fn a_full_claim_names_row_and_test() {
+        let (found, errors) =
+            of("crates/a/tests/b.rs", "// proves: FRM-02, FRM-03\n#[test]\nfn all() {}\n");
+        assert_eq!(errors, 0);
+        assert_eq!(
+            found,
+            [
+                ("FRM-02".into(), Extent::Full, "all".into()),
+                ("FRM-03".into(), Extent::Full, "all".into())
+            ]
+        );
+    }
+
+    #[test]
+    fn one_partial_makes_all_rows_of_the_annotation_partial() {
+        let (found, _) =
+            of("crates/a/src/b.rs", "// proves: FRM-02 partial, FRM-03\n#[test]\nfn all() {}\n");
+        assert!(found.iter().all(|(_, extent, _)| *extent == Extent::Partial(None)));
+        assert_eq!(found.len(), 2);
+    }
+
+    #[test]
+    fn a_reason_runs_over_lines_and_may_hold_commas() {
+        let text =
+            "// proves: FRM-02 partial: reads, not\n// writes\n#[test]\n#[ignore]\nfn all() {}\n";
+        let (found, errors) = of("crates/a/src/b.rs", text);
+        assert_eq!(errors, 0);
+        assert_eq!(found[0].1, Extent::Partial(Some("reads, not writes".into())));
+    }
+
+    #[test]
+    fn two_annotations_above_one_test_are_both_read() {
+        let text = "// proves: FRM-02\n// proves: HW-03 partial: a\n// b\n#[test]\nfn all() {}\n";
+        let (found, errors) = of("crates/a/src/b.rs", text);
+        assert_eq!((found.len(), errors), (2, 0));
+        assert_eq!(found[0].1, Extent::Full);
+        assert_eq!(found[1].1, Extent::Partial(Some("a b".into())));
+    }
+
+    #[test]
+    fn an_annotation_without_a_test_is_an_error() {
+        assert_eq!(of("crates/a/src/b.rs", "// proves: FRM-02\nfn helper() {}\n"), (vec![], 1));
+        assert_eq!(of("crates/a/src/b.rs", "// proves: FRM-02\n"), (vec![], 1));
+    }
+
+    #[test]
+    fn what_is_no_row_is_an_error() {
+        assert_eq!(of("crates/a/src/b.rs", "// proves: frames\n#[test]\nfn a() {}\n"), (vec![], 1));
+        assert_eq!(of("scenarios/a.md", "proves: partial\n"), (vec![], 1));
+    }
+
+    #[test]
+    fn stories_and_interop_checks_are_read() {
+        let (found, errors) = of("scenarios/cut.md", "---\nproves: HW-10\n---\n");
+        assert_eq!((found[0].2.as_str(), errors), ("cut", 0));
+        let (found, errors) =
+            of("interop/run.py", "# proves: JCT-04 partial: one cycle\n@check\ndef scan(line):\n");
+        assert_eq!((found[0].2.as_str(), errors), ("scan", 0));
+    }
+
+    #[test]
+    fn only_tests_folders_are_public() {
+        assert!(is_integration_test("crates/sim/tests/wire.rs"));
+        assert!(!is_integration_test("crates/sim/src/tests/wire.rs"));
+        assert!(!is_integration_test("fuzz/tests/x.rs"));
+    }
+}

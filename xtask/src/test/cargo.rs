@@ -1,0 +1,105 @@
+//! The steps that are cargo's own, and the house rules.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::Result;
+
+use super::count::Counts;
+use super::{Context, Outcome};
+use crate::{features, tidy};
+
+/// The cargo that runs us.
+pub(super) fn cargo() -> PathBuf {
+    std::env::var_os("CARGO").map_or_else(|| PathBuf::from("cargo"), PathBuf::from)
+}
+
+/// Where cargo puts what it builds.
+pub(super) fn target_folder(root: &Path) -> PathBuf {
+    match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(folder) => root.join(folder),
+        None => root.join("target"),
+    }
+}
+
+pub(super) fn format(context: &Context<'_>) -> Result<Outcome> {
+    let ran = context.command("format", cargo(), &["fmt", "--all", "--check"]).run()?;
+    if !ran.success() {
+        return Ok(Outcome::Failed { count: 0, why: ran.explain() });
+    }
+    Ok(Outcome::Passed { count: 0, note: "rustfmt agrees".into() })
+}
+
+pub(super) fn tidy(context: &Context<'_>) -> Result<Outcome> {
+    if tidy::run(context.root)? {
+        Ok(Outcome::Passed { count: 0, note: "house rules hold".into() })
+    } else {
+        Ok(Outcome::Failed { count: 0, why: "house rules are broken, see above".into() })
+    }
+}
+
+pub(super) fn lints(context: &Context<'_>) -> Result<Outcome> {
+    let arguments =
+        ["clippy", "--workspace", "--all-targets", "--color=never", "--", "-D", "warnings"];
+    let ran = context.command("lints", cargo(), &arguments).run()?;
+    if !ran.success() {
+        return Ok(Outcome::Failed { count: 0, why: ran.explain() });
+    }
+    Ok(Outcome::Passed { count: 0, note: "clippy has no warning".into() })
+}
+
+/// All tests of the workspace, those in documentation too.
+pub(super) fn tests(context: &Context<'_>) -> Result<Outcome> {
+    // Tests that skip something say so; without this flag nobody would see it.
+    let arguments =
+        ["test", "--workspace", "--no-fail-fast", "--color=never", "--", "--show-output"];
+    let ran = context.command("tests", cargo(), &arguments).run()?;
+    let counts = Counts::parse(&ran.output);
+    for line in &counts.skipped {
+        println!("    {line}");
+    }
+    if !ran.success() {
+        for line in ran.output.lines().filter(|line| is_failure(line)) {
+            println!("    {line}");
+        }
+        let why = format!("{} failed; {}", counts.failed, ran.explain());
+        return Ok(Outcome::Failed { count: counts.passed, why });
+    }
+    let mut note = format!("tests in {} programs", counts.programs);
+    if counts.ignored > 0 {
+        note += &format!(", {} ignored", counts.ignored);
+    }
+    if !counts.skipped.is_empty() {
+        note += &format!(", {} say that they skipped something", counts.skipped.len());
+    }
+    Ok(Outcome::Passed { count: counts.passed, note })
+}
+
+fn is_failure(line: &str) -> bool {
+    (line.starts_with("test ") && line.ends_with("FAILED")) || line.starts_with("error")
+}
+
+/// The documentation builds without a warning: no dead link.
+pub(super) fn docs(context: &Context<'_>) -> Result<Outcome> {
+    let arguments = ["doc", "--workspace", "--no-deps", "--document-private-items"];
+    let ran =
+        context.command("docs", cargo(), &arguments).env("RUSTDOCFLAGS", "-D warnings").run()?;
+    if !ran.success() {
+        return Ok(Outcome::Failed { count: 0, why: ran.explain() });
+    }
+    Ok(Outcome::Passed { count: 0, note: "rustdoc has no warning".into() })
+}
+
+pub(super) fn features(context: &Context<'_>) -> Result<Outcome> {
+    if features::run(context.root, true)? {
+        Ok(Outcome::Passed { count: 0, note: "FEATURES.md is up to date".into() })
+    } else {
+        Ok(Outcome::Failed { count: 0, why: "FEATURES.md is not up to date".into() })
+    }
+}
+
+/// Whether a program is there and answers.
+pub(super) fn answers(program: &str, argument: &str) -> bool {
+    let output = Command::new(program).arg(argument).output();
+    output.is_ok_and(|output| output.status.success())
+}

@@ -1,0 +1,55 @@
+//! Foreign MainDevices against the virtual segment, each in network namespaces of its own.
+
+use anyhow::Result;
+
+use super::cargo::cargo;
+use super::{Context, Outcome, product, tools};
+
+pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
+    if !tools::is_root() {
+        return Ok(Outcome::Skipped("not root: network namespaces cannot be made".into()));
+    }
+    if let Some(why) = context.missing.get("ip") {
+        return Ok(Outcome::Skipped(why.clone()));
+    }
+    let python = match tools::python(context) {
+        Ok(python) => python,
+        Err(why) => return Ok(Outcome::Skipped(why)),
+    };
+    if let failed @ (Outcome::Failed { .. } | Outcome::Skipped(_)) = product::release(context)? {
+        return Ok(failed);
+    }
+    let target = context.target.join("interop");
+    let arguments = ["build", "--release", "--manifest-path=interop/ethercrab/Cargo.toml"];
+    let ran = context
+        .command("interop-ethercrab", cargo(), &arguments)
+        .env("CARGO_TARGET_DIR", &target)
+        .run()?;
+    if !ran.success() {
+        println!("    ethercrab cannot be built: {}", ran.explain());
+    }
+    let ran = context
+        .command("interop", python, &["interop/run.py"])
+        .env("LINESMAN", product::binary(context))
+        .env("ETHERCRAB_PEER", target.join("release/ethercrab-peer"))
+        .limit(600)
+        .run()?;
+    let mut counts = [0_u64; 3];
+    for line in ran.output.lines() {
+        let kind = ["ok ", "FAIL ", "skip "].iter().position(|word| line.starts_with(word));
+        if let Some(kind) = kind {
+            counts[kind] += 1;
+            println!("    {line}");
+        }
+    }
+    let [passed, failed, skipped] = counts;
+    if !ran.success() || failed > 0 || passed == 0 {
+        let why = format!("{failed} failed; {}", ran.explain());
+        return Ok(Outcome::Failed { count: passed, why });
+    }
+    let mut note = "checks with foreign MainDevices".to_owned();
+    if skipped > 0 {
+        note += &format!(", {skipped} skipped");
+    }
+    Ok(Outcome::Passed { count: passed, note })
+}

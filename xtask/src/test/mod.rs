@@ -1,0 +1,175 @@
+//! `cargo xtask test`: everything that is checked, step by step, with counts and times.
+
+mod cargo;
+mod count;
+mod exec;
+mod fuzz;
+mod interop;
+mod product;
+mod tools;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use clap::Args;
+
+use exec::Run;
+
+/// What to check.
+#[derive(Args, Default)]
+pub(crate) struct Options {
+    /// Only what needs no release build and no root: format, lints, tests, house rules
+    #[arg(long)]
+    quick: bool,
+    /// Only these steps, by name
+    #[arg(long, value_name = "STEP")]
+    only: Vec<String>,
+    /// Install nothing; skip what is not there
+    #[arg(long)]
+    no_install: bool,
+    /// How long to fuzz each target, in seconds
+    #[arg(long, value_name = "N")]
+    fuzz_seconds: Option<u64>,
+    /// How many seeds the swarm runs
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    swarm_seeds: u64,
+    /// How many plants the demo draws
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    demo_seeds: u64,
+}
+
+impl Options {
+    /// One step alone.
+    pub(crate) fn only(step: &str, fuzz_seconds: Option<u64>) -> Self {
+        Self { only: vec![step.to_owned()], fuzz_seconds, ..Self::default() }
+    }
+}
+
+/// What the steps share.
+struct Context<'a> {
+    root: &'a Path,
+    options: &'a Options,
+    /// Where cargo builds.
+    target: PathBuf,
+    /// Where the steps write what their commands print.
+    logs: PathBuf,
+    /// What could not be installed, and why.
+    missing: BTreeMap<&'static str, String>,
+}
+
+/// How a step ended.
+enum Outcome {
+    Passed {
+        /// How many things were tested.
+        count: u64,
+        /// What was counted, and what was left out.
+        note: String,
+    },
+    /// Could not be tried here, and why.
+    Skipped(String),
+    Failed {
+        /// How many passed nevertheless.
+        count: u64,
+        why: String,
+    },
+}
+
+struct Step {
+    name: &'static str,
+    /// Part of `--quick`.
+    quick: bool,
+    run: fn(&Context<'_>) -> Result<Outcome>,
+}
+
+const STEPS: &[Step] = &[
+    Step { name: "format", quick: true, run: cargo::format },
+    Step { name: "tidy", quick: true, run: cargo::tidy },
+    Step { name: "lints", quick: true, run: cargo::lints },
+    Step { name: "tests", quick: true, run: cargo::tests },
+    Step { name: "docs", quick: true, run: cargo::docs },
+    Step { name: "features", quick: true, run: cargo::features },
+    Step { name: "release", quick: false, run: product::release },
+    Step { name: "demo", quick: false, run: product::demo },
+    Step { name: "stories", quick: false, run: product::stories },
+    Step { name: "swarm", quick: false, run: product::swarm },
+    Step { name: "fuzz", quick: false, run: fuzz::run },
+    Step { name: "interop", quick: false, run: interop::run },
+];
+
+/// Runs the chosen steps; `false` when one failed.
+pub(crate) fn run(root: &Path, options: &Options) -> Result<bool> {
+    for name in &options.only {
+        if !STEPS.iter().any(|step| step.name == name) {
+            let names: Vec<&str> = STEPS.iter().map(|step| step.name).collect();
+            bail!("there is no step {name:?}; the steps are {}", names.join(", "));
+        }
+    }
+    let chosen = |step: &&Step| {
+        if options.only.is_empty() {
+            step.quick || !options.quick
+        } else {
+            options.only.iter().any(|name| name == step.name)
+        }
+    };
+    let target = cargo::target_folder(root);
+    let logs = target.join("xtask");
+    std::fs::create_dir_all(&logs)?;
+    let mut context = Context { root, options, target, logs, missing: BTreeMap::new() };
+    let wanted = STEPS.iter().filter(chosen).any(|step| matches!(step.name, "tests" | "interop"));
+    if wanted {
+        context.missing = tools::prepare(&context);
+    }
+    let mut rows = Vec::new();
+    for step in STEPS.iter().filter(chosen) {
+        println!("== {}", step.name);
+        let start = Instant::now();
+        let outcome = (step.run)(&context)
+            .unwrap_or_else(|error| Outcome::Failed { count: 0, why: format!("{error:#}") });
+        let took = start.elapsed();
+        if let Outcome::Failed { why, .. } = &outcome {
+            println!("FAILED: {why}");
+        }
+        rows.push((step.name, outcome, took));
+    }
+    Ok(summary(&rows))
+}
+
+/// The table at the end; `false` when a step failed.
+fn summary(rows: &[(&str, Outcome, Duration)]) -> bool {
+    println!("\n{:<10} {:<8} {:>7} {:>8}  ", "step", "result", "count", "time");
+    let (mut total, mut failed, mut skipped) = (0, 0, 0);
+    let mut time = Duration::ZERO;
+    for (name, outcome, took) in rows {
+        let (result, count, note) = match outcome {
+            Outcome::Passed { count, note } => ("passed", *count, note.as_str()),
+            Outcome::Skipped(why) => {
+                skipped += 1;
+                ("SKIPPED", 0, why.as_str())
+            }
+            Outcome::Failed { count, why } => {
+                failed += 1;
+                ("FAILED", *count, why.lines().next().unwrap_or_default())
+            }
+        };
+        total += count;
+        time += *took;
+        println!("{name:<10} {result:<8} {count:>7} {:>7.1}s  {note}", took.as_secs_f64());
+    }
+    println!(
+        "{:<10} {:<8} {total:>7} {:>7.1}s  {} steps, {failed} failed, {skipped} skipped",
+        "total",
+        if failed == 0 { "passed" } else { "FAILED" },
+        time.as_secs_f64(),
+        rows.len(),
+    );
+    failed == 0
+}
+
+impl Context<'_> {
+    /// A command in the project's root that logs to `NAME.log`.
+    fn command(&self, log: &str, program: impl AsRef<Path>, arguments: &[&str]) -> Run {
+        Run::new(self.root, self.logs.join(format!("{log}.log")), program.as_ref(), arguments)
+    }
+}
