@@ -38,10 +38,8 @@ pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
     })
 }
 
-/// A segment file and what was built of it.
+/// What a segment file describes.
 pub(crate) struct Plant {
-    /// The file.
-    pub(crate) file: SegmentFile,
     /// What was planned: the file without its faults.
     pub(crate) project: Project,
     /// What is there.
@@ -54,7 +52,7 @@ impl Plant {
         let file = segment_file(path)?;
         let project = file.project().map_err(|error| in_file(path, &error))?;
         let segment = Segment::build(&file).map_err(|error| in_file(path, &error))?;
-        Ok(Self { file, project, segment })
+        Ok(Self { project, segment })
     }
 }
 

@@ -55,11 +55,7 @@ impl Server {
     ///
     /// # Errors
     /// When an interface cannot be used.
-    pub fn open(
-        segment: Segment,
-        wiring: Wiring,
-        names: &[String],
-    ) -> Result<Self, LinkError> {
+    pub fn open(segment: Segment, wiring: Wiring, names: &[String]) -> Result<Self, LinkError> {
         let options = SocketOptions::default();
         let cards: Result<Vec<_>, _> =
             names.iter().take(2).map(|name| RawSocket::open(name, &options)).collect();
