@@ -1,3 +1,58 @@
 //! The command line of Linesman.
+//!
+//! [`cli`] says which commands there are, one file of [`command`] does each. A command writes its
+//! answer through [`output`] and ends with an [`exit::Status`], or with a [`failure::Failure`] when
+//! nothing could be judged.
 
-fn main() {}
+mod cli;
+mod command;
+mod exit;
+mod failure;
+mod files;
+mod output;
+mod text;
+mod version;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::cli::Cli;
+use crate::failure::Failure;
+use crate::output::Output;
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return usage(&error),
+    };
+    let mut output = Output::new(cli.color);
+    let json = cli.command.wants_json();
+    match command::run(cli.command, &mut output) {
+        Ok(status) => status.into(),
+        Err(failure) => refuse(&failure, json, &mut output),
+    }
+}
+
+/// Says why nothing could be judged.
+fn refuse(failure: &Failure, json: bool, output: &mut Output) -> ExitCode {
+    if json {
+        output.json(&failure.report());
+    }
+    output.complain(failure);
+    exit::Status::NotJudged.into()
+}
+
+/// Help and version are answers; everything else that clap says is about a wrong command line.
+fn usage(error: &clap::Error) -> ExitCode {
+    let wants_json = std::env::args_os().any(|argument| argument == "--json");
+    if error.use_stderr() && wants_json {
+        let text = error.to_string();
+        let reason = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
+        let failure = Failure::new(reason, "see `linesman --help`");
+        return refuse(&failure, true, &mut Output::new(cli::ColorChoice::Never));
+    }
+    // A closed pipe is the only thing that can go wrong here.
+    let _ = error.print();
+    if error.use_stderr() { exit::Status::NotJudged.into() } else { ExitCode::SUCCESS }
+}

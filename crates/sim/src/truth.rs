@@ -3,31 +3,34 @@
 //! It is written by the physics, never read by them, and shown to nobody who diagnoses: it is what
 //! a verdict is held against.
 
+mod audit;
+
+use std::collections::BTreeMap;
+
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Instant;
+use linesman_proto::topology::End;
+
+pub(crate) use audit::Ledger;
+pub use audit::Unexplained;
+
+/// How many entries are kept; what comes later is counted in the [`FaultRecord`]s only, so that a
+/// segment may run for days.
+pub const MAX_ENTRIES: usize = 200_000;
 
 /// Which fault of the run: its index in the order of injection.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct FaultId(pub u32);
 
-/// One end of a link, by stable identity.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub enum LinkEnd {
-    /// A card of the MainDevice.
-    MainDevice(Path),
-    /// A port of a controller.
-    Device(DeviceId, Port),
-}
-
 /// Where something happened.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum Place {
     /// One direction of a link: from the first end to the second.
-    Direction(LinkEnd, LinkEnd),
+    Direction(End<DeviceId>, End<DeviceId>),
     /// A link, both directions; the first end is the one nearer the MainDevice.
-    Link(LinkEnd, LinkEnd),
+    Link(End<DeviceId>, End<DeviceId>),
     /// A controller.
     Device(DeviceId),
     /// A card of the MainDevice.
@@ -37,8 +40,8 @@ pub enum Place {
 /// What a cause made happen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Effect {
-    /// A symbol error outside of frames, counted by the receiver as physical-layer error.
-    IdleSymbolError,
+    /// A symbol was destroyed, in or outside of a frame: the receiver's physical-layer error.
+    SymbolError,
     /// A frame was spoiled on the wire or in a device.
     FrameSpoiled {
         /// Number of the frame in the segment.
@@ -49,23 +52,31 @@ pub enum Effect {
         /// Number of the frame in the segment.
         frame: u64,
     },
-    /// The signal on a link went away.
+    /// A processing unit counted an undamaged frame for what is in it: foreign, too short,
+    /// circulating.
+    ContentRefused {
+        /// Number of the frame in the segment.
+        frame: u64,
+    },
+    /// An end of a link found its signal gone.
     SignalLost,
-    /// The signal on a link came back.
+    /// Both ends of a link have it again.
     SignalBack,
     /// A controller lost its supply.
     PowerLost,
     /// A controller has its supply again and starts.
     PowerBack,
-    /// A change of state was refused with this AL status code.
+    /// A change of state is refused with this AL status code from now on.
     StateRefused {
         /// The code in 0x0134.
         code: u16,
     },
-    /// A counter was moved by something that is no fault: noise at power-on or plugging.
-    PowerOnNoise,
+    /// Counters were not 0 at the start: noise at power-on or plugging, old errors.
+    OldCounters,
     /// Another type of device than planned sits here.
     WrongDevice,
+    /// A device that was planned is not here.
+    MissingDevice,
 }
 
 /// An entry of the log.
@@ -77,10 +88,6 @@ pub enum Entry {
         at: Instant,
         /// Which one.
         fault: FaultId,
-        /// Its name.
-        name: FaultName,
-        /// Where it was put.
-        place: Place,
     },
     /// A fault ends or is healed.
     End {
@@ -100,4 +107,154 @@ pub enum Entry {
         /// What.
         effect: Effect,
     },
+}
+
+/// A fault of the run and what it has done so far.
+#[derive(Clone, PartialEq, Debug)]
+pub struct FaultRecord {
+    /// Which.
+    pub id: FaultId,
+    /// What it is.
+    pub name: FaultName,
+    /// Where it was put: one place, or several that share one cause.
+    pub places: Vec<Place>,
+    /// When it began to act.
+    pub began: Option<Instant>,
+    /// When it ended or was healed.
+    pub ended: Option<Instant>,
+    /// When it first had an effect.
+    pub first_effect: Option<Instant>,
+    /// Symbols destroyed.
+    pub symbol_errors: u64,
+    /// Frames spoiled.
+    pub frames_spoiled: u64,
+    /// Frames, or rests of frames, that vanished.
+    pub frames_lost: u64,
+    /// Ends of links that lost their link.
+    pub links_lost: u64,
+    /// Controllers that lost their supply.
+    pub supplies_lost: u64,
+}
+
+impl FaultRecord {
+    /// Whether it acts at present.
+    #[must_use]
+    pub fn is_active(&self) -> bool {
+        self.began.is_some() && self.ended.is_none()
+    }
+
+    fn add(&mut self, at: Instant, effect: Effect) {
+        self.first_effect = Some(self.first_effect.map_or(at, |first| first.min(at)));
+        match effect {
+            Effect::SymbolError => self.symbol_errors += 1,
+            Effect::FrameSpoiled { .. } => self.frames_spoiled += 1,
+            Effect::FrameLost { .. } => self.frames_lost += 1,
+            Effect::SignalLost => self.links_lost += 1,
+            Effect::PowerLost => self.supplies_lost += 1,
+            Effect::ContentRefused { .. }
+            | Effect::SignalBack
+            | Effect::PowerBack
+            | Effect::StateRefused { .. }
+            | Effect::OldCounters
+            | Effect::WrongDevice
+            | Effect::MissingDevice => {}
+        }
+    }
+}
+
+/// The log.
+///
+/// Entries are in the order in which the physics found them; effects on frames that were in flight
+/// at once may be a few microseconds out of order.
+#[derive(Clone, Default, Debug)]
+pub struct TruthLog {
+    entries: Vec<Entry>,
+    left_out: u64,
+    faults: Vec<FaultRecord>,
+    /// What each counter may have counted, and for whom.
+    pub(crate) ledger: BTreeMap<(DeviceId, ErrorCounter), Ledger>,
+}
+
+impl TruthLog {
+    /// What happened, up to [`MAX_ENTRIES`].
+    #[must_use]
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// How many entries more there were.
+    #[must_use]
+    pub const fn left_out(&self) -> u64 {
+        self.left_out
+    }
+
+    /// Every fault so far, by [`FaultId`].
+    #[must_use]
+    pub fn faults(&self) -> &[FaultRecord] {
+        &self.faults
+    }
+
+    /// One fault.
+    #[must_use]
+    pub fn fault(&self, id: FaultId) -> Option<&FaultRecord> {
+        self.faults.get(id.0 as usize)
+    }
+
+    /// Faults that act at present.
+    pub fn active(&self) -> impl Iterator<Item = &FaultRecord> {
+        self.faults.iter().filter(|fault| fault.is_active())
+    }
+
+    pub(crate) fn declare(&mut self, name: FaultName, places: Vec<Place>) -> FaultId {
+        let id = FaultId(self.faults.len() as u32);
+        self.faults.push(FaultRecord {
+            id,
+            name,
+            places,
+            began: None,
+            ended: None,
+            first_effect: None,
+            symbol_errors: 0,
+            frames_spoiled: 0,
+            frames_lost: 0,
+            links_lost: 0,
+            supplies_lost: 0,
+        });
+        id
+    }
+
+    pub(crate) fn begin(&mut self, at: Instant, fault: FaultId) {
+        if let Some(record) = self.faults.get_mut(fault.0 as usize) {
+            record.began = Some(at);
+        }
+        self.push(Entry::Begin { at, fault });
+    }
+
+    pub(crate) fn end(&mut self, at: Instant, fault: FaultId) {
+        if let Some(record) = self.faults.get_mut(fault.0 as usize) {
+            record.ended = Some(at);
+        }
+        self.push(Entry::End { at, fault });
+    }
+
+    pub(crate) fn effect(
+        &mut self,
+        at: Instant,
+        fault: Option<FaultId>,
+        place: Place,
+        effect: Effect,
+    ) {
+        if let Some(record) = fault.and_then(|id| self.faults.get_mut(id.0 as usize)) {
+            record.add(at, effect);
+        }
+        self.push(Entry::Effect { at, fault, place, effect });
+    }
+
+    fn push(&mut self, entry: Entry) {
+        if self.entries.len() < MAX_ENTRIES {
+            self.entries.push(entry);
+        } else {
+            self.left_out += 1;
+        }
+    }
 }

@@ -23,7 +23,13 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
     let mut failed = Vec::new();
     let mut why = String::new();
     if !coverage {
-        let arguments = ["build", "--release", "--manifest-path=fuzz/Cargo.toml", "--bin=replay"];
+        let arguments = [
+            "build",
+            "--release",
+            "--manifest-path=fuzz/Cargo.toml",
+            "--no-default-features",
+            "--example=replay",
+        ];
         let ran = context
             .command("fuzz-build", cargo(), &arguments)
             .env("CARGO_TARGET_DIR", context.target.join("fuzz"))
@@ -51,7 +57,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
                 .limit(seconds + 900)
                 .run()?
         } else {
-            let program = context.target.join("fuzz/release/replay");
+            let program = context.target.join("fuzz/release/examples/replay");
             let arguments = [target.as_str(), "--seconds", &seconds.to_string()];
             context.command(&log, program, &arguments).limit(seconds + 120).run()?
         };

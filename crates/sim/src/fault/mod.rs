@@ -1,1 +1,166 @@
 //! What can go wrong: one file per kind of fault.
+//!
+//! A [`Kind`] says where its fault can be, which parameters it takes, and makes a
+//! [`Source`](crate::wire::Source): the changes it makes to the world, one after the other, from
+//! its start to its end. What it holds when it ends (open contacts, supplies that are off, waiting
+//! hits) is let go. No kind knows anything of counters.
+
+mod error;
+mod parameter;
+mod place;
+mod running;
+mod source;
+
+mod brown_out;
+mod cable_degraded;
+mod device_internal;
+mod device_missing;
+mod device_off;
+mod device_wrong;
+mod emc_noise;
+mod init_refused;
+mod link_flapping;
+mod link_open;
+mod nic_damaged;
+mod receiver_damaged;
+mod supply_off;
+mod transmitter_damaged;
+
+use linesman_config::fault::FaultName;
+use linesman_proto::time::{Instant, Span};
+
+pub use error::FaultError;
+pub use parameter::{Parameter, Shape};
+pub use place::PlaceRule;
+pub(crate) use place::Scene;
+pub(crate) use running::{Running, Step};
+
+pub(crate) use device_missing::missing_device;
+pub(crate) use device_wrong::{Replacement, replacement};
+
+use crate::seed::Stream;
+use crate::segment_file::FaultEntry;
+use crate::truth::Place;
+use crate::wire::Source;
+use parameter::Values;
+use place::Target;
+
+/// A kind of fault.
+#[derive(Debug)]
+pub struct Kind {
+    /// Its name; what it is, is [`FaultName::meaning`].
+    pub name: FaultName,
+    /// Where it can be.
+    pub place: PlaceRule,
+    /// What it takes beside place and times.
+    pub parameters: &'static [Parameter],
+    start: fn(Start<'_>) -> Result<Box<dyn Source>, FaultError>,
+}
+
+/// All kinds that a segment can have.
+pub const KINDS: &[Kind] = &[
+    link_open::KIND,
+    link_flapping::KIND,
+    cable_degraded::KIND,
+    emc_noise::KIND,
+    transmitter_damaged::KIND,
+    receiver_damaged::KIND,
+    device_internal::KIND,
+    device_off::KIND,
+    supply_off::KIND,
+    brown_out::KIND,
+    device_wrong::KIND,
+    device_missing::KIND,
+    init_refused::KIND,
+    nic_damaged::KIND,
+];
+
+/// The kind with a name, if a segment can have it.
+#[must_use]
+pub fn kind(name: FaultName) -> Option<&'static Kind> {
+    KINDS.iter().find(|kind| kind.name == name)
+}
+
+/// What a kind makes its changes from.
+struct Start<'a> {
+    /// How errors call the entry.
+    label: &'a str,
+    name: FaultName,
+    from: Instant,
+    to: Option<Instant>,
+    target: Target,
+    values: Values,
+    stream: Stream,
+}
+
+impl Start<'_> {
+    /// The span over which something is spread when no end is given.
+    const OPEN_END: Span = Span::s(1);
+
+    /// From begin to end, or for a second.
+    fn interval(&self) -> (Instant, Instant) {
+        (self.from, self.to.unwrap_or(self.from + Self::OPEN_END))
+    }
+
+    fn number(&self, key: &str) -> f64 {
+        self.values.number(key).unwrap_or(0.0)
+    }
+
+    fn milliseconds(&self, key: &str) -> Span {
+        Span::ns((self.number(key) * 1e6) as u64)
+    }
+
+    fn error(&self, what: String) -> FaultError {
+        FaultError::Combination { entry: self.label.to_owned(), kind: self.name, what }
+    }
+}
+
+/// A fault that is ready to run.
+pub(crate) struct Planned {
+    pub(crate) name: FaultName,
+    pub(crate) places: Vec<Place>,
+    pub(crate) from: Instant,
+    pub(crate) to: Option<Instant>,
+    pub(crate) source: Box<dyn Source>,
+}
+
+/// Works out what an entry means here. It begins at its own time, but not before `earliest`.
+pub(crate) fn plan(
+    label: &str,
+    entry: &FaultEntry,
+    scene: &Scene<'_>,
+    earliest: Instant,
+    stream: Stream,
+) -> Result<Planned, FaultError> {
+    let kind = known_kind(label, entry)?;
+    let target = place::resolve(label, kind, entry, scene)?;
+    let values = parameter::read(label, kind, &entry.parameters)?;
+    let at = |ms: f64| Instant::from_nanos((ms * 1e6) as u64);
+    for (key, value) in [("from_ms", entry.from_ms), ("to_ms", entry.to_ms)] {
+        if value.is_some_and(|ms| !(0.0..=1e12).contains(&ms)) {
+            let given = value.map_or(String::new(), |ms| ms.to_string());
+            let allowed = "0 and more".to_owned();
+            let (entry, key) = (label.to_owned(), key.to_owned());
+            return Err(FaultError::Value { entry, key, given, allowed });
+        }
+    }
+    let from = entry.from_ms.map_or(earliest, at).max(earliest);
+    let to = entry.to_ms.map(at);
+    if let Some(to) = to
+        && to <= from
+    {
+        let (entry, key) = (label.to_owned(), "to_ms".to_owned());
+        let given = format!("{} ms", to.as_nanos() / 1_000_000);
+        let allowed = format!("later than its begin, {} ms", from.as_nanos() / 1_000_000);
+        return Err(FaultError::Value { entry, key, given, allowed });
+    }
+    let places = target.places.clone();
+    let name = kind.name;
+    let source = (kind.start)(Start { label, name, from, to, target, values, stream })?;
+    Ok(Planned { name, places, from, to, source })
+}
+
+fn known_kind(label: &str, entry: &FaultEntry) -> Result<&'static Kind, FaultError> {
+    let name: FaultName = entry.kind.parse().map_err(|_| FaultError::unknown_kind(label, entry))?;
+    kind(name).ok_or_else(|| FaultError::NotHere { entry: label.to_owned(), kind: name })
+}

@@ -1,1 +1,303 @@
 //! A whole network: controllers, wires, the cards of the MainDevice.
+//!
+//! A [`Segment`] takes frames from a card ([`Segment::handle_frame`]) and gives those that arrive
+//! at one ([`Segment::poll_arrival`]). Time is an argument and never goes back; nothing happens
+//! between two calls that does not depend on them alone, so the same calls give the same bytes.
+
+mod build;
+pub(crate) mod card;
+
+use std::collections::BTreeMap;
+
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::Tree;
+
+pub use build::BuildError;
+pub use card::HostPort;
+
+use crate::controller::Controller;
+use crate::device::{SignalId, Signals};
+use crate::fault::{self, FaultError, Running};
+use crate::frame::{Damage, WireFrame};
+use crate::seed::Seed;
+use crate::segment_file::{FaultEntry, SegmentFile};
+use crate::truth::{Effect, FaultId, TruthLog, Unexplained};
+use crate::wire::walk::{Outcome, Traveller};
+use crate::wire::world::World;
+
+/// Buffers kept for frames to come.
+const SPARE_BUFFERS: usize = 32;
+
+/// A frame that arrives at a card.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Arrival {
+    /// When its last bit was there.
+    pub at: Instant,
+    /// The card.
+    pub path: Path,
+    /// Whether its check sequence is right. If not, the card drops and counts it, and no driver
+    /// sees it.
+    pub intact: bool,
+}
+
+/// A network: its controllers, links and cards, and what goes wrong with them.
+#[derive(Debug)]
+pub struct Segment {
+    name: String,
+    tree: Tree,
+    world: World,
+    seed: Seed,
+    /// By node.
+    devices: Vec<DeviceInfo>,
+    /// The node of each device that is there.
+    nodes: BTreeMap<DeviceId, usize>,
+    /// Names of all devices that were planned.
+    names: Vec<String>,
+    now: Instant,
+    /// By time of arrival, then in the order of sending.
+    arrivals: BTreeMap<(Instant, u64), (Path, WireFrame)>,
+    spare: Vec<Vec<u8>>,
+}
+
+/// What a segment knows about a controller beside the controller itself.
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct DeviceInfo {
+    outputs: Vec<SignalId>,
+    inputs: Vec<SignalId>,
+}
+
+impl Segment {
+    /// Builds what a file describes: the line was on before the run began, all links are up. Faults
+    /// of the file are scheduled.
+    ///
+    /// # Errors
+    /// [`BuildError`] names the device or fault that cannot be built, and why.
+    pub fn build(file: &SegmentFile) -> Result<Self, BuildError> {
+        build::build(file)
+    }
+
+    // ---- frames ----
+
+    /// A card sends a frame: its first bit leaves the card at `now`. A card pads what is shorter
+    /// than 60 bytes, and sends nothing without a carrier or longer than 1514 bytes.
+    pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
+        self.now = self.now.max(now);
+        let now = self.now;
+        let mut bytes = self.spare.pop().unwrap_or_default();
+        bytes.clear();
+        bytes.extend_from_slice(frame);
+        bytes.resize(frame.len().max(MIN_LEN), 0);
+        self.world.frames += 1;
+        let frame = WireFrame { bytes, damage: Damage::default(), number: self.world.frames };
+        self.world.look_ahead(now, frame.duration());
+        self.world.advance(now);
+        let card = &mut self.world.cards[path.index()];
+        if frame.bytes.len() > MAX_LEN || !card.has_carrier(now) {
+            card.counts.tx_dropped += 1;
+            self.recycle(frame.bytes);
+            return;
+        }
+        card.counts.tx_frames += 1;
+        let mut traveller = Traveller { frame, spoiled_by: None };
+        match self.world.walk(path, now, &mut traveller) {
+            Outcome::Arrived(path, at) => {
+                let number = traveller.frame.number;
+                self.arrivals.insert((at, number), (path, traveller.frame));
+            }
+            Outcome::Vanished => self.recycle(traveller.frame.bytes),
+        }
+    }
+
+    /// The earliest frame that has arrived by the time last told ([`Segment::advance`],
+    /// [`Segment::handle_frame`]); its bytes replace those in `buffer`.
+    pub fn poll_arrival(&mut self, buffer: &mut Vec<u8>) -> Option<Arrival> {
+        let due = self.arrivals.first_key_value().is_some_and(|((at, _), _)| *at <= self.now);
+        if !due {
+            return None;
+        }
+        let ((at, _), (path, frame)) = self.arrivals.pop_first()?;
+        let intact = frame.damage.is_intact();
+        let card = &mut self.world.cards[path.index()];
+        let counts = &mut card.counts;
+        if intact {
+            counts.rx_frames += 1;
+        } else if frame.bytes.len() < MIN_LEN {
+            counts.rx_length_errors += 1;
+        } else {
+            counts.rx_crc_errors += 1;
+        }
+        buffer.clear();
+        buffer.extend_from_slice(&frame.bytes);
+        self.recycle(frame.bytes);
+        Some(Arrival { at, path, intact })
+    }
+
+    fn recycle(&mut self, bytes: Vec<u8>) {
+        if self.spare.len() < SPARE_BUFFERS {
+            self.spare.push(bytes);
+        }
+    }
+
+    /// When the next frame arrives, of those on their way. What else happens in the segment needs no
+    /// call at its time: it is made up for, in its order, by the next one.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        self.arrivals.first_key_value().map(|((at, _), _)| *at)
+    }
+
+    /// Time passes: devices, links and faults up to `now`.
+    pub fn advance(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        self.world.advance(self.now);
+        for card in &mut self.world.cards {
+            card.settle(self.now);
+        }
+    }
+
+    // ---- faults ----
+
+    /// Injects a fault. It begins at its `from_ms`, or just after `now`: behind all that has been
+    /// worked out already, some 0.1 ms.
+    ///
+    /// # Errors
+    /// [`FaultError`] names the key that cannot be, and what can.
+    pub fn inject(&mut self, now: Instant, entry: &FaultEntry) -> Result<FaultId, FaultError> {
+        self.now = self.now.max(now);
+        let earliest = self.now.max(self.world.horizon) + Span::ns(1);
+        let label = format!("fault {}", self.world.truth.faults().len() + 1);
+        self.schedule(&label, entry, earliest)
+    }
+
+    fn schedule(
+        &mut self,
+        label: &str,
+        entry: &FaultEntry,
+        earliest: Instant,
+    ) -> Result<FaultId, FaultError> {
+        let scene = fault::Scene {
+            names: &self.names,
+            nodes: &self.nodes,
+            tree: &self.tree,
+            world: &self.world,
+        };
+        let number = self.world.truth.faults().len();
+        let stream = self.seed.stream(&format!("fault {number} {}", entry.kind));
+        let planned = fault::plan(label, entry, &scene, earliest, stream)?;
+        let id = self.world.truth.declare(planned.name, planned.places);
+        self.world.running.push(Running::new(id, planned.from, planned.to, planned.source));
+        Ok(id)
+    }
+
+    /// Ends a fault: just after `now`, behind all that has been worked out already. A fault that is
+    /// over, or built in, is left as it is.
+    pub fn heal(&mut self, now: Instant, fault: FaultId) {
+        self.now = self.now.max(now);
+        let at = self.now.max(self.world.horizon) + Span::ns(1);
+        if let Some(running) = self.world.running.iter_mut().find(|running| running.id == fault) {
+            running.heal_at(at);
+        }
+    }
+
+    // ---- what there is ----
+
+    /// What the segment is called.
+    #[must_use]
+    pub fn title(&self) -> &str {
+        &self.name
+    }
+
+    /// The wiring that is really there. Its nodes are in the order of [`Segment::devices`].
+    #[must_use]
+    pub const fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// Controllers that are there, in the order of the tree's nodes.
+    pub fn devices(&self) -> impl Iterator<Item = DeviceId> {
+        (0..self.world.nodes.len()).map(|node| self.world.id(node))
+    }
+
+    /// The node of a device in [`Segment::tree`]; `None` for one that is not there.
+    #[must_use]
+    pub fn node(&self, device: DeviceId) -> Option<usize> {
+        self.nodes.get(&device).copied()
+    }
+
+    /// What a device is called; empty for one that was never planned.
+    #[must_use]
+    pub fn name(&self, device: DeviceId) -> &str {
+        self.names.get(device.index()).map_or("", String::as_str)
+    }
+
+    /// A controller; `None` for one that is not there.
+    #[must_use]
+    pub fn controller(&self, device: DeviceId) -> Option<&Controller> {
+        Some(&self.world.nodes[self.node(device)?].controller)
+    }
+
+    /// All signals.
+    #[must_use]
+    pub const fn signals(&self) -> &Signals {
+        &self.world.signals
+    }
+
+    /// All signals, to drive inputs from outside.
+    pub const fn signals_mut(&mut self) -> &mut Signals {
+        &mut self.world.signals
+    }
+
+    /// The signals that a device drives, channel by channel.
+    #[must_use]
+    pub fn outputs(&self, device: DeviceId) -> &[SignalId] {
+        self.node(device).map_or(&[], |node| &self.devices[node].outputs)
+    }
+
+    /// The signals that a device takes, channel by channel.
+    #[must_use]
+    pub fn inputs(&self, device: DeviceId) -> &[SignalId] {
+        self.node(device).map_or(&[], |node| &self.devices[node].inputs)
+    }
+
+    /// What the driver of a card tells, as of the time last told.
+    #[must_use]
+    pub fn host(&self, path: Path) -> HostPort {
+        let card = self.world.card(path);
+        HostPort { carrier: card.has_carrier(self.now), ..card.counts }
+    }
+
+    // ---- truth ----
+
+    /// What was done to the segment, and what came of it.
+    #[must_use]
+    pub const fn truth(&self) -> &TruthLog {
+        &self.world.truth
+    }
+
+    /// Error counters that moved, since the audit before, without a cause in the log.
+    pub fn audit(&mut self) -> Vec<Unexplained> {
+        let nodes = self.world.nodes.iter();
+        let shown = nodes.flat_map(|node| {
+            let id = node.controller.id();
+            let counters = node.controller.error_counters();
+            let counters: Vec<_> = counters.iter().collect();
+            // What a processor does to its controller is no business of the wires.
+            let counters = counters.into_iter().filter(|(which, _)| *which != ErrorCounter::Pdi);
+            counters.map(move |(counter, value)| (id, counter, value))
+        });
+        self.world.truth.audit(shown)
+    }
+
+    /// Gives a counter a value, as history does. Nothing for a device that is not there.
+    pub fn set_counter(&mut self, device: DeviceId, counter: ErrorCounter, value: u8) {
+        if let Some(node) = self.node(device) {
+            let at = self.now;
+            self.world.nodes[node].controller.set_counter(counter, value);
+            self.world.truth.set(device, counter, value);
+            let place = crate::truth::Place::Device(device);
+            self.world.truth.effect(at, None, place, Effect::OldCounters);
+        }
+    }
+}

@@ -1,1 +1,270 @@
-//! The TOML description of a segment.
+//! The TOML description of a segment: what a commissioning engineer writes.
+//!
+//! ```toml
+//! name = "plant"
+//! seed = 7
+//!
+//! [[device]]
+//! name = "K1"
+//! type = "EK1100"
+//! on = "maindevice"
+//! cable_m = 5.0
+//!
+//! [[fault]]
+//! kind = "link-open"
+//! at = "maindevice-K1.A"
+//! from_ms = 2000
+//! ```
+//!
+//! Unknown keys are errors. The order of devices is the order of their numbers; a device with
+//! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
+
+mod expand;
+mod plant;
+mod value;
+mod write;
+
+use std::collections::BTreeMap;
+
+use linesman_config::attachment::Attachment;
+use linesman_config::project::Project;
+use serde::{Deserialize, Serialize};
+
+pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, parse_counter, wiring};
+pub use plant::{PlantOptions, plant};
+pub use value::{OneOrMany, Value};
+
+use crate::device::library::UnknownType;
+
+/// A segment, as described.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentFile {
+    /// What the segment is called.
+    #[serde(default)]
+    pub name: String,
+    /// The seed of all chance in it; 0 unless said.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// Its error counters show old errors and noise at power-on, instead of 0.
+    #[serde(default)]
+    pub old_counters: bool,
+    /// Its devices, in the order of their numbers.
+    #[serde(default, rename = "device")]
+    pub devices: Vec<SegmentDevice>,
+    /// Where a second card closes a ring, if it does.
+    #[serde(default)]
+    pub ring: Option<SegmentRing>,
+    /// What goes wrong, and when.
+    #[serde(default, rename = "fault")]
+    pub faults: Vec<FaultEntry>,
+}
+
+/// A device of a segment.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentDevice {
+    /// Unique name.
+    pub name: String,
+    /// Type in the library, such as `EL2004`.
+    #[serde(rename = "type")]
+    pub type_name: String,
+    /// Whose port it hangs on: `maindevice`, `maindevice.B`, or `K1.C`.
+    pub on: Attachment,
+    /// The port by which it is entered, `A` unless said.
+    #[serde(default)]
+    #[schemars(regex(pattern = "^[A-D]$"))]
+    pub entry: Option<String>,
+    /// Length of the cable to it in metres, 0 to 2,000; 5 unless said. A terminal on the E-bus has
+    /// none.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 2000.0))]
+    pub cable_m: Option<f64>,
+    /// Serial number in its SII; its number unless said.
+    #[serde(default)]
+    pub serial: Option<u32>,
+    /// How much too fast its clock runs, in ppm, -200 to 200; by chance within 25 unless said.
+    #[serde(default)]
+    #[schemars(range(min = -200.0, max = 200.0))]
+    pub clock_ppm: Option<f64>,
+    /// Error counters that are not 0 at the start: `A.frame`, `A.physical`, `A.forwarded`,
+    /// `A.lost_link` (and B, C, D), `processing_unit`, `pdi`.
+    #[serde(default)]
+    pub counters: BTreeMap<String, u8>,
+}
+
+/// The far end of a ring.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentRing {
+    /// The port that is wired to the second card, such as `B9.B`.
+    pub closes_at: Attachment,
+    /// Length of the cable in metres, 0 to 2,000; 5 unless said.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 2000.0))]
+    pub cable_m: Option<f64>,
+}
+
+/// A fault of a segment: kind, place, times, and the parameters of its kind.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct FaultEntry {
+    /// A fault name, such as `emc-noise`.
+    pub kind: String,
+    /// A link `K1.C-B3.A`, one direction of it `K1.C>B3.A`, or a list of those.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at: Option<OneOrMany>,
+    /// A device.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
+    /// Several devices that share the fault.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub devices: Option<Vec<String>>,
+    /// When it begins, in ms since the start of the run; at once unless said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_ms: Option<f64>,
+    /// When it ends; it lasts unless said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to_ms: Option<f64>,
+    /// Parameters of the kind, such as `hits_per_s`.
+    #[serde(flatten)]
+    pub parameters: BTreeMap<String, Value>,
+}
+
+impl FaultEntry {
+    /// A fault of a kind; place, times and parameters are still to come.
+    #[must_use]
+    pub fn new(kind: linesman_config::fault::FaultName) -> Self {
+        Self { kind: kind.name().to_owned(), ..Self::default() }
+    }
+
+    /// At a link or one direction of it.
+    #[must_use]
+    pub fn at(mut self, place: impl Into<String>) -> Self {
+        self.at = Some(OneOrMany::One(place.into()));
+        self
+    }
+
+    /// In a device.
+    #[must_use]
+    pub fn device(mut self, name: impl Into<String>) -> Self {
+        self.device = Some(name.into());
+        self
+    }
+
+    /// From one time to another, in ms since the start of the run.
+    #[must_use]
+    pub fn from_to(mut self, from_ms: f64, to_ms: Option<f64>) -> Self {
+        (self.from_ms, self.to_ms) = (Some(from_ms), to_ms);
+        self
+    }
+
+    /// With a parameter.
+    #[must_use]
+    pub fn with(mut self, key: &str, value: impl Into<Value>) -> Self {
+        self.parameters.insert(key.to_owned(), value.into());
+        self
+    }
+}
+
+/// A segment file that cannot be used.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+pub enum SegmentFileError {
+    /// Not TOML, or not of this form: with line and column.
+    #[error("{0}")]
+    Form(String),
+    /// A type that the library does not have.
+    #[error("device `{device}`: {source}")]
+    Type {
+        /// Whose.
+        device: String,
+        /// What the library says.
+        source: UnknownType,
+    },
+    /// Names, ports or places contradict each other.
+    #[error("{0}")]
+    Wiring(String),
+    /// A device is wired to or entered by a port that it does not have.
+    #[error("device `{device}` has no port {port}: a {type_name} has {has}")]
+    NoPort {
+        /// Whose.
+        device: String,
+        /// Its type.
+        type_name: String,
+        /// The port that was written.
+        port: linesman_proto::port::Port,
+        /// The ports it has.
+        has: String,
+    },
+    /// Two ports of different kinds are wired to each other.
+    #[error("{from} is {from_kind}, but {to} is {to_kind}: no cable fits both")]
+    Kinds {
+        /// One end.
+        from: String,
+        /// What it is.
+        from_kind: &'static str,
+        /// The other.
+        to: String,
+        /// What it is.
+        to_kind: &'static str,
+    },
+    /// A number out of its range.
+    #[error("device `{device}`: `{key}` is {given}, expected {allowed}")]
+    Range {
+        /// Whose.
+        device: String,
+        /// Which key.
+        key: &'static str,
+        /// What was given.
+        given: String,
+        /// What can be.
+        allowed: &'static str,
+    },
+    /// A counter that no controller has.
+    #[error("device `{device}`: no counter is called `{given}`; expected {allowed}")]
+    Counter {
+        /// Whose.
+        device: String,
+        /// What was given.
+        given: String,
+        /// What can be.
+        allowed: &'static str,
+    },
+}
+
+impl SegmentFile {
+    /// Reads a segment file and checks that its devices are known and its wiring fits together.
+    /// Faults are checked where they are put into a [`Segment`](crate::segment::Segment).
+    ///
+    /// # Errors
+    /// [`SegmentFileError`]: line and column for what is not TOML or not expected, else the device.
+    pub fn parse(text: &str) -> Result<Self, SegmentFileError> {
+        let file: Self =
+            toml::from_str(text).map_err(|error| SegmentFileError::Form(error.to_string()))?;
+        file.check()?;
+        Ok(file)
+    }
+
+    /// Checks devices and wiring.
+    ///
+    /// # Errors
+    /// As [`SegmentFile::parse`].
+    pub fn check(&self) -> Result<(), SegmentFileError> {
+        expand::check(self, &expand(self)?)
+    }
+
+    /// What was planned: the project behind this segment, without anything that is wrong with it.
+    ///
+    /// # Errors
+    /// As [`SegmentFile::parse`].
+    pub fn project(&self) -> Result<Project, SegmentFileError> {
+        expand::project(self, &expand(self)?)
+    }
+
+    /// The file that reads back as this segment.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        write::to_toml(self)
+    }
+}
+#[cfg(test)]
+mod tests;

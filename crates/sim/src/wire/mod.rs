@@ -1,1 +1,20 @@
 //! Cables: links with two directions, their noise, and the walk of a frame along them.
+//!
+//! `World` is the segment as physics knows it: controllers, cards, links and what
+//! has been done to them. It is a function of time up to its horizon: changes are applied ahead of
+//! every frame, and keep their instants, so that a walk meets the world of each instant.
+//! `walk` carries one frame through it, port by port.
+//!
+//! Read first: "The physical model" in `ARCHITECTURE.md`; S1 chapters 3, 6 and 14.1.
+
+pub mod change;
+mod due;
+pub mod history;
+pub mod link;
+mod node;
+pub(crate) mod walk;
+pub(crate) mod world;
+
+pub use change::{Change, Line, Source};
+pub use history::History;
+pub use link::{CABLE_NS_PER_M, Link};

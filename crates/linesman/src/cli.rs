@@ -1,0 +1,68 @@
+//! Which commands and options there are.
+
+use clap::{Parser, Subcommand};
+
+use crate::command::{completion, diagnose, explain, interfaces, schema, sim};
+use crate::version::VERSION;
+
+/// The whole command line.
+#[derive(Parser, Debug)]
+#[command(
+    name = "linesman",
+    version = VERSION,
+    about = "Walks an EtherCAT line and finds the fault.",
+    after_help = "WHERE is eth0 (a network card), eth0+eth1 (a ring), listen:eth0 (beside another \
+                  MainDevice), sim:plant.toml (a virtual segment) or capture:trace.pcapng (or any \
+                  path ending in .pcap, .pcapng or their .gz).\n\nExit status: 0 healthy, 1 an error \
+                  or warning was found, 2 nothing could be judged, 3 inconclusive.",
+    disable_help_subcommand = true,
+    arg_required_else_help = true
+)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Colour: when writing to a terminal, always, or never
+    #[arg(long, global = true, value_enum, default_value_t, hide_possible_values = false)]
+    pub(crate) color: ColorChoice,
+}
+
+/// When to write in colour.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, clap::ValueEnum)]
+pub(crate) enum ColorChoice {
+    /// On a terminal, unless NO_COLOR is set.
+    #[default]
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// The commands.
+#[derive(Subcommand, Debug)]
+pub(crate) enum Command {
+    /// What is wrong with a line: where, why, and what to do
+    Diagnose(diagnose::Arguments),
+    /// Network cards: link, driver, suitability, EtherCAT seen
+    Interfaces(interfaces::Arguments),
+    /// What a finding, AL status code, abort code, register, state or fault name means
+    Explain(explain::Arguments),
+    /// A virtual segment on real interfaces, for any MainDevice
+    Sim(sim::Arguments),
+    /// JSON schema of a file or output
+    Schema(schema::Arguments),
+    /// Shell completion: write it to where your shell looks for it
+    Completion(completion::Arguments),
+}
+
+impl Command {
+    /// Whether the answer is to be JSON, a failure included.
+    pub(crate) fn wants_json(&self) -> bool {
+        match self {
+            Self::Diagnose(arguments) => arguments.json,
+            Self::Interfaces(arguments) => arguments.json,
+            Self::Explain(_) | Self::Sim(_) | Self::Schema(_) | Self::Completion(_) => false,
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! `linesman schema`: the JSON schema of each file and output.
+
+use linesman_config::project::Project;
+use linesman_diagnosis::report::Diagnosis;
+use linesman_sim::segment_file::SegmentFile;
+use schemars::{Schema, schema_for};
+
+use super::diagnose::follow::EventReport;
+use super::interfaces;
+use crate::exit::Status;
+use crate::failure::{ErrorReport, Failure};
+use crate::output::Output;
+
+/// What can be asked.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Arguments {
+    /// The file or output
+    #[arg(value_enum)]
+    name: Name,
+}
+
+/// What has a schema.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+pub(crate) enum Name {
+    /// A virtual segment (TOML)
+    Segment,
+    /// What was planned (TOML)
+    Project,
+    /// `diagnose --json`
+    Diagnosis,
+    /// A line of `diagnose --follow --json`
+    Event,
+    /// `interfaces --json`
+    Interfaces,
+    /// What every command with --json prints when nothing could be judged
+    Error,
+}
+
+/// Prints the schema.
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    output.json(&schema(arguments.name));
+    Ok(Status::Good)
+}
+
+fn schema(name: Name) -> Schema {
+    match name {
+        Name::Segment => schema_for!(SegmentFile),
+        Name::Project => schema_for!(Project),
+        Name::Diagnosis => schema_for!(Diagnosis),
+        Name::Event => schema_for!(EventReport<'_>),
+        Name::Interfaces => schema_for!(interfaces::Report),
+        Name::Error => schema_for!(ErrorReport),
+    }
+}

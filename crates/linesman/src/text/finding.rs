@@ -1,0 +1,172 @@
+//! One finding: what, where, why, how we know, what to do, what follows from it.
+
+use linesman_diagnosis::report::{
+    AlternativeReport, EvidenceReport, FindingReport, FindingState, Number, Severity,
+};
+
+use super::names::Names;
+use super::quantity::{grouped, time};
+use crate::output::{Paint, wrapped};
+
+/// Most pieces of evidence that are shown; JSON has them all.
+const MOST_EVIDENCE: usize = 6;
+/// Most consequences that are shown one by one.
+const MOST_CONSEQUENCES: usize = 5;
+
+/// How a finding is written.
+#[derive(Clone, Copy)]
+pub(crate) struct Writer<'a> {
+    /// Names of the SubDevices.
+    pub(crate) names: &'a Names,
+    /// Colour.
+    pub(crate) paint: Paint,
+    /// Columns.
+    pub(crate) width: usize,
+}
+
+impl Writer<'_> {
+    /// The whole finding.
+    pub(crate) fn finding(&self, finding: &FindingReport) -> String {
+        let mut text = self.headline(finding);
+        self.add(&mut text, "where", &self.names.place(&finding.place));
+        self.add(&mut text, "cause", &cause(finding));
+        for other in &finding.alternatives {
+            self.add(&mut text, "or", &self.alternative(other));
+        }
+        self.add(&mut text, "when", &when(finding));
+        self.evidence(&mut text, &finding.evidence);
+        for (index, action) in finding.actions.iter().enumerate() {
+            let heading = if index == 0 { "do" } else { "" };
+            self.add(&mut text, heading, &format!("{}. {action}", index + 1));
+        }
+        self.consequences(&mut text, &finding.consequences);
+        text
+    }
+
+    /// Severity, code and name in one line.
+    pub(crate) fn headline(&self, finding: &FindingReport) -> String {
+        let over = match finding.state {
+            FindingState::Opened => " (not certain yet)",
+            FindingState::Confirmed => "",
+            FindingState::Closed => " (over)",
+        };
+        format!(
+            "{} {} {}{}\n",
+            self.severity(finding.severity),
+            self.paint.bold(&finding.code),
+            self.paint.bold(&finding.name),
+            self.paint.faint(over)
+        )
+    }
+
+    fn severity(&self, severity: Severity) -> String {
+        match severity {
+            Severity::Error => self.paint.bad("ERROR  "),
+            Severity::Warning => self.paint.warning("WARNING"),
+            Severity::Info => self.paint.faint("INFO   "),
+        }
+    }
+
+    /// A heading and what stands behind it.
+    fn add(&self, text: &mut String, heading: &str, words: &str) {
+        let first = format!("  {}", self.paint.faint(&format!("{heading:<9}")));
+        text.push_str(&wrapped(&first, words, self.width));
+    }
+
+    fn alternative(&self, other: &AlternativeReport) -> String {
+        let place = match &other.place {
+            Some(place) => format!(", {}", self.names.place(place)),
+            None => String::new(),
+        };
+        format!("{} ({}){place}", other.cause, percent(other.confidence))
+    }
+
+    fn evidence(&self, text: &mut String, all: &[EvidenceReport]) {
+        for (index, one) in all.iter().take(MOST_EVIDENCE).enumerate() {
+            let heading = if index == 0 { "evidence" } else { "" };
+            self.add(text, heading, &self.piece(one));
+        }
+        if let Some(more) = all.len().checked_sub(MOST_EVIDENCE).filter(|more| *more > 0) {
+            self.add(text, "", &format!("and {more} more (--json has them all)"));
+        }
+    }
+
+    /// `at 1.234 ms, frame 12: text (14 (B3) port A, register 0x0300, 3 → 18)`.
+    fn piece(&self, evidence: &EvidenceReport) -> String {
+        let mut head = Vec::new();
+        head.extend(evidence.time_ns.map(|Number(at)| format!("at {}", time(at))));
+        head.extend(evidence.frame.map(|Number(frame)| format!("frame {frame}")));
+        let mut tail = Vec::new();
+        if let Some(no) = evidence.no {
+            let port = evidence.port.map(|port| format!(" port {port}")).unwrap_or_default();
+            tail.push(format!("{}{port}", self.names.device(no)));
+        }
+        tail.extend(evidence.register.map(|register| format!("register 0x{register:04X}")));
+        match (evidence.before, evidence.after) {
+            (Some(Number(before)), Some(Number(after))) => tail.push(format!("{before} → {after}")),
+            (None, Some(Number(value))) | (Some(Number(value)), None) => {
+                tail.push(format!("read {value}"));
+            }
+            (None, None) => {}
+        }
+        let head = if head.is_empty() { String::new() } else { format!("{}: ", head.join(", ")) };
+        let tail = if tail.is_empty() { String::new() } else { format!(" ({})", tail.join(", ")) };
+        format!("{head}{}{tail}", evidence.text)
+    }
+
+    fn consequences(&self, text: &mut String, all: &[FindingReport]) {
+        let flat = flattened(all);
+        for (index, one) in flat.iter().take(MOST_CONSEQUENCES).enumerate() {
+            let heading = if index == 0 { "so also" } else { "" };
+            let place = self.names.place(&one.place);
+            self.add(text, heading, &format!("{} {}: {place}", one.code, one.name));
+        }
+        if let Some(more) = flat.len().checked_sub(MOST_CONSEQUENCES).filter(|more| *more > 0) {
+            self.add(text, "", &format!("and {more} more that follow from it"));
+        }
+    }
+}
+
+fn flattened(all: &[FindingReport]) -> Vec<&FindingReport> {
+    let mut flat = Vec::new();
+    for finding in all {
+        flat.push(finding);
+        flat.extend(flattened(&finding.consequences));
+    }
+    flat
+}
+
+fn cause(finding: &FindingReport) -> String {
+    let percent = percent(finding.confidence);
+    format!("{} ({percent}): {}", finding.cause, finding.cause.meaning())
+}
+
+fn percent(confidence: f64) -> String {
+    format!("{:.0} %", confidence * 100.0)
+}
+
+fn when(finding: &FindingReport) -> String {
+    let mut text = format!("from {}", time(finding.opened_ns.0));
+    if let Some(Number(closed)) = finding.closed_ns {
+        let lasted = closed.saturating_sub(finding.opened_ns.0);
+        text = format!("{text} to {}, for {}", time(closed), time(lasted));
+    }
+    text
+}
+
+/// How many findings of each severity there are: `1 error, 2 warnings`.
+pub(crate) fn tally(findings: &[FindingReport]) -> String {
+    let of = |severity| findings.iter().filter(|finding| finding.severity == severity).count();
+    let parts =
+        [(Severity::Error, "error"), (Severity::Warning, "warning"), (Severity::Info, "note")];
+    let words: Vec<String> = parts
+        .into_iter()
+        .map(|(severity, word)| (of(severity), word))
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, word)| {
+            let plural = if count == 1 { "" } else { "s" };
+            format!("{} {word}{plural}", grouped(count as u64))
+        })
+        .collect();
+    words.join(", ")
+}

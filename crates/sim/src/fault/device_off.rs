@@ -1,0 +1,17 @@
+//! `device-off`: a device is without power, or its controller is dead.
+
+use linesman_config::fault::FaultName;
+
+use super::source::Listed;
+use super::{Kind, PlaceRule};
+use crate::wire::Change;
+
+pub(super) const KIND: Kind = Kind {
+    name: FaultName::DeviceOff,
+    place: PlaceRule::Device,
+    parameters: &[],
+    start: |start| {
+        let from = start.from;
+        Ok(Listed::boxed(start.target.nodes.into_iter().map(|node| (from, Change::Off { node }))))
+    },
+};

@@ -1,0 +1,302 @@
+//! Where a fault is: from what was written to lines, links, controllers and cards.
+
+use std::collections::BTreeMap;
+
+use linesman_config::attachment::Attachment;
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::topology::{End, Tree};
+
+use super::Kind;
+use super::error::{FaultError, nearest};
+use crate::segment_file::FaultEntry;
+use crate::truth::Place;
+use crate::wire::Line;
+use crate::wire::world::World;
+
+/// Where a kind of fault can be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum PlaceRule {
+    /// `at`: one link, both directions.
+    Link,
+    /// `at`: one link, one direction or both.
+    Lines,
+    /// `at`: one link or a list of links, one direction or both of each.
+    ManyLines,
+    /// `at`: one direction of a link.
+    Line,
+    /// `device`: one device.
+    Device,
+    /// `device` or `devices`: one device or several.
+    Devices,
+    /// `at`: a card of the MainDevice, `maindevice` unless said.
+    Card,
+}
+
+impl PlaceRule {
+    /// The keys that say so.
+    #[must_use]
+    pub const fn keys(self) -> &'static [&'static str] {
+        match self {
+            Self::Link | Self::Lines | Self::ManyLines | Self::Line | Self::Card => &["at"],
+            Self::Device => &["device"],
+            Self::Devices => &["device", "devices"],
+        }
+    }
+
+    /// What has to be written.
+    #[must_use]
+    pub const fn allowed(self) -> &'static str {
+        match self {
+            Self::Link => "`at = \"K1.C-B3.A\"`, a link (or one end of it, `K1.C`)",
+            Self::Lines => "`at = \"K1.C>B3.A\"`, one direction of a link, or `K1.C-B3.A`, both",
+            Self::ManyLines => {
+                "`at = \"K1.C-B3.A\"`, a link (`K1.C>B3.A` for one direction), or a list of them"
+            }
+            Self::Line => "`at = \"K1.C>B3.A\"`, one direction of a link",
+            Self::Device => "`device = \"B3\"`, a device",
+            Self::Devices => "`device = \"B3\"` or `devices = [\"B3\", \"B4\"]`",
+            Self::Card => "`at = \"maindevice\"` or `\"maindevice.B\"`, a card",
+        }
+    }
+}
+
+/// What places are looked up in.
+pub(crate) struct Scene<'a> {
+    /// By identity, devices that are missing included.
+    pub(crate) names: &'a [String],
+    pub(crate) nodes: &'a BTreeMap<DeviceId, usize>,
+    pub(crate) tree: &'a Tree,
+    pub(crate) world: &'a World,
+}
+
+/// A place, found.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub(super) struct Target {
+    /// For the truth log.
+    pub(super) places: Vec<Place>,
+    pub(super) lines: Vec<Line>,
+    pub(super) links: Vec<usize>,
+    pub(super) nodes: Vec<usize>,
+}
+
+/// What is written in `at`.
+enum Written {
+    /// Both directions.
+    Both(usize),
+    /// One direction.
+    One(Line),
+    /// A card.
+    Card(Path),
+}
+
+pub(super) fn resolve(
+    label: &str,
+    kind: &Kind,
+    entry: &FaultEntry,
+    scene: &Scene<'_>,
+) -> Result<Target, FaultError> {
+    let finder = Finder { label, kind, scene };
+    finder.refuse_other_keys(entry)?;
+    match kind.place {
+        PlaceRule::Device | PlaceRule::Devices => finder.devices(entry),
+        PlaceRule::Card => finder.card(entry),
+        PlaceRule::Link | PlaceRule::Lines | PlaceRule::ManyLines | PlaceRule::Line => {
+            finder.lines(entry)
+        }
+    }
+}
+
+struct Finder<'a> {
+    label: &'a str,
+    kind: &'a Kind,
+    scene: &'a Scene<'a>,
+}
+
+impl Finder<'_> {
+    fn error(&self, given: String) -> FaultError {
+        FaultError::Place {
+            entry: self.label.to_owned(),
+            kind: self.kind.name,
+            given,
+            allowed: self.kind.place.allowed().to_owned(),
+        }
+    }
+
+    fn refuse_other_keys(&self, entry: &FaultEntry) -> Result<(), FaultError> {
+        let keys = self.kind.place.keys();
+        let given = [
+            ("at", entry.at.is_some()),
+            ("device", entry.device.is_some()),
+            ("devices", entry.devices.is_some()),
+        ];
+        match given.into_iter().find(|(key, given)| *given && !keys.contains(key)) {
+            Some((key, _)) => Err(FaultError::unknown_key(self.label, self.kind, key)),
+            None => Ok(()),
+        }
+    }
+
+    fn devices(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
+        let names = entry.device.iter().chain(entry.devices.iter().flatten());
+        let mut target = Target::default();
+        for name in names {
+            let of_device = |known: &str| {
+                known == name
+                    || known.strip_prefix(name.as_str()).is_some_and(|rest| rest.starts_with('/'))
+            };
+            let known = self.scene.names.iter().zip(0u32..);
+            let ids: Vec<DeviceId> =
+                known.filter(|(known, _)| of_device(known)).map(|(_, id)| DeviceId(id)).collect();
+            if ids.is_empty() {
+                return Err(self.error(self.no_device(name)));
+            }
+            target.nodes.extend(ids.iter().filter_map(|id| self.scene.nodes.get(id)));
+            target.places.extend(ids.into_iter().map(Place::Device));
+        }
+        if target.places.is_empty() {
+            return Err(self.error("no device is given".to_owned()));
+        }
+        Ok(target)
+    }
+
+    fn no_device(&self, name: &str) -> String {
+        let near = nearest(name, self.scene.names.iter().map(String::as_str));
+        let near = near.map_or(String::new(), |near| format!(" (did you mean `{near}`?)"));
+        format!("no device is called `{name}`{near}")
+    }
+
+    fn card(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
+        let path = match entry.at.as_ref().map(|at| at.as_slice()) {
+            None => Path::A,
+            Some([at]) => match self.written(at)? {
+                Written::Card(path) => path,
+                Written::Both(_) | Written::One(_) => {
+                    return Err(self.error(format!("`{at}` is a link")));
+                }
+            },
+            Some(_) => return Err(self.error("more than one place is given".to_owned())),
+        };
+        let Some(link) = self.scene.tree.link_at(End::MainDevice(path)) else {
+            return Err(self.error(format!("nothing is plugged into card {path}")));
+        };
+        Ok(Target {
+            places: vec![Place::Host(path)],
+            lines: self.lines_at_card(link, path),
+            links: vec![link],
+            nodes: Vec::new(),
+        })
+    }
+
+    /// The line that arrives at the card, then the one that leaves it.
+    fn lines_at_card(&self, link: usize, path: Path) -> Vec<Line> {
+        let card_is_upstream = self.scene.tree.links()[link].upstream == End::MainDevice(path);
+        vec![
+            Line { link, downstream: !card_is_upstream },
+            Line { link, downstream: card_is_upstream },
+        ]
+    }
+
+    fn lines(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
+        let given = entry.at.as_ref().map_or(&[][..], |at| at.as_slice());
+        let several = self.kind.place == PlaceRule::ManyLines;
+        if given.is_empty() {
+            return Err(self.error("no place is given".to_owned()));
+        }
+        if given.len() > 1 && !several {
+            return Err(self.error("more than one place is given".to_owned()));
+        }
+        let mut target = Target::default();
+        for at in given {
+            match (self.written(at)?, self.kind.place) {
+                (Written::One(_), PlaceRule::Link) => {
+                    return Err(self.error(format!("`{at}` is one direction")));
+                }
+                (Written::Both(_), PlaceRule::Line) => {
+                    return Err(self.error(format!("`{at}` is both directions")));
+                }
+                (Written::Card(path), _) => {
+                    return Err(self.error(format!("nothing is plugged into card {path}")));
+                }
+                (Written::One(line), _) => {
+                    target.places.push(self.scene.world.line_place(line));
+                    target.lines.push(line);
+                    target.links.push(line.link);
+                }
+                (Written::Both(link), _) => {
+                    target.places.push(self.scene.world.link_place(link));
+                    target.lines.extend(Line::both(link));
+                    target.links.push(link);
+                }
+            }
+        }
+        Ok(target)
+    }
+
+    /// Reads `K1.C>B3.A`, `K1.C-B3.A`, or one end of a link. Names may contain either sign: every
+    /// way to part the text is tried.
+    fn written(&self, at: &str) -> Result<Written, FaultError> {
+        let parts = |sign: char| {
+            at.match_indices(sign).map(|(index, _)| (at[..index].trim(), at[index + 1..].trim()))
+        };
+        for (from, to) in parts('>') {
+            if let (Some(from), Some(to)) = (self.end(from), self.end(to)) {
+                let link = self.link_between(at, from, to)?;
+                let downstream = self.scene.tree.links()[link].upstream == from;
+                return Ok(Written::One(Line { link, downstream }));
+            }
+        }
+        for (one, other) in parts('-') {
+            if let (Some(one), Some(other)) = (self.end(one), self.end(other)) {
+                return self.link_between(at, one, other).map(Written::Both);
+            }
+        }
+        match self.end(at) {
+            Some(End::MainDevice(path)) if self.kind.place == PlaceRule::Card => {
+                Ok(Written::Card(path))
+            }
+            Some(end) => match self.scene.tree.link_at(end) {
+                Some(link) => Ok(Written::Both(link)),
+                None => Err(self.error(format!("no link is plugged in at `{at}`"))),
+            },
+            None => Err(self.error(self.unknown_end(at))),
+        }
+    }
+
+    fn end(&self, text: &str) -> Option<End> {
+        match text.parse().ok()? {
+            Attachment::MainDevice(path) => Some(End::MainDevice(path)),
+            Attachment::Device { name, port } => {
+                let id = self.scene.names.iter().position(|known| *known == name)?;
+                let node = self.scene.nodes.get(&DeviceId(id as u32))?;
+                Some(End::Controller(*node, port))
+            }
+        }
+    }
+
+    fn link_between(&self, at: &str, from: End, to: End) -> Result<usize, FaultError> {
+        let link = self.scene.tree.link_at(from);
+        let link = link.filter(|_| self.scene.tree.opposite(from) == Some(to));
+        link.ok_or_else(|| {
+            let name = |end: End| match end {
+                End::MainDevice(path) => Attachment::MainDevice(path).to_string(),
+                End::Controller(node, port) => {
+                    let id = self.scene.world.id(node).index();
+                    format!("{}.{port}", self.scene.names[id])
+                }
+            };
+            let opposite = self.scene.tree.opposite(from);
+            let is = opposite.map_or("nothing".to_owned(), name);
+            self.error(format!("`{at}` is no link: {} is wired to {is}", name(from)))
+        })
+    }
+
+    fn unknown_end(&self, at: &str) -> String {
+        let name = at.rsplit_once('.').map_or(at, |(name, _)| name);
+        let first = name.split(['>', '-']).next().unwrap_or(name);
+        let first = first.rsplit_once('.').map_or(first, |(name, _)| name);
+        if self.scene.names.iter().any(|known| known == first) {
+            format!("`{at}` is no place")
+        } else {
+            self.no_device(first)
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Sources that several kinds use.
+
+use std::collections::VecDeque;
+
+use linesman_proto::time::{Instant, Span};
+
+use crate::seed::Stream;
+use crate::wire::{Change, Line, Source};
+
+/// A few changes that are known from the start.
+#[derive(Clone, Default, Debug)]
+pub(super) struct Listed(pub(super) VecDeque<(Instant, Change)>);
+
+impl Listed {
+    pub(super) fn boxed(changes: impl IntoIterator<Item = (Instant, Change)>) -> Box<dyn Source> {
+        Box::new(Self(changes.into_iter().collect()))
+    }
+}
+
+impl Source for Listed {
+    fn next_change(&mut self) -> Option<(Instant, Change)> {
+        self.0.pop_front()
+    }
+}
+
+/// How strong noise is over time.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Envelope {
+    /// Always the same.
+    Constant,
+    /// It swells and fades, as a cable that is moved to and fro: `period` long, `phase` (0..1) of
+    /// it gone at the begin. Its mean is 3/8 of its peak.
+    Swell { period: Span, phase: f64 },
+}
+
+impl Envelope {
+    /// The mean over time, of a peak of 1.
+    const SWELL_MEAN: f64 = 3.0 / 8.0;
+
+    /// The peak that gives a mean of 1.
+    fn peak(self) -> f64 {
+        match self {
+            Self::Constant => 1.0,
+            Self::Swell { .. } => 1.0 / Self::SWELL_MEAN,
+        }
+    }
+
+    /// The share of the peak, 0..1, `since` the begin.
+    fn share(self, since: Span) -> f64 {
+        match self {
+            Self::Constant => 1.0,
+            Self::Swell { period, phase } => {
+                let turns = since.as_secs_f64() / period.as_secs_f64() + phase;
+                // sin⁴: long calm, short peaks.
+                (turns * std::f64::consts::PI).sin().powi(4)
+            }
+        }
+    }
+}
+
+/// Symbol errors that come by chance, on each of some lines for itself.
+#[derive(Clone, Debug)]
+pub(super) struct Shower {
+    lines: Vec<Line>,
+    /// Mean rate of all lines together.
+    rate_per_s: f64,
+    envelope: Envelope,
+    from: Instant,
+    at: Instant,
+    stream: Stream,
+}
+
+impl Shower {
+    /// `rate_per_s` is the mean of each line.
+    pub(super) fn new(
+        lines: Vec<Line>,
+        rate_per_s: f64,
+        envelope: Envelope,
+        from: Instant,
+        stream: Stream,
+    ) -> Self {
+        let rate_per_s = rate_per_s * lines.len() as f64;
+        Self { lines, rate_per_s, envelope, from, at: from, stream }
+    }
+}
+
+impl Source for Shower {
+    fn next_change(&mut self) -> Option<(Instant, Change)> {
+        let peak = self.rate_per_s * self.envelope.peak();
+        if peak <= 0.0 {
+            return None;
+        }
+        loop {
+            // Draw at the peak's rate and keep each with the envelope's share.
+            self.at += self.stream.wait(peak);
+            if self.at == Instant::MAX {
+                return None;
+            }
+            let kept = self.stream.chance(self.envelope.share(self.at.since(self.from)));
+            let line = *self.stream.pick(&self.lines)?;
+            let flip = flip(&mut self.stream);
+            if kept {
+                return Some((self.at, Change::Hit { line, flip }));
+            }
+        }
+    }
+}
+
+/// What a destroyed symbol does to its byte: one half of it becomes another.
+pub(super) fn flip(stream: &mut Stream) -> u8 {
+    let nibble = stream.between(1, 15) as u8;
+    if stream.chance(0.5) { nibble << 4 } else { nibble }
+}
+
+/// How far into a frame.
+pub(super) fn part(stream: &mut Stream) -> u16 {
+    stream.below(1 << 16) as u16
+}
+
+/// `count` instants spread over an interval: one in each equal part of it, by chance where.
+pub(super) fn spread(
+    count: u32,
+    (from, to): (Instant, Instant),
+    stream: &mut Stream,
+) -> Vec<Instant> {
+    let slot = to.since(from).as_nanos() / u64::from(count.max(1));
+    (0..u64::from(count)).map(|i| from + Span::ns(i * slot + stream.below(slot.max(1)))).collect()
+}
+
+/// Exactly so many hits in frames, spread over an interval and over lines.
+pub(super) fn frame_hits(
+    count: u32,
+    interval: (Instant, Instant),
+    lines: &[Line],
+    stream: &mut Stream,
+) -> Box<dyn Source> {
+    let instants = spread(count, interval, stream);
+    let hits = instants.into_iter().filter_map(|at| {
+        let line = *stream.pick(lines)?;
+        Some((at, Change::FrameHit { line, part: part(stream), flip: flip(stream) }))
+    });
+    Box::new(Listed(hits.collect()))
+}

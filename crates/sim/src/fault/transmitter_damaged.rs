@@ -1,0 +1,37 @@
+//! `transmitter-damaged`: the output stage of a port is damaged.
+//!
+//! It is analogue: the port codes a good frame and sends poor symbols, always, whatever is moved or
+//! switched. The neighbour sees symbol errors; the way back is clean. The place is the line that
+//! leaves the port, `K1.C>B3.A` for the transmitter of K1's port C.
+
+use linesman_config::fault::FaultName;
+
+use super::source::{Envelope, Shower, frame_hits};
+use super::{Kind, Parameter, PlaceRule, Shape};
+
+pub(super) const KIND: Kind = Kind {
+    name: FaultName::TransmitterDamaged,
+    place: PlaceRule::Line,
+    parameters: &[
+        Parameter {
+            key: "hits_per_s",
+            meaning: "Mean number of destroyed symbols a second.",
+            shape: Shape::Number { low: 0.0, high: 1e6, default: Some(100.0) },
+        },
+        Parameter {
+            key: "hits",
+            meaning: "Exactly so many frames are hit, evenly over time, instead of `hits_per_s`.",
+            shape: Shape::Whole { low: 1, high: 1_000_000, default: None },
+        },
+    ],
+    start: |start| {
+        let interval = start.interval();
+        let mut stream = start.stream.clone();
+        if let Some(count) = start.values.whole("hits") {
+            return Ok(frame_hits(count, interval, &start.target.lines, &mut stream));
+        }
+        let rate = start.number("hits_per_s");
+        let lines = start.target.lines;
+        Ok(Box::new(Shower::new(lines, rate, Envelope::Constant, start.from, stream)))
+    },
+};

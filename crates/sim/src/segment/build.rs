@@ -1,0 +1,330 @@
+//! From a file to a segment.
+
+use std::collections::BTreeMap;
+
+use linesman_config::attachment::Attachment;
+use linesman_config::project::{ProjectError, Ring};
+use linesman_proto::address::DeviceId;
+use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::sii::word;
+use linesman_proto::time::Instant;
+use linesman_proto::topology::wiring::ports_after;
+
+use super::{DeviceInfo, Segment};
+use crate::controller::{Controller, LocalClock};
+use crate::device::Signals;
+use crate::device::library::{self, Built, UnknownType};
+use crate::fault::{self, FaultError};
+use crate::hardware::PortKind;
+use crate::seed::Seed;
+use crate::segment_file::{self, Planned, SegmentFile, SegmentFileError};
+use crate::truth::Effect;
+use crate::wire::world::World;
+
+/// Why a segment cannot be built.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The file contradicts itself.
+    #[error(transparent)]
+    File(#[from] SegmentFileError),
+    /// A fault cannot be.
+    #[error(transparent)]
+    Fault(#[from] FaultError),
+    /// With the devices that are wrong or missing the wiring does not fit together.
+    #[error("with its faults the wiring does not fit together: {0}")]
+    Wiring(ProjectError),
+    /// The type that is to sit in another's place is not known.
+    #[error("{entry}: {source}")]
+    Replacement {
+        /// Which fault.
+        entry: String,
+        /// What the library says.
+        source: UnknownType,
+    },
+    /// The type that is to sit in another's place does not fit there.
+    #[error("{entry}: a {type_name} does not fit in the place of `{device}`: {why}")]
+    Misfit {
+        /// Which fault.
+        entry: String,
+        /// Whose place.
+        device: String,
+        /// The type.
+        type_name: String,
+        /// What does not fit.
+        why: String,
+    },
+}
+
+/// What is really put in a place.
+struct Placed {
+    id: DeviceId,
+    planned: Planned,
+    revision: Option<u32>,
+}
+
+pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
+    file.check()?;
+    let planned = segment_file::expand(file)?;
+    let names: Vec<String> = planned.iter().map(|controller| controller.name.clone()).collect();
+    let ids = (0u32..).map(DeviceId);
+    let mut placed: Vec<Placed> =
+        ids.zip(planned).map(|(id, planned)| Placed { id, planned, revision: None }).collect();
+    let mut ring = file.ring.as_ref().map(|ring| Ring { closes_at: ring.closes_at.clone() });
+    for (index, entry) in file.faults.iter().enumerate() {
+        let label = label(index);
+        if let Some(replacement) = fault::replacement(&label, entry)? {
+            replace(&label, &mut placed, &replacement)?;
+        }
+        if let Some(device) = fault::missing_device(entry) {
+            remove(&mut placed, device, &mut ring);
+        }
+    }
+    assemble(file, placed, ring, names)
+}
+
+fn label(index: usize) -> String {
+    format!("fault {}", index + 1)
+}
+
+fn assemble(
+    file: &SegmentFile,
+    placed: Vec<Placed>,
+    ring: Option<Ring>,
+    names: Vec<String>,
+) -> Result<Segment, BuildError> {
+    let controllers: Vec<Planned> = placed.iter().map(|one| one.planned.clone()).collect();
+    let mut wiring = segment_file::wiring(file, &controllers);
+    wiring.ring = ring;
+    let tree = wiring.tree().map_err(BuildError::Wiring)?;
+
+    let seed = Seed(file.seed.unwrap_or(0));
+    let mut signals = Signals::default();
+    let mut devices = Vec::with_capacity(placed.len());
+    let mut made = Vec::with_capacity(placed.len());
+    for one in &placed {
+        let mut built = build_one(one, &mut signals)?;
+        if let Some(revision) = one.revision {
+            set_revision(&mut built.sii, revision);
+        }
+        let clock = clock(file, &one.planned, seed);
+        let Built { hardware, sii, firmware, outputs, inputs } = built;
+        made.push(Controller::new(one.id, hardware, clock, firmware, sii));
+        devices.push(DeviceInfo { outputs, inputs });
+    }
+    let cable_m: Vec<f64> = tree
+        .links()
+        .iter()
+        .map(|link| match link.downstream.node() {
+            Some(node) => placed[node].planned.cable_m,
+            None => {
+                let ring = file.ring.as_ref().and_then(|ring| ring.cable_m);
+                ring.unwrap_or(segment_file::DEFAULT_CABLE_M)
+            }
+        })
+        .collect();
+    let world = World::new(&tree, made, &cable_m, signals);
+    let nodes: BTreeMap<DeviceId, usize> =
+        placed.iter().enumerate().map(|(node, one)| (one.id, node)).collect();
+    let mut segment = Segment {
+        name: file.name.clone(),
+        tree,
+        world,
+        seed,
+        devices,
+        nodes,
+        names,
+        now: Instant::ZERO,
+        arrivals: BTreeMap::new(),
+        spare: Vec::new(),
+    };
+    if file.old_counters {
+        age(&mut segment);
+    }
+    for one in &placed {
+        for (key, value) in &file.devices[one.planned.device].counters {
+            if let Some(counter) =
+                segment_file::parse_counter(key).filter(|_| one.planned.part == 0)
+            {
+                segment.set_counter(one.id, counter, *value);
+            }
+        }
+    }
+    for (index, entry) in file.faults.iter().enumerate() {
+        schedule(&mut segment, &label(index), entry)?;
+    }
+    segment.advance(Instant::ZERO);
+    Ok(segment)
+}
+
+fn schedule(
+    segment: &mut Segment,
+    label: &str,
+    entry: &segment_file::FaultEntry,
+) -> Result<(), BuildError> {
+    let id = segment.schedule(label, entry, Instant::ZERO)?;
+    let effect = if fault::missing_device(entry).is_some() {
+        Effect::MissingDevice
+    } else if fault::replacement(label, entry)?.is_some() {
+        Effect::WrongDevice
+    } else {
+        return Ok(());
+    };
+    let places = segment.world.truth.fault(id).map_or(Vec::new(), |fault| fault.places.clone());
+    for place in places {
+        segment.world.truth.effect(Instant::ZERO, Some(id), place, effect);
+    }
+    Ok(())
+}
+
+fn build_one(one: &Placed, signals: &mut Signals) -> Result<Built, BuildError> {
+    let Planned { name, type_name, serial, part, .. } = &one.planned;
+    let unknown = |source: UnknownType| {
+        BuildError::File(SegmentFileError::Type { device: name.clone(), source })
+    };
+    let built = library::build(type_name, *serial, signals).map_err(unknown)?;
+    let found = built.into_iter().nth(*part);
+    found.ok_or_else(|| unknown(UnknownType { name: type_name.clone() }))
+}
+
+/// A quartz that is a little off, and has run for some time.
+fn clock(file: &SegmentFile, planned: &Planned, seed: Seed) -> LocalClock {
+    let mut stream = seed.stream(&format!("clock {}", planned.name));
+    let start = stream.below(1_000_000_000_000);
+    let ppm = stream.fraction() * 50.0 - 25.0;
+    LocalClock::with_ppm(start, file.devices[planned.device].clock_ppm.unwrap_or(ppm))
+}
+
+fn set_revision(sii: &mut [u8], revision: u32) {
+    let at = word::REVISION.byte();
+    if let Some(slot) = sii.get_mut(at..at + 4) {
+        slot.copy_from_slice(&revision.to_le_bytes());
+    }
+}
+
+/// Old errors and noise at power-on: some counters of some controllers are not 0.
+fn age(segment: &mut Segment) {
+    let mut stream = segment.seed.stream("old counters");
+    let devices: Vec<DeviceId> = segment.devices().collect();
+    for device in devices {
+        for counter in ErrorCounter::ALL {
+            let likely = match counter {
+                ErrorCounter::PhysicalLayer(_) | ErrorCounter::LostLink(_) => 0.15,
+                ErrorCounter::InvalidFrame(_) | ErrorCounter::Forwarded(_) => 0.08,
+                ErrorCounter::ProcessingUnit => 0.05,
+                ErrorCounter::Pdi => 0.0,
+            };
+            if stream.chance(likely) {
+                // Mostly a few, now and then many, up to the end of the counter.
+                let value = stream.log_uniform(1.0, 400.0).min(255.0) as u8;
+                segment.set_counter(device, counter, value);
+            }
+        }
+    }
+}
+
+/// Puts another device in a place.
+fn replace(
+    label: &str,
+    placed: &mut [Placed],
+    replacement: &fault::Replacement,
+) -> Result<(), BuildError> {
+    let Some(index) = placed.iter().position(|one| one.planned.name == replacement.device) else {
+        // The fault itself says what is wrong with its place.
+        return Ok(());
+    };
+    placed[index].revision = replacement.revision;
+    let Some(type_name) = &replacement.type_name else { return Ok(()) };
+    let Some(found) = library::find(type_name) else {
+        let source = UnknownType { name: type_name.clone() };
+        return Err(BuildError::Replacement { entry: label.to_owned(), source });
+    };
+    let misfit = |why: String| BuildError::Misfit {
+        entry: label.to_owned(),
+        device: replacement.device.clone(),
+        type_name: found.name().to_owned(),
+        why,
+    };
+    let device = placed[index].planned.device;
+    let parts = placed.iter().filter(|one| one.planned.device == device).count();
+    let Some(ports) = found.ports().next().filter(|_| parts == 1 && found.ports().count() == 1)
+    else {
+        return Err(misfit("devices with several controllers cannot be exchanged".to_owned()));
+    };
+    let used = used_ports(placed, index);
+    for port in used {
+        let (was, is) = (placed[index].planned.ports[port], ports[port]);
+        if was != is {
+            return Err(misfit(format!("its port {port} is {is:?}, expected {was:?}")));
+        }
+    }
+    placed[index].planned.ports = ports;
+    placed[index].planned.type_name = found.name().to_owned();
+    Ok(())
+}
+
+/// The ports of a controller that something is plugged into.
+fn used_ports(placed: &[Placed], index: usize) -> Vec<Port> {
+    let name = &placed[index].planned.name;
+    let children = placed.iter().filter_map(|other| match &other.planned.on {
+        Attachment::Device { name: on, port } if on == name => Some(*port),
+        Attachment::Device { .. } | Attachment::MainDevice(_) => None,
+    });
+    std::iter::once(placed[index].planned.entry).chain(children).collect()
+}
+
+/// Takes a device out. What hung on it by the kind of wire by which it was itself entered moves up
+/// to its place, the first in the order of frames; the rest is not there either.
+fn remove(placed: &mut Vec<Placed>, device: &str, ring: &mut Option<Ring>) {
+    let Some(index) = placed.iter().position(|one| one.planned.name == device) else { return };
+    let file_device = placed[index].planned.device;
+    let (on, entry) = (placed[index].planned.on.clone(), placed[index].planned.entry);
+    let kind = placed[index].planned.ports[entry];
+    let parts: Vec<(String, PortKindMap)> = placed
+        .iter()
+        .filter(|one| one.planned.device == file_device)
+        .map(|one| (one.planned.name.clone(), one.planned.ports))
+        .collect();
+    placed.retain(|one| one.planned.device != file_device);
+    let mut heir = None;
+    for (name, ports) in &parts {
+        for port in ports_after(entry) {
+            let here = Attachment::Device { name: name.clone(), port };
+            let child = placed.iter_mut().find(|one| one.planned.on == here);
+            if heir.is_none() && ports[port] == kind {
+                if let Some(child) = child {
+                    child.planned.on = on.clone();
+                    heir = Some(child.id);
+                } else if ring.as_ref().is_some_and(|ring| ring.closes_at == here) {
+                    *ring = match &on {
+                        Attachment::Device { .. } => Some(Ring { closes_at: on.clone() }),
+                        Attachment::MainDevice(_) => None,
+                    };
+                    return drop_orphans(placed, ring);
+                }
+            }
+        }
+    }
+    drop_orphans(placed, ring);
+}
+
+type PortKindMap = linesman_proto::port::PortMap<PortKind>;
+
+/// Takes out what hangs on nothing.
+fn drop_orphans(placed: &mut Vec<Placed>, ring: &mut Option<Ring>) {
+    loop {
+        let names: Vec<String> = placed.iter().map(|one| one.planned.name.clone()).collect();
+        let is_there = |on: &Attachment| match on {
+            Attachment::MainDevice(_) => true,
+            Attachment::Device { name, .. } => names.contains(name),
+        };
+        let before = placed.len();
+        placed.retain(|one| is_there(&one.planned.on));
+        if ring.as_ref().is_some_and(|ring| !is_there(&ring.closes_at)) {
+            *ring = None;
+        }
+        if placed.len() == before {
+            return;
+        }
+    }
+}

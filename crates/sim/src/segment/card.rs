@@ -1,0 +1,92 @@
+//! A card of the MainDevice: it sends, receives, checks, and counts as a real one does.
+
+use linesman_proto::time::{Instant, Span};
+
+/// What a card's driver tells: carrier and counters since the start of the run.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct HostPort {
+    /// Whether there is a link.
+    pub carrier: bool,
+    /// How often the carrier came or went.
+    pub carrier_changes: u64,
+    /// Frames given to the wire.
+    pub tx_frames: u64,
+    /// Frames that could not be sent: no carrier, or longer than Ethernet allows.
+    pub tx_dropped: u64,
+    /// Frames received and passed on.
+    pub rx_frames: u64,
+    /// Frames dropped because their check sequence was wrong.
+    pub rx_crc_errors: u64,
+    /// Frames dropped because they were too short: rests of frames.
+    pub rx_length_errors: u64,
+}
+
+/// A card, with its PHY.
+#[derive(Clone, Debug)]
+pub(crate) struct Card {
+    /// Receiver and transmitter together, for one crossing.
+    pub(crate) crossing: Span,
+    /// From the loss of the signal to the loss of the carrier.
+    pub(crate) loss_detection: Span,
+    /// From the signal to the carrier: auto-negotiation.
+    pub(crate) link_up: Span,
+    /// Counters; its carrier is that of `carrier`.
+    pub(crate) counts: HostPort,
+    /// Changes of the carrier that are known, in the order of time.
+    carrier: Vec<(Instant, bool)>,
+}
+
+impl Default for Card {
+    fn default() -> Self {
+        Self {
+            crossing: Span::ns(400),
+            loss_detection: Span::ms(1),
+            link_up: Span::ms(1_600),
+            counts: HostPort::default(),
+            carrier: Vec::new(),
+        }
+    }
+}
+
+impl Card {
+    pub(crate) fn set_carrier(&mut self, at: Instant, up: bool) {
+        self.carrier.push((at, up));
+    }
+
+    pub(crate) fn has_carrier(&self, at: Instant) -> bool {
+        let known = self.carrier.iter().rev().find(|(since, _)| *since <= at);
+        known.map_or(self.counts.carrier, |(_, up)| *up)
+    }
+
+    /// Makes the changes of the carrier up to `now`.
+    pub(crate) fn settle(&mut self, now: Instant) {
+        let due = self.carrier.partition_point(|(at, _)| *at <= now);
+        for (_, up) in self.carrier.drain(..due) {
+            if self.counts.carrier != up {
+                self.counts.carrier = up;
+                self.counts.carrier_changes += 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_carrier_is_known_ahead_and_shown_when_its_time_comes() {
+        let at = Instant::from_nanos;
+        let mut card = Card::default();
+        card.set_carrier(at(10), true);
+        card.set_carrier(at(20), false);
+        let ahead = [5, 10, 19, 20].map(|nanos| card.has_carrier(at(nanos)));
+        assert_eq!(ahead, [false, true, true, false]);
+        assert!(!card.counts.carrier);
+        card.settle(at(15));
+        assert!(card.counts.carrier && card.counts.carrier_changes == 1);
+        card.settle(at(25));
+        assert!(!card.counts.carrier && card.counts.carrier_changes == 2);
+        assert!(!card.has_carrier(at(30)));
+    }
+}

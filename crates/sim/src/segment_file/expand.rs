@@ -1,0 +1,302 @@
+//! From devices to controllers: most devices have one, a large junction has three.
+
+use linesman_config::attachment::Attachment;
+use linesman_config::identity::RevisionRule;
+use linesman_config::project::{Project, ProjectDevice, ProjectError, Ring};
+use linesman_proto::port::{Port, PortMap};
+use linesman_proto::sii::Image;
+use linesman_proto::topology::{End, WiringError};
+
+use super::{SegmentFile, SegmentFileError};
+use crate::device::Signals;
+use crate::device::library::{self, LibraryType, UnknownType};
+use crate::hardware::PortKind;
+
+/// What a cable is long when nothing is said, in metres.
+pub(crate) const DEFAULT_CABLE_M: f64 = 5.0;
+/// The longest cable: glass fibre.
+const LONGEST_CABLE_M: f64 = 2_000.0;
+
+/// A controller that is planned.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Planned {
+    /// Index of its device in the file.
+    pub(crate) device: usize,
+    /// Which controller of the device, from 0.
+    pub(crate) part: usize,
+    pub(crate) name: String,
+    pub(crate) type_name: String,
+    pub(crate) on: Attachment,
+    pub(crate) entry: Port,
+    pub(crate) cable_m: f64,
+    pub(crate) ports: PortMap<PortKind>,
+    pub(crate) serial: u32,
+}
+
+/// All controllers of a file, in the order of their numbers.
+pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileError> {
+    let mut planned = Vec::with_capacity(file.devices.len());
+    for (index, device) in file.devices.iter().enumerate() {
+        let Some(found) = library::find(&device.type_name) else {
+            let source = UnknownType { name: device.type_name.clone() };
+            return Err(SegmentFileError::Type { device: device.name.clone(), source });
+        };
+        let entry = match device.entry.as_deref() {
+            None => Port::A,
+            Some(text) => parse_port(text).ok_or_else(|| SegmentFileError::Range {
+                device: device.name.clone(),
+                key: "entry",
+                given: format!("`{text}`"),
+                allowed: "A, B, C or D",
+            })?,
+        };
+        let serial = device.serial.unwrap_or(planned.len() as u32 + 1);
+        expand_device(file, index, found, entry, serial, &mut planned);
+    }
+    Ok(planned)
+}
+
+fn expand_device(
+    file: &SegmentFile,
+    index: usize,
+    found: &LibraryType,
+    entry: Port,
+    serial: u32,
+    planned: &mut Vec<Planned>,
+) {
+    let device = &file.devices[index];
+    let name = |part: usize| match part {
+        0 => device.name.clone(),
+        part => format!("{}/{}", device.name, part + 1),
+    };
+    for (part, ports) in found.ports().enumerate() {
+        let inner = found.inner_links().iter().find(|link| link.to.0 == part);
+        let (on, entry, cable_m) = match inner {
+            Some(link) => {
+                let on = Attachment::Device { name: name(link.from.0), port: link.from.1 };
+                (on, link.to.1, 0.0)
+            }
+            None => {
+                let length = match ports[entry] {
+                    PortKind::Ebus => 0.0,
+                    PortKind::Mii | PortKind::Absent => DEFAULT_CABLE_M,
+                };
+                (device.on.clone(), entry, device.cable_m.unwrap_or(length))
+            }
+        };
+        planned.push(Planned {
+            device: index,
+            part,
+            name: name(part),
+            type_name: found.name().to_owned(),
+            on,
+            entry,
+            cable_m,
+            ports,
+            serial,
+        });
+    }
+}
+
+fn parse_port(text: &str) -> Option<Port> {
+    let mut letters = text.chars();
+    match (letters.next().and_then(Port::from_letter), letters.next()) {
+        (Some(port), None) => Some(port),
+        (Some(_) | None, _) => None,
+    }
+}
+
+/// Checks names, ports, places and ranges.
+pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFileError> {
+    for device in &file.devices {
+        let out_of_range = |key, given: f64, allowed| SegmentFileError::Range {
+            device: device.name.clone(),
+            key,
+            given: given.to_string(),
+            allowed,
+        };
+        if let Some(length) = device.cable_m.filter(|m| !(0.0..=LONGEST_CABLE_M).contains(m)) {
+            return Err(out_of_range("cable_m", length, "0 to 2000"));
+        }
+        if let Some(ppm) = device.clock_ppm.filter(|ppm| !(-200.0..=200.0).contains(ppm)) {
+            return Err(out_of_range("clock_ppm", ppm, "-200 to 200"));
+        }
+        if let Some(given) = device.counters.keys().find(|key| parse_counter(key).is_none()) {
+            return Err(SegmentFileError::Counter {
+                device: device.name.clone(),
+                given: given.clone(),
+                allowed: "A.frame, A.physical, A.forwarded, A.lost_link (and B, C, D), \
+                          processing_unit, pdi",
+            });
+        }
+    }
+    let ring_m = file.ring.as_ref().and_then(|ring| ring.cable_m);
+    if let Some(length) = ring_m.filter(|m| !(0.0..=LONGEST_CABLE_M).contains(m)) {
+        return Err(SegmentFileError::Range {
+            device: "ring".to_owned(),
+            key: "cable_m",
+            given: length.to_string(),
+            allowed: "0 to 2000",
+        });
+    }
+    wiring(file, planned).tree().map_err(|error| wiring_error(planned, error))?;
+    check_ports(file, planned)
+}
+
+/// The same error with names for numbers.
+fn wiring_error(planned: &[Planned], error: ProjectError) -> SegmentFileError {
+    let name = |node: usize| planned.get(node).map_or("?", |known| known.name.as_str());
+    let end_name = |end: End| match end {
+        End::MainDevice(path) => Attachment::MainDevice(path).to_string(),
+        End::Controller(node, port) => format!("{}.{port}", name(node)),
+    };
+    let ProjectError::Wiring(wrong) = error else {
+        return SegmentFileError::Wiring(error.to_string());
+    };
+    SegmentFileError::Wiring(match wrong {
+        WiringError::NoSuchController { .. } => wrong.to_string(),
+        WiringError::WiredTwice { end, first, second } => format!(
+            "`{}` is wired twice, to `{}` and `{}`: move one of them",
+            end_name(end),
+            name(first),
+            name(second)
+        ),
+        WiringError::OnEntry { node, port, child } => format!(
+            "device `{}` is wired to `{}.{port}`, the port where frames enter `{}`",
+            name(child),
+            name(node),
+            name(node)
+        ),
+        WiringError::Detached { node } => format!(
+            "device `{}` is not connected to the MainDevice: its wiring runs in a circle",
+            name(node)
+        ),
+        WiringError::RingTaken { node, port, taken } => format!(
+            "the ring cannot close at `{}.{port}`: `{}` is wired already",
+            name(node),
+            end_name(taken)
+        ),
+    })
+}
+
+/// The counter behind a key of the file.
+pub(crate) fn parse_counter(key: &str) -> Option<linesman_proto::register::ErrorCounter> {
+    use linesman_proto::register::ErrorCounter as Counter;
+    match key {
+        "processing_unit" => return Some(Counter::ProcessingUnit),
+        "pdi" => return Some(Counter::Pdi),
+        _ => {}
+    }
+    let (port, what) = key.split_once('.')?;
+    let port = parse_port(port)?;
+    match what {
+        "frame" => Some(Counter::InvalidFrame(port)),
+        "physical" => Some(Counter::PhysicalLayer(port)),
+        "forwarded" => Some(Counter::Forwarded(port)),
+        "lost_link" => Some(Counter::LostLink(port)),
+        _ => None,
+    }
+}
+
+/// Every end is a port that is there, and both ends of a link are of one kind.
+fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFileError> {
+    let kind_at = |end: &Attachment| match end {
+        Attachment::MainDevice(_) => Ok(PortKind::Mii),
+        Attachment::Device { name, port } => {
+            match planned.iter().find(|known| known.name == *name) {
+                Some(known) => has_port(known, *port),
+                None => Ok(PortKind::Mii),
+            }
+        }
+    };
+    for controller in planned {
+        let from_kind = kind_at(&controller.on)?;
+        let to_kind = has_port(controller, controller.entry)?;
+        if from_kind != to_kind {
+            return Err(SegmentFileError::Kinds {
+                from: controller.on.to_string(),
+                from_kind: kind_name(from_kind),
+                to: format!("{}.{}", controller.name, controller.entry),
+                to_kind: kind_name(to_kind),
+            });
+        }
+    }
+    if let Some(ring) = &file.ring {
+        let kind = kind_at(&ring.closes_at)?;
+        if kind != PortKind::Mii {
+            return Err(SegmentFileError::Kinds {
+                from: ring.closes_at.to_string(),
+                from_kind: kind_name(kind),
+                to: "maindevice.B".to_owned(),
+                to_kind: kind_name(PortKind::Mii),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn has_port(controller: &Planned, port: Port) -> Result<PortKind, SegmentFileError> {
+    match controller.ports[port] {
+        PortKind::Absent => Err(SegmentFileError::NoPort {
+            device: controller.name.clone(),
+            type_name: controller.type_name.clone(),
+            port,
+            has: controller
+                .ports
+                .iter()
+                .filter(|(_, kind)| **kind != PortKind::Absent)
+                .map(|(port, _)| port.to_string())
+                .collect::<Vec<_>>()
+                .join(", "),
+        }),
+        kind @ (PortKind::Ebus | PortKind::Mii) => Ok(kind),
+    }
+}
+
+const fn kind_name(kind: PortKind) -> &'static str {
+    match kind {
+        PortKind::Ebus => "an E-bus contact",
+        PortKind::Mii => "a 100 Mbit/s port",
+        PortKind::Absent => "no port",
+    }
+}
+
+/// A project that says how things are wired, and nothing of what they are.
+pub(crate) fn wiring(file: &SegmentFile, planned: &[Planned]) -> Project {
+    let devices = planned.iter().map(|controller| ProjectDevice {
+        name: controller.name.clone(),
+        type_name: controller.type_name.clone(),
+        vendor_id: None,
+        product_code: None,
+        revision: None,
+        revision_rule: RevisionRule::Equal,
+        serial: None,
+        on: controller.on.clone(),
+        entry: controller.entry.to_string(),
+        station: None,
+    });
+    let ring = file.ring.as_ref().map(|ring| Ring { closes_at: ring.closes_at.clone() });
+    Project { name: file.name.clone(), devices: devices.collect(), ring }
+}
+
+/// The whole project.
+pub(super) fn project(
+    file: &SegmentFile,
+    planned: &[Planned],
+) -> Result<Project, SegmentFileError> {
+    check(file, planned)?;
+    let mut project = wiring(file, planned);
+    let mut signals = Signals::default();
+    for (controller, wanted) in planned.iter().zip(&mut project.devices) {
+        let built = library::build(&controller.type_name, controller.serial, &mut signals);
+        let built = built
+            .map_err(|source| SegmentFileError::Type { device: controller.name.clone(), source })?;
+        let image = built.get(controller.part).and_then(|one| Image::parse(&one.sii).ok());
+        if let Some(image) = image {
+            wanted.vendor_id = Some(image.identity.vendor_id);
+            wanted.product_code = Some(image.identity.product_code);
+            wanted.revision = Some(image.identity.revision);
+        }
+    }
+    Ok(project)
+}

@@ -1,0 +1,94 @@
+//! What can be done to the world, and who does it.
+
+use std::fmt::Debug;
+
+use linesman_proto::time::Instant;
+use linesman_proto::topology::route::Direction;
+
+use crate::device::Refusal;
+
+/// One direction of a link: a line that symbols travel along.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub struct Line {
+    /// Index of the link.
+    pub link: usize,
+    /// Whether it carries away from card A.
+    pub downstream: bool,
+}
+
+impl Line {
+    /// Both directions of a link, downstream first.
+    #[must_use]
+    pub const fn both(link: usize) -> [Self; 2] {
+        [Self { link, downstream: true }, Self { link, downstream: false }]
+    }
+
+    /// Which way it carries.
+    #[must_use]
+    pub const fn direction(self) -> Direction {
+        if self.downstream { Direction::Downstream } else { Direction::Upstream }
+    }
+}
+
+/// A change of the world. Nodes and links are indices.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Change {
+    /// A symbol is destroyed on a line. What that means depends on what is on it.
+    Hit {
+        /// Where.
+        line: Line,
+        /// What it does to the byte it falls into: never 0.
+        flip: u8,
+    },
+    /// The next frame on a line is hit, somewhere inside.
+    FrameHit {
+        /// Where.
+        line: Line,
+        /// How far into the frame, in 1/65536 of its bytes.
+        part: u16,
+        /// What it does to the byte it falls into: never 0.
+        flip: u8,
+    },
+    /// A link's contact opens: nothing passes in either direction.
+    Open {
+        /// Which.
+        link: usize,
+    },
+    /// It closes again.
+    Close {
+        /// Which.
+        link: usize,
+    },
+    /// A controller loses its supply.
+    Off {
+        /// Which.
+        node: usize,
+    },
+    /// It has its supply again.
+    On {
+        /// Which.
+        node: usize,
+    },
+    /// A controller spoils the next frame that passes it, behind its receiver and before it codes.
+    Glitch {
+        /// Which.
+        node: usize,
+        /// How far into the frame, in 1/65536 of its bytes.
+        part: u16,
+        /// What it does to the byte: never 0.
+        flip: u8,
+    },
+    /// A device refuses a change of state from now on, or no longer.
+    Refuse {
+        /// Which.
+        node: usize,
+        /// The state that it does not go to, and the code it gives.
+        refusal: Option<Refusal>,
+    },
+}
+
+/// Who changes the world: a fault, as a list of changes that is made as far as it is needed.
+pub trait Source: Debug + Send {
+    /// The next change, not earlier than the one before; `None` when there are no more.
+    fn next_change(&mut self) -> Option<(Instant, Change)>;
+}

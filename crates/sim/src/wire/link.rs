@@ -1,0 +1,189 @@
+//! A link: two ends, two directions, a contact that may open.
+//!
+//! Reference: S1 3.1 (loops follow links), 6 (physical layer); facts on cable delay: 5 ns/m.
+
+use std::collections::VecDeque;
+
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
+
+use super::history::History;
+use crate::hardware::PortKind;
+use crate::truth::FaultId;
+
+/// Signal delay of a copper cable.
+pub const CABLE_NS_PER_M: f64 = 5.0;
+
+/// A destroyed symbol on a line, at the receiver.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Hit {
+    pub(super) at: Instant,
+    pub(super) flip: u8,
+    pub(super) fault: FaultId,
+}
+
+/// A hit that waits for a frame.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Ambush {
+    pub(super) from: Instant,
+    pub(super) part: u16,
+    pub(super) flip: u8,
+    pub(super) fault: FaultId,
+}
+
+/// What lies in wait on one line.
+#[derive(Clone, Default, Debug)]
+pub(super) struct Noise {
+    /// In the order of time.
+    hits: VecDeque<Hit>,
+    /// In the order of time.
+    ambushes: VecDeque<Ambush>,
+}
+
+impl Noise {
+    pub(super) fn push_hit(&mut self, hit: Hit) {
+        let behind = self.hits.iter().rev().take_while(|other| other.at > hit.at).count();
+        self.hits.insert(self.hits.len() - behind, hit);
+    }
+
+    pub(super) fn push_ambush(&mut self, ambush: Ambush) {
+        self.ambushes.push_back(ambush);
+    }
+
+    #[inline]
+    pub(super) fn is_quiet(&self) -> bool {
+        self.hits.is_empty() && self.ambushes.is_empty()
+    }
+
+    /// The hits from `from` on and before `to`.
+    pub(super) fn hits(&self, from: Instant, to: Instant) -> impl Iterator<Item = Hit> + '_ {
+        let first = self.hits.partition_point(|hit| hit.at < from);
+        self.hits.range(first..).take_while(move |hit| hit.at < to).copied()
+    }
+
+    /// What waits for a frame that begins at `from`, if anything does. It strikes once.
+    pub(super) fn strike(&mut self, from: Instant) -> Option<Ambush> {
+        let ready = self.ambushes.front().is_some_and(|ambush| ambush.from <= from);
+        if ready { self.ambushes.pop_front() } else { None }
+    }
+
+    /// A fault is over: what still waits for a frame goes with it.
+    pub(super) fn disarm(&mut self, fault: FaultId) {
+        self.ambushes.retain(|ambush| ambush.fault != fault);
+    }
+
+    /// Forgets hits before an instant.
+    pub(super) fn forget(&mut self, before: Instant) {
+        while self.hits.front().is_some_and(|hit| hit.at < before) {
+            self.hits.pop_front();
+        }
+    }
+}
+
+/// How one end of a link stands.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub(super) enum EndState {
+    /// No link.
+    #[default]
+    Down,
+    /// A link.
+    Up,
+    /// A link whose signal is gone; the end will find out.
+    Losing,
+}
+
+/// A link between two ports.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// The end nearer card A.
+    pub upstream: End,
+    /// The other end.
+    pub downstream: End,
+    /// What it is made of.
+    pub kind: PortKind,
+    /// How long a symbol is on its way, cable and both ports.
+    pub transit: Span,
+    /// The contact.
+    pub contact: History,
+    /// By [`Line::downstream`](super::Line): upstream line first.
+    pub(super) noise: [Noise; 2],
+    /// Upstream end first.
+    pub(super) ends: [EndState; 2],
+    /// Whether symbols arrive, in both directions.
+    pub(super) signal: bool,
+    /// Counts changes of the signal, so that what was scheduled before one can be told.
+    pub(super) epoch: u64,
+}
+
+impl Link {
+    /// A link without any signal yet.
+    #[must_use]
+    pub fn new(upstream: End, downstream: End, kind: PortKind, transit: Span) -> Self {
+        Self {
+            upstream,
+            downstream,
+            kind,
+            transit,
+            contact: History::default(),
+            noise: [Noise::default(), Noise::default()],
+            ends: [EndState::Down; 2],
+            signal: true,
+            epoch: 0,
+        }
+    }
+
+    /// Both ends, upstream first.
+    #[must_use]
+    pub const fn both_ends(&self) -> [End; 2] {
+        [self.upstream, self.downstream]
+    }
+
+    /// The end that sends on a line and the one that receives.
+    #[must_use]
+    pub const fn from_to(&self, downstream: bool) -> (End, End) {
+        if downstream { (self.upstream, self.downstream) } else { (self.downstream, self.upstream) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hit(nanos: u64) -> Hit {
+        Hit { at: Instant::from_nanos(nanos), flip: 1, fault: FaultId(0) }
+    }
+
+    #[test]
+    fn hits_are_found_by_time_in_whatever_order_they_came() {
+        let mut noise = Noise::default();
+        assert!(noise.is_quiet());
+        for nanos in [5, 1, 9, 5] {
+            noise.push_hit(hit(nanos));
+        }
+        let found = |from, to| noise.hits(Instant::from_nanos(from), Instant::from_nanos(to));
+        assert_eq!(found(0, 100).count(), 4);
+        assert_eq!(found(5, 9).count(), 2);
+        assert_eq!(found(6, 9).count(), 0);
+        noise.forget(Instant::from_nanos(6));
+        assert_eq!(noise.hits(Instant::ZERO, Instant::MAX).collect::<Vec<_>>(), [hit(9)]);
+    }
+
+    #[test]
+    fn what_waits_strikes_once_and_goes_with_its_fault() {
+        let mut noise = Noise::default();
+        let wait = |from, fault| Ambush {
+            from: Instant::from_nanos(from),
+            part: 0,
+            flip: 1,
+            fault: FaultId(fault),
+        };
+        noise.push_ambush(wait(5, 1));
+        noise.push_ambush(wait(7, 2));
+        noise.push_ambush(wait(8, 1));
+        assert_eq!(noise.strike(Instant::from_nanos(4)), None);
+        assert_eq!(noise.strike(Instant::from_nanos(20)), Some(wait(5, 1)));
+        noise.disarm(FaultId(2));
+        assert_eq!(noise.strike(Instant::from_nanos(20)), Some(wait(8, 1)));
+        assert!(noise.is_quiet());
+    }
+}

@@ -1,0 +1,88 @@
+//! A controller in its place: plugs, supply, and what is to happen to it.
+
+use std::collections::VecDeque;
+
+use linesman_proto::port::{Port, PortMap};
+use linesman_proto::time::Instant;
+
+use super::change::Line;
+use super::history::History;
+use crate::controller::Controller;
+use crate::device::{Refusal, Signals};
+use crate::truth::FaultId;
+
+/// What happens to a controller and cannot be posted to it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Act {
+    Off,
+    On,
+    Refuse(Option<Refusal>),
+}
+
+/// A fault inside that waits for a frame.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Glitch {
+    pub(super) from: Instant,
+    pub(super) part: u16,
+    pub(super) flip: u8,
+    pub(super) fault: FaultId,
+}
+
+/// A controller in its place.
+#[derive(Debug)]
+pub(crate) struct Node {
+    pub(crate) controller: Controller,
+    /// The line that leaves by each port.
+    pub(super) leaving: PortMap<Option<Line>>,
+    pub(super) power: History,
+    pub(super) glitches: VecDeque<Glitch>,
+    /// Whose doing it is that the device refuses a state.
+    pub(super) refused_by: Option<FaultId>,
+    /// In the order of time.
+    acts: VecDeque<(Instant, Act)>,
+}
+
+impl Node {
+    pub(super) fn new(controller: Controller) -> Self {
+        Self {
+            controller,
+            leaving: PortMap::default(),
+            power: History::default(),
+            glitches: VecDeque::new(),
+            refused_by: None,
+            acts: VecDeque::new(),
+        }
+    }
+
+    pub(super) fn act_at(&mut self, at: Instant, act: Act) {
+        self.acts.push_back((at, act));
+    }
+
+    /// Brings the controller to an instant, with all that happens to it on the way.
+    #[inline]
+    pub(super) fn touch(&mut self, now: Instant, signals: &mut Signals) {
+        while let Some((at, act)) = self.acts.front().copied().filter(|(at, _)| *at <= now) {
+            self.acts.pop_front();
+            self.controller.advance(at, signals);
+            match act {
+                Act::Off => self.controller.power_off(at),
+                Act::On => self.controller.power_on(at),
+                Act::Refuse(refusal) => self.controller.refuse(at, refusal),
+            }
+        }
+        self.controller.advance(now, signals);
+    }
+
+    /// A glitch that spoils a frame which passes at `at`, if one waits.
+    #[inline]
+    pub(super) fn strike(&mut self, at: Instant) -> Option<Glitch> {
+        let ready = self.glitches.front().is_some_and(|glitch| glitch.from <= at);
+        if ready { self.glitches.pop_front() } else { None }
+    }
+
+    /// Whether the loop of a port is open at an instant that may be ahead.
+    #[inline]
+    pub(super) fn is_open_at(&self, port: Port, at: Instant) -> bool {
+        self.controller.is_open_at(port, at)
+    }
+}

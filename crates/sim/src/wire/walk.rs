@@ -1,0 +1,322 @@
+//! The walk: one frame, from a card through every port it meets, in real order and real time.
+//!
+//! It is literal on purpose: each receiver checks the frame, each open loop sends it out, each line
+//! may spoil, cut or swallow it. Nothing is known beforehand about where the frame will come out.
+//!
+//! Times are those of the frame's first bit. Behind a port's receiver a controller takes
+//! `forward`, or `process` through its processing unit, to the transmitter of the next open port
+//! (S1 figure 2); a line takes its transit time.
+
+use linesman_proto::address::Path;
+use linesman_proto::port::Port;
+use linesman_proto::register::{self as r, ErrorCounter};
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
+
+use super::change::Line;
+use super::world::World;
+use crate::controller::{CountKind, PortEvent, Verdict};
+use crate::frame::{PREAMBLE_LEN, WireFrame};
+use crate::truth::{Effect, FaultId, Place};
+use linesman_proto::frame::size::BYTE_NS;
+
+/// A frame in one controller meets each port at most this often: the rule on circulating frames
+/// destroys it in its second round, unless the MainDevice has switched that off.
+const MOST_STOPS: usize = 16;
+
+/// A frame on its way, and who is to blame for its state.
+#[derive(Debug)]
+pub(crate) struct Traveller {
+    pub(crate) frame: WireFrame,
+    /// Who spoiled it first.
+    pub(crate) spoiled_by: Option<FaultId>,
+}
+
+/// Where a walk ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Outcome {
+    /// At a card, with its last bit at this instant.
+    Arrived(Path, Instant),
+    /// Nowhere.
+    Vanished,
+}
+
+/// What a line did to a frame.
+enum Crossing {
+    /// Its first bit is at the receiver at this instant; whether the line spoiled it.
+    Through {
+        at: Instant,
+        spoiled: bool,
+    },
+    Lost,
+}
+
+impl World {
+    /// Sends a frame off by a card at `at`.
+    pub(crate) fn walk(&mut self, card: Path, at: Instant, traveller: &mut Traveller) -> Outcome {
+        let Some(mut line) = self.leaving[card.index()] else { return Outcome::Vanished };
+        let mut at = at;
+        let mut made_anew = false;
+        // Every line twice in each direction is more than any frame can do.
+        for _ in 0..4 * self.links.len() {
+            let Crossing::Through { at: arrives, spoiled } = self.cross(line, at, traveller) else {
+                return Outcome::Vanished;
+            };
+            let (_, to) = self.links[line.link].from_to(line.downstream);
+            let (node, port) = match to {
+                End::Controller(node, port) => (node, port),
+                End::MainDevice(path) => {
+                    return Outcome::Arrived(path, arrives + traveller.frame.duration());
+                }
+            };
+            if made_anew {
+                self.symbol_error(arrives, traveller.spoiled_by, line);
+            }
+            let Some((left_by, left_at)) =
+                self.pass(node, port, line, arrives, spoiled || made_anew, traveller)
+            else {
+                return Outcome::Vanished;
+            };
+            let Some(next) = self.nodes[node].leaving[left_by] else {
+                // A loop that stands open by hand, or port A as the last way out, with no plug.
+                self.lost(left_at, None, Place::Device(self.id(node)), traveller);
+                return Outcome::Vanished;
+            };
+            let counting = self.nodes[node].controller.hardware().counting;
+            made_anew = counting.remakes_symbol_errors && !traveller.frame.damage.is_intact();
+            (line, at) = (next, left_at);
+        }
+        self.lost(at, None, self.line_place(line), traveller);
+        Outcome::Vanished
+    }
+
+    // ---- on a line ----
+
+    /// Carries a frame along a line. Its first bit enters at `at`.
+    #[inline]
+    fn cross(&mut self, line: Line, at: Instant, traveller: &mut Traveller) -> Crossing {
+        let link = &self.links[line.link];
+        let arrives = at + link.transit;
+        let duration = traveller.frame.duration();
+        let mut spoiled = false;
+        // The contact lies half way.
+        let contact = at + Span::ns(link.transit.as_nanos() / 2);
+        if let Some((cut, fault)) = self.first_silence(line, contact, contact + duration) {
+            let whole = traveller.frame.byte_at(cut.since(contact));
+            self.lost(cut, Some(fault), self.line_place(line), traveller);
+            match whole {
+                Some(bytes) if cut > contact => {
+                    traveller.frame.bytes.truncate(bytes);
+                    traveller.frame.damage.cut_off = true;
+                    traveller.spoiled_by.get_or_insert(fault);
+                    spoiled = true;
+                }
+                Some(_) | None => return Crossing::Lost,
+            }
+        }
+        let noise = &self.links[line.link].noise[usize::from(line.downstream)];
+        if !noise.is_quiet() {
+            match self.disturb(line, arrives, duration, traveller) {
+                Some(hit) => spoiled |= hit,
+                None => return Crossing::Lost,
+            }
+        }
+        Crossing::Through { at: arrives, spoiled }
+    }
+
+    /// What noise does to a frame: whether it was spoiled; `None` when it is no frame any more.
+    fn disturb(
+        &mut self,
+        line: Line,
+        arrives: Instant,
+        duration: Span,
+        traveller: &mut Traveller,
+    ) -> Option<bool> {
+        let place = self.line_place(line);
+        let noise = &mut self.links[line.link].noise[usize::from(line.downstream)];
+        let ambush = noise.strike(arrives);
+        let hits: Vec<_> = noise.hits(arrives, arrives + duration).collect();
+        let mut spoiled = false;
+        let mut starts = true;
+        for hit in hits {
+            let offset = hit.at.since(arrives);
+            starts &= !is_start_delimiter(offset);
+            self.spoil(hit.at, offset, hit.flip, hit.fault, place, traveller);
+            spoiled = true;
+        }
+        if let Some(ambush) = ambush {
+            let bytes = traveller.frame.bytes.len() as u64;
+            let byte = PREAMBLE_LEN as u64 + bytes * u64::from(ambush.part) / (1 << 16);
+            let offset = Span::ns(byte * BYTE_NS);
+            self.symbol_error(arrives + offset, Some(ambush.fault), line);
+            let at = arrives + offset;
+            self.spoil(at, offset, ambush.flip, ambush.fault, place, traveller);
+            spoiled = true;
+        }
+        if !starts {
+            // Without its start delimiter nobody takes it for a frame.
+            self.miss_start(line, arrives + duration, traveller);
+            return None;
+        }
+        Some(spoiled)
+    }
+
+    /// A receiver sees a frame without a start: some count it, none passes it on.
+    fn miss_start(&mut self, line: Line, end: Instant, traveller: &Traveller) {
+        let fault = traveller.spoiled_by;
+        self.lost(end, fault, self.line_place(line), traveller);
+        let (_, to) = self.links[line.link].from_to(line.downstream);
+        match to {
+            End::MainDevice(_) => {}
+            End::Controller(node, port) => {
+                if self.nodes[node].controller.hardware().counting.counts_missing_start {
+                    let kind = CountKind::InvalidFrame;
+                    self.post(node, end, fault, PortEvent::Count { port, kind });
+                }
+            }
+        }
+    }
+
+    /// Changes the byte that is `offset` behind a frame's first bit; the check sequence no longer
+    /// fits.
+    fn spoil(
+        &mut self,
+        at: Instant,
+        offset: Span,
+        flip: u8,
+        fault: FaultId,
+        place: Place,
+        traveller: &mut Traveller,
+    ) {
+        let frame = &mut traveller.frame;
+        if let Some(byte) = frame.byte_at(offset).and_then(|byte| frame.bytes.get_mut(byte)) {
+            *byte ^= flip;
+        }
+        frame.damage.fcs_bad = true;
+        traveller.spoiled_by.get_or_insert(fault);
+        let effect = Effect::FrameSpoiled { frame: frame.number };
+        self.truth.effect(at, Some(fault), place, effect);
+    }
+
+    fn lost(&mut self, at: Instant, fault: Option<FaultId>, place: Place, traveller: &Traveller) {
+        let effect = Effect::FrameLost { frame: traveller.frame.number };
+        self.truth.effect(at, fault, place, effect);
+    }
+
+    // ---- in a controller ----
+
+    /// Takes a frame in by a port and sends it out by another: which one, and when.
+    #[inline]
+    fn pass(
+        &mut self,
+        node: usize,
+        port: Port,
+        line: Line,
+        at: Instant,
+        spoiled: bool,
+        traveller: &mut Traveller,
+    ) -> Option<(Port, Instant)> {
+        let here = &mut self.nodes[node];
+        if port == Port::A {
+            here.touch(at, &mut self.signals);
+        }
+        if let Some((_, fault)) = here.power.first_break(at, at + Span::ns(1)) {
+            self.lost(at, Some(fault), Place::Device(self.id(node)), traveller);
+            return None;
+        }
+        here.controller.enters(at, port, &traveller.frame);
+        if !traveller.frame.damage.is_intact() {
+            self.receive_damaged(node, port, at, spoiled, traveller);
+        }
+        if !self.nodes[node].is_open_at(port, at) {
+            let fault = self.blame(line.link, at);
+            self.lost(at, fault, self.line_place(line), traveller);
+            return None;
+        }
+        let timing = self.nodes[node].controller.hardware().timing;
+        let mut processed = false;
+        let mut stop = port;
+        for _ in 0..MOST_STOPS {
+            if stop == Port::A {
+                if self.process(node, at, traveller) == Verdict::Destroy {
+                    self.lost(at, traveller.spoiled_by, Place::Device(self.id(node)), traveller);
+                    return None;
+                }
+                processed = true;
+            }
+            stop = stop.next();
+            if self.nodes[node].is_open_at(stop, at) {
+                let takes = if processed { timing.process } else { timing.forward };
+                let leaves = at + takes;
+                self.glitch(node, leaves, traveller);
+                return Some((stop, leaves));
+            }
+        }
+        self.lost(at, None, Place::Device(self.id(node)), traveller);
+        None
+    }
+
+    /// A port counts a damaged frame, and marks it.
+    fn receive_damaged(
+        &mut self,
+        node: usize,
+        port: Port,
+        at: Instant,
+        spoiled: bool,
+        traveller: &mut Traveller,
+    ) {
+        let forwarded = self.nodes[node].controller.hardware().counting.forwarded;
+        let damage = &mut traveller.frame.damage;
+        let kind = if damage.marked && !spoiled && forwarded {
+            CountKind::ForwardedError
+        } else {
+            CountKind::InvalidFrame
+        };
+        damage.marked = true;
+        let end = at + traveller.frame.duration();
+        self.post(node, end, traveller.spoiled_by, PortEvent::Count { port, kind });
+    }
+
+    fn process(&mut self, node: usize, at: Instant, traveller: &mut Traveller) -> Verdict {
+        let intact = traveller.frame.damage.is_intact();
+        if !intact {
+            let end = at + traveller.frame.duration();
+            let kind = CountKind::ProcessingUnitError;
+            let event = PortEvent::Count { port: Port::A, kind };
+            self.post(node, end, traveller.spoiled_by, event);
+        }
+        let controller = &mut self.nodes[node].controller;
+        let errors = r::PROCESSING_UNIT_ERROR_COUNTER.address;
+        controller.advance(at, &mut self.signals);
+        let before = controller.register(errors);
+        let verdict = controller.process(at, &mut traveller.frame, &mut self.signals);
+        if controller.register(errors) > before {
+            let id = controller.id();
+            self.truth.content_moves(id, ErrorCounter::ProcessingUnit);
+            let effect = Effect::ContentRefused { frame: traveller.frame.number };
+            self.truth.effect(at, traveller.spoiled_by, Place::Device(id), effect);
+        }
+        verdict
+    }
+
+    /// A fault inside spoils the frame before it is coded: whoever receives it finds it first.
+    #[inline]
+    fn glitch(&mut self, node: usize, at: Instant, traveller: &mut Traveller) {
+        if self.nodes[node].glitches.is_empty() {
+            return;
+        }
+        if let Some(glitch) = self.nodes[node].strike(at) {
+            let bytes = traveller.frame.bytes.len() as u64;
+            let byte = PREAMBLE_LEN as u64 + bytes * u64::from(glitch.part) / (1 << 16);
+            let offset = Span::ns(byte * BYTE_NS);
+            let place = Place::Device(self.id(node));
+            self.spoil(at + offset, offset, glitch.flip, glitch.fault, place, traveller);
+        }
+    }
+}
+
+/// Whether the start delimiter is on the wire, the last byte of the preamble.
+fn is_start_delimiter(offset: Span) -> bool {
+    let byte = (offset.as_nanos() / BYTE_NS) as usize;
+    byte == PREAMBLE_LEN - 1
+}

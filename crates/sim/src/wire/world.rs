@@ -1,0 +1,369 @@
+//! The segment as physics knows it, and how it changes.
+
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::{End, Tree};
+
+use super::change::{Change, Line};
+use super::due::Agenda;
+use super::link::{Ambush, CABLE_NS_PER_M, Hit, Link};
+use super::node::{Act, Glitch, Node};
+use crate::controller::{Controller, CountKind, PortEvent};
+use crate::device::{Refusal, Signals};
+use crate::fault::Running;
+use crate::hardware::PortKind;
+use crate::segment::card::Card;
+use crate::truth::{Effect, FaultId, Place, TruthLog};
+
+/// Hits are kept this long: longer than any frame is on its way.
+const MEMORY: Span = Span::ms(2);
+
+/// Controllers, cards and links with their histories.
+#[derive(Debug)]
+pub(crate) struct World {
+    /// By node of the tree.
+    pub(crate) nodes: Vec<Node>,
+    /// In the order of [`Tree::links`].
+    pub(crate) links: Vec<Link>,
+    pub(crate) cards: [Card; 2],
+    pub(crate) signals: Signals,
+    pub(crate) truth: TruthLog,
+    pub(super) agenda: Agenda,
+    pub(crate) running: Vec<Running>,
+    /// The line that leaves each card.
+    pub(super) leaving: [Option<Line>; 2],
+    /// All changes up to here are made; what is injected begins later.
+    pub(crate) horizon: Instant,
+    /// An upper bound of the time that a frame of no length takes through all of it, twice.
+    round: Span,
+    pub(crate) frames: u64,
+}
+
+impl World {
+    /// A segment that was on before the run began: all links are up, all SII are loaded.
+    ///
+    /// `controllers` are in the order of the tree's nodes, `cable_m` in the order of its links.
+    pub(crate) fn new(
+        tree: &Tree,
+        controllers: Vec<Controller>,
+        cable_m: &[f64],
+        signals: Signals,
+    ) -> Self {
+        let mut world = Self {
+            nodes: controllers.into_iter().map(Node::new).collect(),
+            links: Vec::new(),
+            cards: [Card::default(), Card::default()],
+            signals,
+            truth: TruthLog::default(),
+            agenda: Agenda::default(),
+            running: Vec::new(),
+            leaving: [None; 2],
+            horizon: Instant::ZERO,
+            round: Span::ZERO,
+            frames: 0,
+        };
+        for (index, wired) in tree.links().iter().enumerate() {
+            world.plug(*wired, index, cable_m.get(index).copied().unwrap_or(0.0));
+        }
+        world.round = world.measure_round();
+        for node in &mut world.nodes {
+            node.controller.power_on_before(Instant::ZERO, &mut world.signals);
+        }
+        for link in 0..world.links.len() {
+            world.link_up(link, Instant::ZERO);
+        }
+        for node in &mut world.nodes {
+            node.touch(Instant::ZERO, &mut world.signals);
+        }
+        world
+    }
+
+    fn plug(&mut self, wired: linesman_proto::topology::Link, index: usize, cable_m: f64) {
+        let cable = Span::ns((cable_m * CABLE_NS_PER_M).max(0.0) as u64);
+        let kind = [wired.upstream, wired.downstream]
+            .into_iter()
+            .find_map(|end| match end {
+                End::MainDevice(_) => None,
+                End::Controller(node, port) => {
+                    Some(self.nodes[node].controller.hardware().ports[port])
+                }
+            })
+            .unwrap_or(PortKind::Mii);
+        let half = |end: End| match end {
+            End::MainDevice(path) => self.cards[path.index()].crossing,
+            End::Controller(node, _) => {
+                let timing = self.nodes[node].controller.hardware().timing;
+                match kind {
+                    PortKind::Ebus => timing.ebus_crossing,
+                    PortKind::Mii | PortKind::Absent => timing.mii_crossing,
+                }
+            }
+        };
+        let ports = half(wired.upstream) + half(wired.downstream);
+        let transit = Span::ns(ports.as_nanos() / 2) + cable;
+        self.links.push(Link::new(wired.upstream, wired.downstream, kind, transit));
+        for line in Line::both(index) {
+            let (from, _) = self.links[index].from_to(line.downstream);
+            match from {
+                End::MainDevice(path) => self.leaving[path.index()] = Some(line),
+                End::Controller(node, port) => self.nodes[node].leaving[port] = Some(line),
+            }
+        }
+    }
+
+    fn measure_round(&self) -> Span {
+        let links = self.links.iter().fold(Span::ZERO, |sum, link| sum + link.transit * 2);
+        let nodes = self.nodes.iter().fold(Span::ZERO, |sum, node| {
+            let timing = node.controller.hardware().timing;
+            sum + timing.process + timing.forward * 3
+        });
+        (links + nodes) * 2
+    }
+
+    // ---- names ----
+
+    pub(crate) fn id(&self, node: usize) -> DeviceId {
+        self.nodes[node].controller.id()
+    }
+
+    pub(crate) fn name_end(&self, end: End) -> End<DeviceId> {
+        end.map(|node| self.id(node))
+    }
+
+    /// The place of a line in the truth log.
+    pub(crate) fn line_place(&self, line: Line) -> Place {
+        let (from, to) = self.links[line.link].from_to(line.downstream);
+        Place::Direction(self.name_end(from), self.name_end(to))
+    }
+
+    // ---- time ----
+
+    /// Makes all changes that a frame of `frame_time` which enters at `now` can meet.
+    pub(crate) fn look_ahead(&mut self, now: Instant, frame_time: Span) {
+        self.change_until(now + self.round + frame_time);
+        let forgotten = now - MEMORY;
+        for link in &mut self.links {
+            for noise in &mut link.noise {
+                noise.forget(forgotten);
+            }
+        }
+    }
+
+    /// Brings everything to `now`.
+    pub(crate) fn advance(&mut self, now: Instant) {
+        self.change_until(now);
+        for node in &mut self.nodes {
+            node.touch(now, &mut self.signals);
+        }
+    }
+
+    /// Makes all changes up to and at an instant.
+    fn change_until(&mut self, until: Instant) {
+        loop {
+            let due = self.agenda.next_at().filter(|at| *at <= until);
+            let fault = self.next_fault().filter(|(at, _)| *at <= until);
+            match (due, fault) {
+                (None, None) => break,
+                (Some(at), Some((fault_at, index))) if fault_at < at => self.run_fault(index),
+                (None, Some((_, index))) => self.run_fault(index),
+                (Some(_), _) => {
+                    if let Some((at, due)) = self.agenda.pop() {
+                        self.serve(at, due);
+                    }
+                }
+            }
+        }
+        self.horizon = self.horizon.max(until);
+    }
+
+    /// Which running fault does something first, and when.
+    fn next_fault(&self) -> Option<(Instant, usize)> {
+        let next = self.running.iter().enumerate();
+        next.filter_map(|(index, fault)| Some((fault.next_at()?, index))).min()
+    }
+
+    fn run_fault(&mut self, index: usize) {
+        let fault = self.running[index].id;
+        match self.running[index].step() {
+            crate::fault::Step::Begin(at) => self.truth.begin(at, fault),
+            crate::fault::Step::Change(at, change) => self.apply(at, fault, change),
+            crate::fault::Step::End { at, healed } => {
+                self.running.remove(index);
+                if healed {
+                    self.disarm(fault);
+                }
+                self.release(at, fault);
+            }
+        }
+    }
+
+    /// Hits that still wait for a frame do not come any more. One whose fault ended by itself comes
+    /// with the next frame: so many hits were asked for.
+    fn disarm(&mut self, fault: FaultId) {
+        for noise in self.links.iter_mut().flat_map(|link| &mut link.noise) {
+            noise.disarm(fault);
+        }
+        for node in &mut self.nodes {
+            node.glitches.retain(|glitch| glitch.fault != fault);
+        }
+    }
+
+    /// A fault is over: everything it holds is let go.
+    fn release(&mut self, at: Instant, fault: FaultId) {
+        for link in 0..self.links.len() {
+            if self.links[link].contact.is_held_by(fault) {
+                self.apply(at, fault, Change::Close { link });
+            }
+        }
+        for node in 0..self.nodes.len() {
+            if self.nodes[node].power.is_held_by(fault) {
+                self.apply(at, fault, Change::On { node });
+            }
+            if self.nodes[node].refused_by == Some(fault) {
+                self.apply(at, fault, Change::Refuse { node, refusal: None });
+            }
+        }
+        self.truth.end(at, fault);
+    }
+
+    // ---- changes ----
+
+    fn apply(&mut self, at: Instant, fault: FaultId, change: Change) {
+        match change {
+            Change::Hit { line, flip } => self.hit(at, fault, line, flip),
+            Change::FrameHit { line, part, flip } => {
+                let ambush = Ambush { from: at, part, flip, fault };
+                self.links[line.link].noise[usize::from(line.downstream)].push_ambush(ambush);
+            }
+            Change::Open { link } => {
+                let was_whole = self.links[link].contact.is_whole();
+                self.links[link].contact.break_at(at, fault);
+                if was_whole {
+                    self.signal_changed(link, at);
+                }
+            }
+            Change::Close { link } => {
+                self.links[link].contact.mend_at(at, fault);
+                if self.links[link].contact.is_whole() {
+                    self.signal_changed(link, at);
+                }
+            }
+            Change::Off { node } => {
+                let was_on = self.nodes[node].power.is_whole();
+                self.nodes[node].power.break_at(at, fault);
+                let place = Place::Device(self.id(node));
+                self.truth.effect(at, Some(fault), place, Effect::PowerLost);
+                if was_on {
+                    self.nodes[node].act_at(at, Act::Off);
+                    self.supply_changed(node, at);
+                }
+            }
+            Change::On { node } => {
+                self.nodes[node].power.mend_at(at, fault);
+                if self.nodes[node].power.is_whole() {
+                    let place = Place::Device(self.id(node));
+                    self.truth.effect(at, Some(fault), place, Effect::PowerBack);
+                    self.nodes[node].act_at(at, Act::On);
+                    self.supply_changed(node, at);
+                }
+            }
+            Change::Glitch { node, part, flip } => {
+                self.nodes[node].glitches.push_back(Glitch { from: at, part, flip, fault });
+            }
+            Change::Refuse { node, refusal } => {
+                self.nodes[node].refused_by = refusal.map(|_| fault);
+                self.nodes[node].act_at(at, Act::Refuse(refusal));
+                if let Some(Refusal { code, .. }) = refusal {
+                    let place = Place::Device(self.id(node));
+                    let effect = Effect::StateRefused { code: code.0 };
+                    self.truth.effect(at, Some(fault), place, effect);
+                }
+            }
+        }
+    }
+
+    fn supply_changed(&mut self, node: usize, at: Instant) {
+        let links = self.nodes[node].leaving.0;
+        for line in links.into_iter().flatten() {
+            self.signal_changed(line.link, at);
+        }
+    }
+
+    /// A symbol is destroyed. Without a signal there is none to destroy.
+    fn hit(&mut self, at: Instant, fault: FaultId, line: Line, flip: u8) {
+        let link = &mut self.links[line.link];
+        if !link.signal {
+            return;
+        }
+        link.noise[usize::from(line.downstream)].push_hit(Hit { at, flip, fault });
+        self.symbol_error(at, Some(fault), line);
+    }
+
+    /// The receiver of a line sees a symbol that it cannot decode.
+    pub(super) fn symbol_error(&mut self, at: Instant, fault: Option<FaultId>, line: Line) {
+        self.truth.effect(at, fault, self.line_place(line), Effect::SymbolError);
+        let (_, to) = self.links[line.link].from_to(line.downstream);
+        if let End::Controller(node, port) = to {
+            self.post(node, at, fault, PortEvent::Count { port, kind: CountKind::SymbolError });
+        }
+    }
+
+    /// Tells a controller, and the log what may move because of it.
+    pub(super) fn post(
+        &mut self,
+        node: usize,
+        at: Instant,
+        fault: Option<FaultId>,
+        event: PortEvent,
+    ) {
+        self.nodes[node].controller.post(at, event);
+        let counter = match event {
+            PortEvent::Link { up: true, .. } => return,
+            PortEvent::Link { port, up: false } => ErrorCounter::LostLink(port),
+            PortEvent::Count { port, kind } => match kind {
+                CountKind::SymbolError => ErrorCounter::PhysicalLayer(port),
+                CountKind::InvalidFrame => ErrorCounter::InvalidFrame(port),
+                CountKind::ForwardedError => ErrorCounter::Forwarded(port),
+                CountKind::ProcessingUnitError => ErrorCounter::ProcessingUnit,
+                CountKind::LostLink => ErrorCounter::LostLink(port),
+            },
+        };
+        self.truth.may_move(self.id(node), counter, fault);
+    }
+
+    // ---- blame ----
+
+    /// Who is to blame for what a link does not carry at an instant: who broke it or the supply at
+    /// one of its ends, now or last.
+    pub(super) fn blame(&self, link: usize, at: Instant) -> Option<FaultId> {
+        let link = &self.links[link];
+        let power = |end: End| end.node().map(|node| &self.nodes[node].power);
+        let histories = || {
+            let ends = link.both_ends().into_iter().filter_map(power);
+            std::iter::once(&link.contact).chain(ends)
+        };
+        histories()
+            .find_map(|history| history.cause_at(at))
+            .or_else(|| histories().find_map(|history| history.last_cause(at)))
+    }
+
+    /// The first instant of a span at which a line carries nothing, and by whose doing.
+    pub(super) fn first_silence(
+        &self,
+        line: Line,
+        from: Instant,
+        to: Instant,
+    ) -> Option<(Instant, FaultId)> {
+        let link = &self.links[line.link];
+        let (sender, _) = link.from_to(line.downstream);
+        let contact = link.contact.first_break(from, to);
+        let sender = sender.node().and_then(|node| self.nodes[node].power.first_break(from, to));
+        [contact, sender].into_iter().flatten().min()
+    }
+
+    /// The card at a path.
+    pub(crate) fn card(&self, path: Path) -> &Card {
+        &self.cards[path.index()]
+    }
+}

@@ -1,0 +1,207 @@
+//! Makes the committed corpora, all with our own code: nothing in them comes from a device or from
+//! another program's file.
+
+use std::error::Error;
+use std::path::Path;
+
+use linesman_link::capture::{
+    CaptureInterfaceId, FrameDirection, FrameToWrite, InterfaceToWrite, LinkType, PcapWriter,
+    PcapngWriter,
+};
+use linesman_link::unix_time::UnixTime;
+use linesman_proto::address::LogicalAddress;
+use linesman_proto::command::Command;
+use linesman_proto::ethernet::{MAX_LEN, MacAddress};
+use linesman_proto::frame::FrameBuilder;
+use linesman_proto::frame::builder::DatagramAddress;
+use linesman_proto::sii::{
+    Category, FmmuUsage, General, Identity, Image, MailboxPair, Pdo, PdoEntry, Protocols, Strings,
+    SyncManager,
+};
+
+type Made = Vec<(&'static str, Vec<u8>)>;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let frames = frames()?;
+    let captures = captures(&frames)?;
+    let targets =
+        [("frame", frames), ("sii", images()?), ("mailbox", messages()), ("capture", captures)];
+    for (target, inputs) in targets {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+        std::fs::create_dir_all(&folder)?;
+        for (name, bytes) in inputs {
+            std::fs::write(folder.join(name), bytes)?;
+        }
+    }
+    Ok(())
+}
+
+/// Frames a MainDevice sends, in each form of wrapping.
+fn frames() -> Result<Made, Box<dyn Error>> {
+    let every: Vec<_> =
+        (0..15).filter_map(Command::from_code).map(|command| (command, 4)).collect();
+    let mut frames = vec![
+        ("broadcast-read", frame(&[(Command::Brd, 2)])?),
+        ("every-command", frame(&every)?),
+        ("process-data", frame(&[(Command::Lrw, 120), (Command::Brd, 2), (Command::Frmw, 8)])?),
+        ("longest", frame(&[(Command::Lrw, 1486)])?),
+        ("no-datagram", frame(&[])?),
+    ];
+    let plain = frame(&[(Command::Fprd, 16), (Command::Fpwr, 3)])?;
+    let mut tagged = plain.clone();
+    tagged.splice(12..12, [0x81, 0x00, 0x60, 0x05]);
+    frames.push(("tagged", tagged));
+    // IPv4 and UDP to port 0x88A4, lengths as they should be.
+    let payload = &plain[14..];
+    let udp_len = (payload.len() as u16 + 8).to_be_bytes();
+    let ip_len = (payload.len() as u16 + 28).to_be_bytes();
+    let mut udp = plain[..12].to_vec();
+    udp.extend([0x08, 0x00, 0x45, 0x00, ip_len[0], ip_len[1], 0, 1, 0, 0, 64, 17, 0, 0]);
+    udp.extend([192, 168, 0, 1, 255, 255, 255, 255, 0x88, 0xA4, 0x88, 0xA4]);
+    udp.extend([udp_len[0], udp_len[1], 0, 0]);
+    udp.extend_from_slice(payload);
+    frames.push(("in-udp", udp));
+    let mut cut = frame(&[(Command::Aprd, 40), (Command::Aprd, 40)])?;
+    cut.truncate(90);
+    frames.push(("cut-off", cut));
+    Ok(frames)
+}
+
+fn frame(datagrams: &[(Command, usize)]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let mut buffer = [0; MAX_LEN];
+    let mut builder = FrameBuilder::new(&mut buffer, MacAddress([2, 0, 0, 0, 0, 1]));
+    for (number, (command, len)) in datagrams.iter().enumerate() {
+        let address = address(number);
+        let data = builder.push(*command, number as u8, address, *len)?;
+        for (at, byte) in data.iter_mut().enumerate() {
+            *byte = (at * 7 + number) as u8;
+        }
+    }
+    let len = builder.finish();
+    Ok(buffer[..len].to_vec())
+}
+
+/// Addresses that hit registers of several kinds.
+fn address(number: usize) -> DatagramAddress {
+    const REGISTERS: [u32; 8] = [0x0110, 0x0130, 0x0134, 0x0300, 0x0502, 0x0600, 0x0800, 0x0910];
+    DatagramAddress::Logical(LogicalAddress(REGISTERS[number % REGISTERS.len()] << 16 | 0x1001))
+}
+
+fn images() -> Result<Made, Box<dyn Error>> {
+    let identity =
+        Identity { vendor_id: 0xE0, product_code: 7, revision: 0x0001_0000, serial_number: 42 };
+    let bare = Image { identity, ..Image::default() };
+    let mut strings = Strings::new();
+    let order = strings.intern("DEMO-8")?;
+    let name = strings.intern("Demonstration box, 8 channels")?;
+    let channel = strings.intern("Channel")?;
+    let general = General { order, name, group: order, ebus_current_ma: 90, ..General::default() };
+    let entry = |bits| {
+        let mut record = [0x00, 0x60, 1, channel.0, 1, bits, 0, 0];
+        record[4] = if bits == 1 { 1 } else { 6 };
+        PdoEntry::from_bytes(record)
+    };
+    let pdo = |index, bits| Pdo {
+        index,
+        sync_manager: Some(0),
+        name: channel,
+        entries: vec![entry(bits); 8],
+        ..Pdo::default()
+    };
+    let simple = Image {
+        categories: vec![
+            Category::Strings(strings.clone()),
+            Category::General(Box::new(general.clone())),
+            Category::Fmmu(vec![FmmuUsage::Outputs, FmmuUsage::Inputs]),
+            Category::SyncManagers(vec![
+                SyncManager::from_bytes([0x00, 0x0F, 1, 0, 0x44, 0, 9, 3]),
+                SyncManager::from_bytes([0x00, 0x10, 1, 0, 0x20, 0, 1, 4]),
+            ]),
+            Category::TxPdos(vec![pdo(0x1A00, 1)]),
+            Category::RxPdos(vec![pdo(0x1600, 1)]),
+        ],
+        ..bare.clone()
+    };
+    let mailbox = Image {
+        standard_mailbox: MailboxPair::from_words([0x1000, 128, 0x1080, 128]),
+        bootstrap_mailbox: MailboxPair::from_words([0x1000, 512, 0x1200, 512]),
+        protocols: Protocols(0x000C),
+        categories: vec![
+            Category::Strings(strings),
+            Category::General(Box::new(general)),
+            Category::TxPdos(vec![pdo(0x1A00, 16), pdo(0x1A01, 16)]),
+        ],
+        ..bare.clone()
+    };
+    let mut unfinished = simple.build()?;
+    unfinished.truncate(unfinished.len() / 2 + 1);
+    Ok(vec![
+        ("bare", bare.build()?),
+        ("simple", simple.build()?),
+        ("mailbox", mailbox.build()?),
+        ("cut-off", unfinished),
+        ("blank", vec![0xFF; 256]),
+    ])
+}
+
+/// Messages by hand: header of six bytes, CoE header of two, then the service.
+fn messages() -> Made {
+    let coe = |service: u8, body: &[u8]| {
+        let len = (body.len() as u16 + 2).to_le_bytes();
+        let mut message = vec![len[0], len[1], 0, 0, 0, 0x13, 0x00, service << 4];
+        message.extend_from_slice(body);
+        message
+    };
+    vec![
+        ("upload-request", coe(2, &[0x40, 0x18, 0x10, 1, 0, 0, 0, 0])),
+        ("upload-expedited", coe(3, &[0x43, 0x18, 0x10, 1, 0xE0, 0, 0, 0])),
+        ("upload-normal", coe(3, &[0x41, 0x08, 0x10, 0, 4, 0, 0, 0, b'D', b'E', b'M', b'O'])),
+        ("upload-segment", coe(3, &[0x00, b's', b'e', b'g', b'm', b'e', b'n', b't'])),
+        ("download", coe(2, &[0x2F, 0x12, 0x1C, 0, 1, 0, 0, 0])),
+        ("complete-access", coe(2, &[0x50, 0x12, 0x1C, 0, 0, 0, 0, 0])),
+        ("abort", coe(2, &[0x80, 0xF0, 0x10, 1, 0x02, 0x00, 0x01, 0x06])),
+        ("emergency", coe(1, &[0x30, 0x81, 0x11, 1, 2, 3, 4, 5])),
+        ("list", coe(8, &[0x02, 0, 0, 0, 1, 0, 0x00, 0x10, 0x18, 0x10])),
+        ("object", coe(8, &[0x04, 0, 0, 0, 0x00, 0x10, 7, 0, 0, 7, b'D', b'e', b'v'])),
+        ("entry", coe(8, &[0x06, 0, 0, 0, 0x18, 0x10, 1, 0, 7, 0, 32, 0, 0x07, 0, b'V'])),
+        ("error-reply", vec![4, 0, 0, 0, 0, 0x10, 1, 0, 2, 0]),
+    ]
+}
+
+fn captures(frames: &Made) -> Result<Made, Box<dyn Error>> {
+    let ethernet = LinkType::from_number(1);
+    let write = |interface, number: usize, bytes| {
+        let time = UnixTime::from_nanos(1_700_000_000_000_000_000 + number as i128 * 2_000_000);
+        let direction =
+            if number % 2 == 0 { FrameDirection::Outgoing } else { FrameDirection::Incoming };
+        FrameToWrite::new(interface, time, direction, bytes)
+    };
+    let mut pcap = PcapWriter::new(Vec::new(), ethernet, false)?;
+    let mut pcapng = PcapngWriter::new(Vec::new(), "linesman")?;
+    let mut interfaces = Vec::new();
+    for name in ["eth0", "eth1"] {
+        let description = "";
+        interfaces.push(pcapng.add_interface(&InterfaceToWrite {
+            name,
+            description,
+            link_type: ethernet,
+        })?);
+    }
+    for (number, (_, bytes)) in frames.iter().filter(|(_, bytes)| bytes.len() < 400).enumerate() {
+        pcap.write_frame(&write(CaptureInterfaceId(0), number, bytes))?;
+        pcapng.write_frame(&write(interfaces[number % 2], number, bytes))?;
+    }
+    let end = UnixTime::from_nanos(1_700_000_001_000_000_000);
+    pcapng.write_statistics(interfaces[0], end, 10, 1)?;
+    let (pcap, pcapng) = (pcap.finish()?, pcapng.finish()?);
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+    std::io::Write::write_all(&mut packed, &pcapng)?;
+    let cut = pcapng[..pcapng.len() * 2 / 3].to_vec();
+    Ok(vec![
+        ("two-interfaces.bin", pcapng),
+        ("nanoseconds.bin", pcap),
+        ("packed.bin", packed.finish()?),
+        ("cut-off.bin", cut),
+        ("empty.bin", Vec::new()),
+    ])
+}

@@ -1,0 +1,131 @@
+"""Two network namespaces with a virtual cable between them, for one run.
+
+`near` holds the MainDevice's end, veth0; `far` the segment's, veth1. Names of namespaces carry the
+process number, so that runs side by side do not meet; they are removed at the end whatever happens.
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+NEAR, FAR = "veth0", "veth1"
+
+
+class Bench:
+    """The namespaces; use it in `with`."""
+
+    def __enter__(self):
+        self.near = f"linesman-near-{os.getpid()}"
+        self.far = f"linesman-far-{os.getpid()}"
+        self.running = []
+        try:
+            for name in (self.near, self.far):
+                ip("netns", "add", name)
+            ip("link", "add", NEAR, "netns", self.near, "type", "veth", "peer", "name", FAR, "netns", self.far)
+            for name, interface in ((self.near, NEAR), (self.far, FAR)):
+                # No neighbour discovery: nothing is to be on the cable but what is tried.
+                inside(name, "sysctl", "-q", "-w", f"net.ipv6.conf.{interface}.disable_ipv6=1")
+                inside(name, "ip", "link", "set", "lo", "up")
+                inside(name, "ip", "link", "set", interface, "up")
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        for process in self.running:
+            end(process)
+        for name in (self.near, self.far):
+            subprocess.run(["ip", "netns", "del", name], capture_output=True)
+
+    def start(self, namespace, *command):
+        """Starts a command that runs on beside what follows."""
+        process = subprocess.Popen(
+            ["ip", "netns", "exec", namespace, *map(str, command)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=HERE,
+        )
+        self.running.append(process)
+        return process
+
+    def run(self, namespace, *command, seconds=60):
+        """Runs a command to its end: (exit status, stdout, stderr)."""
+        process = self.start(namespace, *command)
+        return self.finish(process, seconds)
+
+    def finish(self, process, seconds=60):
+        try:
+            out, err = process.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            out, err = process.communicate()
+            err += f"\nended after {seconds} s"
+        self.running.remove(process)
+        return process.returncode, out, err
+
+    def python(self, namespace, script, *arguments, seconds=60):
+        return self.run(namespace, sys.executable, HERE / script, *arguments, seconds=seconds)
+
+    def sent_near(self):
+        """Frames that any program has sent on the MainDevice's end so far."""
+        path = f"/sys/class/net/{NEAR}/statistics/tx_packets"
+        _, out, _ = self.run(self.near, "cat", path)
+        return int(out)
+
+
+class Segment:
+    """A virtual segment on the far end; use it in `with`."""
+
+    def __init__(self, bench, linesman, file):
+        self.bench, self.linesman, self.file = bench, linesman, file
+
+    def __enter__(self):
+        self.process = self.bench.start(self.bench.far, self.linesman, "sim", self.file, "--on", FAR)
+        end_at = time.monotonic() + 10
+        while time.monotonic() < end_at:
+            if self.process.poll() is not None:
+                _, out, err = self.bench.finish(self.process)
+                raise RuntimeError(f"the segment did not start: {err or out}")
+            status, out, _ = self.bench.python(self.bench.near, "probe.py", NEAR)
+            if status == 0:
+                self.present = int(out)
+                return self
+        raise RuntimeError("the segment does not answer")
+
+    def __exit__(self, *_):
+        if self.process in self.bench.running:
+            end(self.process)
+            self.bench.running.remove(self.process)
+
+
+def end(process):
+    """Asks a process to end as Ctrl-C would, and makes it end."""
+    if process.poll() is None:
+        # `ip netns exec` becomes the command, so this is its own process.
+        process.send_signal(2)
+        try:
+            process.communicate(timeout=5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+
+
+def ip(*arguments):
+    done = subprocess.run(["ip", *arguments], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"ip {' '.join(arguments)}: {done.stderr.strip()}")
+
+
+def inside(namespace, *command):
+    ip("netns", "exec", namespace, *command)
+
+
+def parse(out, err):
+    """The JSON object a command printed."""
+    try:
+        return json.loads(out)
+    except ValueError:
+        raise AssertionError(f"no JSON: {out[:200]!r} {err[-400:]!r}") from None

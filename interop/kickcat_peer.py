@@ -1,0 +1,59 @@
+"""KickCAT as a foreign MainDevice; see peer.py. Its Python interface tells no identities."""
+
+import time
+from datetime import timedelta
+
+import kickcat
+
+import peer
+
+
+def main():
+    interface, cycles, cycle_s = peer.arguments()
+    link = kickcat.create_link(interface, "")
+    link.set_timeout(timedelta(milliseconds=20))
+    bus = kickcat.Bus(link)
+    bus.init(timedelta(milliseconds=500))
+    bus.create_mapping(4096)
+    slaves = bus.slaves()
+    request(bus, kickcat.State.SAFE_OP)
+    write(slaves, peer.PATTERNS[0])
+    bus.process_data_no_check()
+    bus.request_state(kickcat.State.OPERATIONAL)
+    bus.wait_for_state(
+        kickcat.State.OPERATIONAL, timedelta(seconds=2), lambda: bus.process_data_no_check()
+    )
+    complete = 0
+    inputs = {}
+    due = time.monotonic()
+    for pattern in peer.PATTERNS:
+        write(slaves, pattern)
+        for _ in range(cycles // 2):
+            try:
+                bus.process_data()
+                complete += 1
+            except Exception:  # its own exception type, for a wrong working counter or a lost frame
+                pass
+            due += cycle_s
+            time.sleep(max(0.0, due - time.monotonic()))
+        inputs[f"{pattern:02X}"] = [bytes(slave.input_data).hex() for slave in slaves]
+    reached = all(bus.get_state(slave) == kickcat.State.OPERATIONAL for slave in slaves)
+    peer.report(
+        devices=len(slaves), state="OP" if reached else "other", cycles=cycles, complete=complete,
+        inputs=inputs,
+    )
+
+
+def request(bus, state):
+    bus.request_state(state)
+    bus.wait_for_state(state, timedelta(seconds=2))
+
+
+def write(slaves, pattern):
+    for slave in slaves:
+        if slave.output_size:
+            slave.set_output_bytes(bytes([pattern]) * slave.output_size)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""SOEM, through pysoem, as a foreign MainDevice; see peer.py."""
+
+import time
+
+import pysoem
+
+import peer
+
+
+def main():
+    interface, cycles, cycle_s = peer.arguments()
+    master = pysoem.Master()
+    master.open(interface)
+    try:
+        found = master.config_init()
+        if found <= 0:
+            peer.refuse(f"config_init found {found} SubDevices")
+        devices = [[slave.man, slave.id, slave.rev] for slave in master.slaves]
+        names = [slave.name for slave in master.slaves]
+        mapped = master.config_map()
+        if master.state_check(pysoem.SAFEOP_STATE, 2_000_000) != pysoem.SAFEOP_STATE:
+            peer.refuse("SAFEOP not reached: " + states(master))
+        # SubDevices with outputs want process data before they go to OP.
+        master.send_processdata()
+        master.receive_processdata(20_000)
+        master.state = pysoem.OP_STATE
+        master.write_state()
+        for _ in range(200):
+            master.send_processdata()
+            master.receive_processdata(20_000)
+            if master.state_check(pysoem.OP_STATE, 10_000) == pysoem.OP_STATE:
+                break
+        else:
+            peer.refuse("OP not reached: " + states(master))
+        complete, inputs = exchange(master, cycles, cycle_s)
+        state = "OP" if master.state_check(pysoem.OP_STATE, 50_000) == pysoem.OP_STATE else "other"
+        # Orderly, so that no watchdog has to step in.
+        master.state = pysoem.INIT_STATE
+        master.write_state()
+        master.state_check(pysoem.INIT_STATE, 500_000)
+        peer.report(
+            devices=devices, names=names, state=state, mapped=mapped,
+            expected_wkc=master.expected_wkc, cycles=cycles, complete=complete, inputs=inputs,
+        )
+    finally:
+        master.close()
+
+
+def exchange(master, cycles, cycle_s):
+    complete = 0
+    inputs = {}
+    due = time.monotonic()
+    for pattern in peer.PATTERNS:
+        for slave in master.slaves:
+            slave.output = bytes([pattern]) * len(slave.output)
+        for _ in range(cycles // 2):
+            master.send_processdata()
+            if master.receive_processdata(20_000) == master.expected_wkc:
+                complete += 1
+            due += cycle_s
+            time.sleep(max(0.0, due - time.monotonic()))
+        inputs[f"{pattern:02X}"] = [slave.input.hex() for slave in master.slaves]
+    return complete, inputs
+
+
+def states(master):
+    master.read_state()
+    return ", ".join(
+        f"{number} {slave.name} state 0x{slave.state:02X} status 0x{slave.al_status:04X}"
+        for number, slave in enumerate(master.slaves, 1)
+    )
+
+
+if __name__ == "__main__":
+    main()
