@@ -185,7 +185,13 @@ impl Cyclic {
             if judged.told != Some(wkc) {
                 judged.told = Some(wkc);
                 let expected = judged.expected;
-                events(Event::WorkingCounter { task, frame, datagram: at, expected, received: wkc });
+                events(Event::WorkingCounter {
+                    task,
+                    frame,
+                    datagram: at,
+                    expected,
+                    received: wkc,
+                });
                 lock(&self.line).alert();
             }
         }
@@ -245,4 +251,3 @@ fn copy_inputs(datagram: &DatagramPlan, data: &[u8], inputs: &mut [u8]) {
         }
     }
 }
-

@@ -10,8 +10,8 @@ use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode};
 
 use crate::exchange::{ExchangeError, Reply};
-use crate::main_device::ProbeRequest;
 use crate::mailbox::SdoError;
+use crate::main_device::ProbeRequest;
 use crate::procedure::{Look, LookError, ScanError};
 
 /// Something that happened. Events come in the order in which it did.

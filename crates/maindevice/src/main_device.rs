@@ -108,7 +108,8 @@ impl MainDevice {
 
     /// Packs requests of procedures: beside a cycle so many frames each cycle.
     fn send_acyclic(&mut self, now: Instant) {
-        if !self.exchange.has_queued() || self.exchange.acyclic_out() >= self.options.frames_at_once {
+        if !self.exchange.has_queued() || self.exchange.acyclic_out() >= self.options.frames_at_once
+        {
             return;
         }
         if self.running.is_some() {
@@ -343,7 +344,13 @@ impl MainDevice {
     }
 
     /// Fetches an object of a running SubDevice. Ends in [`Event::SdoUploaded`].
-    pub fn sdo_upload(&mut self, now: Instant, id: DeviceId, object: ObjectAddress, complete: bool) {
+    pub fn sdo_upload(
+        &mut self,
+        now: Instant,
+        id: DeviceId,
+        object: ObjectAddress,
+        complete: bool,
+    ) {
         if !self.queue_job(id, Job::Upload { object, complete }) {
             let result = Err(SdoError::NotOpen { id });
             self.aside.emit(Event::SdoUploaded { id, object, result });

@@ -33,7 +33,10 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            sources: [MacAddress([0x00, 0x01, 0x05, 0, 0, 0xA0]), MacAddress([0x00, 0x01, 0x05, 0, 0, 0xB0])],
+            sources: [
+                MacAddress([0x00, 0x01, 0x05, 0, 0, 0xA0]),
+                MacAddress([0x00, 0x01, 0x05, 0, 0, 0xB0]),
+            ],
             ring: false,
             patience: Span::ms(10),
             repeats: 3,

@@ -107,10 +107,7 @@ pub(crate) fn as_sent_by(command: Command, sender: Path) -> Command {
         (Path::A, Addressing::Position)
         | (
             Path::A | Path::B,
-            Addressing::None
-            | Addressing::Station
-            | Addressing::Broadcast
-            | Addressing::Logical,
+            Addressing::None | Addressing::Station | Addressing::Broadcast | Addressing::Logical,
         ) => command,
     }
 }

@@ -3,10 +3,10 @@
 //! Reference: ETG.1000.6, SDO; the messages are those of `proto::mailbox::coe`.
 
 use linesman_proto::address::DeviceId;
+use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::sdo::{Abort, Initial, Request, Response, Segment};
 use linesman_proto::mailbox::coe::{CoeError, Message, ObjectAddress};
 use linesman_proto::mailbox::error_reply::ErrorReplyCode;
-use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::{BufferTooSmall, MailboxType};
 use linesman_proto::time::Span;
 
@@ -178,7 +178,8 @@ impl Transfer<'_, '_> {
                     return Err(SdoError::Aborted { id, object, code });
                 }
                 Ok(Message::SdoResponse(
-                    Response::Upload { object: about, .. } | Response::Download { object: about, .. },
+                    Response::Upload { object: about, .. }
+                    | Response::Download { object: about, .. },
                 )) if about != object => {
                     // The late answer to a transfer that was given up.
                 }

@@ -107,7 +107,10 @@ impl<'a> Multiplexer<'a> {
     }
 
     /// The next CoE message that answers somebody; everything else is handed on meanwhile.
-    pub(crate) async fn receive_coe(&mut self, until: Instant) -> Result<Option<Vec<u8>>, SdoError> {
+    pub(crate) async fn receive_coe(
+        &mut self,
+        until: Instant,
+    ) -> Result<Option<Vec<u8>>, SdoError> {
         let mut pause = FIRST_POLL;
         loop {
             if let Some(buffer) = self.fetch().await? {

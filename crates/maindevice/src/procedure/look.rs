@@ -64,8 +64,7 @@ pub enum LookError {
 }
 
 /// AL status, reserved word, AL status code: 0x0130 to 0x0135, read at once so that they agree.
-pub(crate) const AL_LEN: u16 =
-    register::AL_STATUS_CODE.end().0 - register::AL_STATUS.address.0;
+pub(crate) const AL_LEN: u16 = register::AL_STATUS_CODE.end().0 - register::AL_STATUS.address.0;
 
 /// State and code out of [`AL_LEN`] bytes from 0x0130.
 pub(crate) fn al_of(reply: &Reply) -> (AlStatus, AlStatusCode) {
@@ -92,9 +91,8 @@ pub async fn count(wire: &Wire, network: Network) -> Result<(u16, OredStates), L
 /// [`LookError`] when nobody is there. A single SubDevice that does not answer is no error.
 pub async fn look(wire: Wire, network: Network) -> Result<Look, LookError> {
     let (count, states) = count(&wire, network).await?;
-    let reading: Vec<_> = (0..count)
-        .map(|position| wire.spawn(look_at(wire.clone(), Position(position))))
-        .collect();
+    let reading: Vec<_> =
+        (0..count).map(|position| wire.spawn(look_at(wire.clone(), Position(position)))).collect();
     let mut devices = Vec::with_capacity(reading.len());
     for device in reading {
         devices.push(device.await);

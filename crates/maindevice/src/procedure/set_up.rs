@@ -18,7 +18,11 @@ use crate::executor::Wire;
 pub fn mailbox_sync_managers(device: &DevicePlan) -> Option<[SyncManagerConfig; 2]> {
     let areas = device.mailbox?.areas;
     Some([
-        SyncManagerConfig::enabled(areas.receive.offset, areas.receive.size, SmControl::MAILBOX_OUT),
+        SyncManagerConfig::enabled(
+            areas.receive.offset,
+            areas.receive.size,
+            SmControl::MAILBOX_OUT,
+        ),
         SyncManagerConfig::enabled(areas.send.offset, areas.send.size, SmControl::MAILBOX_IN),
     ])
 }

@@ -58,10 +58,7 @@ const WRITE_AGAIN_AFTER: u32 = 20;
 ///
 /// # Errors
 /// [`ExchangeError`] when the SubDevice does not answer.
-pub async fn read(
-    wire: &Wire,
-    target: Target,
-) -> Result<(AlStatus, AlStatusCode), ExchangeError> {
+pub async fn read(wire: &Wire, target: Target) -> Result<(AlStatus, AlStatusCode), ExchangeError> {
     let reply = wire.read_one(target, register::AL_STATUS.address, AL_LEN).await?;
     Ok(al_of(&reply))
 }
@@ -105,11 +102,7 @@ pub async fn request(wire: &Wire, target: Target, step: Step) -> Result<(), Step
 ///
 /// # Errors
 /// [`StepError`] when the error bit does not go.
-pub async fn acknowledge(
-    wire: &Wire,
-    target: Target,
-    status: AlStatus,
-) -> Result<(), StepError> {
+pub async fn acknowledge(wire: &Wire, target: Target, status: AlStatus) -> Result<(), StepError> {
     // A value that names no state cannot be asked for: INIT clears all.
     let to = status.state().state().unwrap_or(AlState::Init);
     let control = AlControl::request(to).with_error_acknowledge(true).to_bytes();

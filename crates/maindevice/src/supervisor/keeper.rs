@@ -183,11 +183,7 @@ impl Keeper<'_> {
                         | AlState::SafeOp
                         | AlState::Op,
                     ),
-                    AlState::Init
-                    | AlState::Boot
-                    | AlState::PreOp
-                    | AlState::SafeOp
-                    | AlState::Op,
+                    AlState::Init | AlState::Boot | AlState::PreOp | AlState::SafeOp | AlState::Op,
                 ) => {}
             }
             let from = current.unwrap_or(AlState::Op);
@@ -228,11 +224,8 @@ impl Keeper<'_> {
         let counters = wire.read(target, ErrorCounters::START, ErrorCounters::LEN as u16);
         let (al, dl, counters) = (al.await, dl.await, counters.await);
         let answered = |reply: &Reply| reply.wkc.0 > 0;
-        let (al, dl, counters) = (
-            al.ok().filter(answered),
-            dl.ok().filter(answered),
-            counters.ok().filter(answered),
-        );
+        let (al, dl, counters) =
+            (al.ok().filter(answered), dl.ok().filter(answered), counters.ok().filter(answered));
         if al.is_none() && dl.is_none() && counters.is_none() {
             // Once more: a single frame may have been lost together with its repetitions.
             let again = wire.read_one(target, register::AL_STATUS.address, AL_LEN).await;

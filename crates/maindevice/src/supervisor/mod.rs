@@ -98,7 +98,8 @@ async fn search(context: &Context) -> bool {
     let asked: Vec<_> = (lost.iter())
         .map(|device| {
             let target = Target::Station(device.station);
-            let request = crate::exchange::Request::read(target, register::AL_STATUS.address, AL_LEN);
+            let request =
+                crate::exchange::Request::read(target, register::AL_STATUS.address, AL_LEN);
             (device.id, context.wire.submit(request))
         })
         .collect();
