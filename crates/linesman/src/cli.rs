@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{completion, explain, interfaces, schema};
+use crate::command::{completion, diagnose, explain, interfaces, schema, sim};
 use crate::version::VERSION;
 
 /// The whole command line.
@@ -42,10 +42,14 @@ pub(crate) enum ColorChoice {
 /// The commands.
 #[derive(Subcommand, Debug)]
 pub(crate) enum Command {
+    /// What is wrong with a line: where, why, and what to do
+    Diagnose(diagnose::Arguments),
     /// Network cards: link, driver, suitability, EtherCAT seen
     Interfaces(interfaces::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
     Explain(explain::Arguments),
+    /// A virtual segment on real interfaces, for any MainDevice
+    Sim(sim::Arguments),
     /// JSON schema of a file or output
     Schema(schema::Arguments),
     /// Shell completion: write it to where your shell looks for it
@@ -56,8 +60,9 @@ impl Command {
     /// Whether the answer is to be JSON, a failure included.
     pub(crate) fn wants_json(&self) -> bool {
         match self {
+            Self::Diagnose(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
-            Self::Explain(_) | Self::Schema(_) | Self::Completion(_) => false,
+            Self::Explain(_) | Self::Sim(_) | Self::Schema(_) | Self::Completion(_) => false,
         }
     }
 }

@@ -1,9 +1,11 @@
 //! The commands, one file each.
 
 pub(crate) mod completion;
+pub(crate) mod diagnose;
 pub(crate) mod explain;
 pub(crate) mod interfaces;
 pub(crate) mod schema;
+pub(crate) mod sim;
 
 use crate::cli::Command;
 use crate::exit::Status;
@@ -13,8 +15,10 @@ use crate::output::Output;
 /// Does what was asked.
 pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failure> {
     match command {
+        Command::Diagnose(arguments) => diagnose::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
         Command::Explain(arguments) => explain::run(&arguments, output),
+        Command::Sim(arguments) => sim::run(&arguments, output),
         Command::Schema(arguments) => schema::run(&arguments, output),
         Command::Completion(arguments) => completion::run(&arguments, output),
     }

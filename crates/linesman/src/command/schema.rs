@@ -2,8 +2,10 @@
 
 use linesman_config::project::Project;
 use linesman_diagnosis::report::Diagnosis;
+use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
 
+use super::diagnose::follow::EventReport;
 use super::interfaces;
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
@@ -20,10 +22,14 @@ pub(crate) struct Arguments {
 /// What has a schema.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
 pub(crate) enum Name {
+    /// A virtual segment (TOML)
+    Segment,
     /// What was planned (TOML)
     Project,
     /// `diagnose --json`
     Diagnosis,
+    /// A line of `diagnose --follow --json`
+    Event,
     /// `interfaces --json`
     Interfaces,
     /// What every command with --json prints when nothing could be judged
@@ -38,8 +44,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 
 fn schema(name: Name) -> Schema {
     match name {
+        Name::Segment => schema_for!(SegmentFile),
         Name::Project => schema_for!(Project),
         Name::Diagnosis => schema_for!(Diagnosis),
+        Name::Event => schema_for!(EventReport<'_>),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Error => schema_for!(ErrorReport),
     }
