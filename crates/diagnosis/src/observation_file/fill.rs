@@ -3,7 +3,9 @@
 use linesman_config::project::Project;
 use linesman_proto::address::{DeviceId, Network, Path};
 use linesman_proto::port::{Port, PortMap};
-use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters, PortState, RxErrors};
+use linesman_proto::register::{
+    AlStatus, DlStatus, ErrorCounter, ErrorCounters, PortState, RxErrors,
+};
 use linesman_proto::state::{AlStatusCode, DeviceState};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
@@ -66,10 +68,12 @@ impl ObservedDevice {
         }
         let ports = self.ports.all();
         let has_ports = ports.iter().any(|(_, port)| port.is_some());
-        if state.is_some() || has_ports || self.processing_unit.is_some() || self.al_code.is_some() {
+        if state.is_some() || has_ports || self.processing_unit.is_some() || self.al_code.is_some()
+        {
             device.answers(at, None);
         }
-        device.station = device.station.or(self.station.map(linesman_proto::address::StationAddress));
+        device.station =
+            device.station.or(self.station.map(linesman_proto::address::StationAddress));
         self.teach_identity(device, at);
         if let Some(state) = state {
             let bits = u16::from(state.device_byte() & 0x1F);
@@ -111,7 +115,9 @@ impl ObservedDevice {
             let planned = if is_wired(port) { PortState::IN_USE } else { PortState::UNUSED };
             before = before.with_port(port, planned);
             let concerned = state.ports()[port];
-            let flagged = if concerned && state.contains(DeviceState::MISSING_LINK) && is_wired(port)
+            let flagged = if concerned
+                && state.contains(DeviceState::MISSING_LINK)
+                && is_wired(port)
             {
                 PortState::UNUSED
             } else if concerned && state.contains(DeviceState::ADDITIONAL_LINK) && !is_wired(port) {
@@ -122,9 +128,7 @@ impl ObservedDevice {
             let link = ports[port].as_ref().and_then(|port| port.link.or(port.open));
             let open = ports[port].as_ref().and_then(|port| port.open).or(link);
             let observed = match (link, open) {
-                (Some(link), Some(open)) => {
-                    PortState { link, closed: !open, communication: link }
-                }
+                (Some(link), Some(open)) => PortState { link, closed: !open, communication: link },
                 (Some(_), None) | (None, _) => flagged,
             };
             now = now.with_port(port, observed);

@@ -4,6 +4,8 @@
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
 pub mod frame_errors;
+pub mod link_lost;
+pub mod not_answering;
 
 use linesman_config::fault::Class;
 use linesman_proto::time::Instant;
@@ -64,6 +66,8 @@ pub struct View<'a> {
 /// All rules, causes before what may follow from them.
 pub const RULES: &[Rule] = &[
     // Hardware, configuration and host: frame errors, links, devices.
+    link_lost::RULE,
+    not_answering::RULE,
     frame_errors::RULE,
     //
     // The network as a whole, working counters and states.
