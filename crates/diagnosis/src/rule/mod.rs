@@ -6,6 +6,11 @@
 pub mod frame_errors;
 pub mod link_lost;
 pub mod not_answering;
+pub mod nobody_answers;
+pub mod one_direction;
+pub mod restarted;
+pub mod state_error;
+pub mod working_counter;
 
 use linesman_config::fault::Class;
 use linesman_proto::time::Instant;
@@ -71,7 +76,11 @@ pub const RULES: &[Rule] = &[
     frame_errors::RULE,
     //
     // The network as a whole, working counters and states.
-    //
+    nobody_answers::RULE,
+    restarted::RULE,
+    state_error::RULE,
+    working_counter::RULE,
+    one_direction::RULE,
 ];
 
 /// The manual: every page of every rule, by code.
