@@ -5,8 +5,8 @@
 
 pub mod frame_errors;
 pub mod link_lost;
-pub mod not_answering;
 pub mod nobody_answers;
+pub mod not_answering;
 pub mod one_direction;
 pub mod restarted;
 pub mod state_error;
