@@ -2,6 +2,7 @@
 
 mod capture;
 pub(crate) mod follow;
+mod listen;
 
 use std::path::PathBuf;
 
@@ -11,6 +12,7 @@ use linesman_diagnosis::{Engine, Setup};
 use linesman_proto::address::Network;
 use linesman_proto::time::Instant;
 use linesman_runtime::selector::Selector;
+use linesman_runtime::stop::Stop;
 
 use self::follow::Follower;
 use crate::exit::Status;
@@ -21,6 +23,8 @@ use crate::text;
 use crate::text::finding::Writer;
 use crate::text::names::Names;
 use crate::version;
+
+use super::sim;
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -34,6 +38,9 @@ pub(crate) struct Arguments {
     /// Tell findings as they open and close; with --json one linesman.event/1 per line
     #[arg(long)]
     follow: bool,
+    /// How long to look; Ctrl-C ends it too
+    #[arg(long, value_name = "N")]
+    seconds: Option<f64>,
     /// JSON, schema linesman.diagnosis/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -48,11 +55,11 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let session = Session::new(arguments, &selector, project);
             capture::run(path, session, output)
         }
-        Selector::Observations(_)
-        | Selector::Segment(_)
-        | Selector::Cards(_)
-        | Selector::Listen(_) => Err(Failure::new(
-            format!("`{}`: only captures can be judged so far", arguments.place),
+        Selector::Listen(names) => {
+            listen::run(names, Session::new(arguments, &selector, project), output)
+        }
+        Selector::Observations(_) | Selector::Segment(_) | Selector::Cards(_) => Err(Failure::new(
+            format!("`{}`: only captures and listening can be judged so far", arguments.place),
             "record one with `tcpdump -i eth0 -w trace.pcap`, and name the file",
         )),
     }
@@ -62,6 +69,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 pub(crate) struct Session {
     setup: Setup,
     follower: Option<Follower>,
+    seconds: Option<f64>,
     json: bool,
 }
 
@@ -69,7 +77,12 @@ impl Session {
     fn new(arguments: &Arguments, selector: &Selector, project: Option<Project>) -> Self {
         let setup = Setup { project, source: selector.to_string(), ..Setup::default() };
         let follower = arguments.follow.then(|| Follower::new(arguments.json));
-        Self { setup, follower, json: arguments.json }
+        Self { setup, follower, seconds: arguments.seconds, json: arguments.json }
+    }
+
+    /// When a look that began at 0 ends: when the user said, else after `seconds`.
+    fn until(&self, seconds: f64) -> Result<Instant, Failure> {
+        sim::until(Some(self.seconds.unwrap_or(seconds)))
     }
 
     /// Tells what happened to findings, where that was asked for.
@@ -98,6 +111,11 @@ impl Session {
         }
         status(&diagnosis)
     }
+}
+
+/// The wish to stop.
+fn stop() -> Result<Stop, Failure> {
+    Stop::on_signals().map_err(|error| Failure::new(format!("listening for Ctrl-C: {error}"), ""))
 }
 
 /// The diagnosis as text.
