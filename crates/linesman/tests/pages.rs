@@ -97,9 +97,10 @@ fn shape(shape: Shape) -> (String, String) {
         Shape::Number { low, high, default } => {
             (format!("{low} to {high}"), or_nothing(default.map(|number| number.to_string())))
         }
-        Shape::Whole { low, high, default } => {
-            (format!("{low} to {high}, whole"), or_nothing(default.map(|number| number.to_string())))
-        }
+        Shape::Whole { low, high, default } => (
+            format!("{low} to {high}, whole"),
+            or_nothing(default.map(|number| number.to_string())),
+        ),
         Shape::Word { words } => (words.join(", "), words[0].to_owned()),
         Shape::Text => ("text".to_owned(), "nothing".to_owned()),
     }
