@@ -11,6 +11,7 @@ const DATA_MAX: usize = PduStorage::element_size(1100);
 const SUBDEVICES_MAX: usize = 64;
 const IMAGE_MAX: usize = 512;
 const PATTERNS: [u8; 2] = [0xA5, 0x5A];
+const EXCHANGES_TO_OP: u32 = 1_000;
 
 static STORAGE: PduStorage<FRAMES_MAX, DATA_MAX> = PduStorage::new();
 
@@ -26,7 +27,12 @@ fn main() -> Result<()> {
 async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
     let (transmit, receive, pdus) =
         STORAGE.try_split().map_err(|()| anyhow!("the storage is split already"))?;
-    let timeouts = Timeouts { pdu: Duration::from_millis(100), ..Timeouts::default() };
+    // The host is no real-time system, and busy.
+    let timeouts = Timeouts {
+        pdu: Duration::from_millis(100),
+        eeprom: Duration::from_millis(200),
+        ..Timeouts::default()
+    };
     let maindevice = MainDevice::new(pdus, timeouts, MainDeviceConfig::default());
     smol::spawn(tx_rx_task(interface, transmit, receive).context(interface.to_owned())?).detach();
 
@@ -41,8 +47,18 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
         devices.push([identity.vendor_id, identity.product_id, identity.revision]);
         names.push(subdevice.name().to_owned());
     }
-    let group =
-        group.into_op(&maindevice).await.map_err(|error| anyhow!("on the way to OP: {error:?}"))?;
+    // SubDevices with outputs go to OP when process data come, not before.
+    let on_the_way = |error| anyhow!("on the way to OP: {error:?}");
+    let group = group.into_safe_op(&maindevice).await.map_err(on_the_way)?;
+    let group = group.request_into_op(&maindevice).await.map_err(on_the_way)?;
+    let mut waited = 0;
+    while !group.tx_rx(&maindevice).await.map_err(on_the_way)?.all_op() {
+        waited += 1;
+        if waited > EXCHANGES_TO_OP {
+            return Err(anyhow!("OP not reached after {EXCHANGES_TO_OP} exchanges"));
+        }
+        smol::Timer::after(cycle).await;
+    }
 
     let mut wkc = 0;
     let mut complete = 0_u64;
@@ -67,7 +83,7 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
     let result = serde_json::json!({
         "devices": devices,
         "names": names,
-        // `into_op` has waited until every SubDevice said so.
+        // Every SubDevice has said so.
         "state": "OP",
         "expected_wkc": wkc,
         "cycles": cycles,
