@@ -11,7 +11,6 @@ const DATA_MAX: usize = PduStorage::element_size(1100);
 const SUBDEVICES_MAX: usize = 64;
 const IMAGE_MAX: usize = 512;
 const PATTERNS: [u8; 2] = [0xA5, 0x5A];
-const EXCHANGES_TO_OP: u32 = 1_000;
 
 static STORAGE: PduStorage<FRAMES_MAX, DATA_MAX> = PduStorage::new();
 
@@ -27,10 +26,13 @@ fn main() -> Result<()> {
 async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
     let (transmit, receive, pdus) =
         STORAGE.try_split().map_err(|()| anyhow!("the storage is split already"))?;
-    // The host is no real-time system, and busy.
+    // The host is no real-time system, and may be busy: what is tried is the line, not the host.
     let timeouts = Timeouts {
-        pdu: Duration::from_millis(100),
-        eeprom: Duration::from_millis(200),
+        pdu: Duration::from_millis(200),
+        eeprom: Duration::from_secs(1),
+        mailbox_echo: Duration::from_secs(1),
+        mailbox_response: Duration::from_secs(2),
+        state_transition: Duration::from_secs(10),
         ..Timeouts::default()
     };
     let maindevice = MainDevice::new(pdus, timeouts, MainDeviceConfig::default());
@@ -47,15 +49,24 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
         devices.push([identity.vendor_id, identity.product_id, identity.revision]);
         names.push(subdevice.name().to_owned());
     }
-    // SubDevices with outputs go to OP when process data come, not before.
-    let on_the_way = |error| anyhow!("on the way to OP: {error:?}");
-    let group = group.into_safe_op(&maindevice).await.map_err(on_the_way)?;
-    let group = group.request_into_op(&maindevice).await.map_err(on_the_way)?;
-    let mut waited = 0;
-    while !group.tx_rx(&maindevice).await.map_err(on_the_way)?.all_op() {
-        waited += 1;
-        if waited > EXCHANGES_TO_OP {
-            return Err(anyhow!("OP not reached after {EXCHANGES_TO_OP} exchanges"));
+    let group = group
+        .into_safe_op(&maindevice)
+        .await
+        .map_err(|error| anyhow!("on the way to SAFEOP: {error:?}"))?;
+    // SubDevices with outputs want process data before they go to OP, so it is not waited for here.
+    let group = group
+        .request_into_op(&maindevice)
+        .await
+        .map_err(|error| anyhow!("on the way to OP: {error:?}"))?;
+    let mut tries = 0;
+    loop {
+        let answer = group.tx_rx(&maindevice).await;
+        if answer.is_ok_and(|answer| answer.all_op()) {
+            break;
+        }
+        tries += 1;
+        if tries > 2000 {
+            return Err(anyhow!("OP is not reached after {tries} exchanges"));
         }
         smol::Timer::after(cycle).await;
     }
@@ -83,7 +94,6 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
     let result = serde_json::json!({
         "devices": devices,
         "names": names,
-        // Every SubDevice has said so.
         "state": "OP",
         "expected_wkc": wkc,
         "cycles": cycles,
