@@ -4,8 +4,14 @@
 //! each [`rule`] looks at the line for one kind of trouble, [`finding`] gives conditions a life, and
 //! [`report`] is the answer as people and programs read it. [`Engine`] drives them all.
 
+pub mod engine;
 pub mod finding;
 pub mod line;
+pub mod locate;
 pub mod observe;
 pub mod report;
 pub mod rule;
+
+pub use engine::{Engine, Event, EventKind, Probe, ProbeEffect, Setup};
+pub use observe::{Direction, FrameSeen, HostEvent, HostObservation};
+pub use report::Diagnosis;

@@ -1,16 +1,17 @@
 //! One controller: who it is, where it stands, what it said.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use linesman_config::identity::RevisionRule;
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias};
-use linesman_proto::port::Port;
-use linesman_proto::register::{AlStatus, DlStatus};
+use linesman_proto::port::{Port, PortMap};
+use linesman_proto::register::{AlControl, AlStatus, DlStatus, FmmuConfig};
 use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{DcTime32, Instant};
+use linesman_proto::topology::SeenController;
 
-use super::{CounterHistory, Seen};
+use super::{CounterHistory, Seen, SiiImage};
 
 /// How many changes of one kind are kept; older ones are forgotten and counted.
 pub const CHANGES_KEPT: usize = 64;
@@ -44,6 +45,13 @@ pub struct Device {
     pub dl: DlHistory,
     /// Its error counters.
     pub counters: CounterHistory,
+    /// When a frame was received at each port, by its own clock: registers 0x0900 to 0x090F as last
+    /// read. Those of closed ports mean nothing.
+    pub received: Option<PortMap<DcTime32>>,
+    /// Its FMMUs, as they were set up.
+    pub fmmus: BTreeMap<u8, FmmuConfig>,
+    /// What was seen of its SII.
+    pub sii: SiiImage,
 }
 
 /// What the project says of a controller.
@@ -85,6 +93,27 @@ pub struct AlHistory {
     pub changes: VecDeque<AlChange>,
     /// All changes, also those forgotten.
     pub change_count: u64,
+    /// Errors it signalled, oldest first, at most [`CHANGES_KEPT`].
+    pub errors: VecDeque<AlError>,
+    /// Whether it was in the state last asked for, without error, since it was asked.
+    pub has_arrived: bool,
+}
+
+/// An error that a controller signalled in AL status.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct AlError {
+    /// AL status with the error bit, when it was first read.
+    pub status: Seen<AlStatus>,
+    /// The code, as far as it was read while the error stood.
+    pub code: Option<Seen<AlStatusCode>>,
+    /// The state before; `None` when none was read.
+    pub from: Option<AlState>,
+    /// The state asked for at that time.
+    pub requested: Option<Seen<StateValue>>,
+    /// Whether it had been in the state asked for: then it left it by itself, else it refused.
+    pub had_arrived: bool,
+    /// When the error was gone.
+    pub ended: Option<Instant>,
 }
 
 /// A change of AL status.
@@ -144,6 +173,19 @@ impl Device {
             al: AlHistory::default(),
             dl: DlHistory::default(),
             counters: CounterHistory::default(),
+            received: None,
+            fmmus: BTreeMap::new(),
+            sii: SiiImage::default(),
+        }
+    }
+
+    /// Its ports as they were first seen, for the tree.
+    #[must_use]
+    pub fn as_first_seen(&self) -> SeenController {
+        let first = self.dl.first.map(|first| first.value).unwrap_or_default();
+        SeenController {
+            open: PortMap::from_fn(|port| first.port_state(port).is_active()),
+            received: PortMap::from_fn(|port| self.received.map(|times| times[port])),
         }
     }
 
@@ -182,6 +224,7 @@ impl SeenIdentity {
 impl AlHistory {
     /// Takes a reading of AL status. Says whether it is news.
     pub fn record_status(&mut self, status: AlStatus, at: Instant, frame: Option<u64>) -> bool {
+        self.record_error(status, at, frame);
         let before = self.status.replace(Seen::new(status, at, frame));
         self.highest = self.highest.max(status.state().state());
         let Some(before) = before else { return true };
@@ -195,12 +238,74 @@ impl AlHistory {
         true
     }
 
+    fn record_error(&mut self, status: AlStatus, at: Instant, frame: Option<u64>) {
+        let open = self.errors.back_mut().filter(|error| error.ended.is_none());
+        if !status.error() {
+            if let Some(error) = open {
+                error.ended = Some(at);
+            }
+            let requested = self.requested.map(|requested| requested.value);
+            self.has_arrived |= requested == Some(status.state());
+            return;
+        }
+        if open.is_some() {
+            return;
+        }
+        push(
+            &mut self.errors,
+            AlError {
+                status: Seen::new(status, at, frame),
+                code: None,
+                from: self.status.and_then(|status| status.value.state().state()),
+                requested: self.requested,
+                had_arrived: self.has_arrived,
+                ended: None,
+            },
+        );
+        // The code is read after the status; what was read earlier is about something else.
+        self.code = None;
+    }
+
+    /// Takes a write to AL control.
+    pub fn record_request(&mut self, control: AlControl, requested: Seen<StateValue>) {
+        if control.acknowledges_error()
+            && let Some(error) = self.errors.back_mut()
+        {
+            error.ended.get_or_insert(requested.at);
+        }
+        let is_new = self.requested.is_none_or(|known| known.value != requested.value);
+        if is_new {
+            self.has_arrived = false;
+        }
+        self.requested = Some(requested);
+    }
+
+    /// Whether the MainDevice asked for a state without process data.
+    #[must_use]
+    pub fn is_asked_down(&self) -> bool {
+        let requested = self.requested.and_then(|requested| requested.value.state());
+        requested.is_some_and(|state| !state.has_inputs())
+    }
+
+    /// Whether it signals an error now.
+    #[must_use]
+    pub fn has_error(&self) -> bool {
+        self.status.is_some_and(|status| status.value.error())
+    }
+
     /// Takes a reading of AL status code. Says whether it is news.
     pub fn record_code(&mut self, code: AlStatusCode, at: Instant, frame: Option<u64>) -> bool {
         if self.code.is_some_and(|known| known.value == code) {
             return false;
         }
-        self.code = Some(Seen::new(code, at, frame));
+        let seen = Seen::new(code, at, frame);
+        self.code = Some(seen);
+        if code.0 != 0
+            && let Some(error) = self.errors.back_mut()
+            && error.ended.is_none()
+        {
+            error.code.get_or_insert(seen);
+        }
         true
     }
 

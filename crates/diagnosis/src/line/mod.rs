@@ -4,19 +4,28 @@
 //! keeps when and by which frame it was learnt, so that a finding can point there.
 
 pub mod counters;
+pub mod cyclic;
 pub mod device;
 pub mod host;
+pub mod learn;
+pub mod sii_image;
 pub mod traffic;
 
 use linesman_config::project::Project;
-use linesman_proto::address::{DeviceId, Network, Position, StationAddress};
+use linesman_proto::address::{DeviceId, LogicalAddress, Network, Path, Position, StationAddress};
 use linesman_proto::port::Port;
+use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
-use linesman_proto::topology::{End, Link, Tree};
+use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 
 pub use counters::{CounterHistory, CounterTrack, Rise};
-pub use device::{AlChange, AlHistory, Device, DlChange, DlHistory, Planned, SeenIdentity};
-pub use host::{CardHistory, HostHistory};
+pub use cyclic::{Cyclic, Deficit, Owner};
+pub use device::{
+    AlChange, AlError, AlHistory, Device, DlChange, DlHistory, Planned, SeenIdentity,
+};
+pub use host::{CardHistory, HostHistory, Tally};
+pub use learn::Learner;
+pub use sii_image::SiiImage;
 pub use traffic::Traffic;
 
 /// Something that was learnt, with when and from which frame.
@@ -51,11 +60,15 @@ pub struct Line {
     pub tree_is_planned: bool,
     /// What the host noticed.
     pub host: HostHistory,
+    /// Logical datagrams that are sent again and again.
+    pub cyclic: Vec<Cyclic>,
     /// Frames and datagrams.
     pub traffic: Traffic,
     /// The time of the latest frame or observation.
     pub now: Instant,
     revision: u64,
+    /// From how many controllers and receive times the tree was derived.
+    tree_basis: (usize, usize),
 }
 
 impl Line {
@@ -158,6 +171,61 @@ impl Line {
     #[must_use]
     pub fn device_count(&self) -> usize {
         let answered = self.devices.iter().filter(|device| device.answered.is_some()).count();
-        answered.max(usize::from(self.traffic.broadcast_answers))
+        let traffic = &self.traffic;
+        answered.max(usize::from(traffic.broadcast_answers.max(traffic.positions_seen)))
     }
+
+    /// The highest state that any controller was ever seen in.
+    #[must_use]
+    pub fn highest_state(&self) -> Option<AlState> {
+        let states = self.devices.iter().map(|device| device.al.highest);
+        states.max().flatten().max(self.traffic.al_highest)
+    }
+
+    /// Who has an FMMU on a logical datagram, as far as it was seen being set up.
+    pub fn owners(&self, cyclic: &Cyclic) -> impl Iterator<Item = Owner> + '_ {
+        owners(&self.devices, cyclic.start, cyclic.len)
+    }
+
+    /// Puts the tree together from what was seen, once all ports of all controllers are known; not
+    /// where it was planned. Says whether there is a new one.
+    ///
+    /// Only what was first seen counts: the tree is how things are wired when all is well.
+    pub fn derive_tree(&mut self) -> bool {
+        let is_known = !self.devices.is_empty()
+            && self.devices.len() >= self.device_count()
+            && self.devices.iter().all(|device| device.dl.first.is_some());
+        if self.tree_is_planned || !is_known {
+            return false;
+        }
+        let times = self.devices.iter().filter(|device| device.received.is_some()).count();
+        let basis = (self.devices.len(), times);
+        if self.tree.is_some() && self.tree_basis == basis {
+            return false;
+        }
+        self.tree_basis = basis;
+        let seen: Vec<_> = self.devices.iter().map(Device::as_first_seen).collect();
+        let tree = Reconstruction::of(Path::A, &seen).tree;
+        let is_new = self.tree.as_ref() != Some(&tree);
+        self.tree = Some(tree);
+        is_new
+    }
+}
+
+/// Who has an FMMU on a stretch of logical addresses.
+pub(crate) fn owners(
+    devices: &[Device],
+    start: LogicalAddress,
+    len: u16,
+) -> impl Iterator<Item = Owner> + '_ {
+    devices.iter().filter_map(move |device| {
+        let mut owner = Owner { device: device.id, reads: false, writes: false };
+        for fmmu in device.fmmus.values() {
+            if fmmu.active && fmmu.overlap(start, len).is_some() {
+                owner.reads |= fmmu.reads;
+                owner.writes |= fmmu.writes;
+            }
+        }
+        (owner.reads || owner.writes).then_some(owner)
+    })
 }

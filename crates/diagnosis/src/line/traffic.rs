@@ -1,5 +1,6 @@
 //! Frames and datagrams of one network, counted, and how they fared.
 
+use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
 
 use super::Seen;
@@ -20,21 +21,64 @@ pub struct Traffic {
     pub lost: Tally,
     /// The first lost frame.
     pub first_lost: Option<Seen<()>>,
+    /// The latest lost frame.
+    pub latest_lost: Option<Seen<()>>,
+    /// The latest frame that came back.
+    pub latest_returned: Option<Seen<()>>,
+    /// Returns whose request was not seen.
+    pub returned_alone: u64,
+    /// Frames recorded twice.
+    pub duplicates: u64,
+    /// EtherCAT frames without datagrams: network variables, mailbox.
+    pub without_datagrams: u64,
+    /// Whether any frame's direction was known for sure.
+    pub direction_known: bool,
+    /// Datagrams to station or logical addresses in frames that never came back: a MainDevice gets
+    /// that far only when SubDevices answer.
+    pub lost_addressed: u64,
     /// Frames that came back with a wrong check sequence.
     pub damaged: Tally,
-    /// Frames of which bytes are missing at the end.
+    /// The first of those.
+    pub first_damaged: Option<Seen<()>>,
+    /// Frames of which the recorder kept only the beginning.
     pub truncated: u64,
+    /// Frames that end before their last datagram does, though they were recorded whole.
+    pub cut_short: u64,
     /// Datagrams judged: each request once.
     pub datagrams: u64,
     /// Datagrams that nobody answered: their frame never came back, or came back with working
     /// counter 0 where an answer was expected.
     pub unanswered: u64,
+    /// Datagrams that somebody answered.
+    pub answered: u64,
+    /// The first unanswered one.
+    pub first_unanswered: Option<Seen<()>>,
     /// The largest working counter of a broadcast read: how many controllers answered at most.
     pub broadcast_answers: u16,
     /// The working counter of the latest broadcast read, with when it last changed.
     pub broadcast_now: Option<Seen<u16>>,
+    /// The first broadcast read that fewer controllers answered than one before.
+    pub broadcast_first_low: Option<Seen<u16>>,
+    /// Most controllers that a frame passed, by what they add to positions.
+    pub positions_seen: u16,
+    /// The highest state that broadcast reads of AL status prove.
+    pub al_highest: Option<AlState>,
     /// The first frame.
     pub first: Option<Instant>,
     /// The latest frame.
     pub last: Option<Instant>,
+}
+
+impl Traffic {
+    /// Whether frames were seen in one direction only, though the other one must have been there:
+    /// returns without a request, or requests that a MainDevice makes only after answers.
+    #[must_use]
+    pub fn is_one_sided(&self) -> bool {
+        if self.direction_known {
+            return false;
+        }
+        let only_returned = self.sent == 0 && self.returned_alone > 0;
+        let only_sent = self.returned == 0 && self.sent > 0 && self.lost_addressed > 0;
+        only_returned || only_sent
+    }
 }

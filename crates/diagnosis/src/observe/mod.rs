@@ -1,5 +1,12 @@
-//! What comes in: frames as they were seen, and what the host noticed.
+//! What comes in: frames as they were seen, and what the host noticed; and which frames belong
+//! together.
 
+pub mod exchange;
+pub mod fingerprint;
+pub mod pairing;
 pub mod seen;
 
+pub use exchange::{Exchange, FrameCopy};
+pub use fingerprint::Fingerprint;
+pub use pairing::{Outcome, Pairing};
 pub use seen::{Direction, FrameSeen, HostEvent, HostObservation};

@@ -3,6 +3,7 @@
 //! Times are ns since the start of the run; numbers above 2^53 are written as strings, since not
 //! every reader of JSON keeps them.
 
+pub mod build;
 pub mod number;
 
 use linesman_config::fault::{Class, FaultName};

@@ -3,6 +3,8 @@
 //! A rule is a pure function of the line. It is asked whenever something was learnt, and says all
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
+pub mod frame_errors;
+
 use linesman_config::fault::Class;
 use linesman_proto::time::Instant;
 
@@ -62,6 +64,7 @@ pub struct View<'a> {
 /// All rules, causes before what may follow from them.
 pub const RULES: &[Rule] = &[
     // Hardware, configuration and host: frame errors, links, devices.
+    frame_errors::RULE,
     //
     // The network as a whole, working counters and states.
     //

@@ -1,0 +1,416 @@
+//! The whole of diagnosis: frames and host observations in, findings out.
+
+use std::collections::VecDeque;
+
+use linesman_config::project::Project;
+use linesman_proto::address::{DeviceId, Network, RegisterAddress};
+use linesman_proto::frame::{FrameError, FrameView};
+use linesman_proto::time::{Instant, Span};
+
+use crate::finding::{Book, Change, Condition, Finding, Severity};
+use crate::line::{Learner, Line, Seen};
+use crate::observe::{
+    Direction, Exchange, Fingerprint, FrameSeen, HostObservation, Outcome, Pairing,
+};
+use crate::report::{self, Diagnosis, FindingReport, NetworkReport, Number, Verdict};
+use crate::rule::{RULES, View};
+
+/// The rules are asked at most this often; what they find keeps the time of its evidence.
+const JUDGE_EVERY: Span = Span::ms(10);
+
+/// What the engine is told before it begins.
+#[derive(Clone, Default, Debug)]
+pub struct Setup {
+    /// What was planned, for network 0.
+    pub project: Option<Project>,
+    /// Whether the counters of the host's cards will be reported, so that silence means zero.
+    pub host_counters: bool,
+    /// Whether probes can be sent.
+    pub probes: bool,
+    /// What is looked at: a selector, or a file.
+    pub source: String,
+    /// When the run began, RFC 3339.
+    pub start: Option<String>,
+    /// The clock behind the times.
+    pub clock: String,
+}
+
+/// Something happened to a finding.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Event {
+    /// When the engine noticed.
+    pub at: Instant,
+    /// What happened.
+    pub kind: EventKind,
+    /// The finding, without what follows from it.
+    pub finding: FindingReport,
+}
+
+/// What happened to a finding.
+pub type EventKind = Change;
+
+/// A wish to have a register read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Probe {
+    /// The network.
+    pub network: Network,
+    /// The controller.
+    pub device: DeviceId,
+    /// Where to begin.
+    pub register: RegisterAddress,
+    /// How many bytes.
+    pub len: u16,
+    /// Later than this the answer is of no use.
+    pub deadline: Instant,
+    /// What the probe does to the line.
+    pub effect: ProbeEffect,
+}
+
+/// What a probe does to the line.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum ProbeEffect {
+    /// It reads, and changes nothing.
+    Reads,
+    /// It writes: only where the user allowed it.
+    Writes,
+}
+
+/// One network.
+#[derive(Clone, Debug)]
+struct Watched {
+    line: Line,
+    learner: Learner,
+    pairing: Pairing,
+    judged: u64,
+    conditions: Vec<Condition>,
+    probed: Option<Instant>,
+    probed_for: (u64, u64),
+}
+
+impl Watched {
+    fn new(line: Line) -> Self {
+        let learner = Learner::new(&line);
+        Self {
+            line,
+            learner,
+            pairing: Pairing::default(),
+            judged: 0,
+            conditions: Vec::new(),
+            probed: None,
+            probed_for: (0, 0),
+        }
+    }
+
+    /// What makes it worth asking: frames lost, and working counters that fell.
+    fn alarms(&self) -> (u64, u64) {
+        let deficits = self.line.cyclic.iter().map(|cyclic| cyclic.deficits.len() as u64).sum();
+        (self.line.traffic.lost.times, deficits)
+    }
+}
+
+/// The diagnosis of any number of networks.
+#[derive(Clone, Debug)]
+pub struct Engine {
+    setup: Setup,
+    networks: Vec<Watched>,
+    book: Book,
+    events: VecDeque<Event>,
+    probes: VecDeque<Probe>,
+    now: Instant,
+    next_judgement: Instant,
+    has_ended: bool,
+    is_complete: bool,
+}
+
+impl Engine {
+    /// Most events and probes kept for somebody who does not fetch them.
+    const MOST_WAITING: usize = 1024;
+    /// Between two rounds of probes.
+    const PROBE_EVERY: Span = Span::ms(200);
+
+    /// An engine that has seen nothing.
+    #[must_use]
+    pub fn new(setup: Setup) -> Self {
+        let mut line = match &setup.project {
+            Some(project) => Line::planned(Network(0), project),
+            None => Line::new(Network(0)),
+        };
+        line.host.is_watched = setup.host_counters;
+        Self {
+            setup,
+            networks: vec![Watched::new(line)],
+            book: Book::default(),
+            events: VecDeque::new(),
+            probes: VecDeque::new(),
+            now: Instant::default(),
+            next_judgement: Instant::default(),
+            has_ended: false,
+            is_complete: true,
+        }
+    }
+
+    /// An engine for a line that was filled in by other means, such as an observation file.
+    #[must_use]
+    pub fn with_line(setup: Setup, line: Line) -> Self {
+        let now = line.now;
+        let mut engine = Self { networks: vec![Watched::new(line)], now, ..Self::new(setup) };
+        engine.judge();
+        engine
+    }
+
+    /// Takes a frame.
+    pub fn handle_frame(&mut self, frame: &FrameSeen<'_>) {
+        self.now = self.now.max(frame.time);
+        let now = self.now;
+        let watched = self.watched(frame.network);
+        take(watched, frame, now);
+        self.judge_if_due();
+    }
+
+    /// Takes an observation of the host.
+    pub fn handle_host(&mut self, observation: &HostObservation) {
+        self.now = self.now.max(observation.time);
+        let now = self.now;
+        let line = &mut self.watched(observation.network).line;
+        line.host.record(observation);
+        line.now = now;
+        line.touch();
+        self.judge_if_due();
+    }
+
+    /// Time passes. Only for live input: the time of captures comes with their frames.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        for Watched { line, learner, pairing, .. } in &mut self.networks {
+            line.now = line.now.max(now);
+            pairing.expire(now, &mut |exchange| learner.learn(line, exchange));
+        }
+        self.judge_if_due();
+    }
+
+    /// When [`Engine::handle_timeout`] has something to do.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        let lost = self.networks.iter().filter_map(|watched| watched.pairing.timeout()).min();
+        let judgement = self.has_news().then_some(self.next_judgement);
+        match (lost, judgement) {
+            (Some(one), Some(other)) => Some(one.min(other)),
+            (one, other) => one.or(other),
+        }
+    }
+
+    /// What happened to findings, in order.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    /// What the engine would like to have read.
+    pub fn poll_probe(&mut self) -> Option<Probe> {
+        self.probes.pop_front()
+    }
+
+    /// The input ends at `at`. `complete` is whether all of it could be read.
+    pub fn finish(&mut self, at: Instant, complete: bool) {
+        self.now = self.now.max(at);
+        self.has_ended = true;
+        self.is_complete &= complete;
+        for Watched { line, learner, pairing, .. } in &mut self.networks {
+            pairing.finish(&mut |exchange: &Exchange<'_>| learner.learn(line, exchange));
+            line.touch();
+        }
+        self.judge();
+    }
+
+    /// The whole answer so far.
+    #[must_use]
+    pub fn diagnosis(&self) -> Diagnosis {
+        let roots = self.book.roots();
+        Diagnosis {
+            schema: report::SCHEMA.to_owned(),
+            tool: concat!("linesman ", env!("CARGO_PKG_VERSION")).to_owned(),
+            start: self.setup.start.clone(),
+            clock: self.setup.clock.clone(),
+            source: self.setup.source.clone(),
+            complete: self.is_complete,
+            verdict: self.verdict(),
+            network: self.network_report(),
+            findings: roots
+                .into_iter()
+                .map(|finding| report::build::finding(&self.book, finding))
+                .collect(),
+        }
+    }
+
+    /// The findings so far.
+    #[must_use]
+    pub const fn book(&self) -> &Book {
+        &self.book
+    }
+
+    /// What is known of a network; `None` before its first frame.
+    #[must_use]
+    pub fn line(&self, network: Network) -> Option<&Line> {
+        let mut all = self.networks.iter().map(|watched| &watched.line);
+        all.find(|line| line.network == network)
+    }
+
+    fn watched(&mut self, network: Network) -> &mut Watched {
+        let known = self.networks.iter().position(|watched| watched.line.network == network);
+        let index = known.unwrap_or_else(|| {
+            let mut line = Line::new(network);
+            line.host.is_watched = self.setup.host_counters;
+            self.networks.push(Watched::new(line));
+            self.networks.len() - 1
+        });
+        &mut self.networks[index]
+    }
+
+    fn has_news(&self) -> bool {
+        self.networks.iter().any(|watched| watched.line.revision() != watched.judged)
+    }
+
+    fn judge_if_due(&mut self) {
+        if self.now >= self.next_judgement && self.has_news() {
+            self.judge();
+        }
+    }
+
+    fn judge(&mut self) {
+        self.next_judgement = self.now + JUDGE_EVERY;
+        let (now, has_ended) = (self.now, self.has_ended);
+        for watched in &mut self.networks {
+            if watched.line.revision() == watched.judged {
+                continue;
+            }
+            watched.line.derive_tree();
+            watched.judged = watched.line.revision();
+            watched.conditions.clear();
+            let view = View { line: &watched.line, now, has_ended };
+            for rule in RULES {
+                (rule.judge)(&view, &mut watched.conditions);
+            }
+        }
+        let all = self.networks.iter().flat_map(|watched| watched.conditions.iter().cloned());
+        let events = &mut self.events;
+        self.book.update(all.collect(), now, |kind, finding: &Finding| {
+            if events.len() < Self::MOST_WAITING {
+                events.push_back(Event { at: now, kind, finding: report::build::alone(finding) });
+            }
+        });
+        self.ask();
+    }
+
+    /// Asks for what would tell more, where something has just gone wrong.
+    fn ask(&mut self) {
+        if !self.setup.probes || self.has_ended {
+            return;
+        }
+        let now = self.now;
+        for watched in &mut self.networks {
+            let alarms = watched.alarms();
+            let is_due = watched.probed.is_none_or(|at| now.since(at) >= Self::PROBE_EVERY);
+            if alarms == watched.probed_for || !is_due {
+                continue;
+            }
+            watched.probed_for = alarms;
+            watched.probed = Some(now);
+            for device in watched.line.devices.iter().filter(|device| device.answered.is_some()) {
+                for (register, len) in ASKED {
+                    if self.probes.len() < Self::MOST_WAITING {
+                        self.probes.push_back(Probe {
+                            network: watched.line.network,
+                            device: device.id,
+                            register: RegisterAddress(register),
+                            len,
+                            deadline: now + Self::PROBE_EVERY,
+                            effect: ProbeEffect::Reads,
+                        });
+                    }
+                }
+            }
+        }
+    }
+
+    fn verdict(&self) -> Verdict {
+        if self.book.worst().is_some_and(|worst| worst >= Severity::Warning) {
+            return Verdict::Faulty;
+        }
+        let was_seen_at_work = self.networks.iter().any(|watched| {
+            let traffic = &watched.line.traffic;
+            traffic.answered > 0 && !traffic.is_one_sided()
+        });
+        let was_read = self.networks.iter().any(|watched| {
+            let mut devices = watched.line.devices.iter();
+            devices.any(|device| device.al.status.is_some() || device.counters.is_known())
+        });
+        let has_frames = self.networks.iter().any(|watched| watched.line.traffic.frames > 0);
+        if was_seen_at_work || (!has_frames && was_read) {
+            Verdict::Healthy
+        } else {
+            Verdict::Inconclusive
+        }
+    }
+
+    fn network_report(&self) -> NetworkReport {
+        let lines = || self.networks.iter().map(|watched| &watched.line);
+        let sum = |count: fn(&Line) -> u64| Number(lines().map(count).sum());
+        let highest = lines().map(Line::highest_state).max().flatten();
+        NetworkReport {
+            devices: sum(|line| line.device_count() as u64),
+            al_state_highest: highest.map(|state| state.name().to_owned()),
+            datagrams: sum(|line| line.traffic.datagrams),
+            unanswered: sum(|line| line.traffic.unanswered),
+            frames: sum(|line| line.traffic.frames),
+            lost: sum(|line| line.traffic.lost.sum),
+            damaged: sum(|line| line.traffic.damaged.sum),
+        }
+    }
+}
+
+/// DL status, AL status with its code, all error counters.
+const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), (0x0300, 20)];
+
+fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
+    let Watched { line, learner, pairing, .. } = watched;
+    line.now = now;
+    let traffic = &mut line.traffic;
+    let view = match FrameView::parse(frame.bytes) {
+        Ok(view) => view,
+        Err(FrameError::OtherType { .. }) => {
+            traffic.frames += 1;
+            traffic.without_datagrams += 1;
+            return;
+        }
+        Err(FrameError::NotEtherCat { .. } | FrameError::CutOff { .. }) => {
+            traffic.foreign += 1;
+            return;
+        }
+    };
+    traffic.frames += 1;
+    traffic.first.get_or_insert(frame.time);
+    traffic.last = Some(frame.time);
+    traffic.truncated += u64::from(frame.truncated);
+    traffic.direction_known |= frame.direction != Direction::Unknown;
+    if frame.fcs == Some(false) {
+        // Its bytes prove nothing, and the MainDevice's card drops it: the request stays open.
+        traffic.damaged.add(1, frame.time);
+        let seen = Seen::new((), frame.time, Some(frame.number));
+        traffic.first_damaged.get_or_insert(seen);
+        line.touch();
+        return;
+    }
+    let print = Fingerprint::of(&view);
+    traffic.cut_short += u64::from(print.is_cut && !frame.truncated);
+    let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(line, exchange));
+    let traffic = &mut line.traffic;
+    match outcome {
+        Outcome::Request | Outcome::RequestCopy => traffic.sent += 1,
+        Outcome::Return | Outcome::ReturnAlone => {
+            traffic.returned += 1;
+            traffic.returned_alone += u64::from(outcome == Outcome::ReturnAlone);
+            let seen = Seen::new((), frame.time, Some(frame.number));
+            traffic.latest_returned = Some(seen);
+        }
+        Outcome::Duplicate => traffic.duplicates += 1,
+    }
+}

@@ -1,0 +1,179 @@
+//! The findings of a run: their lives, and which follows from which.
+//!
+//! A rule says each time anew what holds or held. What it says for the first time opens a finding;
+//! what it says no longer it took back, and the finding goes without a trace, since it never was
+//! true. A condition that is over stays as a closed finding.
+
+use linesman_proto::time::Instant;
+
+use super::{Condition, Severity};
+
+/// A condition with a life.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Finding {
+    /// Its number in this run, from 1.
+    pub id: u32,
+    /// What the rule says of it now.
+    pub condition: Condition,
+    /// When it began.
+    pub opened: Instant,
+    /// When it was certain.
+    pub confirmed: Option<Instant>,
+    /// When it was over.
+    pub closed: Option<Instant>,
+    /// The finding it follows from, by [`Finding::id`].
+    pub parent: Option<u32>,
+}
+
+/// What happened to a finding.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Change {
+    /// It is new.
+    Opened,
+    /// It is certain now.
+    Confirmed,
+    /// It is over.
+    Closed,
+    /// It was an error to report it: later evidence says otherwise.
+    Withdrawn,
+}
+
+/// All findings of a run.
+#[derive(Clone, Default, Debug)]
+pub struct Book {
+    findings: Vec<Finding>,
+    opened: u32,
+}
+
+impl Book {
+    /// Takes all that the rules say now, and tells what is news.
+    pub fn update(
+        &mut self,
+        conditions: Vec<Condition>,
+        now: Instant,
+        mut tell: impl FnMut(Change, &Finding),
+    ) {
+        let mut before = std::mem::take(&mut self.findings);
+        for condition in conditions {
+            let known = before.iter().position(|finding| is_same(&finding.condition, &condition));
+            let (mut finding, is_new) = match known {
+                Some(index) => (before.remove(index), false),
+                None => (self.open(condition.clone()), true),
+            };
+            let was_confirmed = finding.confirmed.is_some();
+            let was_closed = finding.closed.is_some();
+            finding.opened = finding.opened.min(condition.since);
+            if condition.is_confirmed {
+                let at = condition.confirmed_at.unwrap_or(now).max(finding.opened);
+                finding.confirmed = Some(finding.confirmed.map_or(at, |known| known.min(at)));
+            }
+            finding.closed = condition.ended.map(|at| at.max(finding.opened));
+            finding.condition = condition;
+            if is_new {
+                tell(Change::Opened, &finding);
+            }
+            if !was_confirmed && finding.confirmed.is_some() {
+                tell(Change::Confirmed, &finding);
+            }
+            if !was_closed && finding.closed.is_some() {
+                tell(Change::Closed, &finding);
+            }
+            self.findings.push(finding);
+        }
+        for finding in &before {
+            tell(Change::Withdrawn, finding);
+        }
+        self.findings.sort_by_key(|finding| finding.id);
+        self.hang();
+    }
+
+    /// All findings, oldest first.
+    #[must_use]
+    pub fn findings(&self) -> &[Finding] {
+        &self.findings
+    }
+
+    /// Findings that follow from no other one, worst first, then in order of time.
+    #[must_use]
+    pub fn roots(&self) -> Vec<&Finding> {
+        self.sorted(None)
+    }
+
+    /// What follows from a finding, worst first, then in order of time.
+    #[must_use]
+    pub fn consequences(&self, id: u32) -> Vec<&Finding> {
+        self.sorted(Some(id))
+    }
+
+    /// The worst that there is, or was.
+    #[must_use]
+    pub fn worst(&self) -> Option<Severity> {
+        self.findings.iter().map(|finding| finding.condition.severity).max()
+    }
+
+    fn sorted(&self, parent: Option<u32>) -> Vec<&Finding> {
+        let mut found: Vec<_> =
+            self.findings.iter().filter(|finding| finding.parent == parent).collect();
+        found.sort_by_key(|finding| {
+            (std::cmp::Reverse(finding.condition.severity), finding.opened, finding.id)
+        });
+        found
+    }
+
+    fn open(&mut self, condition: Condition) -> Finding {
+        self.opened += 1;
+        let opened = condition.since;
+        Finding { id: self.opened, condition, opened, confirmed: None, closed: None, parent: None }
+    }
+
+    /// Hangs each finding beneath the one that explains all of its symptoms.
+    fn hang(&mut self) {
+        for finding in &mut self.findings {
+            finding.parent = None;
+        }
+        for index in 0..self.findings.len() {
+            let explaining = |other: &usize| {
+                let (cause, effect) = (&self.findings[*other], &self.findings[index]);
+                *other != index && explains(cause, effect) && !self.follows(*other, effect.id)
+            };
+            let best = (0..self.findings.len()).filter(explaining).max_by(|one, other| {
+                let (one, other) = (&self.findings[*one], &self.findings[*other]);
+                let confidence = one.condition.confidence.total_cmp(&other.condition.confidence);
+                let severity = one.condition.severity.cmp(&other.condition.severity);
+                severity.then(confidence).then(other.id.cmp(&one.id))
+            });
+            if let Some(best) = best {
+                self.findings[index].parent = Some(self.findings[best].id);
+            }
+        }
+    }
+
+    /// Whether a finding follows, at whatever remove, from the one called `id`.
+    fn follows(&self, index: usize, id: u32) -> bool {
+        let mut at = self.findings.get(index);
+        // Each step goes up; there are never more steps than findings.
+        for _ in 0..self.findings.len() {
+            match at {
+                Some(finding) if finding.id == id => return true,
+                Some(finding) => {
+                    let parent = finding.parent;
+                    at = parent.and_then(|id| self.findings.iter().find(|other| other.id == id));
+                }
+                None => return false,
+            }
+        }
+        true
+    }
+}
+
+fn is_same(one: &Condition, other: &Condition) -> bool {
+    one.page.code == other.page.code && one.place.is_same_spot(&other.place)
+}
+
+fn explains(cause: &Finding, effect: &Finding) -> bool {
+    let symptoms = &effect.condition.symptoms;
+    let was_over = cause.closed.is_some_and(|closed| closed < effect.opened);
+    !symptoms.is_empty()
+        && !was_over
+        && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))
+}

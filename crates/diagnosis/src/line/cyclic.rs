@@ -1,0 +1,116 @@
+//! Process data: each logical datagram with the working counter it usually comes back with.
+
+use std::collections::VecDeque;
+
+use linesman_proto::address::{DeviceId, LogicalAddress};
+use linesman_proto::command::Command;
+use linesman_proto::time::Instant;
+
+use super::Seen;
+
+/// Deficits kept of one datagram.
+pub const DEFICITS_KEPT: usize = 16;
+
+/// A logical datagram that is sent again and again.
+#[derive(Clone, Debug)]
+pub struct Cyclic {
+    /// LRD, LWR or LRW.
+    pub command: Command,
+    /// Where it begins.
+    pub start: LogicalAddress,
+    /// Its length in bytes.
+    pub len: u16,
+    /// How often it came back.
+    pub count: u64,
+    /// The working counter it comes back with, since when.
+    pub wkc: Seen<u16>,
+    /// The highest working counter since the process data were set up, when it was first reached:
+    /// what is expected from then on.
+    pub highest: Seen<u16>,
+    /// When the working counter was too low, oldest first, at most [`DEFICITS_KEPT`].
+    pub deficits: VecDeque<Deficit>,
+}
+
+/// A stretch of time in which a working counter was too low.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Deficit {
+    /// What was expected.
+    pub expected: u16,
+    /// The first working counter that was too low.
+    pub first: Seen<u16>,
+    /// The lowest one.
+    pub lowest: u16,
+    /// How many datagrams came back so.
+    pub count: u64,
+    /// When it was right again.
+    pub ended: Option<Instant>,
+}
+
+/// Who has an FMMU on a logical datagram.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Owner {
+    /// The controller.
+    pub device: DeviceId,
+    /// It puts inputs there.
+    pub reads: bool,
+    /// It takes outputs from there.
+    pub writes: bool,
+}
+
+impl Cyclic {
+    /// A datagram that came back for the first time.
+    #[must_use]
+    pub fn new(command: Command, start: LogicalAddress, len: u16, wkc: Seen<u16>) -> Self {
+        let deficits = VecDeque::new();
+        Self { command, start, len, count: 1, wkc, highest: wkc, deficits }
+    }
+
+    /// Whether a working counter is too low now.
+    #[must_use]
+    pub fn has_deficit(&self) -> bool {
+        self.deficits.back().is_some_and(|deficit| deficit.ended.is_none())
+    }
+
+    /// Takes a working counter. `is_wanted` tells, when it falls, whether the MainDevice asked
+    /// for it by taking a SubDevice out of SAFEOP or OP. Says whether it is news.
+    pub fn record(&mut self, wkc: Seen<u16>, is_wanted: impl FnOnce() -> bool) -> bool {
+        self.count += 1;
+        let open = self.deficits.back_mut().filter(|deficit| deficit.ended.is_none());
+        if wkc.value == self.wkc.value {
+            if let Some(deficit) = open {
+                deficit.count += 1;
+            }
+            return false;
+        }
+        self.wkc = wkc;
+        if wkc.value >= self.highest.value {
+            if let Some(deficit) = open {
+                deficit.ended = Some(wkc.at);
+            }
+            if wkc.value > self.highest.value {
+                self.highest = wkc;
+            }
+            return true;
+        }
+        if let Some(deficit) = open {
+            deficit.count += 1;
+            deficit.lowest = deficit.lowest.min(wkc.value);
+            return true;
+        }
+        if is_wanted() {
+            self.highest = wkc;
+            return true;
+        }
+        if self.deficits.len() == DEFICITS_KEPT {
+            self.deficits.pop_front();
+        }
+        self.deficits.push_back(Deficit {
+            expected: self.highest.value,
+            first: wkc,
+            lowest: wkc.value,
+            count: 1,
+            ended: None,
+        });
+        true
+    }
+}

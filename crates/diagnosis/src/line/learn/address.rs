@@ -1,0 +1,175 @@
+//! Which controller an address means.
+//!
+//! Positions mean the controllers of the first full scan, in order, while all of them are there.
+//! When fewer answer, positions have moved: on a line without branches the first ones are still
+//! where they were, elsewhere a position is known only where its station address was read since.
+
+use std::collections::BTreeMap;
+
+use linesman_proto::address::{DeviceId, Position, StationAddress};
+
+use super::{Answer, word_at};
+use crate::line::Line;
+
+/// Most controllers that are learnt from frames.
+const MOST_DEVICES: usize = 4096;
+/// Configured station address.
+const STATION: u16 = 0x0010;
+
+/// What positions and station addresses mean at the moment.
+#[derive(Clone, Default, Debug)]
+pub struct Addresses {
+    stations: BTreeMap<StationAddress, DeviceId>,
+    /// Controllers by position while all are there.
+    order: Vec<DeviceId>,
+    /// How many controllers a frame passes now.
+    present: Option<u16>,
+}
+
+impl Addresses {
+    /// The addresses of a plan; nothing without one.
+    #[must_use]
+    pub fn new(line: &Line) -> Self {
+        let planned = line
+            .devices
+            .iter()
+            .filter_map(|device| device.planned.map(|planned| (planned.station, device.id)));
+        let order = match &line.tree {
+            Some(tree) => tree.order().iter().map(|node| DeviceId(*node as u32)).collect(),
+            None => line.devices.iter().map(|device| device.id).collect(),
+        };
+        Self { stations: planned.collect(), order, present: None }
+    }
+
+    /// How many controllers a frame passes now.
+    pub(super) const fn present(&self) -> Option<u16> {
+        self.present
+    }
+
+    /// A frame passed `passed` controllers.
+    pub(super) fn count(&mut self, line: &mut Line, passed: u16) {
+        if self.present == Some(passed) {
+            return;
+        }
+        self.present = Some(passed);
+        line.traffic.positions_seen = line.traffic.positions_seen.max(passed);
+        let passed = usize::from(passed).min(MOST_DEVICES);
+        while self.order.len() < passed {
+            // Those that answered to a station before any position was known come first.
+            let free = line.devices.get(self.order.len()).map(|device| device.id);
+            let id = free.unwrap_or_else(|| line.add_device());
+            self.order.push(id);
+        }
+        let is_line = line
+            .tree
+            .as_ref()
+            .is_none_or(|tree| (0..tree.len()).all(|node| tree.children(node).count() <= 1));
+        let is_certain =
+            |position: usize| position < passed && (passed == self.order.len() || is_line);
+        for (position, id) in self.order.iter().enumerate() {
+            let known = is_certain(position).then_some(Position(position as u16));
+            if let Some(device) = line.device_mut(*id) {
+                device.position = known;
+            }
+        }
+        line.touch();
+    }
+
+    /// The controller at a position.
+    pub(super) fn at_position(
+        &mut self,
+        line: &mut Line,
+        position: Position,
+        answer: &Answer<'_>,
+    ) -> Option<DeviceId> {
+        let index = usize::from(position.0);
+        if self.present.is_none() && answer.sum > 0 {
+            // Nothing says how many there are; this one is.
+            self.count(line, position.0.checked_add(1)?);
+            self.present = None;
+        }
+        let known = match self.present {
+            Some(present) if usize::from(present) < self.order.len() => line.by_position(position),
+            Some(_) | None => self.order.get(index).copied(),
+        };
+        if known.is_some() {
+            return known;
+        }
+        // Its station address, read or written right here, tells who it is.
+        let data = if answer.effect.reads { answer.reply.data() } else { answer.written() };
+        let station = word_at(data, answer.ado, STATION).filter(|_| answer.sum > 0)?;
+        let id = *self.stations.get(&StationAddress(station))?;
+        line.device_mut(id)?.position = Some(position);
+        Some(id)
+    }
+
+    /// The controller with a station address. One that answers and is not known yet is taken to be
+    /// the first one without a station address.
+    pub(super) fn at_station(
+        &mut self,
+        line: &mut Line,
+        station: StationAddress,
+        answers: bool,
+    ) -> Option<DeviceId> {
+        if let Some(id) = self.stations.get(&station) {
+            return Some(*id);
+        }
+        if !answers {
+            return None;
+        }
+        let free = line.devices.iter().find(|device| {
+            device.station.is_none() && !self.stations.values().any(|id| *id == device.id)
+        });
+        let id = match free.map(|device| device.id) {
+            Some(id) => id,
+            None if line.devices.len() < MOST_DEVICES => line.add_device(),
+            None => return None,
+        };
+        self.give(line, id, station);
+        Some(id)
+    }
+
+    /// A controller's registers were read.
+    pub(super) fn read(&mut self, line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
+        if let Some(station) = word_at(answer.reply.data(), answer.ado, STATION) {
+            self.give(line, id, StationAddress(station));
+        }
+    }
+
+    /// A controller's registers were written.
+    pub(super) fn written(&mut self, line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
+        if let Some(station) = word_at(answer.written(), answer.ado, STATION) {
+            self.give(line, id, StationAddress(station));
+        }
+    }
+
+    /// All controllers' registers were written: one station address for all is none.
+    pub(super) fn broadcast_written(&mut self, line: &mut Line, answer: &Answer<'_>) {
+        if word_at(answer.written(), answer.ado, STATION).is_none() {
+            return;
+        }
+        self.stations.clear();
+        for device in &mut line.devices {
+            device.station = None;
+        }
+        line.touch();
+    }
+
+    fn give(&mut self, line: &mut Line, id: DeviceId, station: StationAddress) {
+        let Some(device) = line.device_mut(id) else { return };
+        let before = device.station;
+        let is_same = before == Some(station) && self.stations.get(&station) == Some(&id);
+        if is_same || station.0 == 0 {
+            // A device that has none any more keeps the last one, by which it will be sought.
+            return;
+        }
+        device.station = Some(station);
+        self.stations.retain(|_, owner| *owner != id);
+        if let Some(other) = self.stations.insert(station, id)
+            && let Some(other) = line.device_mut(other)
+        {
+            other.station = None;
+        }
+        line.touch();
+    }
+}

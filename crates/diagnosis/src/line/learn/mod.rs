@@ -1,0 +1,333 @@
+//! How exchanges teach the line.
+//!
+//! A register that came back with a working counter above 0 was read from, or written to, the
+//! controller that was addressed. Which controller that is, [`address`] knows; what the registers
+//! mean, [`registers`], [`sii`] and [`coe`].
+
+mod address;
+mod coe;
+mod registers;
+mod sii;
+
+use linesman_proto::address::{Position, RegisterAddress, StationAddress};
+use linesman_proto::command::{Addressing, Command, Effect};
+use linesman_proto::frame::{Datagram, FrameView};
+use linesman_proto::time::Instant;
+
+pub use address::Addresses;
+
+use super::{Cyclic, Line, Seen};
+use crate::observe::{Exchange, FrameCopy};
+
+/// Registers from here on are optional: without so many FMMUs and SyncManagers, without distributed
+/// clocks, or without a mailbox message to fetch, nobody answers there, and nothing is wrong.
+const FIRST_OPTIONAL: RegisterAddress = RegisterAddress(0x0600);
+/// Process RAM begins here: mailboxes and process data.
+const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
+/// Most logical datagrams that are followed.
+const MOST_CYCLIC: usize = 256;
+
+/// Teaches one line.
+#[derive(Clone, Default, Debug)]
+pub struct Learner {
+    addresses: Addresses,
+    latest_cyclic: usize,
+    transfers: sii::Transfers,
+}
+
+/// One datagram on its way back, with all there is to know of it.
+struct Answer<'a> {
+    command: Command,
+    effect: Effect,
+    request: Option<Datagram<'a>>,
+    reply: Datagram<'a>,
+    ado: RegisterAddress,
+    /// Its working counter, all copies so far together.
+    sum: u16,
+    is_last: bool,
+    /// Whether positions can be counted: there is but one copy.
+    is_single: bool,
+    at: Instant,
+    frame: u64,
+}
+
+impl Answer<'_> {
+    /// What was written: as it went out if that was seen, since a read may have changed it.
+    fn written(&self) -> &[u8] {
+        match (self.request, self.effect.reads) {
+            (Some(request), _) => request.data(),
+            (None, false) => self.reply.data(),
+            (None, true) => &[],
+        }
+    }
+
+    /// How many controllers it passed.
+    fn passed(&self) -> Option<u16> {
+        if !self.is_single || !self.command.increments_position() {
+            return None;
+        }
+        match self.request {
+            Some(request) => Some(self.reply.adp().wrapping_sub(request.adp())),
+            None if self.effect.addressing == Addressing::Broadcast => Some(self.reply.adp()),
+            None => None,
+        }
+    }
+}
+
+impl Learner {
+    /// A learner for a line that may have been planned.
+    #[must_use]
+    pub fn new(line: &Line) -> Self {
+        Self { addresses: Addresses::new(line), ..Self::default() }
+    }
+
+    /// Learns all that an exchange shows.
+    pub fn learn(&mut self, line: &mut Line, exchange: &Exchange<'_>) {
+        match (&exchange.request, &exchange.reply) {
+            (request, Some(reply)) => self.answered(line, exchange, request.as_ref(), reply),
+            (Some(request), None) => lost(line, exchange, request),
+            (None, None) => {}
+        }
+    }
+
+    fn answered(
+        &mut self,
+        line: &mut Line,
+        exchange: &Exchange<'_>,
+        request: Option<&FrameCopy<'_>>,
+        reply: &FrameCopy<'_>,
+    ) {
+        let Ok(view) = FrameView::parse(reply.bytes) else { return };
+        let mut requests =
+            request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
+        for (index, datagram) in view.datagrams().enumerate() {
+            let Ok(datagram) = datagram else { break };
+            let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
+            let Some(command) = datagram.command() else {
+                line.traffic.datagrams += u64::from(exchange.is_last);
+                continue;
+            };
+            let sum = exchange.sum(index, datagram.wkc().0);
+            let answer = Answer {
+                command,
+                effect: command.effect(),
+                request,
+                reply: datagram,
+                ado: datagram.ado(),
+                sum,
+                is_last: exchange.is_last,
+                is_single: exchange.is_last && exchange.earlier.is_empty(),
+                at: reply.time,
+                frame: reply.number,
+            };
+            self.datagram(line, &answer);
+        }
+    }
+
+    fn datagram(&mut self, line: &mut Line, answer: &Answer<'_>) {
+        let is_expected = match answer.effect.addressing {
+            Addressing::None => false,
+            Addressing::Logical => self.logical(line, answer),
+            Addressing::Broadcast => {
+                self.broadcast(line, answer);
+                answer.ado < FIRST_OPTIONAL
+            }
+            Addressing::Position | Addressing::Station => {
+                self.single(line, answer);
+                answer.ado < FIRST_OPTIONAL
+            }
+        };
+        if answer.is_last {
+            line.traffic.datagrams += 1;
+            if is_expected && answer.sum == 0 {
+                line.traffic.unanswered += 1;
+                let seen = Seen::new((), answer.at, Some(answer.frame));
+                line.traffic.first_unanswered.get_or_insert(seen);
+            } else if answer.sum > 0 {
+                line.traffic.answered += 1;
+            }
+        }
+    }
+
+    /// A datagram to whoever has an FMMU there. Says whether an answer was expected.
+    fn logical(&mut self, line: &mut Line, answer: &Answer<'_>) -> bool {
+        if !answer.is_last {
+            return true;
+        }
+        let (start, len) = (answer.reply.logical(), answer.reply.data_len() as u16);
+        let is_it = |cyclic: &Cyclic| {
+            cyclic.start == start && cyclic.len == len && cyclic.command == answer.command
+        };
+        let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
+        // They come in the same order each cycle.
+        let guess = (self.latest_cyclic + 1) % line.cyclic.len().max(1);
+        let found = if line.cyclic.get(guess).is_some_and(is_it) {
+            Some(guess)
+        } else {
+            line.cyclic.iter().position(is_it)
+        };
+        let Some(index) = found else {
+            if line.cyclic.len() < MOST_CYCLIC {
+                self.latest_cyclic = line.cyclic.len();
+                line.cyclic.push(Cyclic::new(answer.command, start, len, seen));
+                line.touch();
+            }
+            return false;
+        };
+        self.latest_cyclic = index;
+        let devices = &line.devices;
+        let cyclic = &mut line.cyclic[index];
+        let is_wanted = || {
+            let lower = |device: &super::Device| device.al.is_asked_down();
+            let mut owners = super::owners(devices, start, len).peekable();
+            if owners.peek().is_none() {
+                return devices.iter().any(lower);
+            }
+            owners.any(|owner| devices.get(owner.device.index()).is_some_and(lower))
+        };
+        let news = cyclic.record(seen, is_wanted);
+        let is_expected = cyclic.highest.value > 0;
+        if news {
+            line.touch();
+        }
+        is_expected
+    }
+
+    fn broadcast(&mut self, line: &mut Line, answer: &Answer<'_>) {
+        let passed = answer.passed();
+        if let Some(passed) = passed {
+            self.addresses.count(line, passed);
+        }
+        if !answer.is_last {
+            return;
+        }
+        // A broadcast to an optional register is answered by some only.
+        let counts = answer.command == Command::Brd && answer.ado < FIRST_OPTIONAL;
+        if counts {
+            line.traffic.broadcast_answers = line.traffic.broadcast_answers.max(answer.sum);
+            let is_news = line.traffic.broadcast_now.is_none_or(|known| known.value != answer.sum);
+            if is_news {
+                let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
+                if line.traffic.broadcast_first_low.is_none()
+                    && answer.sum < line.traffic.broadcast_answers
+                {
+                    line.traffic.broadcast_first_low = Some(seen);
+                }
+                line.traffic.broadcast_now = Some(seen);
+                line.touch();
+            }
+            if passed.is_none() {
+                self.addresses.count(line, answer.sum);
+            }
+        }
+        if answer.sum == 0 {
+            return;
+        }
+        if answer.effect.reads && !answer.effect.writes {
+            registers::broadcast_read(line, answer);
+        }
+        if answer.effect.writes && !answer.effect.reads {
+            self.addresses.broadcast_written(line, answer);
+            registers::broadcast_write(line, answer);
+        }
+    }
+
+    /// A datagram to one controller.
+    fn single(&mut self, line: &mut Line, answer: &Answer<'_>) {
+        if let Some(passed) = answer.passed() {
+            self.addresses.count(line, passed);
+        }
+        let is_position = answer.effect.addressing == Addressing::Position;
+        let device = if is_position {
+            let adp = match (answer.request, self.addresses.present()) {
+                (Some(request), _) => Some(request.adp()),
+                (None, Some(present)) => Some(answer.reply.adp().wrapping_sub(present)),
+                (None, None) => None,
+            };
+            let position = adp.map(Position::from_auto_increment);
+            position.and_then(|position| self.addresses.at_position(line, position, answer))
+        } else {
+            let station = StationAddress(answer.reply.adp());
+            self.addresses.at_station(line, station, answer.sum > 0)
+        };
+        let Some(id) = device else { return };
+        let Some(device) = line.devices.get_mut(id.index()) else { return };
+        if answer.effect.multiple_write {
+            return;
+        }
+        if answer.sum == 0 {
+            if answer.is_last && answer.ado < FIRST_OPTIONAL && device.answered.is_some() {
+                let is_news = device.silent.is_none();
+                device.is_silent(answer.at, Some(answer.frame));
+                if is_news {
+                    line.touch();
+                }
+            }
+            return;
+        }
+        if answer.reply.wkc().0 == 0 {
+            // The other copy was answered, and taught what there was to learn.
+            return;
+        }
+        let is_news = device.answered.is_none() || device.silent.is_some();
+        device.answers(answer.at, Some(answer.frame));
+        if is_news {
+            line.touch();
+        }
+        if answer.ado >= FIRST_RAM {
+            if answer.effect.reads {
+                coe::read(line, id, answer);
+            }
+            return;
+        }
+        if answer.effect.reads {
+            self.addresses.read(line, id, answer);
+            registers::read(line, id, answer);
+            self.transfers.read(line, id, answer);
+        }
+        if answer.effect.writes {
+            self.addresses.written(line, id, answer);
+            registers::written(line, id, answer);
+            self.transfers.written(id, answer);
+        }
+    }
+}
+
+/// A request that never came back, or of which only some copies did.
+fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
+    let Ok(view) = FrameView::parse(request.bytes) else { return };
+    if exchange.earlier.is_empty() {
+        let traffic = &mut line.traffic;
+        traffic.lost.add(1, request.time);
+        let seen = Seen::new((), request.time, Some(request.number));
+        traffic.first_lost.get_or_insert(seen);
+        traffic.latest_lost = Some(seen);
+        line.touch();
+    }
+    for (index, datagram) in view.datagrams().enumerate() {
+        let Ok(datagram) = datagram else { break };
+        let traffic = &mut line.traffic;
+        traffic.datagrams += 1;
+        if exchange.sum(index, 0) == 0 && datagram.command() != Some(Command::Nop) {
+            traffic.unanswered += 1;
+            let seen = Seen::new((), request.time, Some(request.number));
+            traffic.first_unanswered.get_or_insert(seen);
+        }
+        let addressing = datagram.command().map(Command::addressing);
+        if matches!(addressing, Some(Addressing::Station | Addressing::Logical)) {
+            traffic.lost_addressed += 1;
+        }
+    }
+}
+
+/// The part of `data`, which lies at `start`, that is `len` bytes at `address`.
+fn part(data: &[u8], start: RegisterAddress, address: u16, len: usize) -> Option<&[u8]> {
+    let offset = usize::from(address.checked_sub(start.0)?);
+    data.get(offset..offset + len)
+}
+
+/// The word at `address`, as [`part`].
+fn word_at(data: &[u8], start: RegisterAddress, address: u16) -> Option<u16> {
+    let bytes = part(data, start, address, 2)?;
+    Some(u16::from_le_bytes([bytes[0], bytes[1]]))
+}

@@ -1,0 +1,190 @@
+//! What registers tell: states, ports, counters, receive times, FMMUs.
+
+use linesman_proto::address::{DeviceId, RegisterAddress, StationAlias};
+use linesman_proto::port::{Port, PortMap};
+use linesman_proto::register::{
+    AlControl, AlStatus, ClearGroup, DlStatus, ErrorCounters, FmmuConfig, PortState,
+};
+use linesman_proto::state::{AlState, AlStatusCode};
+use linesman_proto::time::DcTime32;
+
+use super::{Answer, part, word_at};
+use crate::line::{Device, Line, Seen};
+
+const ALIAS: u16 = 0x0012;
+const DL_STATUS: u16 = 0x0110;
+const AL_CONTROL: u16 = 0x0120;
+const AL_STATUS: u16 = 0x0130;
+const AL_STATUS_CODE: u16 = 0x0134;
+const COUNTERS: std::ops::Range<u16> = 0x0300..0x0314;
+const FMMUS: std::ops::Range<u16> = 0x0600..0x0700;
+const RECEIVE_TIMES: u16 = 0x0900;
+
+/// One controller's registers were read.
+pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
+    let (data, start) = (answer.reply.data(), answer.ado);
+    let (at, frame) = (answer.at, Some(answer.frame));
+    let Some(device) = line.devices.get_mut(id.index()) else { return };
+    let mut news = false;
+    if start.0 <= AL_STATUS_CODE {
+        if let Some(alias) = word_at(data, start, ALIAS) {
+            device.alias = Some(StationAlias(alias));
+        }
+        if let Some(status) = dl_status(device, data, start) {
+            news |= device.dl.record(status, at, frame);
+        }
+        if let Some(status) = al_status(data, start) {
+            news |= device.al.record_status(status, at, frame);
+        }
+        if let Some(code) = word_at(data, start, AL_STATUS_CODE) {
+            news |= device.al.record_code(AlStatusCode(code), at, frame);
+        }
+    } else if touches(start, data, COUNTERS) {
+        news |= device.counters.record(start, data, at, frame);
+    } else if start.0 == RECEIVE_TIMES
+        && let Some(times) = part(data, start, RECEIVE_TIMES, 16)
+    {
+        device.received = Some(receive_times(times));
+        news = true;
+    }
+    if news {
+        line.touch();
+    }
+}
+
+/// One controller's registers were written.
+pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
+    let Some(device) = line.devices.get_mut(id.index()) else { return };
+    let is_news = write(device, answer);
+    if touches(answer.ado, answer.written(), FMMUS) {
+        write_fmmus(line, id, answer);
+    }
+    if is_news {
+        line.touch();
+    }
+}
+
+/// All controllers' registers were read; their data are ORed together.
+pub(super) fn broadcast_read(line: &mut Line, answer: &Answer<'_>) {
+    let Some(status) = al_status(answer.reply.data(), answer.ado) else { return };
+    let states = AlState::from_or(status.0 as u8);
+    line.traffic.al_highest = line.traffic.al_highest.max(states.highest());
+    let everybody = usize::from(answer.sum) == line.devices.len();
+    let (Some(state), true, false) = (states.all_in(), everybody, states.any_error()) else {
+        return;
+    };
+    let mut news = false;
+    for device in &mut line.devices {
+        let status = AlStatus::new(state);
+        // Other bits than state and error are not known from here.
+        if device.al.state() != Some(state) || device.al.has_error() {
+            news |= device.al.record_status(status, answer.at, Some(answer.frame));
+        }
+    }
+    if news {
+        line.touch();
+    }
+}
+
+/// All controllers' registers were written.
+pub(super) fn broadcast_write(line: &mut Line, answer: &Answer<'_>) {
+    let data = answer.written();
+    let mut news = false;
+    for device in &mut line.devices {
+        news |= write(device, answer);
+        if touches(answer.ado, data, FMMUS) {
+            device.fmmus.clear();
+        }
+    }
+    if touches(answer.ado, data, FMMUS) {
+        line.cyclic.clear();
+    }
+    if news {
+        line.touch();
+    }
+}
+
+fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
+    let (data, start) = (answer.written(), answer.ado);
+    if let Some(control) = part(data, start, AL_CONTROL, 1) {
+        let control = AlControl(u16::from(control[0]));
+        device
+            .al
+            .record_request(control, Seen::new(control.requested(), answer.at, Some(answer.frame)));
+        return true;
+    }
+    if touches(start, data, COUNTERS) {
+        for group in ClearGroup::ALL {
+            let is_hit = (0..data.len() as u16).any(|offset| {
+                let address = RegisterAddress(start.0.saturating_add(offset));
+                ClearGroup::written_by(address) == Some(group)
+            });
+            if is_hit {
+                device.counters.note_clear(group);
+            }
+        }
+    }
+    false
+}
+
+fn write_fmmus(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
+    let (data, start) = (answer.written(), answer.ado);
+    let Some(device) = line.devices.get_mut(id.index()) else { return };
+    for index in 0..16_u16 {
+        let address = FMMUS.start + index * FmmuConfig::LEN as u16;
+        let Some(bytes) = part(data, start, address, FmmuConfig::LEN) else { continue };
+        let Some(bytes) = bytes.first_chunk() else { continue };
+        let fmmu = FmmuConfig::from_bytes(*bytes);
+        let before = device.fmmus.insert(index as u8, fmmu);
+        if before == Some(fmmu) {
+            continue;
+        }
+        // The process data are laid out anew: what was expected of them holds no longer.
+        line.cyclic.retain(|cyclic| {
+            let touches = |fmmu: &FmmuConfig| fmmu.overlap(cyclic.start, cyclic.len).is_some();
+            !touches(&fmmu) && !before.as_ref().is_some_and(touches)
+        });
+    }
+    line.touch();
+}
+
+/// AL status as far as it was read: many poll the first byte alone, which has state and error.
+fn al_status(data: &[u8], start: RegisterAddress) -> Option<AlStatus> {
+    let low = part(data, start, AL_STATUS, 1)?;
+    Some(AlStatus(word_at(data, start, AL_STATUS).unwrap_or(u16::from(low[0]))))
+}
+
+/// DL status as far as it was read. Some poll the second byte alone, which says all of loops and
+/// communication; a port is then taken to have a carrier where it communicates, and the rest of the
+/// first byte to be as it was, or well.
+fn dl_status(device: &Device, data: &[u8], start: RegisterAddress) -> Option<DlStatus> {
+    if let Some(word) = word_at(data, start, DL_STATUS) {
+        return Some(DlStatus(word));
+    }
+    let high = part(data, start, DL_STATUS + 1, 1)?[0];
+    let known = device.dl.last.map(|last| last.value);
+    if let Some(known) = known.filter(|known| known.to_bytes()[1] == high) {
+        return Some(known);
+    }
+    let low = known.unwrap_or(DlStatus::default().with_pdi(true, true)).to_bytes()[0];
+    let read = DlStatus::from_bytes([low, high]);
+    Some(Port::ALL.into_iter().fold(read, |status, port| {
+        let state = status.port_state(port);
+        status.with_port(port, PortState { link: state.communication, ..state })
+    }))
+}
+
+fn receive_times(bytes: &[u8]) -> PortMap<DcTime32> {
+    PortMap::from_fn(|port| {
+        let at = 4 * port.index();
+        let bytes = bytes.get(at..at + 4).and_then(|bytes| bytes.first_chunk());
+        DcTime32(bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes)))
+    })
+}
+
+fn touches(start: RegisterAddress, data: &[u8], range: std::ops::Range<u16>) -> bool {
+    let end = usize::from(start.0) + data.len();
+    start.0 < range.end && end > usize::from(range.start)
+}
+
+const _: () = assert!(COUNTERS.end - COUNTERS.start == ErrorCounters::LEN as u16);

@@ -1,0 +1,475 @@
+//! What can do such damage: from places and counts to causes, with how sure each is.
+//!
+//! | seen | most likely |
+//! |---|---|
+//! | bad frames, clean symbols | the sender spoils frames before they are coded |
+//! | symbols on several links at the same times | interference from outside |
+//! | symbols in both directions of one link | the cable or its plugs |
+//! | symbols in one direction, again and again | the sender's output or the receiver's input |
+//! | symbols in one direction, a few | the cable, or anything else |
+//!
+//! References: HW-26, HW-27 and the table of `facts/esc.md` 3.4. The numbers are judgement, not
+//! measurement; they add up to less than 1, since there are other causes in the world.
+
+use linesman_config::fault::FaultName;
+use linesman_proto::address::Path;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::Instant;
+use linesman_proto::topology::route::Direction;
+use linesman_proto::topology::{End, Hop};
+
+use super::damage::{Damage, LastHop, Located};
+use super::survey::Survey;
+use crate::line::Rise;
+
+/// From this many hits on, their distribution says something.
+const MANY: u64 = 8;
+
+/// Where a cause sits.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Spot {
+    /// A link (index in the tree), in one direction or both.
+    Link(usize, Option<Direction>),
+    /// A controller (index in the tree).
+    Device(usize),
+    /// The computer with its card.
+    Host,
+}
+
+/// A cause at a spot.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Suspect {
+    /// Why.
+    pub cause: FaultName,
+    /// Where.
+    pub spot: Spot,
+    /// How sure, 0 to 1.
+    pub weight: f64,
+}
+
+/// Damage that has one cause, with what may have done it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Suspicion {
+    /// The hops on which frames are damaged.
+    pub damages: Vec<Damage>,
+    /// What the card adds.
+    pub last_hop: Option<LastHop>,
+    /// Causes, most likely first. Never empty.
+    pub suspects: Vec<Suspect>,
+    /// Damage elsewhere at the same times, that comes from the same source.
+    pub beneath: Vec<Suspicion>,
+}
+
+impl Suspicion {
+    /// When it was first read.
+    #[must_use]
+    pub fn first(&self) -> Option<Instant> {
+        let hops = self.damages.iter().map(|damage| damage.first);
+        hops.chain(self.last_hop.as_ref().map(LastHop::first)).min()
+    }
+
+    /// When it was last read.
+    #[must_use]
+    pub fn last(&self) -> Option<Instant> {
+        let hops = self.damages.iter().map(|damage| damage.last);
+        hops.chain(self.last_hop.as_ref().map(LastHop::last)).max()
+    }
+
+    /// How many frames were damaged at least.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        let hops: u64 = self.damages.iter().map(|damage| damage.frames).sum();
+        hops + self.last_hop.as_ref().map_or(0, LastHop::frames)
+    }
+
+    /// How many symbols could not be decoded at least.
+    #[must_use]
+    pub fn symbols(&self) -> u64 {
+        self.damages.iter().filter_map(|damage| damage.symbols).sum()
+    }
+
+    /// All causes on a line, in the order in which frames get there.
+    #[must_use]
+    pub fn all(survey: &Survey<'_>, located: &Located) -> Vec<Self> {
+        let mut links: Vec<Group> = Vec::new();
+        let mut senders: Vec<Group> = Vec::new();
+        for damage in &located.hops {
+            let both = located.hops.iter().any(|other| {
+                other.hop.link == damage.hop.link && other.hop.direction != damage.hop.direction
+            });
+            match damage.hop.from {
+                // One device that spoils frames inside does so at each of its outputs.
+                End::Controller(node, _) if is_clean(damage) && !both => {
+                    group(&mut senders, node).damages.push(damage.clone());
+                }
+                End::Controller(..) | End::MainDevice(_) => {
+                    group(&mut links, damage.hop.link).damages.push(damage.clone());
+                }
+            }
+        }
+        for last in &located.last_hops {
+            let link = last.hop().link;
+            match last {
+                LastHop::Damaged { .. } => {
+                    let sender = last.hop().from.node();
+                    let spoils = senders.iter_mut().find(|group| Some(group.key) == sender);
+                    // The device that spoils frames on the way out does so on the way home, too.
+                    let group = match spoils {
+                        Some(spoils) => spoils,
+                        None => group(&mut links, link),
+                    };
+                    group.last_hop = Some(last.clone());
+                }
+                LastHop::Unknown { .. } => group(&mut links, link).last_hop = Some(last.clone()),
+            }
+        }
+        let mut all: Vec<Self> = Vec::new();
+        all.extend(senders.into_iter().map(|group| {
+            let suspects = inside(&group);
+            group.with(suspects)
+        }));
+        let noisy = share_source(survey, links);
+        all.extend(noisy);
+        all
+    }
+}
+
+/// Damage that belongs together: by link, or by the device that sent the frames.
+#[derive(Clone, Debug)]
+struct Group {
+    key: usize,
+    damages: Vec<Damage>,
+    last_hop: Option<LastHop>,
+}
+
+impl Group {
+    fn with(self, suspects: Vec<Suspect>) -> Suspicion {
+        let Self { key: _, damages, last_hop } = self;
+        Suspicion { damages, last_hop, suspects, beneath: Vec::new() }
+    }
+
+    fn first(&self) -> Option<Instant> {
+        self.damages.iter().map(|damage| damage.first).min()
+    }
+
+    fn has_symbols(&self) -> bool {
+        self.damages.iter().any(|damage| damage.symbols.is_some_and(|symbols| symbols > 0))
+    }
+}
+
+fn group(groups: &mut Vec<Group>, key: usize) -> &mut Group {
+    let index = match groups.iter().position(|group| group.key == key) {
+        Some(index) => index,
+        None => {
+            groups.push(Group { key, damages: Vec::new(), last_hop: None });
+            groups.len() - 1
+        }
+    };
+    &mut groups[index]
+}
+
+impl LastHop {
+    /// The hop to the card.
+    #[must_use]
+    pub const fn hop(&self) -> Hop {
+        match self {
+            Self::Damaged { hop, .. } | Self::Unknown { hop, .. } => *hop,
+        }
+    }
+
+    /// The card.
+    #[must_use]
+    pub const fn card(&self) -> Path {
+        match self {
+            Self::Damaged { card, .. } | Self::Unknown { card, .. } => *card,
+        }
+    }
+
+    /// How many frames.
+    #[must_use]
+    pub const fn frames(&self) -> u64 {
+        match self {
+            Self::Damaged { frames, .. } => *frames,
+            Self::Unknown { lost, .. } => *lost,
+        }
+    }
+
+    /// When the first was noticed.
+    #[must_use]
+    pub const fn first(&self) -> Instant {
+        match self {
+            Self::Damaged { first, .. } | Self::Unknown { first, .. } => *first,
+        }
+    }
+
+    /// When the latest was noticed.
+    #[must_use]
+    pub const fn last(&self) -> Instant {
+        match self {
+            Self::Damaged { last, .. } | Self::Unknown { last, .. } => *last,
+        }
+    }
+}
+
+fn is_clean(damage: &Damage) -> bool {
+    damage.symbols == Some(0) && damage.frames > 0
+}
+
+/// Clean symbols, bad frames: whoever sends spoiled them before they were coded.
+fn inside(group: &Group) -> Vec<Suspect> {
+    let Some(damage) = group.damages.first() else { return Vec::new() };
+    let frames: u64 = group.damages.iter().map(|damage| damage.frames).sum();
+    let hop = damage.hop;
+    let weight = if frames >= 3 { 0.8 } else { 0.6 };
+    let mut list =
+        vec![Suspect { cause: FaultName::DeviceInternal, spot: Spot::Device(group.key), weight }];
+    // A wrong symbol may decode as another valid one: seldom, and not again and again.
+    let link = Spot::Link(hop.link, Some(hop.direction));
+    for (cause, weight) in [(FaultName::CableDegraded, 0.1), (FaultName::ReceiverDamaged, 0.05)] {
+        list.push(Suspect { cause, spot: link, weight });
+    }
+    add_earlier(&mut list, damage);
+    list
+}
+
+/// Links that are hit at the same times have one source; the first of them leads.
+fn share_source(survey: &Survey<'_>, mut links: Vec<Group>) -> Vec<Suspicion> {
+    links.sort_by_key(|group| group.damages.is_empty());
+    let mut all: Vec<Suspicion> = Vec::new();
+    let mut taken = vec![false; links.len()];
+    // The link that was noticed first leads, and goes on leading.
+    let mut order: Vec<usize> = (0..links.len()).collect();
+    order.sort_by_key(|index| (links[*index].first().unwrap_or(Instant::MAX), *index));
+    for (at, &index) in order.iter().enumerate() {
+        if taken[index] {
+            continue;
+        }
+        let leader = &links[index];
+        let together: Vec<usize> = order[at + 1..]
+            .iter()
+            .copied()
+            .filter(|other| {
+                !taken[*other]
+                    && leader.has_symbols()
+                    && links[*other].has_symbols()
+                    && falls_together(survey, leader, &links[*other])
+            })
+            .collect();
+        let mut members: Vec<&Group> = vec![leader];
+        members.extend(together.iter().map(|other| &links[*other]));
+        let common = (members.len() > 1).then(|| common_device(&members)).flatten();
+        let suspicion = |group: &Group| {
+            let list =
+                if members.len() > 1 { shared(group, common) } else { single(survey, group) };
+            group.clone().with(list)
+        };
+        let mut lead = suspicion(leader);
+        lead.beneath = together.iter().map(|other| suspicion(&links[*other])).collect();
+        for other in together {
+            taken[other] = true;
+        }
+        all.push(lead);
+    }
+    all
+}
+
+/// The device at whose ports all damage is sent, or all is received.
+fn common_device(groups: &[&Group]) -> Option<(usize, FaultName)> {
+    let hops = || groups.iter().flat_map(|group| &group.damages).map(|damage| damage.hop);
+    let first = hops().next()?;
+    let sender = first.from.node().filter(|node| hops().all(|hop| hop.from.node() == Some(*node)));
+    let receiver = first.to.node().filter(|node| hops().all(|hop| hop.to.node() == Some(*node)));
+    match (sender, receiver) {
+        (Some(node), _) => Some((node, FaultName::TransmitterDamaged)),
+        (None, Some(node)) => Some((node, FaultName::ReceiverDamaged)),
+        (None, None) => None,
+    }
+}
+
+/// One of several links that are hit together.
+fn shared(group: &Group, common: Option<(usize, FaultName)>) -> Vec<Suspect> {
+    let spot = link_spot(group);
+    let mut list = vec![Suspect {
+        cause: FaultName::EmcNoise,
+        spot,
+        weight: if common.is_some() { 0.55 } else { 0.75 },
+    }];
+    if let Some((node, cause)) = common {
+        list.push(Suspect { cause, spot: Spot::Device(node), weight: 0.25 });
+    }
+    list.push(Suspect { cause: FaultName::CableDegraded, spot, weight: 0.15 });
+    list
+}
+
+/// One link, or the last hop, by itself.
+fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
+    use FaultName::{
+        CableDegraded, DeviceInternal, EmcNoise, HostDrops, NicDamaged, ReceiverDamaged,
+        TransmitterDamaged,
+    };
+    let spot = link_spot(group);
+    let hop = group.damages.first().map(|damage| damage.hop);
+    let Some(hop) = hop.or_else(|| group.last_hop.as_ref().map(LastHop::hop)) else {
+        return Vec::new();
+    };
+    let hits: u64 = group.damages.iter().map(|d| d.frames.max(d.symbols.unwrap_or(0))).sum::<u64>();
+    let is_unread = group.damages.iter().all(|damage| damage.symbols.is_none());
+    let is_all_clean = !group.damages.is_empty() && group.damages.iter().all(is_clean);
+    let is_both = matches!(spot, Spot::Link(_, None));
+    let at_card = [hop.from, hop.to].into_iter().any(|end| end.node().is_none());
+
+    let weights: Vec<(FaultName, f64)> = match (&group.last_hop, is_both) {
+        (Some(LastHop::Unknown { .. }), _) => {
+            let mut list = vec![
+                suspect(CableDegraded, spot, 0.25),
+                suspect(NicDamaged, Spot::Host, 0.2),
+                suspect(HostDrops, Spot::Host, 0.2),
+                suspect(TransmitterDamaged, spot, 0.1),
+            ];
+            if let Some(node) = hop.from.node() {
+                list.push(suspect(DeviceInternal, Spot::Device(node), 0.1));
+            }
+            list.push(suspect(EmcNoise, spot, 0.1));
+            return list;
+        }
+        (Some(LastHop::Damaged { .. }), false) => {
+            let mut list = vec![
+                suspect(CableDegraded, spot, 0.35),
+                suspect(NicDamaged, Spot::Host, 0.2),
+                suspect(TransmitterDamaged, spot, 0.15),
+            ];
+            if let Some(node) = hop.from.node() {
+                list.push(suspect(DeviceInternal, Spot::Device(node), 0.15));
+            }
+            list.push(suspect(EmcNoise, spot, 0.1));
+            return list;
+        }
+        (_, false) if is_all_clean && at_card => {
+            // Clean symbols, bad frames, and the sender is the card.
+            return vec![
+                suspect(NicDamaged, Spot::Host, 0.75),
+                suspect(CableDegraded, spot, 0.1),
+                suspect(ReceiverDamaged, spot, 0.05),
+            ];
+        }
+        (_, true) => vec![
+            (CableDegraded, 0.6),
+            (EmcNoise, 0.25),
+            (TransmitterDamaged, 0.05),
+            (ReceiverDamaged, 0.05),
+        ],
+        (None, false) if hits >= MANY && is_steady(survey, group) => vec![
+            (TransmitterDamaged, 0.35),
+            (ReceiverDamaged, 0.25),
+            (CableDegraded, 0.2),
+            (EmcNoise, 0.1),
+        ],
+        (None, false) if hits >= MANY => vec![
+            (CableDegraded, 0.35),
+            (EmcNoise, 0.25),
+            (TransmitterDamaged, 0.2),
+            (ReceiverDamaged, 0.1),
+        ],
+        (None, false) => vec![
+            (CableDegraded, 0.45),
+            (EmcNoise, 0.2),
+            (TransmitterDamaged, 0.15),
+            (ReceiverDamaged, 0.1),
+        ],
+    };
+    let share = if is_unread { 0.8 } else { 1.0 };
+    let mut list: Vec<Suspect> = weights
+        .into_iter()
+        .map(|(cause, weight)| match (cause, hop.from, hop.to) {
+            // The output stage of the card is a part of the host, and so is its input stage.
+            (TransmitterDamaged, End::MainDevice(_), _)
+            | (ReceiverDamaged, _, End::MainDevice(_)) => {
+                suspect(NicDamaged, Spot::Host, weight * share)
+            }
+            _ => suspect(cause, spot, weight * share),
+        })
+        .collect();
+    if is_unread {
+        let sender = hop.from.node().map_or(Spot::Host, Spot::Device);
+        list.push(suspect(DeviceInternal, sender, 0.1));
+    }
+    if let Some(damage) = group.damages.first() {
+        add_earlier(&mut list, damage);
+    }
+    list
+}
+
+const fn suspect(cause: FaultName, spot: Spot, weight: f64) -> Suspect {
+    Suspect { cause, spot, weight }
+}
+
+/// Ports that nobody read lie between the last clean check and the first bad one: the hops to them
+/// share the suspicion.
+fn add_earlier(list: &mut Vec<Suspect>, damage: &Damage) {
+    let earlier = damage.or_earlier.len();
+    if earlier == 0 {
+        return;
+    }
+    let share = 1.0 / (earlier as f64 + 1.0);
+    let total: f64 = list.iter().map(|suspect| suspect.weight).sum();
+    for suspect in list.iter_mut() {
+        suspect.weight *= share;
+    }
+    for hop in damage.or_earlier.iter().rev().take(4) {
+        let spot = Spot::Link(hop.link, Some(hop.direction));
+        list.push(suspect(FaultName::CableDegraded, spot, total * share));
+    }
+}
+
+/// The link with the direction in which it damages frames.
+fn link_spot(group: &Group) -> Spot {
+    let hops = group.damages.iter().map(|damage| damage.hop);
+    let mut all = hops.chain(group.last_hop.as_ref().map(LastHop::hop));
+    let Some(first) = all.next() else { return Spot::Host };
+    let is_one = all.all(|hop| hop.direction == first.direction);
+    Spot::Link(first.link, is_one.then_some(first.direction))
+}
+
+/// The rises of the receiving port that show a damage.
+fn rises<'a>(survey: &Survey<'a>, damage: &Damage) -> Vec<&'a Rise> {
+    let End::Controller(node, port) = damage.hop.to else { return Vec::new() };
+    let counters = [ErrorCounter::PhysicalLayer(port), ErrorCounter::InvalidFrame(port)];
+    counters
+        .into_iter()
+        .filter_map(|counter| survey.track(node, counter))
+        .flat_map(|track| &track.rises)
+        .collect()
+}
+
+/// Whether at least half of the rises of the group with fewer of them fall into those of the other.
+fn falls_together(survey: &Survey<'_>, a: &Group, b: &Group) -> bool {
+    let of = |group: &Group| -> Vec<&Rise> {
+        group.damages.iter().flat_map(|damage| rises(survey, damage)).collect()
+    };
+    let (mut few, mut many) = (of(a), of(b));
+    if few.len() > many.len() {
+        std::mem::swap(&mut few, &mut many);
+    }
+    let touching = |rise: &Rise| {
+        many.iter().any(|other| rise.after_time <= other.at && other.after_time <= rise.at)
+    };
+    let hits = few.iter().filter(|rise| touching(rise)).count();
+    !few.is_empty() && hits * 2 >= few.len()
+}
+
+/// Whether errors come in nearly each reading, as a damaged part makes them, and not in bursts.
+fn is_steady(survey: &Survey<'_>, group: &Group) -> bool {
+    group.damages.iter().all(|damage| {
+        let End::Controller(node, port) = damage.hop.to else { return false };
+        let Some(track) = survey.track(node, ErrorCounter::PhysicalLayer(port)) else {
+            return false;
+        };
+        let (Some(first), Some(last)) = (track.first_rise(), track.last_rise()) else {
+            return false;
+        };
+        let reading = last.at.since(last.after_time).as_nanos();
+        let period = last.at.since(first.after_time).as_nanos();
+        let count = track.rises.len() as u64;
+        count >= 5 && period <= reading.saturating_mul(count * 5 / 4)
+    })
+}

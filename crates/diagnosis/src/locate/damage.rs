@@ -1,0 +1,285 @@
+//! From counters to hops: which bad frames were bad already when they came, and which became so.
+//!
+//! The checks are walked in order, with the number of bad frames that earlier checks counted. A port
+//! with forwarded counting counts those apart; one without counts them again as invalid, so what is
+//! beyond their number is new. Readings are made one after the other, and frames are damaged in
+//! between: so only what a port had counted when all earlier ports were last read is compared
+//! (the *horizon*); what was counted later waits for the next reading.
+
+use linesman_proto::address::Path;
+use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::Instant;
+use linesman_proto::topology::{End, Hop, Route};
+
+use super::survey::Survey;
+use crate::line::CounterTrack;
+
+/// Damage on one hop: a link in one direction, with the sender and the receiver at its ends.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Damage {
+    /// The card whose frames are damaged there.
+    pub path: Path,
+    /// The hop. Its `to` is the port that counted.
+    pub hop: Hop,
+    /// Frames that were found bad first there.
+    pub frames: u64,
+    /// Symbols that could not be decoded there, in frames or between them; `None` when nobody read
+    /// that counter.
+    pub symbols: Option<u64>,
+    /// Whether there may have been more: a counter stood at 255, or was cleared by somebody else.
+    pub is_lower_bound: bool,
+    /// Hops before it whose receiving ports nobody read: the damage may be there as well.
+    pub or_earlier: Vec<Hop>,
+    /// When the first was read.
+    pub first: Instant,
+    /// When the latest was read.
+    pub last: Instant,
+}
+
+/// What the card can say of the last hop.
+#[derive(Clone, PartialEq, Debug)]
+pub enum LastHop {
+    /// The card dropped this many bad frames that no controller had found bad.
+    Damaged {
+        /// Where frames of which card arrive.
+        hop: Hop,
+        /// The card that counted.
+        card: Path,
+        /// How many.
+        frames: u64,
+        /// When the card first reported some.
+        first: Instant,
+        /// When it last did.
+        last: Instant,
+    },
+    /// Frames did not come back though no controller found one bad, and the card's counters are not
+    /// known: nobody can tell whether they were damaged on the last hop or lost in the card.
+    Unknown {
+        /// The hop to the card.
+        hop: Hop,
+        /// The card.
+        card: Path,
+        /// How many frames were lost.
+        lost: u64,
+        /// When the first was missed.
+        first: Instant,
+        /// When the latest was missed.
+        last: Instant,
+    },
+}
+
+/// All damage on a line.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Located {
+    /// Hop by hop, in the order of the checks, card A's frames first.
+    pub hops: Vec<Damage>,
+    /// What the cards add.
+    pub last_hops: Vec<LastHop>,
+}
+
+impl Located {
+    /// Searches a line.
+    #[must_use]
+    pub fn on(survey: &Survey<'_>) -> Self {
+        let mut located = Self::default();
+        let mut nothing_counted = true;
+        let mut ends = Vec::new();
+        for route in survey.routes() {
+            let mut walk =
+                Walk { survey, carried: Carried::default(), horizon: Instant::MAX, is_read: false };
+            located.hops.extend(walk.along(route));
+            nothing_counted &= walk.carried.frames == 0;
+            ends.push(walk.card(route));
+            if let Some(hop) = walk.unknown(route) {
+                located.last_hops.push(hop);
+            }
+        }
+        if !nothing_counted {
+            located.last_hops.clear();
+        }
+        located.last_hops.extend(ends.into_iter().flatten());
+        located
+    }
+}
+
+/// Bad frames that earlier checks counted.
+#[derive(Clone, Copy, Default, Debug)]
+struct Carried {
+    frames: u64,
+    is_lower_bound: bool,
+}
+
+struct Walk<'s, 'a> {
+    survey: &'s Survey<'a>,
+    carried: Carried,
+    /// What was counted up to then is in all readings walked by so far.
+    horizon: Instant,
+    /// Whether any check was read.
+    is_read: bool,
+}
+
+/// A counter as far as it can be compared with those before it.
+#[derive(Clone, Copy, Default, Debug)]
+struct Reading {
+    /// Rises up to the horizon.
+    settled: u64,
+    /// All rises.
+    total: u64,
+    /// Rises that fall together with a change of the link.
+    excused: u64,
+    is_lower_bound: bool,
+}
+
+impl Walk<'_, '_> {
+    fn along(&mut self, route: &Route) -> Vec<Damage> {
+        let mut found = Vec::new();
+        let mut unread = Vec::new();
+        for hop in route.hops() {
+            let End::Controller(node, port) = hop.to else { continue };
+            let Some(invalid) = self.survey.track(node, ErrorCounter::InvalidFrame(port)) else {
+                unread.push(*hop);
+                continue;
+            };
+            let damage = self.check(*hop, node, port, invalid);
+            if let Some((frames, symbols, is_lower_bound)) = damage {
+                let (first, last) = self.period(node, port);
+                found.push(Damage {
+                    path: route.path(),
+                    hop: *hop,
+                    frames,
+                    symbols,
+                    is_lower_bound,
+                    // A frame that was bad before was counted by the first port that was read.
+                    or_earlier: if frames > 0 { unread.clone() } else { Vec::new() },
+                    first,
+                    last,
+                });
+            }
+            // What is damaged before here would have been counted here.
+            unread.clear();
+            self.is_read = true;
+            if let Some(at) = self.survey.last_read(node, port) {
+                self.horizon = self.horizon.min(at);
+            }
+        }
+        found
+    }
+
+    /// What is new at a port: frames, symbols, and whether that is a lower bound.
+    fn check(
+        &mut self,
+        hop: Hop,
+        node: usize,
+        port: Port,
+        invalid: &CounterTrack,
+    ) -> Option<(u64, Option<u64>, bool)> {
+        let read = |counter| self.survey.track(node, counter).map(|track| self.read(hop, track));
+        let invalid = self.read(hop, invalid);
+        let forwarded = read(ErrorCounter::Forwarded(port)).unwrap_or_default();
+        let physical = read(ErrorCounter::PhysicalLayer(port));
+        let is_physical_read = physical.is_some();
+        let physical = physical.unwrap_or_default();
+        let before = self.carried;
+
+        let bad = invalid.settled + forwarded.settled;
+        let frames = if before.frames == 0 || forwarded.total > 0 {
+            invalid.settled
+        } else if before.is_lower_bound || invalid.is_lower_bound {
+            // Two counters that both stand at their end, or were cleared at different times, differ
+            // by chance: only symbols of its own show that a port has damage of its own.
+            let own = invalid.settled.saturating_sub(before.frames);
+            if physical.settled > 0 { own } else { 0 }
+        } else {
+            invalid.settled.saturating_sub(before.frames)
+        };
+        let frames = frames.saturating_sub(invalid.excused);
+
+        // Some controllers make a symbol error anew when they send a bad frame on: then the symbols
+        // go with the bad frames that came, one each.
+        let goes_with_frames = physical.settled <= bad && physical.settled * 2 >= bad;
+        let is_remade = frames == 0 && before.frames > 0 && goes_with_frames;
+        let symbols = if is_remade { 0 } else { physical.settled };
+        let symbols = symbols.saturating_sub(physical.excused);
+
+        self.carried.frames = before.frames.max(invalid.total + forwarded.total);
+        self.carried.is_lower_bound |= invalid.is_lower_bound || forwarded.is_lower_bound;
+        let is_lower_bound = invalid.is_lower_bound || physical.is_lower_bound;
+        (frames > 0 || symbols > 0).then_some((
+            frames,
+            is_physical_read.then_some(symbols),
+            is_lower_bound,
+        ))
+    }
+
+    fn read(&self, hop: Hop, track: &CounterTrack) -> Reading {
+        let total = track.total.rise();
+        let horizon = if self.survey.has_ended() { Instant::MAX } else { self.horizon };
+        let mut reading = Reading {
+            settled: total,
+            total,
+            excused: 0,
+            is_lower_bound: track.total.is_lower_bound(),
+        };
+        for rise in &track.rises {
+            let by = u64::from(rise.difference.rise);
+            if rise.at > horizon {
+                reading.settled = reading.settled.saturating_sub(by);
+            } else if self.survey.falls_with_link_change(hop.link, rise) {
+                reading.excused += by;
+            }
+        }
+        reading
+    }
+
+    /// When the port counted: the first and the latest reading that showed a rise.
+    fn period(&self, node: usize, port: Port) -> (Instant, Instant) {
+        let counters = [ErrorCounter::InvalidFrame(port), ErrorCounter::PhysicalLayer(port)];
+        let tracks = || counters.into_iter().filter_map(|c| self.survey.track(node, c));
+        let first = tracks().filter_map(|track| Some(track.first_rise()?.at)).min();
+        let last = tracks().filter_map(|track| Some(track.last_rise()?.at)).max();
+        let now = self.survey.line().now;
+        (first.unwrap_or(now), last.unwrap_or(now))
+    }
+
+    /// What the card counted beyond what the controllers did.
+    fn card(&self, route: &Route) -> Option<LastHop> {
+        let card = route.arrives_at()?;
+        let hop = *route.hops().last()?;
+        let errors = self.survey.line().host.card(card).crc;
+        let (first, last) = (errors.first?, errors.last?);
+        let read_since = |at: Instant| self.survey.has_ended() || self.horizon > at;
+        let frames = errors.sum.saturating_sub(self.carried.frames);
+        let is_new = if self.carried.frames == 0 {
+            read_since(first)
+        } else {
+            !self.carried.is_lower_bound && read_since(last)
+        };
+        (frames > 0 && is_new && self.is_read).then_some(LastHop::Damaged {
+            hop,
+            card,
+            frames,
+            first,
+            last,
+        })
+    }
+
+    /// Frames that were lost while no counter moved and none of the card is known.
+    fn unknown(&self, route: &Route) -> Option<LastHop> {
+        let card = route.arrives_at()?;
+        let hop = *route.hops().last()?;
+        let line = self.survey.line();
+        let lost = line.traffic.lost;
+        let (first, last) = (lost.first?, lost.last?);
+        let is_silent = self.carried.frames == 0 && !line.host.is_watched;
+        let is_read = self.is_read && (self.survey.has_ended() || self.horizon > first);
+        let is_explained = self.survey.any_link_changed(first, last);
+        (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
+            hop,
+            card,
+            lost: lost.sum,
+            first,
+            last,
+        })
+    }
+}

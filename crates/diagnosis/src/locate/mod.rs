@@ -1,0 +1,16 @@
+//! Where frames are damaged: the counters of all controllers, read in the order of the checks.
+//!
+//! A controller checks a frame where it comes in from outside, and counts a bad one; whether later
+//! controllers count it again depends on their type. But all of them lie *behind* the damage: the
+//! first port in the order of [`Route::checks`](linesman_proto::topology::Route::checks) that counts
+//! is the far end of the hop on which frames are damaged. [`damage`] finds these hops; [`cause`] asks
+//! what can do such damage.
+//! References: S1 14 (error counters); how to find an error, `REQUIREMENTS` HW-18, HW-22 to HW-28.
+
+pub mod cause;
+pub mod damage;
+pub mod survey;
+
+pub use cause::{Suspect, Suspicion};
+pub use damage::{Damage, LastHop, Located};
+pub use survey::Survey;

@@ -1,0 +1,150 @@
+//! What the search looks at: the wiring, the ways of the frames, the counters, and when links changed.
+
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::{End, Route, Tree};
+
+use crate::line::{CounterTrack, Line, Rise};
+
+/// How far apart the readings that show a link's change and those that show the noise of that change
+/// may lie: link status and counters are read one after the other.
+const SAME_EVENT: Span = Span::ms(500);
+
+/// Readings further apart than this say nothing of what fell together between them.
+const LONGEST_EVENT: Span = Span::s(5);
+
+/// A controller whose counters were not read for this long no longer holds up a judgement.
+const STALE: Span = Span::s(10);
+
+/// A line with its wiring, ready to be searched.
+#[derive(Clone, Debug)]
+pub struct Survey<'a> {
+    line: &'a Line,
+    tree: &'a Tree,
+    routes: Vec<Route>,
+    has_ended: bool,
+    /// By link: from when to when it may have changed.
+    changes: Vec<Vec<(Instant, Instant)>>,
+}
+
+impl<'a> Survey<'a> {
+    /// Prepares the search; `None` while the wiring is not known.
+    ///
+    /// `has_ended` says that no further reading will come: then everything is judged as it stands.
+    #[must_use]
+    pub fn of(line: &'a Line, has_ended: bool) -> Option<Self> {
+        let tree = line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len())?;
+        let mut routes = Vec::with_capacity(2);
+        if tree.closes_at().is_some() {
+            let broken: Vec<usize> =
+                (0..tree.links().len()).filter(|link| is_down(line, tree, *link)).collect();
+            routes.extend(Path::ALL.map(|path| Route::of(tree, path, &broken)));
+        } else {
+            // What was counted before a link broke was counted on the whole way, so the whole way it
+            // is. What lies behind the break is simply not read any more.
+            let paths = Path::ALL.into_iter().filter(|path| tree.first(*path).is_some());
+            routes.extend(paths.map(|path| Route::of(tree, path, &[])));
+        }
+        let changes = (0..tree.links().len()).map(|link| changes(line, tree, link)).collect();
+        Some(Self { line, tree, routes, has_ended, changes })
+    }
+
+    /// The network.
+    #[must_use]
+    pub const fn line(&self) -> &'a Line {
+        self.line
+    }
+
+    /// The wiring.
+    #[must_use]
+    pub const fn tree(&self) -> &'a Tree {
+        self.tree
+    }
+
+    /// The ways of the frames: one for each card in use.
+    #[must_use]
+    pub fn routes(&self) -> &[Route] {
+        &self.routes
+    }
+
+    /// Whether no further reading will come.
+    #[must_use]
+    pub const fn has_ended(&self) -> bool {
+        self.has_ended
+    }
+
+    /// A counter of the controller at `node` of the tree; `None` when it was never read.
+    #[must_use]
+    pub fn track(&self, node: usize, counter: ErrorCounter) -> Option<&'a CounterTrack> {
+        self.line.devices.get(node)?.counters.track(counter)
+    }
+
+    /// Whether a rise falls together with a change of the link, as noise and cut-off frames do.
+    #[must_use]
+    pub fn falls_with_link_change(&self, link: usize, rise: &Rise) -> bool {
+        let Some(changes) = self.changes.get(link) else { return false };
+        if rise.at.since(rise.after_time) > LONGEST_EVENT {
+            return false;
+        }
+        changes.iter().any(|(from, to)| *from <= rise.at && rise.after_time <= *to)
+    }
+
+    /// Whether any link changed between two times: then frames were lost for that reason.
+    #[must_use]
+    pub fn any_link_changed(&self, from: Instant, to: Instant) -> bool {
+        self.changes.iter().flatten().any(|(began, ended)| *began <= to && from <= *ended)
+    }
+
+    /// When the counters at `port` of `node` were last read, if that reading is still waited for: not
+    /// of a controller that is gone, nor of one that is no longer read.
+    #[must_use]
+    pub fn last_read(&self, node: usize, port: Port) -> Option<Instant> {
+        let device = self.line.devices.get(node)?;
+        let at = device.counters.track(ErrorCounter::InvalidFrame(port))?.last.at;
+        (device.silent.is_none() && at + STALE >= self.line.now).then_some(at)
+    }
+
+    /// A link's end with its controller by identity.
+    #[must_use]
+    pub fn name(&self, end: End) -> End<DeviceId> {
+        end.map(|node| DeviceId(node as u32))
+    }
+}
+
+/// Whether either end of a link is known to have no link.
+fn is_down(line: &Line, tree: &Tree, link: usize) -> bool {
+    let ends = [tree.links()[link].upstream, tree.links()[link].downstream];
+    ends.into_iter().any(|end| match end {
+        End::MainDevice(path) => line.host.card(path).carrier.is_some_and(|carrier| !carrier.value),
+        End::Controller(node, port) => line.devices[node].dl.is_active(port) == Some(false),
+    })
+}
+
+/// When a link may have changed, as its two ends tell.
+fn changes(line: &Line, tree: &Tree, link: usize) -> Vec<(Instant, Instant)> {
+    let around = |from: Instant, to: Instant| (from.before(SAME_EVENT), to + SAME_EVENT);
+    let mut changes = Vec::new();
+    for end in [tree.links()[link].upstream, tree.links()[link].downstream] {
+        match end {
+            End::MainDevice(path) => {
+                let card = line.host.card(path);
+                let changed = card.carrier.filter(|_| card.carrier_changes > 0);
+                changes.extend(changed.map(|carrier| around(carrier.at, carrier.at)));
+            }
+            End::Controller(node, port) => {
+                let device = &line.devices[node];
+                let moved =
+                    device.dl.changes.iter().filter(|change| {
+                        change.from.port_state(port) != change.to.port_state(port)
+                    });
+                changes.extend(moved.map(|change| around(change.at, change.at)));
+                let lost = device.counters.track(ErrorCounter::LostLink(port));
+                let rises = lost.into_iter().flat_map(|track| &track.rises);
+                changes.extend(rises.map(|rise| (rise.after_time, rise.at)));
+            }
+        }
+    }
+    changes
+}

@@ -1,0 +1,40 @@
+//! A request and what came back for it.
+
+use linesman_proto::address::Path;
+use linesman_proto::time::Instant;
+
+/// One copy of a frame on its way.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct FrameCopy<'a> {
+    /// The frame.
+    pub bytes: &'a [u8],
+    /// When it was seen.
+    pub time: Instant,
+    /// Its number.
+    pub number: u64,
+    /// The card, where known.
+    pub path: Option<Path>,
+}
+
+/// What is known of one request after a copy of it came back, or after none did.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Exchange<'a> {
+    /// On its way out; `None` when only the return was seen.
+    pub request: Option<FrameCopy<'a>>,
+    /// On its way back; `None` when it never came.
+    pub reply: Option<FrameCopy<'a>>,
+    /// Working counters, datagram by datagram, of copies that came back before this one: in a ring
+    /// each request goes out by both cards.
+    pub earlier: &'a [u16],
+    /// Whether nothing more will come: now it can be judged.
+    pub is_last: bool,
+}
+
+impl Exchange<'_> {
+    /// The working counter of datagram `index`, all copies together, when the one that just came
+    /// back has `wkc`.
+    #[must_use]
+    pub fn sum(&self, index: usize, wkc: u16) -> u16 {
+        self.earlier.get(index).map_or(wkc, |earlier| earlier.saturating_add(wkc))
+    }
+}

@@ -1,0 +1,62 @@
+//! What a frame keeps on its way through the line, and what changes.
+//!
+//! Controllers keep command, index, length and, but for positions, the address of each datagram;
+//! they change working counters, positions and data. The former pair a frame with its request, the
+//! latter tell the two apart where the capture does not.
+
+use linesman_proto::command::Addressing;
+use linesman_proto::frame::FrameView;
+
+/// Both halves of a frame, hashed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Fingerprint {
+    /// What stays: equal for a request and its return.
+    pub lasting: u64,
+    /// Working counters and positions: a frame that any controller answered differs from its
+    /// request.
+    pub changing: u64,
+    /// Whether any working counter is above 0.
+    pub is_answered: bool,
+    /// Datagrams that could be read.
+    pub datagrams: u32,
+    /// Whether the walk over the datagrams ended too early.
+    pub is_cut: bool,
+}
+
+impl Fingerprint {
+    /// Of the datagrams of a frame.
+    #[must_use]
+    pub fn of(view: &FrameView<'_>) -> Self {
+        let mut print =
+            Self { lasting: 0, changing: 0, is_answered: false, datagrams: 0, is_cut: false };
+        for datagram in view.datagrams() {
+            let Ok(datagram) = datagram else {
+                print.is_cut = true;
+                break;
+            };
+            let is_position = datagram.command().is_some_and(|command| {
+                matches!(command.addressing(), Addressing::Position | Addressing::Broadcast)
+            });
+            let address = u64::from(datagram.logical().0);
+            let (lasting, changing) =
+                if is_position { (address >> 16, address & 0xFFFF) } else { (address, 0) };
+            let head = u64::from(datagram.code()) << 56
+                | u64::from(datagram.index()) << 48
+                | (datagram.data_len() as u64) << 32;
+            let wkc = u64::from(datagram.wkc().0);
+            print.lasting = mix(print.lasting, head | lasting);
+            print.changing = mix(print.changing, changing << 16 | wkc);
+            print.is_answered |= wkc > 0;
+            print.datagrams += 1;
+        }
+        print
+    }
+}
+
+/// Multiply and fold: fast, and good enough to tell a few hundred frames apart. An odd factor keeps
+/// all bits of the product in play.
+const fn mix(state: u64, word: u64) -> u64 {
+    const FACTOR: u128 = 0x9E37_79B9_7F4A_7C15;
+    let product = (state.rotate_left(23) ^ word ^ 0xF39C_C060_5CED_C835) as u128 * FACTOR;
+    (product as u64) ^ ((product >> 64) as u64)
+}

@@ -1,0 +1,301 @@
+//! Which frames belong together.
+//!
+//! A live socket knows what it sent and what it received. Most captures do not: there a frame is a
+//! return when it fits an outstanding request and differs from it in what controllers change, or
+//! carries the mark that the first controller sets in the source address. A frame that fits no
+//! request is a return whose request was not seen if it is marked like one or was answered, and a
+//! new request otherwise.
+//!
+//! Frames of one line come back in the order in which they were sent, so a request that later ones
+//! overtook is lost. Time stamps decide nothing here but for live sockets, since those of captures
+//! jump and run backwards.
+
+use std::collections::VecDeque;
+
+use linesman_proto::address::Path;
+use linesman_proto::ethernet::MacAddress;
+use linesman_proto::frame::FrameView;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen};
+
+/// Most requests waiting for their return; beyond, the oldest is lost.
+const MOST_PENDING: usize = 256;
+/// So many later returns make a request lost: far more than two paths can reorder.
+const OVERTAKEN: u16 = 16;
+/// On a live socket a frame that is not back by then never comes.
+const TIMEOUT: Span = Span::ms(100);
+/// Two equal requests closer than this are one that was recorded twice: the shortest frame takes
+/// longer.
+const RECORDED_TWICE: Span = Span::us(3);
+/// How many returns are remembered to know one that was recorded twice.
+const REMEMBERED: usize = 8;
+/// Senders kept.
+const MOST_SENDERS: usize = 4;
+
+/// What a frame turned out to be, besides the exchange it may complete.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Outcome {
+    /// A request.
+    Request,
+    /// The same request by the other card.
+    RequestCopy,
+    /// A return.
+    Return,
+    /// A return whose request was not seen.
+    ReturnAlone,
+    /// A frame that was recorded twice.
+    Duplicate,
+}
+
+/// Requests that wait for their return.
+#[derive(Clone, Default, Debug)]
+pub struct Pairing {
+    pending: VecDeque<Pending>,
+    spare: Vec<Vec<u8>>,
+    spare_sums: Vec<Vec<u16>>,
+    returned: [Option<(Fingerprint, Instant)>; REMEMBERED],
+    returned_next: usize,
+    senders: Vec<MacAddress>,
+    returns_seen: bool,
+}
+
+#[derive(Clone, Debug)]
+struct Pending {
+    print: Fingerprint,
+    bytes: Vec<u8>,
+    time: Instant,
+    number: u64,
+    path: Option<Path>,
+    is_marked: bool,
+    is_live: bool,
+    sent: [bool; 2],
+    /// Copies that are still out.
+    out: u8,
+    overtaken: u16,
+    /// Working counters of copies that came back.
+    sums: Vec<u16>,
+}
+
+impl Pending {
+    fn copy(&self) -> FrameCopy<'_> {
+        FrameCopy { bytes: &self.bytes, time: self.time, number: self.number, path: self.path }
+    }
+}
+
+impl Pairing {
+    /// Takes a whole, undamaged frame, and hands over every exchange it completes or settles.
+    pub fn take(
+        &mut self,
+        frame: &FrameSeen<'_>,
+        view: &FrameView<'_>,
+        print: Fingerprint,
+        settle: &mut impl FnMut(&Exchange<'_>),
+    ) -> Outcome {
+        let source = view.source();
+        let found = self.pending.iter().position(|pending| pending.print.lasting == print.lasting);
+        let is_return = match frame.direction {
+            Direction::Sent => false,
+            Direction::Received => true,
+            Direction::Unknown => self.is_return(found, source, print),
+        };
+        if !is_return {
+            return self.request(frame, source, print, settle);
+        }
+        self.returns_seen = true;
+        let Some(found) = found else {
+            if self.was_returned(print, frame.time) {
+                return Outcome::Duplicate;
+            }
+            self.remember(print, frame.time);
+            let reply = Some(copy(frame));
+            settle(&Exchange { request: None, reply, earlier: &[], is_last: true });
+            return Outcome::ReturnAlone;
+        };
+        self.remember(print, frame.time);
+        self.give_back(found, frame, view, settle);
+        Outcome::Return
+    }
+
+    /// Settles what a live socket waited for in vain.
+    pub fn expire(&mut self, now: Instant, settle: &mut impl FnMut(&Exchange<'_>)) {
+        while self.timeout().is_some_and(|at| at <= now) {
+            self.lose(0, settle);
+        }
+    }
+
+    /// When [`Pairing::expire`] has something to do.
+    #[must_use]
+    pub fn timeout(&self) -> Option<Instant> {
+        self.pending.front().filter(|oldest| oldest.is_live).map(|oldest| oldest.time + TIMEOUT)
+    }
+
+    /// Settles all requests that are still out: the input has ended.
+    pub fn finish(&mut self, settle: &mut impl FnMut(&Exchange<'_>)) {
+        while !self.pending.is_empty() {
+            self.lose(0, settle);
+        }
+    }
+
+    /// Requests whose return is still awaited.
+    #[must_use]
+    pub fn outstanding(&self) -> usize {
+        self.pending.len()
+    }
+
+    /// The source addresses that requests came from, at most four.
+    #[must_use]
+    pub fn senders(&self) -> &[MacAddress] {
+        &self.senders
+    }
+
+    /// Whether a frame of unknown direction is on its way back.
+    fn is_return(&self, found: Option<usize>, source: MacAddress, print: Fingerprint) -> bool {
+        let Some(pending) = found.map(|index| &self.pending[index]) else {
+            let is_own = |sender: &MacAddress| !sender.is_marked() && sender.marked() == source;
+            return print.is_answered || self.senders.iter().any(is_own);
+        };
+        if print.changing != pending.print.changing {
+            return true;
+        }
+        match (pending.is_marked, source.is_marked()) {
+            (false, marked) => marked,
+            // An address that is marked from the start shows nothing. Where answers are known to
+            // come, a second frame is the return; else it is the request again.
+            (true, _) => self.returns_seen,
+        }
+    }
+
+    fn request(
+        &mut self,
+        frame: &FrameSeen<'_>,
+        source: MacAddress,
+        print: Fingerprint,
+        settle: &mut impl FnMut(&Exchange<'_>),
+    ) -> Outcome {
+        let same = |pending: &&mut Pending| {
+            pending.print == print && gap(pending.time, frame.time) <= RECORDED_TWICE
+        };
+        // Copies for the other card follow at once, so only the latest ones can be meant.
+        if let Some(pending) = self.pending.iter_mut().rev().take(8).find(same) {
+            let card = frame.path.unwrap_or_default().index();
+            if !pending.sent[card] {
+                pending.sent[card] = true;
+                pending.out += 1;
+                return Outcome::RequestCopy;
+            }
+            if frame.direction == Direction::Unknown && pending.bytes == frame.bytes {
+                return Outcome::Duplicate;
+            }
+        }
+        if !self.senders.contains(&source) && self.senders.len() < MOST_SENDERS {
+            self.senders.push(source);
+        }
+        if self.pending.len() >= MOST_PENDING {
+            self.lose(0, settle);
+        }
+        let mut bytes = self.spare.pop().unwrap_or_default();
+        bytes.clear();
+        bytes.extend_from_slice(frame.bytes);
+        let mut sums = self.spare_sums.pop().unwrap_or_default();
+        sums.clear();
+        let mut sent = [false; 2];
+        sent[frame.path.unwrap_or_default().index()] = true;
+        self.pending.push_back(Pending {
+            print,
+            bytes,
+            time: frame.time,
+            number: frame.number,
+            path: frame.path,
+            is_marked: source.is_marked(),
+            is_live: frame.direction != Direction::Unknown,
+            sent,
+            out: 1,
+            overtaken: 0,
+            sums,
+        });
+        Outcome::Request
+    }
+
+    /// Pairs a return with pending request `found`.
+    fn give_back(
+        &mut self,
+        found: usize,
+        frame: &FrameSeen<'_>,
+        view: &FrameView<'_>,
+        settle: &mut impl FnMut(&Exchange<'_>),
+    ) {
+        let pending = &mut self.pending[found];
+        pending.out -= 1;
+        let is_last = pending.out == 0;
+        settle(&Exchange {
+            request: Some(pending.copy()),
+            reply: Some(copy(frame)),
+            earlier: &pending.sums,
+            is_last,
+        });
+        if is_last {
+            self.remove(found);
+        } else {
+            let readable = view.datagrams().map_while(Result::ok);
+            for (index, datagram) in readable.enumerate() {
+                let wkc = datagram.wkc().0;
+                match pending.sums.get_mut(index) {
+                    Some(sum) => *sum = sum.saturating_add(wkc),
+                    None => pending.sums.push(wkc),
+                }
+            }
+        }
+        if found > 0 {
+            self.overtake(found, settle);
+        }
+    }
+
+    /// Everything sent before the request at `found` was overtaken once more.
+    fn overtake(&mut self, found: usize, settle: &mut impl FnMut(&Exchange<'_>)) {
+        for pending in self.pending.iter_mut().take(found) {
+            pending.overtaken += 1;
+        }
+        while self.pending.front().is_some_and(|oldest| oldest.overtaken >= OVERTAKEN) {
+            self.lose(0, settle);
+        }
+    }
+
+    /// Gives up on a request; what came back of its copies counts.
+    fn lose(&mut self, index: usize, settle: &mut impl FnMut(&Exchange<'_>)) {
+        let Some(pending) = self.pending.get(index) else { return };
+        settle(&Exchange {
+            request: Some(pending.copy()),
+            reply: None,
+            earlier: &pending.sums,
+            is_last: true,
+        });
+        self.remove(index);
+    }
+
+    fn remove(&mut self, index: usize) {
+        if let Some(pending) = self.pending.remove(index) {
+            self.spare.push(pending.bytes);
+            self.spare_sums.push(pending.sums);
+        }
+    }
+
+    fn remember(&mut self, print: Fingerprint, time: Instant) {
+        self.returned[self.returned_next] = Some((print, time));
+        self.returned_next = (self.returned_next + 1) % REMEMBERED;
+    }
+
+    fn was_returned(&self, print: Fingerprint, time: Instant) -> bool {
+        let known = self.returned.iter().flatten();
+        known.into_iter().any(|(other, at)| *other == print && gap(*at, time) <= RECORDED_TWICE)
+    }
+}
+
+const fn copy<'a>(frame: &FrameSeen<'a>) -> FrameCopy<'a> {
+    FrameCopy { bytes: frame.bytes, time: frame.time, number: frame.number, path: frame.path }
+}
+
+/// The time between two instants in either order.
+fn gap(one: Instant, other: Instant) -> Span {
+    if one < other { other.since(one) } else { one.since(other) }
+}

@@ -1,0 +1,299 @@
+//! # Damaged frames and symbols
+//!
+//! Frames are spoiled, or symbols between them, on a link or inside a device.
+//!
+//! **How it is found.** A controller checks each frame where it comes in from outside: at the IN port
+//! on the way out, at the other ports on the way back. Bad frames count in the low byte of the RX error
+//! register of the port (0x0300, 0x0302, 0x0304, 0x0306), symbols that cannot be decoded in the high
+//! byte, also those between frames. A controller behind the first one counts a bad frame as forwarded
+//! (0x0308 to 0x030B) or, if its type does not have these counters, once more as bad. So the ports are
+//! put in the order in which a frame meets them, and the *first* one that counts lies directly behind
+//! the damage. Only rises during the watch count: old values, and errors at the moment a link comes or
+//! goes, are history.
+//!
+//! **What it means.**
+//!
+//! * Bad frames and bad symbols, or symbols alone: the signal suffers between the output of one device
+//!   and the input of the next. Cable, plug, contact, interference, or one of the two port circuits.
+//!   Both directions of one link point to the cable; several links at the same moments to interference;
+//!   one direction that counts steadily to the sender's output or the receiver's input.
+//! * Bad frames with clean symbols (`H111`): the device before the port spoils frames inside, before
+//!   they are coded. Changing the cable will not help.
+//! * The way from the first SubDevice back to the card is checked by nobody but the card. If its own
+//!   counters are known, they tell; if not, frames that are lost without any counter moving (`H112`)
+//!   may have been spoiled on that last piece of cable or lost in the computer: then all of these are
+//!   named.
+//!
+//! **What to do.** Look at the place first: cable beside power cables, self-made plugs, shield, supply
+//! and ground of both devices. Then exchange cable or devices and see whether the errors stay at the
+//! place or move with the part.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::DeviceId;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::Span;
+use linesman_proto::topology::End;
+use linesman_proto::topology::route::Direction;
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
+use crate::locate::cause::Spot;
+use crate::locate::{Damage, LastHop, Located, Survey, Suspicion};
+
+/// The signal suffers on a link.
+pub const ON_LINK: RulePage = RulePage {
+    code: "H110",
+    name: "damage-on-link",
+    severity: Severity::Error,
+    class: Class::Hardware,
+    source: include_str!("frame_errors.rs"),
+};
+
+/// A device, or the card, spoils frames before they are coded.
+pub const INSIDE: RulePage = RulePage {
+    code: "H111",
+    name: "damage-in-device",
+    severity: Severity::Error,
+    class: Class::Hardware,
+    source: include_str!("frame_errors.rs"),
+};
+
+/// Frames are lost where nobody counts.
+pub const LAST_HOP: RulePage = RulePage {
+    code: "H112",
+    name: "lost-on-last-hop",
+    severity: Severity::Warning,
+    class: Class::Hardware,
+    source: include_str!("frame_errors.rs"),
+};
+
+/// Errors that did not come again for this long are over.
+const QUIET: Span = Span::s(2);
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[ON_LINK, INSIDE, LAST_HOP], judge };
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let Some(survey) = Survey::of(view.line, view.has_ended) else { return };
+    let located = Located::on(&survey);
+    for suspicion in Suspicion::all(&survey, &located) {
+        add(view, &survey, &suspicion, None, conditions);
+    }
+}
+
+fn add(
+    view: &View<'_>,
+    survey: &Survey<'_>,
+    suspicion: &Suspicion,
+    leader: Option<&Suspicion>,
+    conditions: &mut Vec<Condition>,
+) {
+    let Some(most_likely) = suspicion.suspects.first() else { return };
+    let (first, last) = match (suspicion.first(), suspicion.last()) {
+        (Some(first), Some(last)) => (first, last),
+        (None, _) | (_, None) => return,
+    };
+    let is_unknown = matches!(suspicion.last_hop, Some(LastHop::Unknown { .. }));
+    let page = match (is_unknown, most_likely.spot) {
+        (true, _) => &LAST_HOP,
+        (false, Spot::Link(..)) => &ON_LINK,
+        (false, Spot::Device(_) | Spot::Host) => &INSIDE,
+    };
+    let at = place(survey, most_likely.spot);
+    let mut condition =
+        Condition::new(page, at, most_likely.cause, first).confidence(most_likely.weight);
+    if suspicion.frames() == 0 {
+        condition.severity = Severity::Warning;
+    }
+    for other in &suspicion.suspects[1..] {
+        let place = place(survey, other.spot);
+        condition.alternatives.push(Alternative {
+            cause: other.cause,
+            place: (place != at).then_some(place),
+            confidence: other.weight,
+        });
+    }
+    if !is_unknown {
+        condition = condition.confirmed(first);
+    }
+    if last + QUIET < view.line.now {
+        condition = condition.ended(last);
+    }
+    for damage in &suspicion.damages {
+        show(survey, damage, &mut condition);
+    }
+    if let Some(last_hop) = &suspicion.last_hop {
+        condition.evidence.push(card_evidence(last_hop));
+    }
+    for action in actions(survey, most_likely.cause, most_likely.spot) {
+        condition = condition.advise(action);
+    }
+    let mine = symptoms(survey, suspicion);
+    condition.symptoms.extend(mine.iter().copied());
+    condition.explains.extend(mine);
+    for other in &suspicion.beneath {
+        condition.explains.extend(symptoms(survey, other));
+    }
+    condition.explains.extend(later_checks(survey, suspicion));
+    if suspicion.frames() > 0 {
+        condition.explains.push(Symptom::FramesLost);
+        condition.explains.push(Symptom::CardErrors);
+    }
+    if leader.is_some() {
+        // Only the one that leads explains; the others hang beneath it.
+        condition.explains.clear();
+    }
+    conditions.push(condition);
+    for other in &suspicion.beneath {
+        add(view, survey, other, Some(suspicion), conditions);
+    }
+}
+
+/// What the damage is about: the ports that found it first, and the card.
+fn symptoms(survey: &Survey<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
+    let ports = suspicion.damages.iter().filter_map(|damage| match survey.name(damage.hop.to) {
+        End::Controller(id, port) => Some(Symptom::PortErrors(id, port)),
+        End::MainDevice(_) => None,
+    });
+    let card = suspicion.last_hop.as_ref().map(|hop| match hop {
+        LastHop::Damaged { .. } => Symptom::CardErrors,
+        LastHop::Unknown { .. } => Symptom::FramesLost,
+    });
+    ports.chain(card).collect()
+}
+
+/// The ports that meet the bad frames later.
+fn later_checks(survey: &Survey<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
+    let mut later = Vec::new();
+    for damage in suspicion.damages.iter().filter(|damage| damage.frames > 0) {
+        for route in survey.routes().iter().filter(|route| route.path() == damage.path) {
+            let hop = route.hops().iter().position(|hop| *hop == damage.hop);
+            for check in hop.into_iter().flat_map(|hop| route.checks_from(hop + 1)) {
+                later.push(Symptom::PortErrors(DeviceId(check.node as u32), check.port));
+            }
+        }
+    }
+    later.sort_unstable();
+    later.dedup();
+    later
+}
+
+fn place(survey: &Survey<'_>, spot: Spot) -> Place {
+    let network = survey.line().network;
+    match spot {
+        Spot::Link(link, direction) => {
+            let direction = match direction {
+                Some(Direction::Downstream) => LinkDirection::AToB,
+                Some(Direction::Upstream) => LinkDirection::BToA,
+                None => LinkDirection::Both,
+            };
+            let link = survey.tree().links()[link].map(|node| DeviceId(node as u32));
+            Place::link(network, link, Some(direction))
+        }
+        Spot::Device(node) => Place::device(network, DeviceId(node as u32)),
+        Spot::Host => Place::Host,
+    }
+}
+
+/// The counters that show a damage, with what they mean.
+fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
+    let End::Controller(node, port) = damage.hop.to else { return };
+    let id = DeviceId(node as u32);
+    let from = end_text(survey, damage.hop.from);
+    let at_least = if damage.is_lower_bound { "at least " } else { "" };
+    let label = survey.line().label(id);
+    let frames = damage.frames;
+    let frames_text = format!(
+        "SubDevice {label}, port {port}, is the first in the order of checks that counts bad frames \
+         from {from}: {at_least}{frames} of its own"
+    );
+    let symbols_text = match damage.symbols {
+        Some(symbols) => format!(
+            "SubDevice {label}, port {port}, could not decode {at_least}{symbols} symbols from {from}"
+        ),
+        None => String::new(),
+    };
+    let shown = [
+        (ErrorCounter::InvalidFrame(port), frames > 0, frames_text),
+        (
+            ErrorCounter::PhysicalLayer(port),
+            damage.symbols.is_some_and(|symbols| symbols > 0),
+            symbols_text,
+        ),
+    ];
+    for (counter, is_shown, text) in shown {
+        let track = survey.track(node, counter);
+        if let Some(rise) = track.filter(|_| is_shown).and_then(|track| track.last_rise()) {
+            let first = track.and_then(|track| track.first_rise()).unwrap_or(rise);
+            let evidence = Evidence::rise(id, counter.address(), Some(port), rise, text)
+                .values(Some(u64::from(first.before)), Some(u64::from(rise.after)));
+            condition.evidence.push(evidence);
+        }
+    }
+}
+
+fn card_evidence(last_hop: &LastHop) -> Evidence {
+    let (card, frames) = (last_hop.card(), last_hop.frames());
+    let text = match last_hop {
+        LastHop::Damaged { .. } => format!(
+            "card {card} dropped {frames} bad frames that no SubDevice had found bad: they were \
+             spoiled on the last way, from the first SubDevice to the card"
+        ),
+        LastHop::Unknown { .. } => format!(
+            "{frames} frames did not come back to card {card}, and no counter of any SubDevice moved; \
+             the counters of the card are not known"
+        ),
+    };
+    Evidence::host(Some(last_hop.last()), text)
+}
+
+fn end_text(survey: &Survey<'_>, end: End) -> String {
+    match survey.name(end) {
+        End::MainDevice(card) => format!("the MainDevice (card {card})"),
+        End::Controller(id, port) => format!("SubDevice {}, port {port}", survey.line().label(id)),
+    }
+}
+
+/// What to do, in the order in which it is worth doing. Reference: HW-25.
+fn actions(survey: &Survey<'_>, cause: FaultName, spot: Spot) -> Vec<String> {
+    let ends = |link: usize| {
+        let link = survey.tree().links()[link];
+        (end_text(survey, link.upstream), end_text(survey, link.downstream))
+    };
+    match spot {
+        Spot::Link(link, _) => {
+            let (a, b) = ends(link);
+            let mut list = Vec::new();
+            if cause == FaultName::EmcNoise {
+                list.push(
+                    "Look for what switches at the moments of the errors: drives, contactors, welding."
+                        .to_owned(),
+                );
+            }
+            list.push(format!(
+                "Check the cable or contact between {a} and {b}: near power cables or other sources of \
+                 noise, self-made plugs, shield, bend, seat of the plug."
+            ));
+            list.push(format!(
+                "Check supply and ground of {a} and {b}: E-bus current, difference in ground potential."
+            ));
+            list.push(
+                "Exchange the cable, then swap one of the two devices: see whether the errors stay or \
+                 move with the part."
+                    .to_owned(),
+            );
+            list
+        }
+        Spot::Device(node) => {
+            let label = survey.line().label(DeviceId(node as u32));
+            vec![
+                format!("Exchange SubDevice {label}: symbols after it are clean, frames are not."),
+                "Before that, check its supply; the cable behind it is not the cause.".to_owned(),
+            ]
+        }
+        Spot::Host => vec![
+            "Try another network card, or another socket of the computer.".to_owned(),
+            "Check the plug and the cable at the card.".to_owned(),
+        ],
+    }
+}
