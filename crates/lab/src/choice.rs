@@ -5,7 +5,7 @@ use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::Span;
 use linesman_proto::topology::{End, Tree};
 use linesman_sim::seed::Stream;
-use linesman_sim::segment_file::FaultEntry;
+use linesman_sim::segment_file::{FaultEntry, OneOrMany};
 
 /// The line as far as choosing needs it.
 #[derive(Clone, Debug)]
@@ -183,7 +183,7 @@ impl Choice {
 #[must_use]
 pub fn text(entry: &FaultEntry) -> String {
     let mut text = entry.kind.clone();
-    if let Some(at) = &entry.at {
+    for at in entry.at.iter().flat_map(OneOrMany::as_slice) {
         text += &format!(" at {at}");
     }
     for device in entry.device.iter().chain(entry.devices.iter().flatten()) {

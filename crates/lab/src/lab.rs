@@ -9,9 +9,8 @@ use linesman_config::project::Project;
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
 use linesman_diagnosis::{Engine, Setup};
-use linesman_maindevice::{Event, MainDevice, Options};
+use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest};
 use linesman_proto::address::{DeviceId, Network, Path};
-use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 use linesman_sim::fault::FaultError;
@@ -400,7 +399,12 @@ impl Lab {
             self.handle_event(event);
         }
         while let Some(probe) = self.engine.poll_probe() {
-            self.main.probe(self.now, probe.into());
+            let request = ProbeRequest {
+                device: probe.device,
+                register: probe.register,
+                len: probe.len,
+            };
+            self.main.probe(self.now, request);
         }
         while self.engine.poll_event().is_some() {}
         Ok(())
@@ -426,7 +430,7 @@ impl Lab {
 
     fn handle_event(&mut self, event: Event) {
         match &event {
-            Event::Scanned(inventory) => match self.plan(inventory) {
+            Event::Scanned(inventory) => match self.make_plan(inventory) {
                 Ok(plan) => {
                     self.main.start(self.now, plan.clone());
                     self.plan = Some(plan);
@@ -443,7 +447,7 @@ impl Lab {
     }
 
     /// The plan for what was found, with the names of the project where they fit.
-    fn plan(&self, inventory: &linesman_config::inventory::Inventory) -> Result<Plan, String> {
+    fn make_plan(&self, inventory: &linesman_config::inventory::Inventory) -> Result<Plan, String> {
         let mut planned = inventory.planned(self.options.target);
         if planned.len() == self.project.devices.len() {
             for (device, wanted) in planned.iter_mut().zip(&self.project.devices) {

@@ -8,7 +8,7 @@ use linesman_lab::options::LabOptions;
 use linesman_link::capture::{
     CaptureInterfaceId, FrameDirection, FrameToWrite, InterfaceToWrite, LinkType, PcapngWriter,
 };
-use linesman_link::UnixTime;
+use linesman_link::unix_time::UnixTime;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Seed;
 use linesman_sim::segment_file::FaultEntry;
@@ -19,7 +19,7 @@ use linesman_config::fault::FaultName;
 fn capture(seed: u64) -> Vec<u8> {
     let writer = PcapngWriter::new(Vec::new(), "linesman test").unwrap();
     let writer = Arc::new(Mutex::new(Some(writer)));
-    let interface = InterfaceToWrite { name: "lab0", description: "", link_type: LinkType::ETHERNET };
+    let interface = InterfaceToWrite { name: "lab0", description: "", link_type: LinkType::Ethernet };
     writer.lock().unwrap().as_mut().unwrap().add_interface(&interface).unwrap();
     let mut file = plant(Seed(seed), &PlantOptions::default());
     let first = file.devices[0].name.clone();
@@ -36,8 +36,8 @@ fn capture(seed: u64) -> Vec<u8> {
             interface: CaptureInterfaceId(0),
             time: UnixTime::from_nanos(seen.time.as_nanos().into()),
             direction: match seen.direction {
-                Direction::Sent => FrameDirection::Sent,
-                Direction::Received => FrameDirection::Received,
+                Direction::Sent => FrameDirection::Outgoing,
+                Direction::Received => FrameDirection::Incoming,
                 Direction::Unknown => FrameDirection::Unknown,
             },
             with_fcs: false,

@@ -28,9 +28,9 @@
 //! they stand.
 
 pub mod parse;
-//pub mod run;
+pub mod run;
 pub mod step;
 
-//pub use run::{StepReport, StoryReport, exit_status, play};
+pub use run::{StepReport, StoryReport, exit_status, play};
 pub use parse::{Front, SegmentText, Story, StoryError};
 pub use step::{Expectation, Heal, Step, StepAt, What};

@@ -204,9 +204,10 @@ impl Stage {
     }
 
     fn resolve<'a>(&self, what: &'a Expectation) -> Result<Resolved<'a>, String> {
-        let site = match what {
-            Expectation::Finding { place: Some(place), .. } => Some(self.site(place)?),
-            _ => None,
+        let site = if let Expectation::Finding { place: Some(place), .. } = what {
+            Some(self.site(place)?)
+        } else {
+            None
         };
         Ok(Resolved { what, site })
     }

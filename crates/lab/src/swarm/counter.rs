@@ -16,21 +16,21 @@ pub struct Returned {
     /// Number of the frame in the run.
     pub frame: u64,
     /// What it was of.
-    pub of: Of,
+    pub kind: Kind,
     /// Its value.
     pub counter: u16,
 }
 
 /// The datagrams that are checked.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Of {
+pub enum Kind {
     /// The broadcast read of the AL status: everyone counts.
     Broadcast,
     /// A logical datagram, by its address.
     Logical(u32),
 }
 
-impl Of {
+impl Kind {
     /// What a datagram is, if it is one that is checked.
     #[must_use]
     pub fn of(datagram: &Datagram<'_>) -> Option<Self> {
@@ -51,11 +51,11 @@ impl Of {
 ///
 /// It counts by hand: a broadcast one for each, a logical read one, a write one, both three.
 #[must_use]
-pub fn expected(of: Of, plan: &Plan, reached: &[bool]) -> Option<u16> {
+pub fn expected(kind: Kind, plan: &Plan, reached: &[bool]) -> Option<u16> {
     let there = |node: usize| reached.get(node).copied().unwrap_or(false);
-    match of {
-        Of::Broadcast => Some(reached.iter().filter(|reached| **reached).count() as u16),
-        Of::Logical(address) => {
+    match kind {
+        Kind::Broadcast => Some(reached.iter().filter(|reached| **reached).count() as u16),
+        Kind::Logical(address) => {
             let (.., datagram) = plan.datagrams().find(|(.., datagram)| {
                 matches!(datagram.address, DatagramAddress::Logical(at) if at.0 == address)
             })?;

@@ -12,7 +12,7 @@ use linesman_proto::topology::Tree;
 use linesman_sim::seed::Stream;
 use linesman_sim::truth::FaultId;
 
-use super::counter::{Of, Returned, expected};
+use super::counter::{Kind, Returned, expected};
 use super::reach::Reach;
 use super::run::{SwarmOptions, cabled};
 use crate::choice::{AT_RUN_TIME, Choice, Ground};
@@ -118,10 +118,11 @@ impl<'a> Episode<'a> {
             ground.choose(name, stream)
         };
         let mut choices: Vec<Choice> = draw().into_iter().collect();
-        if let (Some(first), Some(second)) = (choices.first(), draw()) {
-            if stream.chance(0.2) && are_apart(tree, first, &second) {
-                choices.push(second);
-            }
+        if let (Some(first), Some(second)) = (choices.first(), draw())
+            && stream.chance(0.2)
+            && are_apart(tree, first, &second)
+        {
+            choices.push(second);
         }
         choices
     }
@@ -155,10 +156,10 @@ impl<'a> Episode<'a> {
         let mut wrong = None;
         for note in returned {
             // What a SubDevice serves while it is being set up is its own affair.
-            if matches!(note.of, Of::Logical(_)) && !up {
+            if matches!(note.kind, Kind::Logical(_)) && !up {
                 continue;
             }
-            let Some(expected) = expected(note.of, plan, &reached) else { continue };
+            let Some(expected) = expected(note.kind, plan, &reached) else { continue };
             self.checked += 1;
             if expected != note.counter {
                 wrong = wrong.or(Some((*note, expected)));
@@ -169,7 +170,7 @@ impl<'a> Episode<'a> {
                 "working counter {} of {:?} in frame {} at {}, expected {expected}: {} of {} \
                  SubDevices can be reached",
                 note.counter,
-                note.of,
+                note.kind,
                 note.frame,
                 note.at,
                 reached.iter().filter(|reached| **reached).count(),
@@ -343,9 +344,9 @@ fn note_into(notes: Notes) -> impl FnMut(&FrameSeen<'_>) + Send {
         let Ok(view) = FrameView::parse(seen.bytes) else { return };
         let mut notes = notes.lock().unwrap_or_else(PoisonError::into_inner);
         for datagram in view.datagrams().flatten() {
-            if let Some(of) = Of::of(&datagram) {
+            if let Some(kind) = Kind::of(&datagram) {
                 let counter = datagram.wkc().0;
-                notes.push(Returned { at: seen.time, frame: seen.number, of, counter });
+                notes.push(Returned { at: seen.time, frame: seen.number, kind, counter });
             }
         }
     }

@@ -1,5 +1,6 @@
 //! One seed, and many of them.
 
+use std::fmt;
 use std::ops::Range;
 
 use linesman_proto::address::DeviceId;
@@ -80,6 +81,24 @@ impl SeedReport {
     #[must_use]
     pub fn replay(&self) -> String {
         format!("linesman lab swarm --seeds {}..{}", self.seed, self.seed + 1)
+    }
+}
+
+impl fmt::Display for SeedReport {
+    /// One line when all held; else also what did not, and how to play it again.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mark = if self.is_green() { "ok  " } else { "FAIL" };
+        let faults = self.episodes.iter().flat_map(|episode| &episode.faults);
+        let faults: Vec<&str> = faults.map(|fault| fault.entry.as_str()).collect();
+        let (seed, devices) = (self.seed, self.devices);
+        write!(f, "{mark} seed {seed:>4}  {devices:>3} SubDevices  {}", faults.join(" | "))?;
+        for violation in &self.violations {
+            write!(f, "\n       {violation}")?;
+        }
+        if !self.is_green() {
+            write!(f, "\n       again: {}", self.replay())?;
+        }
+        Ok(())
     }
 }
 

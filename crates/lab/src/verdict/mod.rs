@@ -6,6 +6,7 @@
 
 pub mod admit;
 pub mod claim;
+pub mod judge;
 pub mod site;
 
 pub use admit::{Admitted, Scene, Truth, TruthPlace};
