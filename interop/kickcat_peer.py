@@ -36,7 +36,7 @@ def main():
                 pass
             due += cycle_s
             time.sleep(max(0.0, due - time.monotonic()))
-        inputs[f"{pattern:02X}"] = [bytes(slave.input_data()).hex() for slave in slaves]
+        inputs[f"{pattern:02X}"] = [bytes(slave.input_data).hex() for slave in slaves]
     reached = all(bus.get_state(slave) == kickcat.State.OPERATIONAL for slave in slaves)
     peer.report(
         devices=len(slaves), state="OP" if reached else "other", cycles=cycles, complete=complete,
@@ -51,8 +51,8 @@ def request(bus, state):
 
 def write(slaves, pattern):
     for slave in slaves:
-        if slave.output_size():
-            slave.set_output_bytes(bytes([pattern]) * slave.output_size())
+        if slave.output_size:
+            slave.set_output_bytes(bytes([pattern]) * slave.output_size)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{completion, explain, interfaces, schema};
+use crate::command::{completion, explain, interfaces, schema, sim};
 use crate::version::VERSION;
 
 /// The whole command line.
@@ -46,6 +46,8 @@ pub(crate) enum Command {
     Interfaces(interfaces::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
     Explain(explain::Arguments),
+    /// A virtual segment on real interfaces, for any MainDevice
+    Sim(sim::Arguments),
     /// JSON schema of a file or output
     Schema(schema::Arguments),
     /// Shell completion: write it to where your shell looks for it
@@ -57,7 +59,7 @@ impl Command {
     pub(crate) fn wants_json(&self) -> bool {
         match self {
             Self::Interfaces(arguments) => arguments.json,
-            Self::Explain(_) | Self::Schema(_) | Self::Completion(_) => false,
+            Self::Explain(_) | Self::Sim(_) | Self::Schema(_) | Self::Completion(_) => false,
         }
     }
 }

@@ -8,8 +8,8 @@ mod cli;
 mod command;
 mod exit;
 mod failure;
+mod files;
 mod output;
-#[cfg(test)]
 mod text;
 mod version;
 

@@ -12,6 +12,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::Segment;
 
 use crate::stop::Stop;
+use crate::wiring::Wiring;
 
 /// Frames fetched in one call.
 const BATCH: usize = 64;
@@ -24,6 +25,7 @@ const NAP: Span = Span::ms(50);
 pub struct Server {
     clock: HostClock,
     segment: Segment,
+    wiring: Wiring,
     cards: Vec<RawSocket>,
     batch: Batch,
     answer: Vec<u8>,
@@ -48,11 +50,12 @@ pub struct Served {
 }
 
 impl Server {
-    /// Opens the interfaces: the first is card A's cable, the second card B's.
+    /// Opens the interfaces: the first is card A's cable, the second card B's. What the segment
+    /// puts out comes back to its inputs by `wiring`.
     ///
     /// # Errors
     /// When an interface cannot be used.
-    pub fn open(segment: Segment, names: &[String]) -> Result<Self, LinkError> {
+    pub fn open(segment: Segment, wiring: Wiring, names: &[String]) -> Result<Self, LinkError> {
         let options = SocketOptions::default();
         let cards: Result<Vec<_>, _> =
             names.iter().take(2).map(|name| RawSocket::open(name, &options)).collect();
@@ -60,6 +63,7 @@ impl Server {
             cards: cards?,
             clock: HostClock::start(),
             segment,
+            wiring,
             batch: Batch::new(BATCH),
             answer: Vec::new(),
             served: Served::default(),
@@ -77,6 +81,7 @@ impl Server {
             self.receive()?;
             let now = self.clock.now();
             self.segment.advance(now);
+            self.wiring.carry(self.segment.signals_mut());
             self.send(now)?;
             if stop.is_set() || now >= until {
                 return Ok(());

@@ -4,6 +4,7 @@ pub(crate) mod completion;
 pub(crate) mod explain;
 pub(crate) mod interfaces;
 pub(crate) mod schema;
+pub(crate) mod sim;
 
 use crate::cli::Command;
 use crate::exit::Status;
@@ -15,6 +16,7 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
     match command {
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
         Command::Explain(arguments) => explain::run(&arguments, output),
+        Command::Sim(arguments) => sim::run(&arguments, output),
         Command::Schema(arguments) => schema::run(&arguments, output),
         Command::Completion(arguments) => completion::run(&arguments, output),
     }

@@ -2,6 +2,7 @@
 
 use linesman_config::project::Project;
 use linesman_diagnosis::report::Diagnosis;
+use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
 
 use super::interfaces;
@@ -20,6 +21,8 @@ pub(crate) struct Arguments {
 /// What has a schema.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
 pub(crate) enum Name {
+    /// A virtual segment (TOML)
+    Segment,
     /// What was planned (TOML)
     Project,
     /// `diagnose --json`
@@ -38,6 +41,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 
 fn schema(name: Name) -> Schema {
     match name {
+        Name::Segment => schema_for!(SegmentFile),
         Name::Project => schema_for!(Project),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Interfaces => schema_for!(interfaces::Report),

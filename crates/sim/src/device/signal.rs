@@ -9,18 +9,18 @@ pub struct SignalId(pub u32);
 /// A digital signal is 0 or 1; what the number of an analogue one means (digits, mV, …) is agreed
 /// between the devices that share it.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
-pub struct Signals(Vec<i32>);
+pub struct Signals(Vec<Option<i32>>);
 
 impl Signals {
-    /// `count` signals, all 0.
+    /// `count` signals, all 0 and driven by nothing.
     #[must_use]
     pub fn new(count: usize) -> Self {
-        Self(vec![0; count])
+        Self(vec![None; count])
     }
 
-    /// One more signal, 0 at first.
+    /// One more signal, 0 at first and driven by nothing.
     pub fn add(&mut self) -> SignalId {
-        self.0.push(0);
+        self.0.push(None);
         SignalId((self.0.len() - 1) as u32)
     }
 
@@ -39,14 +39,20 @@ impl Signals {
     /// Its value; 0 for a signal that does not exist: an open input reads low.
     #[must_use]
     pub fn value(&self, signal: SignalId) -> i32 {
-        self.0.get(signal.0 as usize).copied().unwrap_or(0)
+        self.driven(signal).unwrap_or(0)
     }
 
     /// Drives it. A signal that does not exist goes nowhere.
     pub fn set(&mut self, signal: SignalId, value: i32) {
         if let Some(slot) = self.0.get_mut(signal.0 as usize) {
-            *slot = value;
+            *slot = Some(value);
         }
+    }
+
+    /// Its value, if anything has driven it yet: a wire that nothing is connected to says nothing.
+    #[must_use]
+    pub fn driven(&self, signal: SignalId) -> Option<i32> {
+        self.0.get(signal.0 as usize).copied().flatten()
     }
 
     /// Whether a digital signal is high.
@@ -68,6 +74,7 @@ mod tests {
         signals.set(added, -7);
         assert_eq!((signals.value(added), signals.is_high(added)), (-7, true));
         assert!(!signals.is_high(SignalId(0)));
+        assert_eq!((signals.driven(SignalId(0)), signals.driven(added)), (None, Some(-7)));
         signals.set(SignalId(9), 1);
         assert_eq!(signals.value(SignalId(9)), 0, "a signal that leads nowhere reads low");
     }

@@ -2,9 +2,10 @@
 
 use linesman_config::attachment::Attachment;
 use linesman_config::identity::RevisionRule;
-use linesman_config::project::{Project, ProjectDevice, Ring};
+use linesman_config::project::{Project, ProjectDevice, ProjectError, Ring};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::sii::Image;
+use linesman_proto::topology::{End, WiringError};
 
 use super::{SegmentFile, SegmentFileError};
 use crate::device::Signals;
@@ -138,8 +139,44 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
             allowed: "0 to 2000",
         });
     }
-    wiring(file, planned).tree().map_err(SegmentFileError::Wiring)?;
+    wiring(file, planned).tree().map_err(|error| wiring_error(planned, error))?;
     check_ports(file, planned)
+}
+
+/// The same error with names for numbers.
+fn wiring_error(planned: &[Planned], error: ProjectError) -> SegmentFileError {
+    let name = |node: usize| planned.get(node).map_or("?", |known| known.name.as_str());
+    let end_name = |end: End| match end {
+        End::MainDevice(path) => Attachment::MainDevice(path).to_string(),
+        End::Controller(node, port) => format!("{}.{port}", name(node)),
+    };
+    let ProjectError::Wiring(wrong) = error else {
+        return SegmentFileError::Wiring(error.to_string());
+    };
+    SegmentFileError::Wiring(match wrong {
+        WiringError::NoSuchController { .. } => wrong.to_string(),
+        WiringError::WiredTwice { end, first, second } => format!(
+            "`{}` is wired twice, to `{}` and `{}`: move one of them",
+            end_name(end),
+            name(first),
+            name(second)
+        ),
+        WiringError::OnEntry { node, port, child } => format!(
+            "device `{}` is wired to `{}.{port}`, the port where frames enter `{}`",
+            name(child),
+            name(node),
+            name(node)
+        ),
+        WiringError::Detached { node } => format!(
+            "device `{}` is not connected to the MainDevice: its wiring runs in a circle",
+            name(node)
+        ),
+        WiringError::RingTaken { node, port, taken } => format!(
+            "the ring cannot close at `{}.{port}`: `{}` is wired already",
+            name(node),
+            end_name(taken)
+        ),
+    })
 }
 
 /// The counter behind a key of the file.

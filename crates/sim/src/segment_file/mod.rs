@@ -20,16 +20,18 @@
 //! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
 
 mod expand;
+mod plant;
 mod value;
 mod write;
 
 use std::collections::BTreeMap;
 
 use linesman_config::attachment::Attachment;
-use linesman_config::project::{Project, ProjectError};
+use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, parse_counter, wiring};
+pub use plant::{PlantOptions, plant};
 pub use value::{OneOrMany, Value};
 
 use crate::device::library::UnknownType;
@@ -180,7 +182,7 @@ pub enum SegmentFileError {
     },
     /// Names, ports or places contradict each other.
     #[error("{0}")]
-    Wiring(ProjectError),
+    Wiring(String),
     /// A device is wired to or entered by a port that it does not have.
     #[error("device `{device}` has no port {port}: a {type_name} has {has}")]
     NoPort {
@@ -264,3 +266,5 @@ impl SegmentFile {
         write::to_toml(self)
     }
 }
+#[cfg(test)]
+mod tests;

@@ -9,7 +9,7 @@ use linesman_proto::port::Port;
 use linesman_proto::register::SmControl;
 
 use super::chip::{ET1100, ET1200};
-use super::spec::{EntrySpec, PdoSpec, Spec, SyncManagerSpec, Use};
+use super::spec::{Behind, EntrySpec, PdoSpec, Spec, SyncManagerSpec, Use};
 use super::{InnerLink, LibraryType};
 use crate::hardware::PortKind::{Absent, Ebus, Mii};
 
@@ -32,7 +32,8 @@ const COUPLER: Spec = Spec {
     pdi_configuration_2: 0,
     sync_managers: &[],
     pdos: &[],
-    identification_switch: None,
+    behind: Behind::Plain,
+    op_modes: &[],
 };
 
 const JUNCTION: Spec = Spec { group: "Infrastructure", ..COUPLER };
@@ -73,7 +74,7 @@ pub(super) const TYPES: &[LibraryType] = &[
             step: 1,
             channels: 1,
             name: "ID",
-            sync_manager: 0,
+            sync_manager: Some(0),
             entries: &[EntrySpec {
                 index: 0x6000,
                 subindex: 1,
@@ -82,7 +83,7 @@ pub(super) const TYPES: &[LibraryType] = &[
                 bits: 16,
             }],
         }],
-        identification_switch: Some(CODING_SWITCH),
+        behind: Behind::CodingSwitch(CODING_SWITCH),
         ..COUPLER
     }]),
     single(&[Spec {

@@ -5,7 +5,7 @@ use linesman_proto::register::SmControl;
 
 use super::LibraryType;
 use super::chip::ET1200;
-use super::spec::{EntrySpec, PdoSpec, Spec, SyncManagerSpec, Use};
+use super::spec::{Behind, EntrySpec, PdoSpec, Spec, SyncManagerSpec, Use};
 use crate::hardware::PortKind::{Absent, Ebus};
 
 /// SII byte 0: digital I/O.
@@ -13,13 +13,14 @@ const DIGITAL_IO: u8 = 0x04;
 /// SII byte 1: device emulation.
 const EMULATION: u8 = 0x01;
 
-const fn inputs(count: u8) -> PdoSpec {
+/// Digital inputs; one PDO each.
+pub(super) const fn inputs(count: u8) -> PdoSpec {
     PdoSpec {
         index: 0x1A00,
         step: 1,
         channels: count,
         name: "Channel",
-        sync_manager: 0,
+        sync_manager: Some(0),
         entries: &[EntrySpec {
             index: 0x6000,
             subindex: 1,
@@ -30,13 +31,14 @@ const fn inputs(count: u8) -> PdoSpec {
     }
 }
 
-const fn outputs(count: u8) -> PdoSpec {
+/// Digital outputs; one PDO each.
+pub(super) const fn outputs(count: u8) -> PdoSpec {
     PdoSpec {
         index: 0x1600,
         step: 1,
         channels: count,
         name: "Channel",
-        sync_manager: 0,
+        sync_manager: Some(0),
         entries: &[EntrySpec {
             index: 0x7000,
             subindex: 1,
@@ -47,7 +49,8 @@ const fn outputs(count: u8) -> PdoSpec {
     }
 }
 
-const TERMINAL: Spec = Spec {
+/// A terminal without a processor.
+pub(super) const TERMINAL: Spec = Spec {
     name: "",
     title: "",
     group: "",
@@ -61,33 +64,32 @@ const TERMINAL: Spec = Spec {
     pdi_configuration_2: 0,
     sync_managers: &[],
     pdos: &[],
-    identification_switch: None,
+    behind: Behind::Plain,
+    op_modes: &[],
 };
 
-const INPUTS: Spec = Spec {
-    group: "DigIn",
-    sync_managers: &[SyncManagerSpec {
-        start: 0x1000,
-        length: 1,
-        control: SmControl::INPUTS_WITHOUT_EVENT,
-        enable: 0x01,
-        kind: Use::Inputs,
-    }],
-    ..TERMINAL
+/// Up to eight inputs.
+pub(super) const INPUT_BYTE: SyncManagerSpec = SyncManagerSpec {
+    start: 0x1000,
+    length: 1,
+    control: SmControl::INPUTS_WITHOUT_EVENT,
+    enable: 0x01,
+    kind: Use::Inputs,
 };
 
-const OUTPUTS: Spec = Spec {
-    group: "DigOut",
-    sync_managers: &[SyncManagerSpec {
-        start: 0x0F00,
-        length: 1,
-        control: SmControl::OUTPUTS_WITHOUT_EVENT,
-        // Enabled, and only in OP.
-        enable: 0x09,
-        kind: Use::Outputs,
-    }],
-    ..TERMINAL
+/// Up to eight outputs.
+pub(super) const OUTPUT_BYTE: SyncManagerSpec = SyncManagerSpec {
+    start: 0x0F00,
+    length: 1,
+    control: SmControl::OUTPUTS_WITHOUT_EVENT,
+    // Enabled, and only in OP.
+    enable: 0x09,
+    kind: Use::Outputs,
 };
+
+const INPUTS: Spec = Spec { group: "DigIn", sync_managers: &[INPUT_BYTE], ..TERMINAL };
+
+const OUTPUTS: Spec = Spec { group: "DigOut", sync_managers: &[OUTPUT_BYTE], ..TERMINAL };
 
 const FOUR_INPUTS: &[PdoSpec] = &[inputs(4)];
 const EIGHT_INPUTS: &[PdoSpec] = &[inputs(8)];

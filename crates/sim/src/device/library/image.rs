@@ -3,31 +3,42 @@
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
 use linesman_proto::sii::{
-    Category, Configuration, FmmuUsage, General, GeneralFlags, Identity, Image, Pdo, PdoEntry,
-    PdoFlags, PortKind as SiiPort, StringIndex, Strings, SyncManager, SyncManagerEnable,
-    SyncManagerKind,
+    Category, CoeDetails, Configuration, FmmuUsage, General, GeneralFlags, Identity, Image,
+    MailboxArea, MailboxPair, OpMode, Pdo, PdoEntry, PdoFlags, PortKind as SiiPort, Protocols,
+    Size, StringIndex, Strings, SyncManager, SyncManagerEnable, SyncManagerKind,
 };
 
+use super::object::{Individual, channel_name};
 use super::spec::{EntrySpec, PdoSpec, Spec, Use};
 use crate::hardware::PortKind;
 
 /// Who makes all types of this library.
-const VENDOR: u32 = 2;
+pub(super) const VENDOR: u32 = 2;
 /// PDO flags of channels that are always there: mandatory, fixed.
 const ALWAYS_THERE: PdoFlags = PdoFlags(0x0011);
+/// PDO flags of what can be assigned: fixed.
+const FIXED: PdoFlags = PdoFlags(0x0010);
+/// CoE details: SDO, SDO information, PDO assignment, complete access.
+const COE: u8 = 0x27;
+/// General flag: the mailbox repeats lost messages.
+const MAILBOX_REPEATS: u8 = 0x04;
+/// EEPROM of devices with a processor: 32 Kbit.
+const LARGE: Size = Size(0x1F);
 /// General flag: the identification value stands in memory.
 const IDENTIFICATION_IN_MEMORY: u8 = 0x10;
 
 /// The whole image as bytes.
-pub(super) fn build(spec: &Spec, serial: u32) -> Vec<u8> {
+pub(super) fn build(spec: &Spec, individual: Individual) -> Vec<u8> {
     // The tables are in this crate and far from every limit of the format; a test builds them all.
-    image(spec, serial).build().unwrap_or_default()
+    image(spec, individual).build().unwrap_or_default()
 }
 
-fn image(spec: &Spec, serial: u32) -> Image {
+fn image(spec: &Spec, individual: Individual) -> Image {
     let mut strings = Strings::new();
     let mut categories = Vec::new();
+    let has_mailbox = spec.mailbox().is_present();
     let general = general(spec, &mut strings);
+    let op_modes = op_modes(spec, &mut strings);
     let outputs = pdos(spec, true, &mut strings);
     let inputs = pdos(spec, false, &mut strings);
     categories.push(Category::Strings(strings));
@@ -42,6 +53,9 @@ fn image(spec: &Spec, serial: u32) -> Image {
     if !outputs.is_empty() {
         categories.push(Category::RxPdos(outputs));
     }
+    if !op_modes.is_empty() {
+        categories.push(Category::OpModes(op_modes));
+    }
     Image {
         configuration: Configuration {
             pdi_control: spec.pdi_control,
@@ -52,9 +66,13 @@ fn image(spec: &Spec, serial: u32) -> Image {
         identity: Identity {
             vendor_id: VENDOR,
             product_code: spec.product,
-            revision: spec.revision,
-            serial_number: serial,
+            revision: individual.revision,
+            serial_number: individual.serial,
         },
+        bootstrap_mailbox: bootstrap(spec),
+        standard_mailbox: spec.mailbox(),
+        protocols: Protocols(if has_mailbox { Protocols::COE } else { 0 }),
+        size: if has_mailbox { LARGE } else { Size::default() },
         categories,
         ..Image::default()
     }
@@ -69,13 +87,17 @@ fn general(spec: &Spec, strings: &mut Strings) -> General {
     let order = text(strings, spec.name);
     let group = text(strings, spec.group);
     let name = text(strings, spec.title);
-    let memory = spec.identification_switch;
+    let memory = spec.coding_switch();
+    let in_memory = memory.map_or(0, |_| IDENTIFICATION_IN_MEMORY);
+    let has_mailbox = spec.mailbox().is_present();
+    let repeats = if has_mailbox { MAILBOX_REPEATS } else { 0 };
     General {
         group,
         order,
         name,
         group_again: group,
-        flags: GeneralFlags(memory.map_or(0, |_| IDENTIFICATION_IN_MEMORY)),
+        coe: CoeDetails(if has_mailbox { COE } else { 0 }),
+        flags: GeneralFlags(in_memory | repeats),
         physical_memory_address: memory.unwrap_or(RegisterAddress(0)),
         ebus_current_ma: spec.ebus_current_ma,
         ports: PortMap(spec.ports.map(|port| match port {
@@ -87,13 +109,37 @@ fn general(spec: &Spec, strings: &mut Strings) -> General {
     }
 }
 
-fn fmmus(spec: &Spec) -> Vec<FmmuUsage> {
-    let usages = spec.sync_managers.iter().map(|manager| match manager.kind {
-        Use::Outputs => FmmuUsage::Outputs,
-        Use::Inputs => FmmuUsage::Inputs,
+fn op_modes(spec: &Spec, strings: &mut Strings) -> Vec<OpMode> {
+    let modes = spec.op_modes.iter().map(|mode| OpMode {
+        // A SYNC0 in each cycle of the MainDevice.
+        sync0_cycle_factor: i16::from(mode.assign_activate != 0),
+        assign_activate: mode.assign_activate,
+        name: text(strings, mode.name),
+        ..OpMode::default()
     });
-    let mut usages: Vec<_> = usages.collect();
-    usages.dedup();
+    modes.collect()
+}
+
+/// The mailbox in BOOT: as large as all devices of this vendor have it.
+pub(super) fn bootstrap(spec: &Spec) -> MailboxPair {
+    const BOOTSTRAP: MailboxPair = MailboxPair {
+        receive: MailboxArea { offset: RegisterAddress(0x1000), size: 244 },
+        send: MailboxArea { offset: RegisterAddress(0x10F4), size: 244 },
+    };
+    if spec.mailbox().is_present() { BOOTSTRAP } else { MailboxPair::default() }
+}
+
+fn fmmus(spec: &Spec) -> Vec<FmmuUsage> {
+    if spec.mailbox().is_present() {
+        return vec![FmmuUsage::Outputs, FmmuUsage::Inputs, FmmuUsage::MailboxState];
+    }
+    let mut usages = Vec::new();
+    if spec.sync_manager(Use::Outputs).is_some() {
+        usages.push(FmmuUsage::Outputs);
+    }
+    if spec.sync_manager(Use::Inputs).is_some() {
+        usages.push(FmmuUsage::Inputs);
+    }
     usages
 }
 
@@ -104,12 +150,19 @@ fn sync_managers(spec: &Spec) -> Vec<SyncManager> {
         control: manager.control.0,
         status: 0,
         enable: SyncManagerEnable(manager.enable),
-        kind: match manager.kind {
-            Use::Outputs => SyncManagerKind::Outputs,
-            Use::Inputs => SyncManagerKind::Inputs,
-        },
+        kind: sync_manager_kind(manager.kind),
     });
     records.collect()
+}
+
+/// How the specification calls the use of a SyncManager.
+pub(super) const fn sync_manager_kind(kind: Use) -> SyncManagerKind {
+    match kind {
+        Use::MailboxOut => SyncManagerKind::MailboxOut,
+        Use::MailboxIn => SyncManagerKind::MailboxIn,
+        Use::Outputs => SyncManagerKind::Outputs,
+        Use::Inputs => SyncManagerKind::Inputs,
+    }
 }
 
 fn pdos(spec: &Spec, outputs: bool, strings: &mut Strings) -> Vec<Pdo> {
@@ -120,18 +173,14 @@ fn pdos(spec: &Spec, outputs: bool, strings: &mut Strings) -> Vec<Pdo> {
 }
 
 fn one_pdo(pdo: &PdoSpec, channel: u8, strings: &mut Strings) -> Pdo {
-    let name = if pdo.channels > 1 {
-        format!("{} {}", pdo.name, channel + 1)
-    } else {
-        pdo.name.to_owned()
-    };
+    let name = channel_name(pdo.name, channel, pdo.channels);
     let entries = pdo.entries.iter().map(|entry| one_entry(entry, channel, strings)).collect();
     Pdo {
-        index: pdo.index + pdo.step * u16::from(channel),
-        sync_manager: Some(pdo.sync_manager),
+        index: pdo.index_of(channel),
+        sync_manager: pdo.sync_manager,
         synchronization: 0,
         name: text(strings, &name),
-        flags: ALWAYS_THERE,
+        flags: if pdo.sync_manager.is_some() { ALWAYS_THERE } else { FIXED },
         entries,
     }
 }
@@ -139,7 +188,7 @@ fn one_pdo(pdo: &PdoSpec, channel: u8, strings: &mut Strings) -> Pdo {
 fn one_entry(entry: &EntrySpec, channel: u8, strings: &mut Strings) -> PdoEntry {
     let padding = entry.index == 0;
     PdoEntry {
-        index: if padding { 0 } else { entry.index + 0x10 * u16::from(channel) },
+        index: entry.index_of(channel),
         subindex: entry.subindex,
         name: if padding { StringIndex::NONE } else { text(strings, entry.name) },
         data_type_code: if padding { 0 } else { entry.data_type.0 as u8 },

@@ -4,17 +4,29 @@
 //! device needs is made from it: hardware, SII image and firmware. Identities, ports, currents and
 //! default process data are those of the products that the types are named after.
 
+mod analog;
+mod box_module;
 mod chip;
 mod coupler;
 mod digital;
 mod image;
+mod object;
+mod smart;
 mod spec;
 
 use linesman_proto::port::{Port, PortMap};
 
-use self::spec::{Spec, Switching};
+use self::object::Individual;
+use self::spec::{Behind, Function, ProcessorSpec, Spec, Switching};
+use super::application::Channel;
+use super::application::analog::{AnalogInput, AnalogOutput};
+use super::application::digital::DigitalOutput;
+use super::application::stepper::Stepper;
+pub use super::application_layer::Refusal;
+use super::dictionary::Dictionary;
 use super::emulated::{DigitalArea, Emulated, WordArea};
 use super::firmware::Firmware;
+use super::processor::{Description, Processor};
 use super::signal::{SignalId, Signals};
 use crate::hardware::{Hardware, PortKind};
 
@@ -114,13 +126,21 @@ fn closest(name: &str) -> String {
 
 /// All types, couplers first.
 pub fn types() -> impl Iterator<Item = &'static LibraryType> {
-    [coupler::TYPES, digital::TYPES].into_iter().flatten()
+    [coupler::TYPES, digital::TYPES, analog::TYPES, smart::TYPES, box_module::TYPES]
+        .into_iter()
+        .flatten()
 }
 
-/// The type with this name, in any case.
+/// The type with this name, in any case; the variant may be left out ("EP1008" is an EP1008-0001).
 #[must_use]
 pub fn find(type_name: &str) -> Option<&'static LibraryType> {
-    types().find(|known| known.name().eq_ignore_ascii_case(type_name))
+    let without_variant = |known: &&LibraryType| {
+        let base = known.name().split('-').next();
+        base.is_some_and(|base| base.eq_ignore_ascii_case(type_name))
+    };
+    types()
+        .find(|known| known.name().eq_ignore_ascii_case(type_name))
+        .or_else(|| types().find(without_variant))
 }
 
 /// Makes a device: one [`Built`] for each of its controllers, in the order in which frames reach
@@ -133,16 +153,99 @@ pub fn build(
     serial: u32,
     signals: &mut Signals,
 ) -> Result<Vec<Built>, UnknownType> {
-    let found = find(type_name).ok_or_else(|| UnknownType { name: type_name.to_owned() })?;
-    Ok(found.controllers.iter().map(|spec| build_one(spec, serial, signals)).collect())
+    build_revision(type_name, None, serial, signals)
 }
 
-fn build_one(spec: &Spec, serial: u32, signals: &mut Signals) -> Built {
+/// The same with another revision than the newest one, in identity and dictionary.
+///
+/// # Errors
+/// [`UnknownType`] when the library does not have it.
+pub fn build_revision(
+    type_name: &str,
+    revision: Option<u32>,
+    serial: u32,
+    signals: &mut Signals,
+) -> Result<Vec<Built>, UnknownType> {
+    let found = find(type_name).ok_or_else(|| UnknownType { name: type_name.to_owned() })?;
+    let build = |spec: &Spec| {
+        let revision = revision.unwrap_or(spec.revision);
+        build_one(spec, Individual { revision, serial }, signals)
+    };
+    Ok(found.controllers.iter().map(build).collect())
+}
+
+fn build_one(spec: &Spec, individual: Individual, signals: &mut Signals) -> Built {
     let mut add = |count: usize| (0..count).map(|_| signals.add()).collect::<Vec<_>>();
     let outputs = add(spec.output_channels());
     let inputs = add(spec.input_channels());
-    let firmware = emulated(spec, &outputs, &inputs);
-    Built { hardware: spec.hardware(), sii: image::build(spec, serial), firmware, outputs, inputs }
+    let firmware = match spec.behind {
+        Behind::Plain | Behind::CodingSwitch(_) => emulated(spec, &outputs, &inputs),
+        Behind::Processor(processor) => {
+            with_processor(spec, processor, individual, &outputs, &inputs)
+        }
+    };
+    let sii = image::build(spec, individual);
+    Built { hardware: spec.hardware(), sii, firmware, outputs, inputs }
+}
+
+/// A device with a processor.
+fn with_processor(
+    spec: &Spec,
+    processor: &ProcessorSpec,
+    individual: Individual,
+    outputs: &[SignalId],
+    inputs: &[SignalId],
+) -> Box<dyn Firmware> {
+    let dictionary = object::dictionary(spec, processor, individual);
+    let channels = channels(processor.function, &dictionary, outputs, inputs);
+    let description = Description {
+        dictionary,
+        channels,
+        mailbox: spec.mailbox(),
+        bootstrap: Some(image::bootstrap(spec)),
+        times: processor.times,
+    };
+    Box::new(Processor::new(description))
+}
+
+fn channels(
+    function: Function,
+    dictionary: &Dictionary,
+    outputs: &[SignalId],
+    inputs: &[SignalId],
+) -> Vec<Box<dyn Channel>> {
+    let outputs = || (0u8..).zip(outputs.iter().copied());
+    let inputs = || (0u8..).zip(inputs.iter().copied());
+    match function {
+        Function::None => Vec::new(),
+        Function::DigitalOutputs { .. } => outputs()
+            .map(|(channel, signal)| {
+                let index = 0x7000 + 0x10 * u16::from(channel);
+                Box::new(DigitalOutput::new(dictionary, index, 1, signal)) as Box<dyn Channel>
+            })
+            .collect(),
+        Function::AnalogInputs { range, .. } => inputs()
+            .map(|(channel, signal)| {
+                Box::new(AnalogInput::new(dictionary, channel, range, signal)) as Box<dyn Channel>
+            })
+            .collect(),
+        Function::AnalogOutputs { subindex, range, .. } => outputs()
+            .map(|(channel, signal)| {
+                let output = AnalogOutput::new(dictionary, channel, subindex, range, signal);
+                Box::new(output) as Box<dyn Channel>
+            })
+            .collect(),
+        Function::Stepper => {
+            let position = outputs().map(|(_, signal)| signal).next();
+            let mut switches = inputs().map(|(_, signal)| signal);
+            match (position, switches.next(), switches.next()) {
+                (Some(position), Some(first), Some(second)) => {
+                    vec![Box::new(Stepper::new(dictionary, position, [first, second]))]
+                }
+                _ => Vec::new(),
+            }
+        }
+    }
 }
 
 /// A device whose controller drives its channels itself.
@@ -156,9 +259,9 @@ fn emulated(spec: &Spec, outputs: &[SignalId], inputs: &[SignalId]) -> Box<dyn F
         };
         vec![area]
     };
-    let words = spec.identification_switch.iter().zip(inputs).map(|(at, signal)| WordArea {
+    let words = spec.coding_switch().into_iter().zip(inputs).map(|(at, signal)| WordArea {
         sync_manager: 0,
-        at: *at,
+        at,
         signal: *signal,
     });
     let emulated = Emulated::new(

@@ -4,8 +4,11 @@ use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::coe::DataType;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::SmControl;
+use linesman_proto::sii::{MailboxArea, MailboxPair};
 
 use super::chip::Chip;
+use crate::device::application::analog::Range;
+use crate::device::processor::ResponseTimes;
 use crate::hardware::{Hardware, PortKind};
 
 /// One controller of a type.
@@ -37,8 +40,119 @@ pub(super) struct Spec {
     pub(super) sync_managers: &'static [SyncManagerSpec],
     /// Process data.
     pub(super) pdos: &'static [PdoSpec],
-    /// Where a coding switch can be read, if it has one.
-    pub(super) identification_switch: Option<RegisterAddress>,
+    /// What is behind the controller.
+    pub(super) behind: Behind,
+    /// Operation modes with distributed clocks, for those that have them.
+    pub(super) op_modes: &'static [OpModeSpec],
+}
+
+/// What is behind a controller.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Behind {
+    /// Nothing, or channels that the controller drives itself.
+    Plain,
+    /// A coding switch that can be read at this address.
+    CodingSwitch(RegisterAddress),
+    /// A processor.
+    Processor(&'static ProcessorSpec),
+}
+
+/// A processor.
+#[derive(Debug)]
+pub(super) struct ProcessorSpec {
+    /// What its process data do.
+    pub(super) function: Function,
+    /// Version of its hardware, object 0x1009.
+    pub(super) hardware_version: &'static str,
+    /// Version of its software, object 0x100A.
+    pub(super) software_version: &'static str,
+    /// Objects with settings.
+    pub(super) settings: &'static [SettingsSpec],
+    /// How quick it is.
+    pub(super) times: ResponseTimes,
+}
+
+/// What process data do.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Function {
+    /// There are none.
+    None,
+    /// Digital outputs 0x70n0:01.
+    DigitalOutputs {
+        /// How many.
+        channels: u8,
+    },
+    /// Analogue inputs 0x60n0.
+    AnalogInputs {
+        /// How many.
+        channels: u8,
+        /// What they measure.
+        range: Range,
+    },
+    /// Analogue outputs 0x70n0.
+    AnalogOutputs {
+        /// How many.
+        channels: u8,
+        /// Subindex of the value.
+        subindex: u8,
+        /// What they give.
+        range: Range,
+    },
+    /// One axis.
+    Stepper,
+}
+
+impl Function {
+    /// Signals driven and taken.
+    const fn signals(self) -> (usize, usize) {
+        match self {
+            Self::None => (0, 0),
+            Self::DigitalOutputs { channels } | Self::AnalogOutputs { channels, .. } => {
+                (channels as usize, 0)
+            }
+            Self::AnalogInputs { channels, .. } => (0, channels as usize),
+            Self::Stepper => (1, 2),
+        }
+    }
+}
+
+/// A run of objects with settings that differ in their channel only.
+#[derive(Debug)]
+pub(super) struct SettingsSpec {
+    /// Index of the first; 0x10 more for each further one.
+    pub(super) index: u16,
+    /// How many.
+    pub(super) channels: u8,
+    /// Its name; the number of the channel is put behind when there are several.
+    pub(super) name: &'static str,
+    /// What is in it.
+    pub(super) entries: &'static [SettingSpec],
+}
+
+/// A setting.
+#[derive(Debug)]
+pub(super) struct SettingSpec {
+    /// Its subindex.
+    pub(super) subindex: u8,
+    /// Its name.
+    pub(super) name: &'static str,
+    /// Its type.
+    pub(super) data_type: DataType,
+    /// Its bits.
+    pub(super) bits: u8,
+    /// Its value after power-on.
+    pub(super) default: u32,
+    /// The greatest value that is taken.
+    pub(super) maximum: Option<u32>,
+}
+
+/// An operation mode with (or, for `assign_activate` 0, without) distributed clocks.
+#[derive(Debug)]
+pub(super) struct OpModeSpec {
+    /// Its name.
+    pub(super) name: &'static str,
+    /// What is written to 0x0980.
+    pub(super) assign_activate: u16,
 }
 
 /// A SyncManager as the SII describes it.
@@ -59,6 +173,10 @@ pub(super) struct SyncManagerSpec {
 /// What a SyncManager is for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Use {
+    /// Mailbox messages from the MainDevice.
+    MailboxOut,
+    /// Mailbox messages to the MainDevice.
+    MailboxIn,
     /// Process data from the MainDevice.
     Outputs,
     /// Process data to the MainDevice.
@@ -76,8 +194,8 @@ pub(super) struct PdoSpec {
     pub(super) channels: u8,
     /// Its name; the number of the channel is put behind when there are several.
     pub(super) name: &'static str,
-    /// The SyncManager it belongs to by default.
-    pub(super) sync_manager: u8,
+    /// The SyncManager it belongs to by default; `None` when it is not assigned.
+    pub(super) sync_manager: Option<u8>,
     /// What is in it.
     pub(super) entries: &'static [EntrySpec],
 }
@@ -88,10 +206,9 @@ impl PdoSpec {
         self.index < 0x1A00
     }
 
-    /// Bits of all its channels together.
-    pub(super) fn bits(&self) -> usize {
-        let one: usize = self.entries.iter().map(|entry| usize::from(entry.bits)).sum();
-        one * usize::from(self.channels)
+    /// The index of the PDO of a channel.
+    pub(super) const fn index_of(&self, channel: u8) -> u16 {
+        self.index + self.step * channel as u16
     }
 }
 
@@ -108,6 +225,13 @@ pub(super) struct EntrySpec {
     pub(super) data_type: DataType,
     /// Its bits.
     pub(super) bits: u8,
+}
+
+impl EntrySpec {
+    /// The index of its object for a channel; 0 for padding.
+    pub(super) const fn index_of(&self, channel: u8) -> u16 {
+        if self.index == 0 { 0 } else { self.index + 0x10 * channel as u16 }
+    }
 }
 
 /// Channels that a controller switches without a processor.
@@ -127,17 +251,47 @@ impl Spec {
 
     /// How many signals it drives.
     pub(super) fn output_channels(&self) -> usize {
-        self.channels(true)
+        match self.behind {
+            Behind::Processor(processor) => processor.function.signals().0,
+            Behind::Plain | Behind::CodingSwitch(_) => self.channels(true),
+        }
     }
 
     /// How many signals it takes.
     pub(super) fn input_channels(&self) -> usize {
-        self.channels(false)
+        match self.behind {
+            Behind::Processor(processor) => processor.function.signals().1,
+            Behind::Plain | Behind::CodingSwitch(_) => self.channels(false),
+        }
     }
 
     fn channels(&self, outputs: bool) -> usize {
         let mine = self.pdos.iter().filter(|pdo| pdo.is_output() == outputs);
         mine.map(|pdo| usize::from(pdo.channels)).sum()
+    }
+
+    /// Where its coding switch can be read.
+    pub(super) const fn coding_switch(&self) -> Option<RegisterAddress> {
+        match self.behind {
+            Behind::CodingSwitch(at) => Some(at),
+            Behind::Plain | Behind::Processor(_) => None,
+        }
+    }
+
+    /// The SyncManager for this use.
+    pub(super) fn sync_manager(&self, kind: Use) -> Option<&'static SyncManagerSpec> {
+        self.sync_managers.iter().find(|manager| manager.kind == kind)
+    }
+
+    /// Its mailbox; both sizes 0 for a device without.
+    pub(super) fn mailbox(&self) -> MailboxPair {
+        let area = |kind| {
+            self.sync_manager(kind).map_or(MailboxArea::default(), |manager| MailboxArea {
+                offset: RegisterAddress(manager.start),
+                size: manager.length,
+            })
+        };
+        MailboxPair { receive: area(Use::MailboxOut), send: area(Use::MailboxIn) }
     }
 
     /// Where the outputs are that the controller switches itself.
@@ -147,7 +301,7 @@ impl Spec {
 
     /// Where the inputs are that the controller takes itself.
     pub(super) fn switching_inputs(&self) -> Option<Switching> {
-        self.switching(Use::Inputs).filter(|_| self.identification_switch.is_none())
+        self.switching(Use::Inputs).filter(|_| self.coding_switch().is_none())
     }
 
     fn switching(&self, kind: Use) -> Option<Switching> {

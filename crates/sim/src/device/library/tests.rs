@@ -1,10 +1,11 @@
 //! The library as a MainDevice finds it.
 
 use linesman_config::profile::DeviceProfile;
-use linesman_proto::sii::{Direction, Image};
+use linesman_proto::sii::{Checksum, Direction, Image, SyncManagerKind};
 
-use super::{LibraryType, build, find, types};
+use super::{LibraryType, build, build_revision, find, types};
 use crate::device::Signals;
+use crate::device::tests::Device;
 
 #[test]
 fn every_type_is_found_once_and_bears_a_sound_image() {
@@ -19,6 +20,7 @@ fn every_type_is_found_once_and_bears_a_sound_image() {
             assert_eq!(image.oddities, [], "{name}");
             assert_eq!(image.identity.vendor_id, 2, "{name}");
             assert_eq!(image.identity.serial_number, 4_711, "{name}");
+            assert_eq!(image.checksum, Checksum::Valid, "{name}");
             assert_eq!(image.build().unwrap(), one.sii, "{name}");
             assert!(!one.sii.is_empty());
             channels += one.outputs.len() + one.inputs.len();
@@ -59,4 +61,144 @@ fn profiles_of_digital_terminals() {
         assert_eq!((manager.index, manager.direction), (0, direction), "{name}");
         assert_eq!((manager.start.0, manager.len, manager.control.0), (start, len, control));
     }
+}
+
+#[test]
+fn profiles_of_devices_with_a_processor() {
+    // type, bytes of outputs, bytes of inputs
+    let table = [
+        ("EL2014", 1, 3),
+        ("EL3004", 0, 16),
+        ("EL3102", 0, 8),
+        ("EL3104", 0, 16),
+        ("EL3154", 0, 16),
+        ("EL3162", 0, 8),
+        ("EL4004", 8, 0),
+        ("EL4102", 4, 0),
+        ("EL4112", 4, 0),
+        ("EL6601", 0, 0),
+        ("EL7041", 8, 8),
+        ("EP4174", 8, 0),
+    ];
+    for (name, outputs, inputs) in table {
+        let built = build(name, 1, &mut Signals::default()).unwrap();
+        let image = Image::parse(&built[0].sii).unwrap();
+        let profile = DeviceProfile::from_sii(&image);
+        assert_eq!(profile.process_len(Direction::Outputs), outputs, "{name}");
+        assert_eq!(profile.process_len(Direction::Inputs), inputs, "{name}");
+        let mailbox = profile.mailbox.unwrap();
+        let size = if name == "EL6601" { 1_024 } else { 128 };
+        assert_eq!(mailbox.areas.receive.offset.0, 0x1000, "{name}");
+        assert_eq!((mailbox.areas.receive.size, mailbox.areas.send.size), (size, size), "{name}");
+        assert!(mailbox.complete_access && mailbox.protocols.0 == 0x0004, "{name}");
+        assert!(!profile.device_emulation, "{name}");
+        for manager in &profile.process {
+            let record = image.sync_managers()[usize::from(manager.index)];
+            assert_eq!(record.length, manager.len, "{name}: default length");
+        }
+        let kinds: Vec<_> = image.sync_managers().iter().map(|record| record.kind).collect();
+        let expected = [
+            SyncManagerKind::MailboxOut,
+            SyncManagerKind::MailboxIn,
+            SyncManagerKind::Outputs,
+            SyncManagerKind::Inputs,
+        ];
+        assert_eq!(kinds, expected, "{name}");
+    }
+}
+
+#[test]
+fn every_type_comes_up_and_exchanges_process_data() {
+    for known in types() {
+        let mut signals = Signals::default();
+        for built in build(known.name(), 7, &mut signals).unwrap() {
+            let mut device = Device::new(built, signals.clone());
+            device.bring_up();
+            device.exchange_some();
+        }
+    }
+}
+
+#[test]
+fn another_revision_shows_in_identity_and_dictionary() {
+    let mut signals = Signals::default();
+    let built = build_revision("EL3104", Some(0x0015_0000), 7, &mut signals).unwrap().remove(0);
+    assert_eq!(Image::parse(&built.sii).unwrap().identity.revision, 0x0015_0000);
+    let mut device = Device::new(built, signals);
+    device.to_preop();
+    assert_eq!(device.upload(0x1018, 3), Ok(vec![0, 0, 0x15, 0]));
+}
+
+#[test]
+fn a_junction_of_eight_ports_is_three_controllers() {
+    let junction = find("CU1128").unwrap();
+    assert_eq!(junction.ports().count(), 3);
+    let copper: usize = junction
+        .ports()
+        .map(|ports| {
+            ports.iter().filter(|(_, kind)| **kind == crate::hardware::PortKind::Mii).count()
+        })
+        .sum();
+    assert_eq!(copper, 8);
+    for link in junction.inner_links() {
+        let ports: Vec<_> = junction.ports().collect();
+        for (controller, port) in [link.from, link.to] {
+            assert_eq!(ports[controller][port], crate::hardware::PortKind::Ebus);
+        }
+    }
+}
+
+/// Real images, when they are there: categories, SyncManagers and PDOs are to be the same.
+#[test]
+fn images_are_built_like_those_of_real_devices() {
+    let Some(folder) = real_images() else { return };
+    for (name, file) in [("EK1100", "ec-EK1100.bin"), ("EL2004", "ec-EL2004.bin")] {
+        let bytes = read(&folder, file);
+        let real = Image::parse(&bytes).unwrap();
+        let built = build(name, 0, &mut Signals::default()).unwrap().remove(0);
+        let ours = Image::parse(&built.sii).unwrap();
+        assert_eq!(ours.identity.product_code, real.identity.product_code, "{name}");
+        assert_eq!(ours.configuration, real.configuration, "{name}");
+        assert_eq!(ours.order(), real.order(), "{name}");
+        assert_eq!(ours.group(), real.group(), "{name}");
+        assert_eq!(ours.ebus_current_ma(), real.ebus_current_ma(), "{name}");
+        assert_eq!(ours.general().map(|g| g.ports), real.general().map(|g| g.ports), "{name}");
+        let managers = |image: &Image| {
+            let records = image.sync_managers().iter();
+            records.map(|r| (r.start, r.control, r.enable, r.kind)).collect::<Vec<_>>()
+        };
+        assert_eq!(managers(&ours), managers(&real), "{name}");
+        let outputs = |image: &Image| {
+            let pdos = image.pdos(Direction::Outputs);
+            pdos.map(|pdo| {
+                let entries = pdo.entries.iter();
+                let entries = entries.map(|e| (e.index, e.subindex, e.data_type_code, e.bits));
+                (pdo.index, pdo.sync_manager, pdo.flags, entries.collect::<Vec<_>>())
+            })
+            .collect::<Vec<_>>()
+        };
+        assert_eq!(outputs(&ours), outputs(&real), "{name}");
+        assert_eq!(
+            DeviceProfile::from_sii(&ours).process.len(),
+            DeviceProfile::from_sii(&real).process.len()
+        );
+    }
+}
+
+/// The folder with real images; says so when it is not there.
+#[allow(clippy::disallowed_methods, clippy::disallowed_macros)]
+fn real_images() -> Option<std::path::PathBuf> {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let data = std::env::var("LINESMAN_DATA").unwrap_or(format!("{root}/../shared/data"));
+    let folder = std::path::Path::new(&data).join("sii");
+    if folder.join("ec-EK1100.bin").exists() {
+        return Some(folder);
+    }
+    eprintln!("SKIPPED: no SII images in {}; set LINESMAN_DATA", folder.display());
+    None
+}
+
+#[allow(clippy::disallowed_methods)]
+fn read(folder: &std::path::Path, file: &str) -> Vec<u8> {
+    std::fs::read(folder.join(file)).unwrap()
 }

@@ -1,0 +1,70 @@
+//! Files that users write: read as a whole, with messages that say which file and where.
+
+use std::fs;
+use std::path::Path;
+
+use linesman_config::project::Project;
+use linesman_sim::segment::Segment;
+use linesman_sim::segment_file::SegmentFile;
+
+use crate::failure::Failure;
+
+/// Longest text file that is read, in bytes; nobody writes more by hand.
+const MAX_TEXT: u64 = 16 * 1024 * 1024;
+
+/// The text of a file.
+pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
+    let name = path.display();
+    let refuse = |error: std::io::Error| {
+        let advice = match error.kind() {
+            std::io::ErrorKind::NotFound => "check the path",
+            std::io::ErrorKind::IsADirectory => "name a file in it",
+            _ => "check the rights of the file (`ls -l`)",
+        };
+        Failure::new(format!("{name}: reading {what}: {error}"), advice)
+    };
+    let len = fs::metadata(path).map_err(refuse)?.len();
+    if len > MAX_TEXT {
+        let reason = format!("{name}: {len} bytes, expected {what}, a text of at most {MAX_TEXT}");
+        return Err(Failure::new(reason, "check the path"));
+    }
+    let bytes = fs::read(path).map_err(refuse)?;
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        let reason = format!("{name}: at byte {at}: no text in UTF-8, expected {what} in TOML");
+        let advice = "check that this is the right file; save it as UTF-8; for a capture say \
+                      `capture:FILE`";
+        Failure::new(reason, advice)
+    })
+}
+
+/// What a segment file describes.
+pub(crate) struct Plant {
+    /// What was planned: the file without its faults.
+    pub(crate) project: Project,
+    /// What is there.
+    pub(crate) segment: Segment,
+}
+
+impl Plant {
+    /// Reads and builds the segment of a file.
+    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+        let file = segment_file(path)?;
+        let project = file.project().map_err(|error| in_file(path, &error))?;
+        let segment = Segment::build(&file).map_err(|error| in_file(path, &error))?;
+        Ok(Self { project, segment })
+    }
+}
+
+/// A segment file.
+pub(crate) fn segment_file(path: &Path) -> Result<SegmentFile, Failure> {
+    let text = text(path, "a segment file")?;
+    SegmentFile::parse(&text).map_err(|error| in_file(path, &error))
+}
+
+/// An error inside a file.
+pub(crate) fn in_file(path: &Path, error: &dyn std::error::Error) -> Failure {
+    let mut failure = Failure::from_error(error);
+    failure.reason = format!("{}: {}", path.display(), failure.reason.trim_end());
+    failure
+}

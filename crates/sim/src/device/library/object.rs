@@ -1,0 +1,229 @@
+//! The objects of a type, made from its tables.
+//!
+//! Read first: ETG.1000.6, object dictionary; ETG.5001 for the ranges 0x6000 (inputs), 0x7000
+//! (outputs), 0x8000 (settings).
+
+use linesman_proto::mailbox::coe::information::{Access, ObjectCode};
+use linesman_proto::mailbox::coe::{DataType, ObjectIndex};
+use linesman_proto::sii::SyncManagerKind;
+
+use super::image::{VENDOR, sync_manager_kind};
+use super::spec::{EntrySpec, PdoSpec, ProcessorSpec, SettingsSpec, Spec};
+use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE};
+
+/// Device type of modular devices (ETG.5001).
+const MODULAR_DEVICE: u64 = 0x0000_1389;
+/// Data type of a PDO mapping.
+const PDO_MAPPING: DataType = DataType(0x0021);
+/// Data type of the identity.
+const IDENTITY: DataType = DataType(0x0023);
+/// Data type of a record that is none of the others.
+const RECORD: DataType = DataType(0x002A);
+/// Readable always, writable in PREOP.
+const SET_UP: Access = Access(READ_ONLY.0 | Access::WRITE_PRE_OP);
+/// A setting that is kept for a replacement.
+const SETTING: Access = Access(READ_WRITE.0 | Access::BACKUP | Access::SETTING);
+
+/// Who it is, beyond its type.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Individual {
+    pub(super) revision: u32,
+    pub(super) serial: u32,
+}
+
+/// All objects of a device with a processor.
+pub(super) fn dictionary(
+    spec: &Spec,
+    processor: &ProcessorSpec,
+    individual: Individual,
+) -> Dictionary {
+    let mut objects = about(spec, processor, individual);
+    for pdo in spec.pdos {
+        for channel in 0..pdo.channels {
+            objects.push(mapping(pdo, channel));
+            values(pdo, channel, &mut objects);
+        }
+    }
+    objects.push(sync_manager_types(spec));
+    for sync_manager in [2, 3] {
+        objects.push(assignment(spec, sync_manager));
+        objects.push(synchronisation(sync_manager));
+    }
+    for settings in processor.settings {
+        objects.extend((0..settings.channels).map(|channel| setting(settings, channel)));
+    }
+    let profile = vec![
+        Entry::number(1, "Index distance", DataType::UINT, 16, READ_ONLY, 0x10),
+        Entry::number(2, "Maximum number of modules", DataType::UINT, 16, READ_ONLY, 1),
+    ];
+    objects.push(record(0xF000, "Modular device profile", RECORD, profile));
+    Dictionary::new(objects)
+}
+
+fn record(index: u16, name: &str, data_type: DataType, entries: Vec<Entry>) -> Object {
+    Object::list(ObjectIndex(index), name, ObjectCode::Record, data_type, entries)
+}
+
+fn about(spec: &Spec, processor: &ProcessorSpec, individual: Individual) -> Vec<Object> {
+    let number = |subindex, name: &str, value: u32| {
+        Entry::number(subindex, name, DataType::UDINT, 32, READ_ONLY, u64::from(value))
+    };
+    let device_type =
+        Entry::number(0, "Device type", DataType::UDINT, 32, READ_ONLY, MODULAR_DEVICE);
+    let error_register = Entry::number(0, "Error register", DataType::USINT, 8, READ_ONLY, 0);
+    let identity = vec![
+        number(1, "Vendor ID", VENDOR),
+        number(2, "Product code", spec.product),
+        number(3, "Revision", individual.revision),
+        number(4, "Serial number", individual.serial),
+    ];
+    vec![
+        Object::variable(ObjectIndex::DEVICE_TYPE, device_type),
+        Object::variable(ObjectIndex::ERROR_REGISTER, error_register),
+        Object::variable(ObjectIndex::DEVICE_NAME, Entry::text("Device name", spec.name)),
+        Object::variable(
+            ObjectIndex::HARDWARE_VERSION,
+            Entry::text("Hardware version", processor.hardware_version),
+        ),
+        Object::variable(
+            ObjectIndex::SOFTWARE_VERSION,
+            Entry::text("Software version", processor.software_version),
+        ),
+        record(ObjectIndex::IDENTITY.0, "Identity", IDENTITY, identity),
+    ]
+}
+
+/// The name of a channel's PDO or settings.
+pub(super) fn channel_name(name: &str, channel: u8, channels: u8) -> String {
+    if channels > 1 { format!("{name} {}", channel + 1) } else { name.to_owned() }
+}
+
+/// The name of a subindex that has no other.
+fn subindex_name(subindex: u8) -> String {
+    format!("SubIndex {subindex:03}")
+}
+
+fn mapping(pdo: &PdoSpec, channel: u8) -> Object {
+    let entries = (1..).zip(pdo.entries).map(|(subindex, entry)| {
+        let index = u64::from(entry.index_of(channel));
+        let value = index << 16 | u64::from(entry.subindex) << 8 | u64::from(entry.bits);
+        Entry::number(subindex, &subindex_name(subindex), DataType::UDINT, 32, READ_ONLY, value)
+    });
+    let entries = entries.collect();
+    let kind = if pdo.is_output() { "RxPDO-Map" } else { "TxPDO-Map" };
+    let name = format!("{} {kind}", channel_name(pdo.name, channel, pdo.channels));
+    record(pdo.index_of(channel), &name, PDO_MAPPING, entries)
+}
+
+/// The objects that a PDO maps, added to those that others have mapped already.
+fn values(pdo: &PdoSpec, channel: u8, objects: &mut Vec<Object>) {
+    let direction = if pdo.is_output() { Access::RX_PDO } else { Access::TX_PDO };
+    for entry in pdo.entries.iter().filter(|entry| entry.index != 0) {
+        let index = ObjectIndex(entry.index_of(channel));
+        let value = value(entry, Access(READ_ONLY.0 | direction));
+        match objects.iter_mut().find(|object| object.index == index) {
+            Some(object) => insert(object, value),
+            None => {
+                let name = channel_name(pdo.name, channel, pdo.channels);
+                objects.push(record(index.0, &name, RECORD, vec![value]));
+            }
+        }
+    }
+}
+
+fn value(entry: &EntrySpec, access: Access) -> Entry {
+    let bits = u16::from(entry.bits);
+    Entry::number(entry.subindex, entry.name, entry.data_type, bits, access, 0)
+}
+
+/// Puts an entry where it belongs; one that is there already stays.
+fn insert(object: &mut Object, entry: Entry) {
+    let place = object.entries.binary_search_by_key(&entry.subindex, |entry| entry.subindex);
+    if let Err(at) = place {
+        object.entries.insert(at, entry);
+    }
+    let last = object.entries.last().map_or(0, |entry| entry.subindex);
+    if let Some(count) = object.entries.first_mut() {
+        count.value = vec![last];
+    }
+}
+
+fn sync_manager_types(spec: &Spec) -> Object {
+    let kinds = (1..).zip(spec.sync_managers).map(|(subindex, manager)| {
+        let kind: SyncManagerKind = sync_manager_kind(manager.kind);
+        let name = subindex_name(subindex);
+        Entry::number(subindex, &name, DataType::USINT, 8, READ_ONLY, u64::from(kind.code()))
+    });
+    let kinds = kinds.collect();
+    let index = ObjectIndex::SYNC_MANAGER_TYPES;
+    Object::list(index, "Sync manager type", ObjectCode::Array, DataType::USINT, kinds)
+}
+
+/// The PDOs of a SyncManager: room for all that there are, those of the defaults assigned.
+fn assignment(spec: &Spec, sync_manager: u8) -> Object {
+    let outputs = sync_manager == 2;
+    let all = spec.pdos.iter().filter(|pdo| pdo.is_output() == outputs);
+    let room: usize = all.clone().map(|pdo| usize::from(pdo.channels)).sum();
+    let assigned: Vec<u16> = all
+        .filter(|pdo| pdo.sync_manager == Some(sync_manager))
+        .flat_map(|pdo| (0..pdo.channels).map(|channel| pdo.index_of(channel)))
+        .collect();
+    let pdos = (1..=u8::MAX).take(room).map(|subindex| {
+        let pdo = assigned.get(usize::from(subindex) - 1).copied().unwrap_or(0);
+        let name = subindex_name(subindex);
+        Entry::number(subindex, &name, DataType::UINT, 16, SET_UP, u64::from(pdo))
+    });
+    let name = if outputs { "RxPDO assign" } else { "TxPDO assign" };
+    let index = ObjectIndex(0x1C10 + u16::from(sync_manager));
+    let mut object = Object::list(index, name, ObjectCode::Array, DataType::UINT, pdos.collect());
+    if let Some(count) = object.entries.first_mut() {
+        count.value = vec![assigned.len() as u8];
+        count.access = SET_UP;
+    }
+    object
+}
+
+/// The synchronisation parameters of outputs (0x1C32) or inputs (0x1C33): free run, or with the
+/// frames.
+fn synchronisation(sync_manager: u8) -> Object {
+    const FREE_RUN_OR_FRAMES: u64 = 0x0003;
+    const SHORTEST_CYCLE_NS: u64 = 100_000;
+    let word = |subindex, name: &str, access, value| {
+        Entry::number(subindex, name, DataType::UINT, 16, access, value)
+    };
+    let double = |subindex, name: &str, value| {
+        Entry::number(subindex, name, DataType::UDINT, 32, READ_ONLY, value)
+    };
+    let mut sync_mode = word(0x01, "Sync mode", SET_UP, 0);
+    sync_mode.maximum = Some(1);
+    let entries = vec![
+        sync_mode,
+        double(0x02, "Cycle time", 0),
+        double(0x03, "Shift time", 0),
+        word(0x04, "Sync modes supported", READ_ONLY, FREE_RUN_OR_FRAMES),
+        double(0x05, "Minimum cycle time", SHORTEST_CYCLE_NS),
+        double(0x06, "Calc and copy time", 0),
+        word(0x0B, "SM event missed counter", READ_ONLY, 0),
+        word(0x0C, "Cycle exceeded counter", READ_ONLY, 0),
+        word(0x0D, "Shift too short counter", READ_ONLY, 0),
+        Entry::number(0x20, "Sync error", DataType::BOOL, 1, READ_ONLY, 0),
+    ];
+    let name = if sync_manager == 2 { "SM output parameter" } else { "SM input parameter" };
+    record(0x1C30 + u16::from(sync_manager), name, RECORD, entries)
+}
+
+fn setting(settings: &SettingsSpec, channel: u8) -> Object {
+    let entries = settings.entries.iter().map(|entry| Entry {
+        maximum: entry.maximum,
+        ..Entry::number(
+            entry.subindex,
+            entry.name,
+            entry.data_type,
+            u16::from(entry.bits),
+            SETTING,
+            u64::from(entry.default),
+        )
+    });
+    let name = channel_name(settings.name, channel, settings.channels);
+    record(settings.index + 0x10 * u16::from(channel), &name, RECORD, entries.collect())
+}

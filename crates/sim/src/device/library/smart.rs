@@ -1,0 +1,334 @@
+//! Terminals with a processor that are neither plain digital nor analogue, and what all terminals
+//! with a processor share.
+
+use linesman_proto::mailbox::coe::DataType;
+use linesman_proto::register::SmControl;
+
+use super::LibraryType;
+use super::chip::ET1100;
+use super::spec::{
+    Behind, EntrySpec, Function, OpModeSpec, PdoSpec, ProcessorSpec, SettingSpec, SettingsSpec,
+    Spec, SyncManagerSpec, Use,
+};
+use crate::device::processor::ResponseTimes;
+use crate::hardware::PortKind::{Absent, Ebus};
+
+/// SII byte 0: a processor of 8 bits, asynchronous.
+const PROCESSOR: u8 = 0x08;
+/// SII byte 1: SYNC and latch unit on, no device emulation.
+const CLOCK_UNITS: u8 = 0x0C;
+
+/// Mailbox out of 128 bytes.
+pub(super) const MAILBOX_OUT: SyncManagerSpec = mailbox_out(128);
+/// Mailbox in of 128 bytes.
+pub(super) const MAILBOX_IN: SyncManagerSpec = mailbox_in(0x1080, 128);
+/// No outputs.
+pub(super) const NO_OUTPUTS: SyncManagerSpec =
+    SyncManagerSpec { control: SmControl::OUTPUTS_WITHOUT_WATCHDOG, enable: 0, ..outputs(0) };
+/// No inputs.
+pub(super) const NO_INPUTS: SyncManagerSpec = SyncManagerSpec { enable: 0, ..inputs(0) };
+
+const fn mailbox_out(length: u16) -> SyncManagerSpec {
+    SyncManagerSpec {
+        start: 0x1000,
+        length,
+        control: SmControl::MAILBOX_OUT,
+        enable: 0x01,
+        kind: Use::MailboxOut,
+    }
+}
+
+const fn mailbox_in(start: u16, length: u16) -> SyncManagerSpec {
+    SyncManagerSpec {
+        start,
+        length,
+        control: SmControl::MAILBOX_IN,
+        enable: 0x01,
+        kind: Use::MailboxIn,
+    }
+}
+
+/// Outputs behind a mailbox of 128 bytes.
+pub(super) const fn outputs(length: u16) -> SyncManagerSpec {
+    SyncManagerSpec {
+        start: 0x1100,
+        length,
+        control: SmControl::OUTPUTS,
+        enable: 0x01,
+        kind: Use::Outputs,
+    }
+}
+
+/// Inputs behind a mailbox of 128 bytes.
+pub(super) const fn inputs(length: u16) -> SyncManagerSpec {
+    SyncManagerSpec {
+        start: 0x1180,
+        length,
+        control: SmControl::INPUTS,
+        enable: 0x01,
+        kind: Use::Inputs,
+    }
+}
+
+/// With the frames, or with SYNC0 and SYNC1.
+pub(super) const SYNCHRONISED: &[OpModeSpec] = &[
+    OpModeSpec { name: "Synchron", assign_activate: 0 },
+    OpModeSpec { name: "DC-Synchron", assign_activate: 0x0700 },
+];
+
+/// A terminal with a processor.
+pub(super) const TERMINAL: Spec = Spec {
+    name: "",
+    title: "",
+    group: "",
+    product: 0,
+    revision: 0,
+    chip: &ET1100,
+    ports: [Ebus, Ebus, Absent, Absent],
+    ebus_current_ma: 0,
+    pdi_control: PROCESSOR,
+    esc_configuration: CLOCK_UNITS,
+    pdi_configuration_2: 0,
+    sync_managers: &[],
+    pdos: &[],
+    behind: Behind::Plain,
+    op_modes: &[],
+};
+
+const fn bit(index: u16, subindex: u8, name: &'static str) -> EntrySpec {
+    EntrySpec { index, subindex, name, data_type: DataType::BOOL, bits: 1 }
+}
+
+const fn number(
+    index: u16,
+    subindex: u8,
+    name: &'static str,
+    data_type: DataType,
+    bits: u8,
+) -> EntrySpec {
+    EntrySpec { index, subindex, name, data_type, bits }
+}
+
+const fn padding(bits: u8) -> EntrySpec {
+    EntrySpec { index: 0, subindex: 0, name: "", data_type: DataType(0), bits }
+}
+
+const fn pdo(
+    index: u16,
+    name: &'static str,
+    sync_manager: Option<u8>,
+    entries: &'static [EntrySpec],
+) -> PdoSpec {
+    PdoSpec { index, step: 1, channels: 1, name, sync_manager, entries }
+}
+
+/// Four outputs with diagnosis of each, and of the whole terminal.
+const DIAGNOSED_OUTPUTS: &[PdoSpec] = &[
+    PdoSpec {
+        channels: 4,
+        ..pdo(0x1600, "DIG Outputs Channel", Some(2), &[bit(0x7000, 1, "Output")])
+    },
+    PdoSpec {
+        channels: 4,
+        ..pdo(
+            0x1A00,
+            "DIG Inputs Channel",
+            Some(3),
+            &[
+                bit(0x6001, 1, "Overtemperature"),
+                bit(0x6001, 2, "Open load"),
+                bit(0x6001, 3, "Overvoltage"),
+                bit(0x6001, 4, "Short circuit"),
+            ],
+        )
+    },
+    pdo(
+        0x1A04,
+        "DIG Inputs Device",
+        Some(3),
+        &[
+            bit(0xF600, 0x11, "Common fault"),
+            bit(0xF600, 0x12, "Undervoltage"),
+            bit(0xF600, 0x13, "Overvoltage"),
+            bit(0xF600, 0x14, "Overtemperature"),
+        ],
+    ),
+];
+
+const DIAGNOSED_OUTPUTS_PROCESSOR: ProcessorSpec = ProcessorSpec {
+    function: Function::DigitalOutputs { channels: 4 },
+    hardware_version: "02",
+    software_version: "01",
+    settings: &[],
+    times: ResponseTimes::TERMINAL,
+};
+
+/// Encoder and motor of one axis.
+const AXIS: &[PdoSpec] = &[
+    pdo(
+        0x1600,
+        "ENC Control compact",
+        Some(2),
+        &[
+            bit(0x7000, 0x01, "Enable latch C"),
+            bit(0x7000, 0x02, "Enable latch extern on positive edge"),
+            bit(0x7000, 0x03, "Set counter"),
+            bit(0x7000, 0x04, "Enable latch extern on negative edge"),
+            padding(4),
+            padding(8),
+            number(0x7000, 0x11, "Set counter value", DataType::UINT, 16),
+        ],
+    ),
+    pdo(
+        0x1602,
+        "STM Control",
+        Some(2),
+        &[
+            bit(0x7010, 0x01, "Enable"),
+            bit(0x7010, 0x02, "Reset"),
+            bit(0x7010, 0x03, "Reduce torque"),
+            padding(5),
+            padding(8),
+        ],
+    ),
+    pdo(0x1604, "STM Velocity", Some(2), &[number(0x7010, 0x21, "Velocity", DataType::INT, 16)]),
+    pdo(
+        0x1A00,
+        "ENC Status compact",
+        Some(3),
+        &[
+            bit(0x6000, 0x01, "Latch C valid"),
+            bit(0x6000, 0x02, "Latch extern valid"),
+            bit(0x6000, 0x03, "Set counter done"),
+            bit(0x6000, 0x04, "Counter underflow"),
+            bit(0x6000, 0x05, "Counter overflow"),
+            padding(3),
+            padding(5),
+            bit(0x6000, 0x0E, "Sync error"),
+            padding(1),
+            bit(0x6000, 0x10, "TxPDO Toggle"),
+            number(0x6000, 0x11, "Counter value", DataType::UINT, 16),
+            number(0x6000, 0x12, "Latch value", DataType::UINT, 16),
+        ],
+    ),
+    pdo(
+        0x1A03,
+        "STM Status",
+        Some(3),
+        &[
+            bit(0x6010, 0x01, "Ready to enable"),
+            bit(0x6010, 0x02, "Ready"),
+            bit(0x6010, 0x03, "Warning"),
+            bit(0x6010, 0x04, "Error"),
+            bit(0x6010, 0x05, "Moving positive"),
+            bit(0x6010, 0x06, "Moving negative"),
+            bit(0x6010, 0x07, "Torque reduced"),
+            padding(1),
+            padding(3),
+            bit(0x6010, 0x0C, "Digital input 1"),
+            bit(0x6010, 0x0D, "Digital input 2"),
+            bit(0x6010, 0x0E, "Sync error"),
+            padding(1),
+            bit(0x6010, 0x10, "TxPDO Toggle"),
+        ],
+    ),
+];
+
+const fn word(subindex: u8, name: &'static str, default: u32, maximum: u32) -> SettingSpec {
+    let (data_type, maximum) = (DataType::UINT, Some(maximum));
+    SettingSpec { subindex, name, data_type, bits: 16, default, maximum }
+}
+
+const AXIS_PROCESSOR: ProcessorSpec = ProcessorSpec {
+    function: Function::Stepper,
+    hardware_version: "11",
+    software_version: "12",
+    settings: &[
+        SettingsSpec {
+            index: 0x8010,
+            channels: 1,
+            name: "STM Motor Settings",
+            entries: &[
+                word(0x01, "Maximal current", 5_000, 5_000),
+                word(0x02, "Reduced current", 2_500, 5_000),
+                word(0x03, "Nominal voltage", 5_000, 5_000),
+                word(0x04, "Motor coil resistance", 100, 65_535),
+                word(0x06, "Motor fullsteps", 200, 65_535),
+            ],
+        },
+        SettingsSpec {
+            index: 0x8012,
+            channels: 1,
+            name: "STM Features",
+            entries: &[SettingSpec {
+                subindex: 0x05,
+                name: "Speed range",
+                data_type: DataType(0x0032),
+                bits: 3,
+                default: 0,
+                maximum: Some(4),
+            }],
+        },
+    ],
+    times: ResponseTimes::DRIVE,
+};
+
+const SWITCH_PORT_PROCESSOR: ProcessorSpec = ProcessorSpec {
+    function: Function::None,
+    hardware_version: "10",
+    software_version: "11",
+    settings: &[],
+    times: ResponseTimes::TERMINAL,
+};
+
+const fn single(spec: &'static [Spec; 1]) -> LibraryType {
+    LibraryType { controllers: spec, inner_links: &[] }
+}
+
+/// All types of this family.
+pub(super) const TYPES: &[LibraryType] = &[
+    single(&[Spec {
+        name: "EL2014",
+        title: "EL2014 4Ch. Dig. Output 24V, 0.5A, Diagnostics",
+        group: "DigOut",
+        product: 0x07DE_3052,
+        revision: 0x0011_0000,
+        ebus_current_ma: 60,
+        sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(1), inputs(3)],
+        pdos: DIAGNOSED_OUTPUTS,
+        behind: Behind::Processor(&DIAGNOSED_OUTPUTS_PROCESSOR),
+        ..TERMINAL
+    }]),
+    single(&[Spec {
+        name: "EL6601",
+        title: "EL6601 1 Port Switch (Ethernet, CoE)",
+        group: "Communication",
+        product: 0x19C9_3052,
+        revision: 0x0015_0000,
+        ebus_current_ma: 260,
+        sync_managers: &[
+            mailbox_out(1_024),
+            mailbox_in(0x1400, 1_024),
+            SyncManagerSpec { start: 0x1800, ..NO_OUTPUTS },
+            SyncManagerSpec { start: 0x1C00, ..NO_INPUTS },
+        ],
+        behind: Behind::Processor(&SWITCH_PORT_PROCESSOR),
+        ..TERMINAL
+    }]),
+    single(&[Spec {
+        name: "EL7041",
+        title: "EL7041 1Ch. Stepper motor output stage (50V, 5A)",
+        group: "DriveAxisTerminals",
+        product: 0x1B81_3052,
+        revision: 0x001A_0000,
+        ebus_current_ma: 140,
+        sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(8), inputs(8)],
+        pdos: AXIS,
+        behind: Behind::Processor(&AXIS_PROCESSOR),
+        op_modes: &[
+            OpModeSpec { name: "Synchron", assign_activate: 0 },
+            OpModeSpec { name: "DC-Synchron", assign_activate: 0x0300 },
+        ],
+        ..TERMINAL
+    }]),
+];

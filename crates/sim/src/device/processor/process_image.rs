@@ -1,0 +1,132 @@
+//! Process data of a device with a dictionary: which bits of a buffer are which objects.
+//!
+//! Read first: ETG.1000.6, PDO mapping. The assignment object (0x1C12, 0x1C13) lists PDOs, the
+//! mapping object of each PDO lists entries: index, subindex and bits in one number.
+
+use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
+
+use crate::device::dictionary::{Dictionary, EntryRef};
+
+/// The process data of one direction.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub(super) struct ProcessImage {
+    slots: Vec<Slot>,
+    bits: usize,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Slot {
+    /// `None` for padding.
+    entry: Option<EntryRef>,
+    bits: usize,
+}
+
+/// An entry is mapped that does not exist.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct NotMappable;
+
+impl ProcessImage {
+    /// What this assignment object comes to. An assignment that does not exist is empty.
+    pub(super) fn of(
+        dictionary: &Dictionary,
+        assignment: ObjectIndex,
+    ) -> Result<Self, NotMappable> {
+        let mut image = Self::default();
+        for pdo in listed(dictionary, assignment) {
+            let pdo = ObjectIndex(pdo as u16);
+            dictionary.object(pdo).ok_or(NotMappable)?;
+            for mapped in listed(dictionary, pdo) {
+                image.add(dictionary, mapped as u32)?;
+            }
+        }
+        Ok(image)
+    }
+
+    fn add(&mut self, dictionary: &Dictionary, mapped: u32) -> Result<(), NotMappable> {
+        let [bits, subindex, low, high] = mapped.to_le_bytes();
+        let index = u16::from_le_bytes([low, high]);
+        let entry = match index {
+            0 => None,
+            _ => {
+                let address = ObjectAddress::new(index, subindex);
+                Some(dictionary.find(address).ok_or(NotMappable)?)
+            }
+        };
+        let bits = usize::from(bits);
+        self.slots.push(Slot { entry, bits });
+        self.bits += bits;
+        Ok(())
+    }
+
+    /// Its length in bytes.
+    pub(super) fn len(&self) -> usize {
+        self.bits.div_ceil(8)
+    }
+
+    /// The values of its objects, bit behind bit.
+    pub(super) fn pack(&self, dictionary: &Dictionary, buffer: &mut Vec<u8>) {
+        buffer.clear();
+        buffer.resize(self.len(), 0);
+        let mut at = 0;
+        for slot in &self.slots {
+            if let Some(entry) = slot.entry {
+                put_bits(buffer, at, slot.bits, dictionary.number(entry));
+            }
+            at += slot.bits;
+        }
+    }
+
+    /// Takes the values of its objects out of a buffer; bits that the buffer lacks are 0.
+    pub(super) fn unpack(&self, buffer: &[u8], dictionary: &mut Dictionary) {
+        let mut at = 0;
+        for slot in &self.slots {
+            if let Some(entry) = slot.entry {
+                dictionary.set_number(entry, take_bits(buffer, at, slot.bits));
+            }
+            at += slot.bits;
+        }
+    }
+}
+
+/// The entries of a list, as many as its subindex 0 says.
+fn listed(dictionary: &Dictionary, index: ObjectIndex) -> impl Iterator<Item = u64> {
+    let entries = dictionary.object(index).map_or(&[][..], |object| &object.entries);
+    let count = entries.first().map_or(0, |count| count.as_number() as usize);
+    entries.iter().skip(1).take(count).map(|entry| entry.as_number())
+}
+
+/// Puts the lowest `bits` (up to 64) of a value into a buffer.
+fn put_bits(buffer: &mut [u8], at: usize, bits: usize, value: u64) {
+    for bit in 0..bits.min(64) {
+        if value >> bit & 1 != 0
+            && let Some(byte) = buffer.get_mut((at + bit) / 8)
+        {
+            *byte |= 1 << ((at + bit) % 8);
+        }
+    }
+}
+
+fn take_bits(buffer: &[u8], at: usize, bits: usize) -> u64 {
+    (0..bits.min(64)).fold(0, |value, bit| {
+        let byte = buffer.get((at + bit) / 8).copied().unwrap_or(0);
+        value | u64::from(byte >> ((at + bit) % 8) & 1) << bit
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_keep_their_places() {
+        let mut buffer = vec![0; 4];
+        put_bits(&mut buffer, 3, 2, 0b11);
+        put_bits(&mut buffer, 12, 16, 0xBEEF);
+        assert_eq!(buffer, [0b0001_1000, 0xF0, 0xEE, 0x0B]);
+        assert_eq!(take_bits(&buffer, 12, 16), 0xBEEF);
+        assert_eq!(take_bits(&buffer, 2, 4), 0b0110);
+        assert_eq!(take_bits(&buffer, 28, 16), 0, "behind the end");
+        put_bits(&mut buffer, 30, 8, 0xFF);
+        assert_eq!(buffer[3], 0xCB);
+    }
+}

@@ -1,0 +1,153 @@
+use std::collections::BTreeSet;
+
+use linesman_config::fault::FaultName;
+use linesman_proto::port::Port;
+use linesman_proto::topology::End;
+
+use super::*;
+use crate::seed::Seed;
+
+const PLANT: &str = r#"
+name = "plant \"7\""
+seed = 7
+old_counters = true
+
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+cable_m = 5.0
+counters = { "A.physical" = 3, processing_unit = 1 }
+
+[[device]]
+name = "Term 2 (EL2008)"
+type = "EL2008"
+on = "K1.B"
+
+[[device]]
+name = "K3"
+type = "EK1101"
+on = "K1.C"
+entry = "A"
+cable_m = 12
+clock_ppm = -3.5
+
+[ring]
+closes_at = "K3.C"
+cable_m = 30.0
+
+[[fault]]
+kind = "emc-noise"
+at = ["K1.C>K3.A", "maindevice-K1.A"]
+from_ms = 2000
+to_ms = 5000
+hits_per_s = 40.0
+
+[[fault]]
+kind = "supply-off"
+devices = ["K1", "K3"]
+
+[[fault]]
+kind = "init-refused"
+device = "Term 2 (EL2008)"
+to = "OP"
+code = 27
+"#;
+
+#[test]
+fn a_file_reads_and_writes_itself() {
+    let file = SegmentFile::parse(PLANT).unwrap();
+    assert_eq!(SegmentFile::parse(&file.to_toml()), Ok(file.clone()));
+    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 3));
+    assert_eq!(file.devices[2].cable_m, Some(12.0));
+    assert_eq!(file.devices[0].counters["A.physical"], 3);
+    let noise = &file.faults[0];
+    assert_eq!(noise.at.as_ref().unwrap().as_slice().len(), 2);
+    assert_eq!((noise.from_ms, noise.to_ms), (Some(2000.0), Some(5000.0)));
+    assert_eq!(noise.parameters["hits_per_s"], Value::Number(40.0));
+    assert_eq!(file.faults[2].parameters["code"], Value::Integer(27));
+}
+
+#[test]
+fn mistakes_are_named() {
+    let table = [
+        ("cable_m = 5.0", "cable = 5.0", "unknown field `cable`"),
+        ("seed = 7", "sead = 7", "line 3"),
+        ("\"EL2008\"", "\"EL9999\"", "device `Term 2 (EL2008)`: device type \"EL9999\""),
+        ("\"K1.B\"", "\"K9.B\"", "no device is called `K9`"),
+        ("\"K1.B\"", "\"K1.C\"", "`K1.C` is wired twice, to `Term 2 (EL2008)` and `K3`"),
+        ("\"K1.B\"", "\"K1.D\"", "device `K1` has no port D: a EK1100 has A, B, C"),
+        ("on = \"K1.C\"", "on = \"K1.B\"", "wired twice"),
+        ("on = \"K1.B\"", "on = \"K3.C\"", "Term 2 (EL2008).A is an E-bus contact"),
+        ("entry = \"A\"", "entry = \"X\"", "`entry` is `X`, expected A, B, C or D"),
+        ("cable_m = 12", "cable_m = -1", "`cable_m` is -1, expected 0 to 2000"),
+        ("clock_ppm = -3.5", "clock_ppm = 300.0", "`clock_ppm` is 300"),
+        ("\"A.physical\"", "\"A.fysical\"", "no counter is called `A.fysical`"),
+        ("name = \"K3\"", "name = \"K1\"", "two devices are called `K1`"),
+        ("closes_at = \"K3.C\"", "closes_at = \"K3.B\"", "K3.B is an E-bus contact"),
+    ];
+    for (from, to, expected) in table {
+        let error = SegmentFile::parse(&PLANT.replace(from, to)).expect_err(to).to_string();
+        assert!(error.contains(expected), "{to}: {error}");
+    }
+}
+
+#[test]
+fn the_project_is_what_was_planned() {
+    let mut file = SegmentFile::parse(PLANT).unwrap();
+    file.faults = vec![
+        FaultEntry::new(FaultName::DeviceMissing).device("Term 2 (EL2008)"),
+        FaultEntry::new(FaultName::DeviceWrong).device("K3").with("type", "EK1100"),
+    ];
+    let project = file.project().unwrap();
+    let names: Vec<&str> = project.devices.iter().map(|device| device.name.as_str()).collect();
+    assert_eq!(names, ["K1", "Term 2 (EL2008)", "K3"]);
+    // Vendor 2 is Beckhoff; its product codes hold the type number in the high word.
+    let codes = project.devices.iter().map(|device| device.product_code.unwrap() >> 16);
+    assert_eq!(codes.collect::<Vec<_>>(), [1100, 2008, 1101]);
+    assert!(project.devices.iter().all(|device| device.vendor_id == Some(2)));
+    let tree = project.tree().unwrap();
+    assert_eq!(tree.closes_at(), Some((2, Port::C)));
+    assert_eq!(tree.upstream(1), Some(End::Controller(0, Port::B)));
+}
+
+#[test]
+fn plants_are_whole_and_belong_to_their_seed() {
+    let (mut sizes, mut junctions, mut depths) = (BTreeSet::new(), 0, BTreeSet::new());
+    for seed in 0..100 {
+        let file = plant(Seed(seed), &PlantOptions::default());
+        assert_eq!(file, plant(Seed(seed), &PlantOptions::default()));
+        let tree = file.project().unwrap_or_else(|error| panic!("{seed}: {error}")).tree().unwrap();
+        assert!((5..=60).contains(&tree.len()), "{seed}: {}", tree.len());
+        assert_eq!(SegmentFile::parse(&file.to_toml()), Ok(file.clone()), "{seed}");
+        sizes.insert(tree.len());
+        depths.extend((0..tree.len()).map(|node| tree.depth(node)));
+        junctions += usize::from(file.devices.iter().any(|device| device.name.starts_with('J')));
+    }
+    assert!(sizes.len() > 20, "{sizes:?}");
+    assert!(junctions > 30, "{junctions}");
+    assert!(depths.last().is_some_and(|deepest| *deepest >= 20), "{depths:?}");
+}
+
+#[test]
+fn plants_keep_to_their_options() {
+    let options = PlantOptions { min_devices: 25, max_devices: 40, junction: true, ring: true };
+    for seed in 0..50 {
+        let file = plant(Seed(seed), &options);
+        let tree = file.project().unwrap().tree().unwrap();
+        assert!((25..=40).contains(&tree.len()), "{seed}: {}", tree.len());
+        assert!(file.devices.iter().any(|device| device.name.starts_with('J')), "{seed}");
+        assert!(tree.closes_at().is_some(), "{seed}");
+    }
+    let one = PlantOptions { min_devices: 0, max_devices: 1, ..PlantOptions::default() };
+    assert_eq!(plant(Seed(1), &one).devices.len(), 1);
+}
+
+#[test]
+fn the_schema_names_what_can_be_written() {
+    let schema = schemars::schema_for!(SegmentFile);
+    let text = schema.as_value().to_string();
+    for word in ["device", "closes_at", "cable_m", "from_ms", "additionalProperties"] {
+        assert!(text.contains(word), "{word}");
+    }
+}
