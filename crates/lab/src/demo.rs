@@ -9,7 +9,7 @@ use linesman_diagnosis::report::FindingReport;
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
 use linesman_sim::seed::Seed;
-use linesman_sim::segment_file::plant::{PlantOptions, plant};
+use linesman_sim::segment_file::{PlantOptions, plant};
 use linesman_sim::segment_file::SegmentFile;
 use linesman_sim::truth::{FaultId, Place};
 
@@ -23,6 +23,8 @@ use crate::verdict::{Claim, Match, Scene, Site};
 
 /// SubDevices of a demo plant, at least.
 pub const MIN_DEVICES: usize = 25;
+/// SubDevices of a demo plant, at most.
+pub const MAX_DEVICES: usize = 36;
 /// Cycle of the process data.
 const CYCLE: Span = Span::ms(2);
 /// How long the bring-up may take.
@@ -101,7 +103,12 @@ impl Demo {
     /// [`LabError::Segment`].
     pub fn new(seed: u64) -> Result<Self, LabError> {
         let seed = Seed(seed);
-        let options = PlantOptions { min_devices: MIN_DEVICES, ..PlantOptions::default() };
+        let options = PlantOptions {
+            min_devices: MIN_DEVICES,
+            max_devices: MAX_DEVICES,
+            junction: true,
+            ..PlantOptions::default()
+        };
         let file = plant(seed, &options);
         let lab = Lab::new(&file, LabOptions { cycle: CYCLE, ..LabOptions::default() })?;
         let mut menu = MENU.to_vec();

@@ -4,8 +4,9 @@
 //! the diagnosis, and a tap if there is one; what the card counts becomes host observations, as it
 //! does with a real card.
 
+use linesman_config::inventory::Inventory;
 use linesman_config::plan::{Plan, PlanOptions};
-use linesman_config::project::Project;
+use linesman_config::project::{Project, ProjectError};
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
 use linesman_diagnosis::{Engine, Setup};
@@ -18,7 +19,7 @@ use linesman_sim::segment::{BuildError, HostPort, Segment};
 use linesman_sim::segment_file::{FaultEntry, SegmentFile, SegmentFileError};
 use linesman_sim::truth::{FaultId, TruthLog, Unexplained};
 
-use crate::options::LabOptions;
+use crate::options::{Begin, LabOptions};
 
 /// How often the card's counters are looked at.
 const HOST_INTERVAL: Span = Span::ms(100);
@@ -36,6 +37,9 @@ pub enum LabError {
     /// The segment file does not fit together.
     #[error(transparent)]
     File(#[from] SegmentFileError),
+    /// The project behind it does not fit together.
+    #[error(transparent)]
+    Project(#[from] ProjectError),
     /// A fault cannot be injected.
     #[error(transparent)]
     Fault(#[from] FaultError),
@@ -80,6 +84,7 @@ pub struct Lab {
     frames: u64,
     events: Vec<(Instant, Event)>,
     failure: Option<String>,
+    inventory: Option<Inventory>,
     plan: Option<Plan>,
     host_next: Instant,
     host_last: [HostPort; 2],
@@ -99,14 +104,17 @@ impl Lab {
     pub fn new(file: &SegmentFile, options: LabOptions) -> Result<Self, LabError> {
         let segment = Segment::build(file)?;
         let project = file.project()?;
-        let tree = project.tree().map_err(SegmentFileError::Wiring)?;
+        let tree = project.tree()?;
         let network = Network(0);
         let paths = if file.ring.is_some() { 2 } else { 1 };
         let setup = Setup {
             project: options.project.then(|| project.clone()),
             host_counters: options.host_counters,
             probes: options.probes,
-            source: format!("lab:{}", file.name),
+            source: match options.source.as_str() {
+                "" => format!("lab:{}", file.name),
+                source => source.to_owned(),
+            },
             start: None,
             clock: "virtual".to_owned(),
         };
@@ -123,6 +131,7 @@ impl Lab {
             frames: 0,
             events: Vec::new(),
             failure: None,
+            inventory: None,
             plan: None,
             host_next: Instant::ZERO,
             host_last: [HostPort::default(); 2],
@@ -131,7 +140,7 @@ impl Lab {
             transmit: vec![0; FRAME],
             options,
         };
-        if lab.options.bring_up {
+        if lab.options.begin != Begin::Idle {
             lab.main.scan(lab.now);
         }
         Ok(lab)
@@ -187,6 +196,12 @@ impl Lab {
     #[must_use]
     pub fn tree(&self) -> &Tree {
         &self.tree
+    }
+
+    /// What the last scan found.
+    #[must_use]
+    pub fn inventory(&self) -> Option<&Inventory> {
+        self.inventory.as_ref()
     }
 
     /// What the MainDevice runs by, once it has scanned the line.
@@ -430,13 +445,12 @@ impl Lab {
 
     fn handle_event(&mut self, event: Event) {
         match &event {
-            Event::Scanned(inventory) => match self.make_plan(inventory) {
-                Ok(plan) => {
-                    self.main.start(self.now, plan.clone());
-                    self.plan = Some(plan);
+            Event::Scanned(inventory) => {
+                self.inventory = Some((**inventory).clone());
+                if self.options.begin == Begin::Run {
+                    self.start(inventory);
                 }
-                Err(error) => self.failure = Some(error),
-            },
+            }
             Event::ScanFailed(error) => self.failure = Some(error.to_string()),
             _ => {}
         }
@@ -446,8 +460,18 @@ impl Lab {
         self.events.push((self.now, event));
     }
 
+    fn start(&mut self, inventory: &Inventory) {
+        match self.make_plan(inventory) {
+            Ok(plan) => {
+                self.main.start(self.now, plan.clone());
+                self.plan = Some(plan);
+            }
+            Err(error) => self.failure = Some(error),
+        }
+    }
+
     /// The plan for what was found, with the names of the project where they fit.
-    fn make_plan(&self, inventory: &linesman_config::inventory::Inventory) -> Result<Plan, String> {
+    fn make_plan(&self, inventory: &Inventory) -> Result<Plan, String> {
         let mut planned = inventory.planned(self.options.target);
         if planned.len() == self.project.devices.len() {
             for (device, wanted) in planned.iter_mut().zip(&self.project.devices) {

@@ -3,6 +3,18 @@
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
+/// What a lab does with its line from the start.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum Begin {
+    /// Nothing is sent until told.
+    Idle,
+    /// The line is scanned, which changes no state.
+    Scan,
+    /// The line is scanned, driven to the target state and kept there.
+    #[default]
+    Run,
+}
+
 /// Choices for a lab.
 #[derive(Clone, Debug)]
 pub struct LabOptions {
@@ -17,8 +29,10 @@ pub struct LabOptions {
     pub project: bool,
     /// Whether the diagnosis may ask for registers by itself.
     pub probes: bool,
-    /// Whether the line is brought up at once. Otherwise nothing is sent until told.
-    pub bring_up: bool,
+    /// What is done with the line from the start.
+    pub begin: Begin,
+    /// What the report says was looked at; empty for the segment's name.
+    pub source: String,
 }
 
 impl Default for LabOptions {
@@ -29,7 +43,8 @@ impl Default for LabOptions {
             host_counters: true,
             project: true,
             probes: true,
-            bring_up: true,
+            begin: Begin::Run,
+            source: String::new(),
         }
     }
 }

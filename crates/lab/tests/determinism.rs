@@ -12,7 +12,7 @@ use linesman_link::unix_time::UnixTime;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Seed;
 use linesman_sim::segment_file::FaultEntry;
-use linesman_sim::segment_file::plant::{PlantOptions, plant};
+use linesman_sim::segment_file::{PlantOptions, plant};
 use linesman_config::fault::FaultName;
 
 /// The capture of a run of a seed, with a fault in it.

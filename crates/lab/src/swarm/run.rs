@@ -9,7 +9,7 @@ use linesman_proto::topology::End;
 use linesman_sim::hardware::PortKind;
 use linesman_sim::seed::Seed;
 use linesman_sim::segment::Segment;
-use linesman_sim::segment_file::plant::{PlantOptions, plant};
+use linesman_sim::segment_file::{PlantOptions, plant};
 
 use super::episode::{Episode, EpisodeReport};
 use crate::lab::{Lab, LabError};
