@@ -158,6 +158,8 @@ catalogue! {
         "The computer sends its frames unevenly.";
     HostDrops "host-drops" Host
         "The computer drops frames after they came back.";
+    OneSidedRecording "one-sided-recording" Host
+        "A recording shows frames in one direction only: what came back, or what went out, is missing.";
 }
 
 impl fmt::Display for FaultName {

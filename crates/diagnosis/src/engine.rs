@@ -404,12 +404,16 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(line, exchange));
     let traffic = &mut line.traffic;
     match outcome {
-        Outcome::Request | Outcome::RequestCopy => traffic.sent += 1,
+        Outcome::Request | Outcome::RequestCopy => {
+            traffic.sent += 1;
+            if traffic.senders.len() < pairing.senders().len() {
+                traffic.senders = pairing.senders().to_vec();
+                line.touch();
+            }
+        }
         Outcome::Return | Outcome::ReturnAlone => {
-            traffic.returned += 1;
             traffic.returned_alone += u64::from(outcome == Outcome::ReturnAlone);
-            let seen = Seen::new((), frame.time, Some(frame.number));
-            traffic.latest_returned = Some(seen);
+            traffic.record_returned(frame.time, frame.number);
         }
         Outcome::Duplicate => traffic.duplicates += 1,
     }

@@ -6,12 +6,15 @@
 mod support;
 
 use linesman_config::fault::Class;
-use linesman_diagnosis::report::Verdict;
+use linesman_diagnosis::report::{FindingState, PlaceReport, Severity, Verdict};
 use linesman_proto::address::Network;
 use support::{read_capture, real_captures, text};
 
-/// Name, SubDevices, highest AL state, requests, datagrams of requests, unanswered requests that
-/// tshark shows without a return.
+/// Name, SubDevices, highest AL state, datagrams of requests.
+///
+/// The SubDevices are those of the data's description; states and datagrams are what tshark shows:
+/// the highest value of AL status, and the datagrams of frames without the mark of returning ones
+/// (where requests are missing, those of returns).
 const ROWS: [(&str, u64, Option<&str>, u64); 17] = [
     ("ec-replay-ek1100-alias-address", 3, Some("PREOP"), 650),
     ("ec-replay-ek1100-el2828-el2889", 3, Some("OP"), 2062),
@@ -19,16 +22,16 @@ const ROWS: [(&str, u64, Option<&str>, u64); 17] = [
     ("ec-replay-ek1914-el3004-mailbox", 2, Some("PREOP"), 497),
     ("ec-replay-ek1914-segmented-upload", 2, Some("PREOP"), 482),
     ("ec-rs-detect-slaves-ek1100-el1004", 2, None, 1),
-    ("ec-soem-sdinfo-ek1100-el1004", 2, Some("PREOP"), 290),
-    ("ec-soem-sdinfo-ek1100-only", 1, Some("PREOP"), 94),
+    ("ec-soem-sdinfo-ek1100-el1004", 2, Some("SAFEOP"), 290),
+    ("ec-soem-sdinfo-ek1100-only", 1, Some("SAFEOP"), 94),
     ("ec-soem-sdinfo-no-slaves", 0, None, 19),
-    ("ec-soem-single-lan9252", 1, Some("PREOP"), 499),
-    ("ec-twincat-run-ek1100-el1004", 2, Some("OP"), 291),
+    ("ec-soem-single-lan9252", 1, Some("SAFEOP"), 499),
+    ("ec-twincat-run-ek1100-el1004", 2, Some("PREOP"), 291),
     ("ec-twincat-scan-devices-2", 2, None, 6),
     ("echist-no-reborrow-202307", 3, Some("OP"), 2850),
     ("echist-replay-el2828-el2889-202405", 3, Some("OP"), 9982),
     ("echist-replay-mailbox-el3004", 2, Some("PREOP"), 896),
-    ("echist-replay-no-complete-access-202308", 1, Some("PREOP"), 1996),
+    ("echist-replay-no-complete-access-202308", 1, Some("OP"), 1996),
     ("echist-replay-segmented-upload-202401", 1, Some("PREOP"), 312),
 ];
 
@@ -38,30 +41,69 @@ fn every_real_capture_is_read_as_what_it_is() {
     for (name, devices, state, datagrams) in ROWS {
         let engine = read_capture(&folder.join(format!("{name}.pcapng")));
         let report = engine.diagnosis();
-        let line = engine.line(Network(0)).unwrap();
-        println!(
-            "{name}: {} devices, {:?}, {} datagrams, {} unanswered, {} lost, {:?}; {}",
-            report.network.devices.0,
-            report.network.al_state_highest,
-            report.network.datagrams.0,
-            report.network.unanswered.0,
-            report.network.lost.0,
-            report.verdict,
-            line.devices
-                .iter()
-                .map(|device| format!(
-                    "{}: {:?} {:?} {:?} {:?};",
-                    line.label(device.id),
-                    device.station,
-                    device.position,
-                    device.al.state(),
-                    device.identity.identity()
-                ))
-                .collect::<String>(),
-        );
-        println!("    {:?}", line.tree.as_ref().map(|tree| tree.links().len()));
-        for finding in &report.findings {
-            println!("    {} {} {:?}", finding.code, finding.name, finding.place);
+        let network = &report.network;
+        assert_eq!(network.devices.0, devices, "{name}");
+        assert_eq!(network.al_state_highest.as_deref(), state, "{name}");
+        assert_eq!(network.datagrams.0, datagrams, "{name}");
+        assert!(report.complete, "{name}");
+        if name != "ec-soem-sdinfo-no-slaves" {
+            assert_eq!(report.verdict, Verdict::Healthy, "{name}: {}", text(&report));
+            assert!(report.findings.is_empty(), "{name}: {}", text(&report));
         }
     }
+}
+
+#[test]
+fn unanswered_datagrams_are_those_without_an_answer() {
+    let Some(folder) = real_captures() else { return };
+    let unanswered = |name: &str| {
+        read_capture(&folder.join(format!("{name}.pcapng"))).diagnosis().network.unanswered.0
+    };
+    assert_eq!(unanswered("ec-soem-sdinfo-no-slaves"), 19);
+    // Its last frame has no return.
+    assert_eq!(unanswered("ec-twincat-run-ek1100-el1004"), 1);
+    // The controller took no AL control twice: processed, working counter 0.
+    assert_eq!(unanswered("ec-soem-single-lan9252"), 2);
+    // Clock registers of devices without clocks, and SyncManagers they do not have, are none.
+    assert_eq!(unanswered("ec-replay-ek1914-el3004-mailbox"), 0);
+    assert_eq!(unanswered("ec-replay-ek1100-el2828-el2889"), 0);
+}
+
+#[test]
+fn no_answer_at_all_is_one_finding_that_says_what_to_check() {
+    let Some(folder) = real_captures() else { return };
+    let engine = read_capture(&folder.join("ec-soem-sdinfo-no-slaves.pcapng"));
+    let report = engine.diagnosis();
+    assert_eq!(report.verdict, Verdict::Faulty);
+    let [finding] = &report.findings[..] else { panic!("{}", text(&report)) };
+    assert_eq!(finding.name, "nobody-answers");
+    assert_eq!((finding.severity, finding.class), (Severity::Error, Class::Hardware));
+    assert_eq!(finding.state, FindingState::Confirmed);
+    let PlaceReport::Link { a, b: None, .. } = finding.place else { panic!("{}", text(&report)) };
+    assert_eq!((a.no, a.port), (0, 'A'));
+    assert_eq!(finding.evidence[0].frame.unwrap().0, 1);
+    assert!(finding.actions.len() >= 3);
+    let others: f64 = finding.alternatives.iter().map(|other| other.confidence).sum();
+    assert!(finding.confidence + others <= 1.0);
+}
+
+/// Vendor, product code and revision as the SII images of these devices have them.
+#[test]
+fn identities_and_stations_are_learnt_from_the_frames() {
+    let Some(folder) = real_captures() else { return };
+    let engine = read_capture(&folder.join("ec-replay-ek1100-el2828-el2889.pcapng"));
+    let line = engine.line(Network(0)).unwrap();
+    let found: Vec<_> = line
+        .devices
+        .iter()
+        .map(|device| {
+            let identity = device.identity.identity().unwrap();
+            (device.station.unwrap().0, identity.vendor_id, identity.product_code)
+        })
+        .collect();
+    let expected = [(0x1000, 2, 0x044C_2C52), (0x1001, 2, 0x0B0C_3052), (0x1002, 2, 0x0B49_3052)];
+    assert_eq!(found, expected);
+    // A coupler with two terminals behind it.
+    let tree = line.tree.as_ref().unwrap();
+    assert_eq!((tree.parent(1), tree.parent(2)), (Some(0), Some(1)));
 }

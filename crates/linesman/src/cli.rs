@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{completion, explain, interfaces, schema, sim};
+use crate::command::{completion, diagnose, explain, interfaces, schema, sim};
 use crate::version::VERSION;
 
 /// The whole command line.
@@ -42,6 +42,8 @@ pub(crate) enum ColorChoice {
 /// The commands.
 #[derive(Subcommand, Debug)]
 pub(crate) enum Command {
+    /// What is wrong with a line: where, why, and what to do
+    Diagnose(diagnose::Arguments),
     /// Network cards: link, driver, suitability, EtherCAT seen
     Interfaces(interfaces::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
@@ -58,6 +60,7 @@ impl Command {
     /// Whether the answer is to be JSON, a failure included.
     pub(crate) fn wants_json(&self) -> bool {
         match self {
+            Self::Diagnose(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
             Self::Explain(_) | Self::Sim(_) | Self::Schema(_) | Self::Completion(_) => false,
         }

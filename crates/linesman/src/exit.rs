@@ -7,12 +7,10 @@ use std::process::ExitCode;
 pub(crate) enum Status {
     /// 0: healthy; of other commands: done, expectations held.
     Good,
-    #[expect(dead_code, reason = "given by the commands that judge")]
     /// 1: there is, or was, an error or warning finding; an expectation did not hold.
     Findings,
     /// 2: nothing could be judged.
     NotJudged,
-    #[expect(dead_code, reason = "given by the commands that judge")]
     /// 3: too little was seen to say whether the line is healthy.
     Inconclusive,
 }

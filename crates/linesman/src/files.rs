@@ -16,10 +16,10 @@ const MAX_TEXT: u64 = 16 * 1024 * 1024;
 pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
     let name = path.display();
     let refuse = |error: std::io::Error| {
-        let advice = match error.kind() {
-            std::io::ErrorKind::NotFound => "check the path",
-            std::io::ErrorKind::IsADirectory => "name a file in it",
-            _ => "check the rights of the file (`ls -l`)",
+        let advice = if error.kind() == std::io::ErrorKind::NotFound {
+            "check the path"
+        } else {
+            "check that it is a file which you may read (`ls -l`)"
         };
         Failure::new(format!("{name}: reading {what}: {error}"), advice)
     };
@@ -60,6 +60,12 @@ impl Plant {
 pub(crate) fn segment_file(path: &Path) -> Result<SegmentFile, Failure> {
     let text = text(path, "a segment file")?;
     SegmentFile::parse(&text).map_err(|error| in_file(path, &error))
+}
+
+/// A project file.
+pub(crate) fn project(path: &Path) -> Result<Project, Failure> {
+    let text = text(path, "a project")?;
+    Project::parse(&text).map_err(|error| in_file(path, &error))
 }
 
 /// An error inside a file.

@@ -2,9 +2,11 @@
 
 mod support;
 
+use std::ffi::OsStr;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use support::capture::{HEADER, Pcap, RECORD};
 use support::{Run, assert_valid, linesman};
 use tempfile::TempDir;
 
@@ -81,4 +83,86 @@ fn a_refusal_is_json_when_json_was_asked_for() {
     let run = linesman(["interfaces", "--json", "--nonsense"]);
     assert_eq!(run.status, 2);
     assert_valid(&run.json(), "error");
+}
+
+fn diagnose(path: &Path, more: &[&str]) -> Run {
+    let start = [OsStr::new("diagnose"), path.as_os_str()];
+    linesman(start.into_iter().chain(more.iter().map(OsStr::new)))
+}
+
+/// A pcapng file up to the middle of its first block.
+const CUT_PCAPNG: [u8; 14] = [0x0A, 0x0D, 0x0D, 0x0A, 0x1C, 0, 0, 0, 0x4D, 0x3C, 0x2B, 0x1A, 1, 0];
+
+#[test]
+fn a_capture_that_is_none() {
+    let files = Files::new();
+    let mut foreign = Pcap::new();
+    let mut arp = [0xFF; 60];
+    arp[12..14].copy_from_slice(&[0x08, 0x06]);
+    foreign.frame(0, &arp);
+    let rows: [(&str, &[u8], &[&str]); 6] = [
+        ("cut.pcapng", &CUT_PCAPNG, &["first block", "cut off", "record it again"]),
+        ("empty.pcap", &[], &["is empty"]),
+        ("random.pcap", &[3, 141, 59, 26, 53, 58, 97, 93, 23, 84], &["03 8d 3b 1a", "tcpdump"]),
+        ("text.pcapng.gz", b"hello, world, no gzip", &["expected the first bytes of a capture"]),
+        ("header.pcap", &Pcap::new().0, &["no EtherCAT frame among 0 Ethernet frames"]),
+        ("foreign.pcap", &foreign.0, &["no EtherCAT frame among 1 Ethernet frame;", "0x88A4"]),
+    ];
+    for (name, bytes, words) in rows {
+        let path = files.write(name, bytes);
+        let run = diagnose(&path, &[]);
+        refused(&run, words);
+        assert!(run.stdout.is_empty() && run.stderr.contains(name), "{}", run.all());
+        let run = diagnose(&path, &["--json"]);
+        refused(&run, words);
+        let error = run.json();
+        assert_valid(&error, "error");
+        assert_eq!(error["schema"], "linesman.error/1");
+    }
+    refused(&diagnose(&files.0.path().join("missing.pcap"), &[]), &["there is no such file"]);
+    let directory = files.0.path().join("directory.pcap");
+    fs::create_dir(&directory).unwrap();
+    refused(&diagnose(&directory, &[]), &["it is a directory"]);
+}
+
+#[test]
+fn a_capture_cut_off_later_is_judged_as_far_as_it_goes() {
+    let files = Files::new();
+    let mut capture = Pcap::new();
+    capture.exchanges(100);
+    let whole = diagnose(&files.write("whole.pcap", &capture.0), &["--json"]);
+    assert_eq!((whole.status, whole.stderr.as_str()), (0, ""), "{}", whole.all());
+    assert_eq!(whole.json()["complete"], true);
+    // Cut inside of the record behind 50 exchanges, at several places.
+    for more in [1, 15, 17, RECORD - 1] {
+        let cut = &capture.0[..HEADER + 100 * RECORD + more];
+        let run = diagnose(&files.write("cut.pcap", cut), &["--json"]);
+        let diagnosis = run.json();
+        assert_valid(&diagnosis, "diagnosis");
+        assert_eq!(diagnosis["complete"], false, "{more}");
+        assert_eq!(diagnosis["network"]["datagrams"], 50, "{more}");
+        assert_eq!(diagnosis["network"]["devices"], 2, "{more}");
+        assert_eq!(run.status, 0, "what can be read is healthy: {diagnosis}");
+        assert!(run.stderr.contains("ends after 100 frames"), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn a_selector_that_is_none() {
+    refused(&diagnose(Path::new("tap:eth0"), &[]), &["`tap:` is not known", "listen:eth0"]);
+    let run = diagnose(Path::new("tap:eth0"), &["--json"]);
+    assert_valid(&run.json(), "error");
+    assert_eq!(run.status, 2);
+}
+
+#[test]
+fn a_project_that_is_none() {
+    let files = Files::new();
+    let mut capture = Pcap::new();
+    capture.exchanges(2);
+    let capture = files.write("good.pcap", &capture.0);
+    let project = files.write("plan.toml", "nam = \"x\"\n");
+    let run = diagnose(&capture, &["--project", project.to_str().unwrap()]);
+    assert_eq!(run.status, 2, "{}", run.all());
+    assert!(run.stderr.contains("plan.toml") && run.stderr.contains("nam"), "{}", run.stderr);
 }

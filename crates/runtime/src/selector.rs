@@ -55,13 +55,13 @@ impl fmt::Display for Selector {
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum SelectorError {
     /// Nothing stands there, or nothing behind the colon.
-    #[error("`{given}`: nothing is named, expected one of: {}", Selector::HELP)]
+    #[error("`{given}`: nothing is named. Do: name one of: {}", Selector::HELP)]
     Empty {
         /// The whole word.
         given: String,
     },
     /// The word before the colon is not known.
-    #[error("`{given}`: `{kind}:` is not known, expected one of: {}", Selector::HELP)]
+    #[error("`{given}`: `{kind}:` is not known. Do: name one of: {}", Selector::HELP)]
     UnknownKind {
         /// The whole word.
         given: String,

@@ -39,6 +39,8 @@ pub struct Device {
     pub answered: Option<Seen<()>>,
     /// When it did not answer for the first time since it last answered; `None` while it answers.
     pub silent: Option<Seen<()>>,
+    /// When it did not answer, oldest first, at most [`CHANGES_KEPT`].
+    pub absences: VecDeque<Absence>,
     /// Its state.
     pub al: AlHistory,
     /// Its ports.
@@ -127,6 +129,17 @@ pub struct AlChange {
     pub at: Instant,
     /// The number of the frame that showed it.
     pub frame: Option<u64>,
+    /// The state asked for at that time, where a request was seen.
+    pub requested: Option<AlState>,
+}
+
+/// A stretch of time in which a controller did not answer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Absence {
+    /// The first datagram that it did not answer.
+    pub since: Seen<()>,
+    /// When it answered again.
+    pub ended: Option<Instant>,
 }
 
 /// DL status over time.
@@ -170,6 +183,7 @@ impl Device {
             position: None,
             answered: None,
             silent: None,
+            absences: VecDeque::new(),
             al: AlHistory::default(),
             dl: DlHistory::default(),
             counters: CounterHistory::default(),
@@ -198,12 +212,61 @@ impl Device {
     /// Notes that it answered.
     pub fn answers(&mut self, at: Instant, frame: Option<u64>) {
         self.answered = Some(Seen::new((), at, frame));
-        self.silent = None;
+        if self.silent.take().is_some()
+            && let Some(absence) = self.absences.back_mut()
+        {
+            absence.ended = Some(at);
+        }
     }
 
     /// Notes that it did not answer though it was asked.
     pub fn is_silent(&mut self, at: Instant, frame: Option<u64>) {
-        self.silent.get_or_insert(Seen::new((), at, frame));
+        if self.silent.is_none() {
+            let since = Seen::new((), at, frame);
+            self.silent = Some(since);
+            push(&mut self.absences, Absence { since, ended: None });
+        }
+    }
+
+    /// When it first was in trouble of its own, or did not answer, within a stretch of time.
+    #[must_use]
+    pub fn trouble_within(&self, from: Instant, to: Instant) -> Option<Trouble> {
+        let overlaps = |since: Instant, ended: Option<Instant>| {
+            since <= to && ended.is_none_or(|ended| ended >= from)
+        };
+        let mut absences = self.absences.iter();
+        if let Some(absence) = absences.find(|absence| overlaps(absence.since.at, absence.ended)) {
+            return Some(Trouble::Absent(*absence));
+        }
+        let mut errors = self.al.errors.iter();
+        if let Some(error) = errors.find(|error| overlaps(error.status.at, error.ended)) {
+            return Some(Trouble::Error(*error));
+        }
+        let mut falls = self.al.changes.iter().filter(|change| change.is_own_fall());
+        let fall = falls.find(|change| change.at >= from && change.at <= to);
+        fall.map(|change| Trouble::Fall(*change))
+    }
+}
+
+/// What keeps a controller from doing its share.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Trouble {
+    /// It does not answer.
+    Absent(Absence),
+    /// It signals an error.
+    Error(AlError),
+    /// It left its state by itself, without an error.
+    Fall(AlChange),
+}
+
+impl AlChange {
+    /// Whether it went to a lower state though nobody asked for one, and without an error.
+    #[must_use]
+    pub fn is_own_fall(&self) -> bool {
+        let (from, to) = (self.from.state().state(), self.to.state().state());
+        let (Some(from), Some(to)) = (from, to) else { return false };
+        let was_asked = self.requested.is_none_or(|requested| requested < from);
+        to < from && !was_asked && !self.to.error()
     }
 }
 
@@ -234,13 +297,26 @@ impl AlHistory {
             return false;
         }
         self.change_count += 1;
-        push(&mut self.changes, AlChange { from: before.value, to: status, at, frame });
+        let requested = self.requested.and_then(|requested| requested.value.state());
+        push(&mut self.changes, AlChange { from: before.value, to: status, at, frame, requested });
         true
     }
 
+    /// Whether the error bit is but an echo: a controller without a processor behind it copies AL
+    /// control to AL status, with the bit that acknowledges errors. An error of its own would keep
+    /// a SubDevice from the state asked for.
+    fn is_echo(&self, status: AlStatus) -> bool {
+        match self.requested {
+            Some(requested) => requested.value == status.state(),
+            // Nobody was seen asking: a MainDevice that starts does so with INIT and acknowledge.
+            None => status.state().state() == Some(AlState::Init),
+        }
+    }
+
     fn record_error(&mut self, status: AlStatus, at: Instant, frame: Option<u64>) {
+        let is_error = status.error() && !self.is_echo(status);
         let open = self.errors.back_mut().filter(|error| error.ended.is_none());
-        if !status.error() {
+        if !is_error {
             if let Some(error) = open {
                 error.ended = Some(at);
             }
@@ -290,7 +366,7 @@ impl AlHistory {
     /// Whether it signals an error now.
     #[must_use]
     pub fn has_error(&self) -> bool {
-        self.status.is_some_and(|status| status.value.error())
+        self.errors.back().is_some_and(|error| error.ended.is_none())
     }
 
     /// Takes a reading of AL status code. Says whether it is news.

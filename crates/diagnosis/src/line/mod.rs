@@ -21,12 +21,13 @@ use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cyclic::{Cyclic, Deficit, Owner};
 pub use device::{
-    AlChange, AlError, AlHistory, Device, DlChange, DlHistory, Planned, SeenIdentity,
+    Absence, AlChange, AlError, AlHistory, Device, DlChange, DlHistory, Planned, SeenIdentity,
+    Trouble,
 };
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
 pub use sii_image::SiiImage;
-pub use traffic::Traffic;
+pub use traffic::{Silence, Traffic};
 
 /// Something that was learnt, with when and from which frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]

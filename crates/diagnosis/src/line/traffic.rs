@@ -1,10 +1,29 @@
 //! Frames and datagrams of one network, counted, and how they fared.
 
+use std::collections::VecDeque;
+
+use linesman_proto::ethernet::MacAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
 
 use super::Seen;
 use super::host::Tally;
+
+/// Silences kept.
+pub const SILENCES_KEPT: usize = 16;
+
+/// A stretch of time in which requests went out and nothing came back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Silence {
+    /// The first request without a return.
+    pub since: Seen<()>,
+    /// The latest one.
+    pub last: Seen<()>,
+    /// How many requests.
+    pub frames: u64,
+    /// When something came back again.
+    pub ended: Option<Instant>,
+}
 
 /// What passed the observer.
 #[derive(Clone, Default, Debug)]
@@ -25,6 +44,10 @@ pub struct Traffic {
     pub latest_lost: Option<Seen<()>>,
     /// The latest frame that came back.
     pub latest_returned: Option<Seen<()>>,
+    /// When nothing at all came back, oldest first, at most [`SILENCES_KEPT`].
+    pub silences: VecDeque<Silence>,
+    /// The source addresses that requests came from, at most four.
+    pub senders: Vec<MacAddress>,
     /// Returns whose request was not seen.
     pub returned_alone: u64,
     /// Frames recorded twice.
@@ -70,6 +93,45 @@ pub struct Traffic {
 }
 
 impl Traffic {
+    /// A request was lost.
+    pub fn record_lost(&mut self, at: Instant, frame: u64) {
+        let seen = Seen::new((), at, Some(frame));
+        self.lost.add(1, at);
+        self.first_lost.get_or_insert(seen);
+        self.latest_lost = Some(seen);
+        // Only what was sent after the latest return adds to a silence: the others were overtaken.
+        let returned = self.latest_returned.and_then(|returned| returned.frame);
+        if returned.is_some_and(|returned| returned > frame) {
+            return;
+        }
+        match self.silences.back_mut().filter(|silence| silence.ended.is_none()) {
+            Some(silence) => {
+                silence.last = seen;
+                silence.frames += 1;
+            }
+            None => {
+                if self.silences.len() == SILENCES_KEPT {
+                    self.silences.pop_front();
+                }
+                self.silences.push_back(Silence {
+                    since: seen,
+                    last: seen,
+                    frames: 1,
+                    ended: None,
+                });
+            }
+        }
+    }
+
+    /// A frame came back.
+    pub fn record_returned(&mut self, at: Instant, frame: u64) {
+        self.returned += 1;
+        self.latest_returned = Some(Seen::new((), at, Some(frame)));
+        if let Some(silence) = self.silences.back_mut() {
+            silence.ended.get_or_insert(at);
+        }
+    }
+
     /// Whether frames were seen in one direction only, though the other one must have been there:
     /// returns without a request, or requests that a MainDevice makes only after answers.
     #[must_use]

@@ -28,6 +28,8 @@ pub struct Exchange<'a> {
     pub earlier: &'a [u16],
     /// Whether nothing more will come: now it can be judged.
     pub is_last: bool,
+    /// Whether the input ended while the return may still have been on its way.
+    pub is_cut_off: bool,
 }
 
 impl Exchange<'_> {

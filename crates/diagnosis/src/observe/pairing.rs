@@ -28,6 +28,8 @@ const TIMEOUT: Span = Span::ms(100);
 /// Two equal requests closer than this are one that was recorded twice: the shortest frame takes
 /// longer.
 const RECORDED_TWICE: Span = Span::us(3);
+/// So many requests may be on their way when the input ends.
+const CUT_OFF: usize = 2;
 /// How many returns are remembered to know one that was recorded twice.
 const REMEMBERED: usize = 8;
 /// Senders kept.
@@ -109,7 +111,13 @@ impl Pairing {
             }
             self.remember(print, frame.time);
             let reply = Some(copy(frame));
-            settle(&Exchange { request: None, reply, earlier: &[], is_last: true });
+            settle(&Exchange {
+                request: None,
+                reply,
+                earlier: &[],
+                is_last: true,
+                is_cut_off: false,
+            });
             return Outcome::ReturnAlone;
         };
         self.remember(print, frame.time);
@@ -120,7 +128,7 @@ impl Pairing {
     /// Settles what a live socket waited for in vain.
     pub fn expire(&mut self, now: Instant, settle: &mut impl FnMut(&Exchange<'_>)) {
         while self.timeout().is_some_and(|at| at <= now) {
-            self.lose(0, settle);
+            self.lose(0, false, settle);
         }
     }
 
@@ -132,8 +140,12 @@ impl Pairing {
 
     /// Settles all requests that are still out: the input has ended.
     pub fn finish(&mut self, settle: &mut impl FnMut(&Exchange<'_>)) {
-        while !self.pending.is_empty() {
-            self.lose(0, settle);
+        let is_few =
+            self.pending.iter().filter(|pending| pending.overtaken == 0).count() <= CUT_OFF;
+        while let Some(oldest) = self.pending.front() {
+            // An input that stops between a request and its return loses nothing.
+            let is_cut_off = self.returns_seen && oldest.overtaken == 0 && is_few;
+            self.lose(0, is_cut_off, settle);
         }
     }
 
@@ -192,7 +204,7 @@ impl Pairing {
             self.senders.push(source);
         }
         if self.pending.len() >= MOST_PENDING {
-            self.lose(0, settle);
+            self.lose(0, false, settle);
         }
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
@@ -233,6 +245,7 @@ impl Pairing {
             reply: Some(copy(frame)),
             earlier: &pending.sums,
             is_last,
+            is_cut_off: false,
         });
         if is_last {
             self.remove(found);
@@ -257,18 +270,19 @@ impl Pairing {
             pending.overtaken += 1;
         }
         while self.pending.front().is_some_and(|oldest| oldest.overtaken >= OVERTAKEN) {
-            self.lose(0, settle);
+            self.lose(0, false, settle);
         }
     }
 
     /// Gives up on a request; what came back of its copies counts.
-    fn lose(&mut self, index: usize, settle: &mut impl FnMut(&Exchange<'_>)) {
+    fn lose(&mut self, index: usize, is_cut_off: bool, settle: &mut impl FnMut(&Exchange<'_>)) {
         let Some(pending) = self.pending.get(index) else { return };
         settle(&Exchange {
             request: Some(pending.copy()),
             reply: None,
             earlier: &pending.sums,
             is_last: true,
+            is_cut_off,
         });
         self.remove(index);
     }

@@ -4,6 +4,11 @@
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
 pub mod frame_errors;
+pub mod nobody_answers;
+pub mod one_direction;
+pub mod restarted;
+pub mod state_error;
+pub mod working_counter;
 
 use linesman_config::fault::Class;
 use linesman_proto::time::Instant;
@@ -67,7 +72,11 @@ pub const RULES: &[Rule] = &[
     frame_errors::RULE,
     //
     // The network as a whole, working counters and states.
-    //
+    nobody_answers::RULE,
+    restarted::RULE,
+    state_error::RULE,
+    working_counter::RULE,
+    one_direction::RULE,
 ];
 
 /// The manual: every page of every rule, by code.

@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 pub(crate) mod completion;
+pub(crate) mod diagnose;
 pub(crate) mod explain;
 pub(crate) mod interfaces;
 pub(crate) mod schema;
@@ -14,6 +15,7 @@ use crate::output::Output;
 /// Does what was asked.
 pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failure> {
     match command {
+        Command::Diagnose(arguments) => diagnose::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
         Command::Explain(arguments) => explain::run(&arguments, output),
         Command::Sim(arguments) => sim::run(&arguments, output),

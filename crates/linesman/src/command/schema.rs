@@ -5,6 +5,7 @@ use linesman_diagnosis::report::Diagnosis;
 use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
 
+use super::diagnose::follow::EventReport;
 use super::interfaces;
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
@@ -27,6 +28,8 @@ pub(crate) enum Name {
     Project,
     /// `diagnose --json`
     Diagnosis,
+    /// A line of `diagnose --follow --json`
+    Event,
     /// `interfaces --json`
     Interfaces,
     /// What every command with --json prints when nothing could be judged
@@ -44,6 +47,7 @@ fn schema(name: Name) -> Schema {
         Name::Segment => schema_for!(SegmentFile),
         Name::Project => schema_for!(Project),
         Name::Diagnosis => schema_for!(Diagnosis),
+        Name::Event => schema_for!(EventReport<'_>),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Error => schema_for!(ErrorReport),
     }

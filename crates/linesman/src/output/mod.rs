@@ -1,6 +1,7 @@
 //! Where answers go: text for people, JSON for programs, complaints and progress to the side.
 
 pub(crate) mod paint;
+pub(crate) mod progress;
 pub(crate) mod table;
 pub(crate) mod wrap;
 
@@ -9,6 +10,7 @@ use std::io::{self, IsTerminal as _, Write as _};
 use serde::Serialize;
 
 pub(crate) use paint::Paint;
+pub(crate) use progress::Progress;
 pub(crate) use table::Table;
 pub(crate) use wrap::wrapped;
 
@@ -52,7 +54,6 @@ impl Output {
     }
 
     /// Whether the reader went away (`| head`).
-    #[allow(dead_code, reason = "asked by commands that go on for long")]
     pub(crate) const fn is_closed(&self) -> bool {
         self.closed
     }
@@ -75,6 +76,14 @@ impl Output {
     /// Writes one JSON object.
     pub(crate) fn json<T: Serialize>(&mut self, value: &T) {
         match serde_json::to_string_pretty(value) {
+            Ok(text) => self.line(&text),
+            Err(error) => self.warn(&format!("writing JSON: {error}")),
+        }
+    }
+
+    /// Writes one JSON object on one line.
+    pub(crate) fn json_line<T: Serialize>(&mut self, value: &T) {
+        match serde_json::to_string(value) {
             Ok(text) => self.line(&text),
             Err(error) => self.warn(&format!("writing JSON: {error}")),
         }

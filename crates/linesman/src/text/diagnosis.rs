@@ -36,9 +36,17 @@ fn verdict(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
         [rest, tally.as_str()].into_iter().filter(|part| !part.is_empty()).collect();
     wrapped(
         &format!("{word}  "),
-        &format!("{}: {}", diagnosis.source, parts.join("; ")),
+        &format!("{}: {}", short(&diagnosis.source), parts.join("; ")),
         writer.width,
     )
+}
+
+/// The source without the directories of a file.
+fn short(source: &str) -> &str {
+    match source.split_once(':') {
+        Some(("capture" | "sim", path)) => path.rsplit('/').next().unwrap_or(path),
+        Some(_) | None => source,
+    }
 }
 
 fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
@@ -106,7 +114,7 @@ mod tests {
         cause["consequences"] = json!([finding("F2", "S201")]);
         serde_json::from_value(json!({
             "schema": "linesman.diagnosis/1", "tool": "linesman", "start": null, "clock": "capture",
-            "source": "trace.pcapng", "complete": false, "verdict": "faulty",
+            "source": "capture:/tmp/trace.pcapng", "complete": false, "verdict": "faulty",
             "network": { "devices": 2, "al_state_highest": "OP", "datagrams": 20_000,
                          "unanswered": 3, "frames": 40_000, "lost": 1, "damaged": 0 },
             "findings": [cause]

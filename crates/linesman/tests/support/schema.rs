@@ -53,10 +53,8 @@ impl Check<'_> {
                 }
             }
             "type" => {
-                let names: Vec<&str> = match says {
-                    Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
-                    other => other.as_str().into_iter().collect(),
-                };
+                let several = says.as_array().into_iter().flatten();
+                let names: Vec<&str> = several.chain([says]).filter_map(Value::as_str).collect();
                 if !names.iter().any(|name| is(value, name)) {
                     self.fault(at, format!("{value} is not {names:?}"));
                 }

@@ -5,6 +5,7 @@
 //! one before finds the controller as the later one left it.
 
 use linesman_proto::address::{DeviceId, RegisterAddress, StationAddress};
+use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::Port;
 use linesman_proto::register::{self as r, AlStatus, DlStatus, ErrorCounter, ErrorCounters};
 use linesman_proto::state::AlStatusCode;
@@ -346,6 +347,13 @@ impl Controller {
     pub fn refuse(&mut self, at: Instant, refusal: Option<Refusal>) {
         self.firmware.refuse(refusal);
         self.core.emulation_suspended = refusal.is_some();
+        self.core.call_firmware(at);
+        self.reschedule();
+    }
+
+    /// The device sends an emergency at `at`, or as soon as its mailbox works.
+    pub fn report(&mut self, at: Instant, emergency: Emergency) {
+        self.firmware.report(emergency);
         self.core.call_firmware(at);
         self.reschedule();
     }

@@ -1,4 +1,4 @@
-//! How a SubDevice answers AL control: states, errors, acknowledgement, identification.
+//! How a SubDevice answers AL control: states, errors, acknowledgement.
 //!
 //! Read first: ETG.1000.6, EtherCAT state machine; [`respond`] is its table.
 //! What a device checks before it enters a state is its own affair: here is what all have in common.
@@ -22,7 +22,6 @@ pub struct Refusal {
 #[derive(Clone, Copy, Default, Debug)]
 pub struct ApplicationLayer {
     boots: bool,
-    identification: Option<u16>,
     refusal: Option<Refusal>,
 }
 
@@ -31,11 +30,6 @@ impl ApplicationLayer {
     #[must_use]
     pub fn new(boots: bool) -> Self {
         Self { boots, ..Self::default() }
-    }
-
-    /// The value it shows when AL control bit 5 asks for it; `None` for a device that has none.
-    pub fn set_identification(&mut self, identification: Option<u16>) {
-        self.identification = identification;
     }
 
     /// From now on it refuses a step, or does so no longer.
@@ -87,12 +81,11 @@ impl ApplicationLayer {
         Some(requested)
     }
 
-    /// It is in `state`. The identification is shown if AL control asks for it.
-    pub fn enter(&self, pdi: &mut Pdi<'_>, state: AlState) {
-        let asked = pdi.al_control().requests_identification();
-        let shown = self.identification.filter(|_| asked);
-        pdi.set_al_code(shown.map_or(AlStatusCode::NO_ERROR, AlStatusCode));
-        pdi.set_al_status(AlStatus::new(state).with_identification_loaded(shown.is_some()));
+    /// It is in `state`, without error. No device here has an identification to show, so bit 5 of AL
+    /// control stays unanswered.
+    pub fn enter(pdi: &mut Pdi<'_>, state: AlState) {
+        pdi.set_al_code(AlStatusCode::NO_ERROR);
+        pdi.set_al_status(AlStatus::new(state));
     }
 
     /// It stays in `state`, or falls back to it, because of an error.
@@ -104,7 +97,7 @@ impl ApplicationLayer {
     /// Answers all requests of a device that checks nothing.
     pub fn serve_unchecked(&self, pdi: &mut Pdi<'_>) {
         if let Some(state) = self.take_request(pdi) {
-            self.enter(pdi, state);
+            Self::enter(pdi, state);
         }
     }
 

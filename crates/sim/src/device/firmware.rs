@@ -5,6 +5,7 @@
 
 use std::fmt::Debug;
 
+use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::time::Instant;
 
 use super::application_layer::Refusal;
@@ -40,6 +41,11 @@ pub trait Firmware: Debug + Send {
     /// [`Controller::refuse`](crate::controller::Controller::refuse), which also makes a controller
     /// with device emulation leave the answer to this side.
     fn refuse(&mut self, refusal: Option<Refusal>);
+
+    /// Tells the MainDevice of an error through the mailbox, as soon as there is one; a device without
+    /// a mailbox cannot. Faults go through
+    /// [`Controller::report`](crate::controller::Controller::report).
+    fn report(&mut self, _emergency: Emergency) {}
 
     /// The supply is gone: outputs are no longer driven. Nothing else can be done any more.
     fn stop(&mut self, _signals: &mut Signals) {}

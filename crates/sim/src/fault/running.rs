@@ -13,6 +13,7 @@ pub(crate) struct Running {
     to: Option<Instant>,
     source: Box<dyn Source>,
     begun: bool,
+    healed: bool,
     next: Option<(Instant, Change)>,
 }
 
@@ -21,7 +22,11 @@ pub(crate) struct Running {
 pub(crate) enum Step {
     Begin(Instant),
     Change(Instant, Change),
-    End(Instant),
+    /// It ends; healed before its time, what still waits for a frame goes with it.
+    End {
+        at: Instant,
+        healed: bool,
+    },
 }
 
 impl Running {
@@ -32,12 +37,15 @@ impl Running {
         mut source: Box<dyn Source>,
     ) -> Self {
         let next = source.next_change();
-        Self { id, from, to, source, begun: false, next }
+        Self { id, from, to, source, begun: false, healed: false, next }
     }
 
-    /// Ends it at an instant, unless it ends before.
-    pub(crate) fn end_at(&mut self, at: Instant) {
-        self.to = Some(self.to.map_or(at, |to| to.min(at)));
+    /// Heals it at an instant, unless it ends before.
+    pub(crate) fn heal_at(&mut self, at: Instant) {
+        if self.to.is_none_or(|to| at < to) {
+            self.to = Some(at);
+            self.healed = true;
+        }
     }
 
     /// When it does something next; `None` when it lasts without doing anything.
@@ -64,7 +72,7 @@ impl Running {
                 self.next = self.source.next_change();
                 Step::Change(at, change)
             }
-            Some(_) | None => Step::End(end),
+            Some(_) | None => Step::End { at: end, healed: self.healed },
         }
     }
 }

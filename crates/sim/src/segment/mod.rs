@@ -197,7 +197,7 @@ impl Segment {
         self.now = self.now.max(now);
         let at = self.now.max(self.world.horizon) + Span::ns(1);
         if let Some(running) = self.world.running.iter_mut().find(|running| running.id == fault) {
-            running.end_at(at);
+            running.heal_at(at);
         }
     }
 

@@ -188,10 +188,24 @@ impl World {
         match self.running[index].step() {
             crate::fault::Step::Begin(at) => self.truth.begin(at, fault),
             crate::fault::Step::Change(at, change) => self.apply(at, fault, change),
-            crate::fault::Step::End(at) => {
+            crate::fault::Step::End { at, healed } => {
                 self.running.remove(index);
+                if healed {
+                    self.disarm(fault);
+                }
                 self.release(at, fault);
             }
+        }
+    }
+
+    /// Hits that still wait for a frame do not come any more. One whose fault ended by itself comes
+    /// with the next frame: so many hits were asked for.
+    fn disarm(&mut self, fault: FaultId) {
+        for noise in self.links.iter_mut().flat_map(|link| &mut link.noise) {
+            noise.disarm(fault);
+        }
+        for node in &mut self.nodes {
+            node.glitches.retain(|glitch| glitch.fault != fault);
         }
     }
 
@@ -201,15 +215,11 @@ impl World {
             if self.links[link].contact.is_held_by(fault) {
                 self.apply(at, fault, Change::Close { link });
             }
-            for noise in &mut self.links[link].noise {
-                noise.disarm(fault);
-            }
         }
         for node in 0..self.nodes.len() {
             if self.nodes[node].power.is_held_by(fault) {
                 self.apply(at, fault, Change::On { node });
             }
-            self.nodes[node].glitches.retain(|glitch| glitch.fault != fault);
             if self.nodes[node].refused_by == Some(fault) {
                 self.apply(at, fault, Change::Refuse { node, refusal: None });
             }

@@ -131,11 +131,15 @@ impl Bench {
             .unwrap_or_else(|| panic!("{name}"))
     }
 
-    /// All counters that are not 0, as `K1.C frame 3`, in order.
+    /// All counters that are not 0 of controllers that have power, as `K1.C frame 3`, in order.
     pub(crate) fn counters(&self) -> Vec<String> {
         let mut shown = Vec::new();
         for id in self.segment.devices() {
-            let counters = self.segment.controller(id).unwrap().error_counters();
+            let controller = self.segment.controller(id).unwrap();
+            if !controller.is_powered() {
+                continue;
+            }
+            let counters = controller.error_counters();
             let name = self.segment.name(id);
             for (counter, value) in counters.iter().filter(|(_, value)| *value != 0) {
                 let text = match counter {

@@ -296,12 +296,8 @@ impl Learner {
 /// A request that never came back, or of which only some copies did.
 fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
     let Ok(view) = FrameView::parse(request.bytes) else { return };
-    if exchange.earlier.is_empty() {
-        let traffic = &mut line.traffic;
-        traffic.lost.add(1, request.time);
-        let seen = Seen::new((), request.time, Some(request.number));
-        traffic.first_lost.get_or_insert(seen);
-        traffic.latest_lost = Some(seen);
+    if exchange.earlier.is_empty() && !exchange.is_cut_off {
+        line.traffic.record_lost(request.time, request.number);
         line.touch();
     }
     for (index, datagram) in view.datagrams().enumerate() {

@@ -77,7 +77,7 @@ impl Scale {
             return raw;
         }
         let gain = i64::from(self.gain.get(dictionary) as u32 as i32);
-        let scaled = (i64::from(raw) * gain >> 16) + i64::from(self.offset.get_i16(dictionary));
+        let scaled = ((i64::from(raw) * gain) >> 16) + i64::from(self.offset.get_i16(dictionary));
         scaled.clamp(-0x8000, 0x7FFF) as i32
     }
 }

@@ -125,7 +125,7 @@ fn another_revision_shows_in_identity_and_dictionary() {
     let built = build_revision("EL3104", Some(0x0015_0000), 7, &mut signals).unwrap().remove(0);
     assert_eq!(Image::parse(&built.sii).unwrap().identity.revision, 0x0015_0000);
     let mut device = Device::new(built, signals);
-    device.to_preop();
+    device.enter_preop();
     assert_eq!(device.upload(0x1018, 3), Ok(vec![0, 0, 0x15, 0]));
 }
 

@@ -67,7 +67,8 @@ impl Mailbox {
 
     /// Tells the MainDevice of an error on the device's own account.
     pub fn report(&mut self, emergency: Emergency, pdi: &Pdi<'_>) {
-        self.send(MailboxType::Coe, Header::new(MailboxType::Coe, Counter::NONE, 0), pdi, |body| {
+        let to_main_device = Header::new(MailboxType::Coe, Counter::NONE, 0);
+        self.send(MailboxType::Coe, to_main_device, pdi, |body| {
             CoeMessage::Emergency(emergency).write(body)
         });
     }

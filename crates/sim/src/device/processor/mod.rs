@@ -6,7 +6,7 @@
 mod check;
 mod process_image;
 
-use linesman_proto::mailbox::coe::ObjectIndex;
+use linesman_proto::mailbox::coe::{Emergency, ObjectAddress, ObjectIndex};
 use linesman_proto::register as r;
 use linesman_proto::sii::MailboxPair;
 use linesman_proto::state::{AlState, AlStatusCode};
@@ -25,6 +25,9 @@ use crate::controller::Pdi;
 const OUTPUT_ASSIGNMENT: ObjectIndex = ObjectIndex(0x1C12);
 /// The inputs.
 const INPUT_ASSIGNMENT: ObjectIndex = ObjectIndex(0x1C13);
+
+/// Emergencies that wait for a mailbox; further ones are forgotten.
+const UNTOLD: usize = 8;
 
 /// How long a processor takes for what it does.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -94,6 +97,8 @@ pub struct Processor {
     /// The step that is being worked on.
     step: Option<Step>,
     next_sample: Instant,
+    /// Errors to tell of.
+    emergencies: Vec<Emergency>,
     buffer: Vec<u8>,
 }
 
@@ -126,6 +131,7 @@ impl Processor {
             inputs: ProcessImage::default(),
             step: None,
             next_sample: Instant::ZERO,
+            emergencies: Vec::new(),
             buffer: Vec::new(),
             description,
         }
@@ -144,7 +150,7 @@ impl Processor {
         if let Some(step) = self.step.filter(|step| step.due <= now) {
             self.step = None;
             match self.go(step, now, pdi) {
-                Outcome::Entered => self.application_layer.enter(pdi, step.to),
+                Outcome::Entered => ApplicationLayer::enter(pdi, step.to),
                 Outcome::Failed(state, code) => self.fall(pdi, state, code),
                 Outcome::Waits => self.step = Some(step),
             }
@@ -153,6 +159,8 @@ impl Processor {
         let listens = self.step.is_none_or(|step| step.due <= now);
         if listens && let Some(to) = self.application_layer.take_request(pdi) {
             let from = ApplicationLayer::state(pdi);
+            // Whoever asks has seen the error, if there was one: outputs may come again.
+            pdi.deactivate_sync_manager(check::OUTPUTS, false);
             let due = now + self.time_for(from, to);
             self.step = Some(Step { to, due, deadline: due + self.description.times.outputs });
         }
@@ -164,7 +172,10 @@ impl Processor {
             (AlState::Init, AlState::PreOp | AlState::Boot) => times.to_preop,
             (AlState::PreOp, AlState::SafeOp) => times.to_safeop,
             (AlState::SafeOp, AlState::Op) => times.to_op,
-            _ => times.down,
+            (
+                AlState::Init | AlState::Boot | AlState::PreOp | AlState::SafeOp | AlState::Op,
+                AlState::Init | AlState::Boot | AlState::PreOp | AlState::SafeOp | AlState::Op,
+            ) => times.down,
         }
     }
 
@@ -234,9 +245,14 @@ impl Processor {
         Outcome::Failed(AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG)
     }
 
-    /// It leaves its state, or does not get further, because of an error.
+    /// It leaves its state, or does not get further, because of an error. On the way out of OP it
+    /// locks its outputs until the error is acknowledged, so that the MainDevice misses their working
+    /// counter.
     fn fall(&mut self, pdi: &mut Pdi<'_>, state: AlState, code: AlStatusCode) {
         self.make_safe(pdi);
+        if ApplicationLayer::is_operational(pdi) && self.outputs.len() > 0 {
+            pdi.deactivate_sync_manager(check::OUTPUTS, true);
+        }
         if !state.has_mailbox() {
             self.mailbox.restart();
         }
@@ -260,6 +276,17 @@ impl Processor {
         {
             self.step = None;
             self.fall(pdi, AlState::PreOp, code);
+        }
+    }
+
+    /// Hands over what is to be told, and keeps the error register.
+    fn tell_emergencies(&mut self, pdi: &Pdi<'_>) {
+        for emergency in self.emergencies.drain(..) {
+            let register = ObjectAddress { index: ObjectIndex::ERROR_REGISTER, subindex: 0 };
+            if let Some(register) = self.dictionary.find(register) {
+                self.dictionary.set_number(register, u64::from(emergency.register.0));
+            }
+            self.mailbox.report(emergency, pdi);
         }
     }
 
@@ -321,6 +348,7 @@ impl Firmware for Processor {
         self.mailbox.restart();
         (self.inputs, self.outputs) = (ProcessImage::default(), ProcessImage::default());
         self.step = None;
+        self.emergencies.clear();
         self.next_sample = now;
         self.make_safe(pdi);
     }
@@ -333,6 +361,7 @@ impl Firmware for Processor {
         self.serve_requests(now, pdi);
         let state = ApplicationLayer::state(pdi);
         let again = if state.has_mailbox() {
+            self.tell_emergencies(pdi);
             self.mailbox.serve(now, pdi, &mut self.dictionary, state)
         } else {
             None
@@ -343,6 +372,12 @@ impl Firmware for Processor {
 
     fn refuse(&mut self, refusal: Option<Refusal>) {
         self.application_layer.refuse(refusal);
+    }
+
+    fn report(&mut self, emergency: Emergency) {
+        if self.emergencies.len() < UNTOLD {
+            self.emergencies.push(emergency);
+        }
     }
 
     fn samples(&self) -> bool {

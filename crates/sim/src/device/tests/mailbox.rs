@@ -1,5 +1,6 @@
 //! The mailbox itself: waiting, repeating, and whatever a bad MainDevice may put into it.
 
+use linesman_proto::mailbox::coe::{Emergency, ErrorRegister};
 use linesman_proto::mailbox::{ErrorReply, Header, MailboxType, Message};
 use linesman_proto::time::Span;
 use proptest::prelude::*;
@@ -13,7 +14,7 @@ fn upload(counter: u8) -> [u8; 16] {
 
 fn preop() -> Device {
     let mut device = Device::of("EL3104");
-    device.to_preop();
+    device.enter_preop();
     device
 }
 
@@ -93,6 +94,20 @@ fn the_address_of_a_gateway_comes_back() {
 }
 
 #[test]
+fn an_emergency_comes_unasked_once_there_is_a_mailbox() {
+    let mut device = Device::of("EL3104");
+    let emergency =
+        Emergency { code: 0x4210, register: ErrorRegister(0x09), data: [1, 2, 3, 4, 5] };
+    let now = device.bench.now;
+    device.bench.controller.report(now, emergency);
+    device.bench.wait(Span::ms(10));
+    device.enter_preop();
+    let message = device.fetch_soon().unwrap();
+    assert_eq!(message[..16], [10, 0, 0, 0, 0, 0x13, 0, 0x10, 0x10, 0x42, 9, 1, 2, 3, 4, 5]);
+    assert_eq!(device.upload(0x1001, 0), Ok(vec![9]));
+}
+
+#[test]
 fn in_init_nobody_answers_and_afterwards_nothing_is_left() {
     let mut device = preop();
     device.post(&upload(1));
@@ -102,7 +117,7 @@ fn in_init_nobody_answers_and_afterwards_nothing_is_left() {
     assert!(device.fetch_soon().is_none());
     device.bench.write(0x0806, &[0]);
     device.bench.write(0x080E, &[0]);
-    device.to_preop();
+    device.enter_preop();
     assert!(device.fetch_soon().is_none());
     device.post(&upload(1));
     assert!(device.fetch_soon().is_some(), "the counter starts anew");

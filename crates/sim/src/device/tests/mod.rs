@@ -1,5 +1,8 @@
 //! Devices as a MainDevice finds them: brought up by register writes, asked through the mailbox.
 
+// An answer of another kind fails the test, whichever it is.
+#![allow(clippy::wildcard_enum_match_arm)]
+
 use linesman_config::profile::DeviceProfile;
 use linesman_proto::address::{LogicalAddress, RegisterAddress};
 use linesman_proto::command::Command;
@@ -111,13 +114,13 @@ impl Device {
     }
 
     /// From INIT to PREOP.
-    pub(crate) fn to_preop(&mut self) {
+    pub(crate) fn enter_preop(&mut self) {
         self.set_up_mailbox();
         assert_eq!(self.request(2), (2, 0), "{}", self.profile.type_name);
     }
 
     /// From PREOP to SAFEOP.
-    pub(crate) fn to_safeop(&mut self) {
+    pub(crate) fn enter_safeop(&mut self) {
         self.set_up_process_data();
         assert_eq!(self.request(4), (4, 0), "{}", self.profile.type_name);
     }
@@ -125,8 +128,8 @@ impl Device {
     /// From INIT to OP.
     pub(crate) fn bring_up(&mut self) {
         assert_eq!(self.status(), (1, 0));
-        self.to_preop();
-        self.to_safeop();
+        self.enter_preop();
+        self.enter_safeop();
         self.exchange(&[]);
         assert_eq!(self.request(8), (8, 0), "{}", self.profile.type_name);
     }

@@ -8,9 +8,9 @@ use super::Device;
 fn analogue_outputs_follow_in_op_and_fall_back_with_the_watchdog() {
     let mut device = Device::of("EL4102");
     let [first, second] = device.built.outputs[..] else { panic!() };
-    device.to_preop();
+    device.enter_preop();
     assert_eq!(device.download(0x8010, 0x13, &0x0100i16.to_le_bytes()), Ok(()));
-    device.to_safeop();
+    device.enter_safeop();
     device.exchange(&[0x34, 0x12, 0xFF, 0x7F]);
     assert_eq!(device.bench.signals.value(first), 0, "not in SAFEOP");
     assert_eq!(device.request(8), (8, 0));
@@ -27,8 +27,13 @@ fn analogue_outputs_follow_in_op_and_fall_back_with_the_watchdog() {
     assert_eq!(device.status(), (0x14, 0x001B));
     assert_eq!(values(&device), (0, 0x0100), "the default of channel 2 was set");
     let (_, wkc) = device.exchange(&[0x34, 0x12]);
-    assert_eq!(wkc, 2, "the buffer takes outputs all the same");
+    assert_eq!(wkc, 0, "locked until the error is acknowledged");
     assert_eq!(values(&device), (0, 0x0100));
+    assert_eq!(device.request(0x14), (4, 0));
+    let (_, wkc) = device.exchange(&[0x34, 0x12]);
+    assert_eq!((wkc, values(&device)), (2, (0, 0x0100)));
+    assert_eq!(device.request(8), (8, 0));
+    assert_eq!(values(&device), (0x1234, 0));
     device.bench.controller.power_off(device.bench.now);
     device.bench.wait(Span::us(1));
     assert_eq!(values(&device), (0, 0));
@@ -38,7 +43,7 @@ fn analogue_outputs_follow_in_op_and_fall_back_with_the_watchdog() {
 fn analogue_inputs_bring_status_and_value() {
     let mut device = Device::of("EL3104");
     let inputs = device.built.inputs.clone();
-    device.to_preop();
+    device.enter_preop();
     // Channel 3: limit 1 is watched, at 1000. Channel 4: half the gain, and 10 more.
     assert_eq!(device.download(0x8020, 0x07, &[1]), Ok(()));
     assert_eq!(device.download(0x8020, 0x13, &1_000i16.to_le_bytes()), Ok(()));
@@ -48,7 +53,7 @@ fn analogue_inputs_bring_status_and_value() {
     for (signal, value) in inputs.iter().zip([-0x1234, 0x8000, 1_001, -400]) {
         device.bench.signals.set(*signal, value);
     }
-    device.to_safeop();
+    device.enter_safeop();
     device.exchange(&[]);
     assert_eq!(device.request(8), (8, 0));
     let (bytes, wkc) = device.exchange(&[]);
@@ -79,14 +84,14 @@ fn an_input_that_nothing_drives_sees_a_slow_wave() {
         device.bench.wait(Span::ms(100));
     }
     let (least, greatest) = (*values.iter().min().unwrap(), *values.iter().max().unwrap());
-    assert!(least >= 0x1FFF && least < 0x2800, "{least}");
-    assert!(greatest > 0x5800 && greatest <= 0x6000, "{greatest}");
+    assert!((0x1FFF..0x2800).contains(&least), "{least}");
+    assert!((0x5800..=0x6000).contains(&greatest), "{greatest}");
 }
 
 #[test]
 fn an_assignment_changes_what_is_exchanged() {
     let mut device = Device::of("EL3104");
-    device.to_preop();
+    device.enter_preop();
     // The values alone, of channels 2 and 1.
     for (subindex, value) in [(0, &[0][..]), (1, &[0x03, 0x1A]), (2, &[0x01, 0x1A]), (0, &[2])] {
         assert_eq!(device.download(0x1C13, subindex, value), Ok(()));

@@ -12,7 +12,7 @@ use super::Device;
 
 fn preop(name: &str) -> Device {
     let mut device = Device::of(name);
-    device.to_preop();
+    device.enter_preop();
     device
 }
 
@@ -94,7 +94,7 @@ fn what_cannot_be_done_is_aborted_with_its_code() {
     assert_eq!(device.download(0x1C13, 0, &[0]), Ok(()));
     assert_eq!(device.download(0x1C13, 1, &[0x00, 0x16]), Err(0x0604_0041), "an RxPDO");
     device = preop("EL3104");
-    device.to_safeop();
+    device.enter_safeop();
     assert_eq!(device.download(0x1C13, 0, &[0]), Err(0x0800_0022), "in PREOP only");
     assert_eq!(device.download(0x8000, 0x13, &[1, 0]), Ok(()));
 }
@@ -108,7 +108,7 @@ fn long_values_come_in_segments() {
     areas.areas.receive.size = 0x22;
     areas.areas.send.size = 0x22;
     device.profile.mailbox = Some(areas);
-    device.to_preop();
+    device.enter_preop();
     let whole = device.upload_any(0x1A00, 0, true).unwrap();
     assert_eq!(whole.len(), 2 + 11 * 4);
     assert_eq!(whole[..6], [11, 0, 1, 1, 0x00, 0x60]);
@@ -121,7 +121,7 @@ fn segments_out_of_turn_are_aborted() {
     let mut areas = device.profile.mailbox.unwrap();
     areas.areas.send.size = 0x22;
     device.profile.mailbox = Some(areas);
-    device.to_preop();
+    device.enter_preop();
     let code = |answer: &[u8]| match CoeMessage::parse(answer).unwrap() {
         CoeMessage::Abort(abort) => Some(abort.code),
         _ => None,

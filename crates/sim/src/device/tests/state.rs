@@ -36,7 +36,7 @@ fn steps_that_do_not_exist_are_refused_with_their_codes() {
         assert_eq!(device.request(0x11), (1, 0), "acknowledged");
     }
     let mut device = Device::of("EL4102");
-    device.to_preop();
+    device.enter_preop();
     assert_eq!(device.request(8), (0x12, 0x0011));
     assert_eq!(device.request(3), (0x12, 0x0011));
     assert_eq!(device.request(1), (1, 0), "INIT is always heard");
@@ -45,7 +45,7 @@ fn steps_that_do_not_exist_are_refused_with_their_codes() {
 #[test]
 fn acknowledgement_and_the_next_state_may_come_in_one() {
     let mut device = Device::of("EL4102");
-    device.to_preop();
+    device.enter_preop();
     assert_eq!(device.request(4), (0x12, 0x001D));
     device.set_up_process_data();
     assert_eq!(device.request(4), (0x12, 0x001D), "not acknowledged");
@@ -91,7 +91,7 @@ fn process_data_that_do_not_fit_are_refused() {
     ];
     for (index, start, len, control, code) in table {
         let mut device = Device::of("EL7041");
-        device.to_preop();
+        device.enter_preop();
         device.set_up_process_data();
         device.bench.write(0x0800 + 8 * u16::from(index) + 6, &[0]);
         device.guard(index, start, len, control);
@@ -102,7 +102,7 @@ fn process_data_that_do_not_fit_are_refused() {
 #[test]
 fn a_watchdog_of_no_time_is_refused_where_one_is_wanted() {
     let mut device = Device::of("EL4102");
-    device.to_preop();
+    device.enter_preop();
     device.set_up_process_data();
     device.bench.write(0x0420, &[0, 0]);
     assert_eq!(device.request(4), (0x12, 0x001F));
@@ -111,8 +111,8 @@ fn a_watchdog_of_no_time_is_refused_where_one_is_wanted() {
 #[test]
 fn without_outputs_it_does_not_go_to_op() {
     let mut device = Device::of("EL4102");
-    device.to_preop();
-    device.to_safeop();
+    device.enter_preop();
+    device.enter_safeop();
     assert_eq!(device.request(8), (4, 0), "it waits");
     device.bench.wait(Span::s(1));
     assert_eq!(device.status(), (0x14, 0x001B));
@@ -126,8 +126,8 @@ fn without_outputs_it_does_not_go_to_op() {
 #[test]
 fn while_it_waits_for_outputs_it_hears_another_request() {
     let mut device = Device::of("EL4102");
-    device.to_preop();
-    device.to_safeop();
+    device.enter_preop();
+    device.enter_safeop();
     assert_eq!(device.request(8), (4, 0));
     assert_eq!(device.request(1), (1, 0));
 }
@@ -179,7 +179,7 @@ fn told_to_refuse_every_type_refuses() {
         let refusal = Refusal { transition_to: AlState::SafeOp, code };
         let now = device.bench.now;
         device.bench.controller.refuse(now, Some(refusal));
-        device.to_preop();
+        device.enter_preop();
         device.set_up_process_data();
         assert_eq!(device.request(4), (0x12, 0x8001), "{}", known.name());
         assert_eq!(device.request(0x12), (2, 0), "{}", known.name());

@@ -1,0 +1,194 @@
+//! # A SubDevice refuses a state, or leaves it
+//!
+//! A SubDevice sets the error bit of AL status (0x0130) and gives a code (0x0134).
+//!
+//! **How it is found.** AL status is read with the error bit, and the code shortly after. If the
+//! SubDevice had not yet been in the state that AL control (0x0120) asked for, it *refused* the change
+//! (`S200`); if it had been there, it *left* that state by itself (`S201`, watchdog `S202`,
+//! synchronisation `T400`).
+//!
+//! **What it means.** A refusal is about settings in most cases: process data, SyncManagers, mailbox,
+//! start-up commands that do not fit the device. Leaving a state is about what happens while it runs:
+//! outputs that stop (watchdog), clocks and frames that come at the wrong time, or an error of the
+//! device itself. If there is trouble with cables at the same moment, that comes first: the code is then
+//! what follows.
+//!
+//! **What to do.** The code says more than the state: its own page has the checks, most promising first.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::state::status_code::Class as CodeClass;
+use linesman_proto::state::{AlState, AlStatusCode, StatusCode};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::{AlError, Device};
+
+/// It refused a change.
+pub const REFUSED: RulePage = RulePage {
+    code: "S200",
+    name: "state-refused",
+    severity: Severity::Error,
+    class: Class::Software,
+    source: include_str!("state_error.rs"),
+};
+
+/// It left its state with an error.
+pub const LEFT: RulePage = RulePage {
+    code: "S201",
+    name: "state-left",
+    severity: Severity::Error,
+    class: Class::Software,
+    source: include_str!("state_error.rs"),
+};
+
+/// Its watchdog expired.
+pub const WATCHDOG: RulePage = RulePage {
+    code: "S202",
+    name: "watchdog-expired",
+    severity: Severity::Error,
+    class: Class::Software,
+    source: include_str!("state_error.rs"),
+};
+
+/// It lost synchronisation.
+pub const SYNC: RulePage = RulePage {
+    code: "T400",
+    name: "synchronisation-lost",
+    severity: Severity::Error,
+    class: Class::Timing,
+    source: include_str!("state_error.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[REFUSED, LEFT, WATCHDOG, SYNC], judge };
+
+const AL_CONTROL: RegisterAddress = RegisterAddress(0x0120);
+const AL_STATUS: RegisterAddress = RegisterAddress(0x0130);
+const AL_STATUS_CODE: RegisterAddress = RegisterAddress(0x0134);
+/// SyncManager watchdog.
+const WATCHDOG_CODE: AlStatusCode = AlStatusCode(0x001B);
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    for device in &view.line.devices {
+        // One finding for each kind of trouble, however often it came back: the latest is shown.
+        let mut pages: Vec<(&'static RulePage, &AlError, u32)> = Vec::new();
+        for error in &device.al.errors {
+            let page = page_of(error);
+            match pages.iter_mut().find(|(known, ..)| known.code == page.code) {
+                Some((_, latest, times)) => {
+                    *latest = error;
+                    *times += 1;
+                }
+                None => pages.push((page, error, 1)),
+            }
+        }
+        for (page, error, times) in pages {
+            conditions.push(condition(view, device, page, error, times));
+        }
+    }
+}
+
+fn page_of(error: &AlError) -> &'static RulePage {
+    if !error.had_arrived {
+        return &REFUSED;
+    }
+    match error.code.map(|code| code.value) {
+        Some(WATCHDOG_CODE) => &WATCHDOG,
+        Some(code) if code.explain().class == CodeClass::Timing => &SYNC,
+        Some(_) | None => &LEFT,
+    }
+}
+
+fn condition(
+    view: &View<'_>,
+    device: &Device,
+    page: &'static RulePage,
+    error: &AlError,
+    times: u32,
+) -> Condition {
+    let line = view.line;
+    let place = Place::device(line.network, device.id);
+    let meaning = error.code.map(|code| code.value.explain());
+    let cause = match page.code {
+        "S200" => FaultName::InitRefused,
+        "S202" => FaultName::WatchdogStarved,
+        "T400" => FaultName::SyncLost,
+        _ => FaultName::FirmwareFault,
+    };
+    let mut condition = Condition::new(page, place, cause, error.status.at)
+        .confidence(if meaning.is_some() { 0.8 } else { 0.6 })
+        .confirmed(error.status.at)
+        .about([Symptom::StateLost(device.id)])
+        .explaining([Symptom::WorkingCounter(device.id)]);
+    condition = match (cause, meaning.map(|meaning| meaning.class)) {
+        (FaultName::InitRefused, Some(CodeClass::Configuration)) => {
+            condition.or(FaultName::ConfigMismatch, 0.15)
+        }
+        (FaultName::InitRefused, Some(CodeClass::Timing)) => {
+            condition.or(FaultName::SyncLost, 0.15)
+        }
+        (FaultName::InitRefused, _) => condition.or(FaultName::FirmwareFault, 0.1),
+        (FaultName::WatchdogStarved, _) => {
+            condition.or_at(FaultName::HostJitter, Place::Host, 0.1).or(FaultName::LateFrames, 0.05)
+        }
+        (FaultName::SyncLost, _) => {
+            condition.or_at(FaultName::HostJitter, Place::Host, 0.1).or(FaultName::ClockDrift, 0.05)
+        }
+        _ => condition.or(FaultName::ConfigMismatch, 0.1),
+    };
+    if let Some(ended) = error.ended {
+        condition = condition.ended(ended);
+    }
+    for evidence in evidence(device, error, meaning, times) {
+        condition = condition.shown_by(evidence);
+    }
+    match meaning {
+        Some(meaning) => {
+            for action in meaning.actions {
+                condition = condition.advise(*action);
+            }
+        }
+        None => {
+            condition = condition
+                .advise("Read AL status code (0x0134) of this SubDevice: it says why.")
+                .advise("Request the states one by one and note at which step the error comes.");
+        }
+    }
+    condition
+}
+
+fn evidence(
+    device: &Device,
+    error: &AlError,
+    meaning: Option<StatusCode>,
+    times: u32,
+) -> Vec<Evidence> {
+    let mut list = Vec::new();
+    let from = error.from.map_or("an unknown state", AlState::name);
+    let now = error.status.value.state();
+    let again = if times > 1 { format!(", {times} times by now") } else { String::new() };
+    let text = match error.requested.and_then(|requested| requested.value.state()) {
+        Some(wanted) if !error.had_arrived => {
+            format!("AL status: {now} with error, {wanted} was asked for{again}")
+        }
+        Some(_) | None => format!("AL status: {now} with error, before it was in {from}{again}"),
+    };
+    let before = error.from.map(|state| u64::from(state.bits()));
+    let after = Some(u64::from(error.status.value.0));
+    list.push(Evidence::register(device.id, AL_STATUS, &error.status, text).values(before, after));
+    if let (Some(code), Some(meaning)) = (error.code, meaning) {
+        let text =
+            format!("AL status code 0x{:04X}: {}. {}", code.value.0, meaning.name, meaning.cause);
+        let value = Some(u64::from(code.value.0));
+        let shown = Evidence::register(device.id, AL_STATUS_CODE, &code, text);
+        list.push(shown.values(None, value));
+    }
+    if let Some(requested) = error.requested.filter(|_| !error.had_arrived) {
+        let text = format!("AL control: {} asked for", requested.value);
+        let value = Some(u64::from(requested.value.bits()));
+        let shown = Evidence::register(device.id, AL_CONTROL, &requested, text);
+        list.push(shown.values(None, value));
+    }
+    list
+}

@@ -1,0 +1,209 @@
+//! # Working counter too low
+//!
+//! Process data came back with a lower working counter than before: at least one SubDevice did not read
+//! or write its share.
+//!
+//! **How it is found.** Each logical datagram has a working counter that it comes back with while all is
+//! well; it is known from the time after the process data were set up. Who owns which part is known from
+//! the FMMUs (0x0600 and up) that were seen being written. An SubDevice that gives inputs adds 1; one
+//! that takes outputs adds 1 to an LWR and 2 to an LRW. The missing amount and what else is known of the
+//! owners (no answer, error, fallen state) tell who it is. When the MainDevice itself took a SubDevice
+//! out of SAFEOP or OP, a lower working counter is what it wanted.
+//!
+//! **What it means.** By itself it says only *that* data are missing. Usually another finding says why,
+//! and this one is listed beneath it.
+//!
+//! **What to do.** Look at the SubDevice's state and at the way to it.
+
+use std::collections::BTreeMap;
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::DeviceId;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::{Cyclic, Deficit, Device, Line, Owner, Trouble};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "S210",
+    name: "working-counter-low",
+    severity: Severity::Error,
+    class: Class::Software,
+    source: include_str!("working_counter.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// States and presence are polled more slowly than process data: what is seen of a SubDevice so much
+/// earlier or later still belongs to the deficit.
+const AROUND: Span = Span::ms(1500);
+
+/// Who did not do his share.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
+struct Suspects {
+    /// They are the ones for sure; else one or some of them.
+    is_certain: bool,
+    devices: Vec<DeviceId>,
+}
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    // Datagrams of one device fail together: one finding for each set of suspects.
+    let mut groups: BTreeMap<Suspects, Vec<(&Cyclic, &Deficit)>> = BTreeMap::new();
+    for cyclic in &view.line.cyclic {
+        for deficit in &cyclic.deficits {
+            let suspects = suspects(view, cyclic, deficit);
+            groups.entry(suspects).or_default().push((cyclic, deficit));
+        }
+    }
+    for (suspects, deficits) in &groups {
+        conditions.push(condition(view, suspects, deficits));
+    }
+}
+
+/// Which of the owners can explain what is missing.
+fn suspects(view: &View<'_>, cyclic: &Cyclic, deficit: &Deficit) -> Suspects {
+    let line = view.line;
+    let missing = deficit.expected - deficit.lowest;
+    let share = |owner: &Owner| cyclic.command.increment(owner.reads, owner.writes);
+    let owners: Vec<_> = line.owners(cyclic).collect();
+    if owners.is_empty() {
+        // The set-up was not seen: whoever is in trouble right then.
+        let devices: Vec<_> = line
+            .devices
+            .iter()
+            .filter(|device| trouble(device, deficit, view.now).is_some())
+            .map(|device| device.id)
+            .collect();
+        return Suspects { is_certain: devices.len() == 1, devices };
+    }
+    let in_trouble: Vec<_> = owners
+        .iter()
+        .filter(|owner| {
+            let device = line.device(owner.device);
+            device.is_some_and(|device| trouble(device, deficit, view.now).is_some())
+        })
+        .collect();
+    let is_enough = in_trouble.iter().map(|owner| share(owner)).sum::<u16>() >= missing;
+    if !in_trouble.is_empty() && is_enough {
+        let devices: Vec<_> = in_trouble.iter().map(|owner| owner.device).collect();
+        return Suspects { is_certain: true, devices };
+    }
+    let all: u16 = owners.iter().map(share).sum();
+    if all == missing {
+        let devices = owners.iter().map(|owner| owner.device).collect();
+        return Suspects { is_certain: true, devices };
+    }
+    // One device that fails loses its whole share, or one direction of it.
+    let fits = |owner: &&Owner| {
+        let inputs = cyclic.command.increment(owner.reads, false);
+        let outputs = cyclic.command.increment(false, owner.writes);
+        [share(owner), inputs, outputs].contains(&missing)
+    };
+    let alone: Vec<_> = owners.iter().filter(fits).map(|owner| owner.device).collect();
+    match alone.len() {
+        0 => Suspects {
+            is_certain: false,
+            devices: owners.iter().map(|owner| owner.device).collect(),
+        },
+        1 => Suspects { is_certain: true, devices: alone },
+        _ => Suspects { is_certain: false, devices: alone },
+    }
+}
+
+fn trouble(device: &Device, deficit: &Deficit, now: Instant) -> Option<Trouble> {
+    let from = deficit.first.at.before(AROUND);
+    let to = deficit.ended.unwrap_or(now) + AROUND;
+    device.trouble_within(from, to)
+}
+
+fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Deficit)]) -> Condition {
+    let line = view.line;
+    let since = deficits.iter().map(|(_, deficit)| deficit.first.at).min().unwrap_or_default();
+    let total: u64 = deficits.iter().map(|(_, deficit)| deficit.count).sum();
+    let lasts = deficits.iter().any(|(_, deficit)| deficit.ended.is_none());
+    let ended = deficits.iter().filter_map(|(_, deficit)| deficit.ended).max();
+    let first_suspect = suspects.devices.first().and_then(|id| line.device(*id));
+    let place = match first_suspect {
+        Some(device) if suspects.is_certain => Place::device(line.network, device.id),
+        Some(_) | None => Place::Network { network: line.network },
+    };
+    let known = first_suspect
+        .and_then(|device| deficits.iter().find_map(|(_, at)| trouble(device, at, view.now)));
+    let (cause, confidence, others) = match known {
+        Some(Trouble::Absent(_)) => {
+            (FaultName::DeviceOff, 0.4, [(FaultName::LinkOpen, 0.35), (FaultName::BrownOut, 0.1)])
+        }
+        Some(Trouble::Error(_)) => (
+            FaultName::FirmwareFault,
+            0.5,
+            [(FaultName::ConfigMismatch, 0.2), (FaultName::WatchdogStarved, 0.1)],
+        ),
+        Some(Trouble::Fall(_)) => (
+            FaultName::BrownOut,
+            0.5,
+            [(FaultName::FirmwareFault, 0.2), (FaultName::DeviceOff, 0.1)],
+        ),
+        None => (
+            FaultName::FirmwareFault,
+            0.4,
+            [(FaultName::DeviceOff, 0.2), (FaultName::ConfigMismatch, 0.2)],
+        ),
+    };
+    let mut condition =
+        Condition::new(&PAGE, place, cause, since).confidence(confidence).confirmed(since);
+    for (cause, confidence) in others {
+        condition = condition.or(cause, confidence);
+    }
+    for (cyclic, deficit) in deficits.iter().rev().take(3) {
+        condition = condition.shown_by(evidence(line, cyclic, deficit));
+    }
+    if suspects.is_certain {
+        condition =
+            condition.about(suspects.devices.iter().map(|device| Symptom::WorkingCounter(*device)));
+    }
+    if !lasts && let Some(ended) = ended {
+        condition = condition.ended(ended);
+        if total <= 3 {
+            condition.severity = Severity::Warning;
+        }
+    }
+    let names: Vec<_> = suspects.devices.iter().map(|id| line.label(*id)).collect();
+    condition = match (names.is_empty(), suspects.is_certain) {
+        (true, _) => condition.advise(
+            "Read AL status and DL status of all SubDevices: who is missing, or not in OP?",
+        ),
+        (false, true) => condition.advise(format!(
+            "Read AL status (0x0130) and its code of SubDevice {}.",
+            names.join(", ")
+        )),
+        (false, false) => condition.advise(format!(
+            "Read AL status (0x0130) of SubDevices {}: one of them is it.",
+            names.join(", ")
+        )),
+    };
+    condition
+        .advise("Take no output of this datagram for written and no input for fresh meanwhile.")
+}
+
+fn evidence(line: &Line, cyclic: &Cyclic, deficit: &Deficit) -> Evidence {
+    let owners: Vec<_> = line.owners(cyclic).map(|owner| line.label(owner.device)).collect();
+    let whose = if owners.is_empty() {
+        String::new()
+    } else {
+        format!(" (SubDevices {})", owners.join(", "))
+    };
+    let until = match deficit.ended {
+        Some(at) => format!("{} times until {} ns", deficit.count, at.as_nanos()),
+        None => format!("{} times so far", deficit.count),
+    };
+    let text = format!(
+        "{} at {}, {} bytes{whose}: working counter {} instead of {}, {until}",
+        cyclic.command, cyclic.start, cyclic.len, deficit.lowest, deficit.expected
+    );
+    let frame = deficit.first.frame.unwrap_or(0);
+    Evidence::frame(deficit.first.at, frame, text)
+        .values(Some(u64::from(deficit.expected)), Some(u64::from(deficit.first.value)))
+}

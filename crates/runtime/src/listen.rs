@@ -1,0 +1,150 @@
+//! Listening on cards without ever sending: beside another MainDevice, and before becoming one.
+
+use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
+use linesman_link::clock::HostClock;
+use linesman_link::direction::FrameDirection;
+use linesman_link::error::LinkError;
+use linesman_link::socket::{Batch, ListenFilter, Listener, Ready, Waitable, wait_any};
+use linesman_proto::address::{Network, Path};
+use linesman_proto::ethernet::MacAddress;
+use linesman_proto::time::{Instant, Span};
+
+use crate::host_watch::HostWatch;
+
+/// Frames fetched in one call.
+const BATCH: usize = 256;
+/// How long a line is listened to before it is driven: a MainDevice at work sends more often.
+const BEFORE_DRIVING: Span = Span::ms(300);
+
+/// One card, or the two at the ends of a ring, that are listened on.
+pub struct Ears {
+    clock: HostClock,
+    cards: Vec<Ear>,
+    batch: Batch,
+    frames: u64,
+}
+
+struct Ear {
+    listener: Listener,
+    path: Path,
+    watch: HostWatch,
+    /// Whether frames were seen that this host sent: then the MainDevice runs here, and what comes
+    /// in has come back. Else the card may be fed by a tap, with requests and answers alike.
+    sees_own: bool,
+}
+
+/// Something that was heard.
+#[derive(Clone, Copy, Debug)]
+pub enum Heard<'a> {
+    /// A frame.
+    Frame(FrameSeen<'a>),
+    /// Something about the host.
+    Host(HostObservation),
+}
+
+impl Ears {
+    /// Begins to listen; the first interface is card A, the second card B.
+    ///
+    /// # Errors
+    /// When an interface cannot be used.
+    pub fn open(names: &[String], clock: HostClock) -> Result<Self, LinkError> {
+        let open = |(path, name): (Path, &String)| {
+            Ok(Ear {
+                listener: Listener::open(name, ListenFilter::EtherCat)?,
+                watch: HostWatch::open(name, path, &clock)?,
+                path,
+                sees_own: false,
+            })
+        };
+        let cards: Result<Vec<Ear>, LinkError> =
+            Path::ALL.into_iter().zip(names).map(open).collect();
+        Ok(Self { clock, cards: cards?, batch: Batch::new(BATCH), frames: 0 })
+    }
+
+    /// The clock of the run.
+    #[must_use]
+    pub const fn clock(&self) -> &HostClock {
+        &self.clock
+    }
+
+    /// Whether this host has sent EtherCAT frames: then its card's counters are about the line.
+    #[must_use]
+    pub fn sees_own(&self) -> bool {
+        self.cards.iter().any(|card| card.sees_own)
+    }
+
+    /// Waits for frames, at most until `deadline`, and gives what was heard to `sink`.
+    ///
+    /// # Errors
+    /// When an interface vanished, was switched off, or the kernel refuses something else.
+    pub fn hear(
+        &mut self,
+        deadline: Instant,
+        mut sink: impl FnMut(Heard<'_>),
+    ) -> Result<(), LinkError> {
+        let Self { clock, cards, batch, frames } = self;
+        match cards.as_slice() {
+            [a, b, ..] => wait_any([&a.listener as &dyn Waitable, &b.listener], clock, deadline)?,
+            [a] => a.listener.wait(clock, deadline)?,
+            [] => Ready::Deadline,
+        };
+        for card in cards {
+            card.listener.recv_batch(batch, clock)?;
+            for frame in batch.iter() {
+                *frames += 1;
+                card.sees_own |= frame.direction == FrameDirection::Outgoing;
+                let direction = match frame.direction {
+                    FrameDirection::Outgoing => Direction::Sent,
+                    FrameDirection::Incoming if card.sees_own => Direction::Received,
+                    FrameDirection::Incoming | FrameDirection::Unknown => Direction::Unknown,
+                };
+                sink(Heard::Frame(FrameSeen {
+                    network: Network::default(),
+                    path: Some(card.path),
+                    direction,
+                    time: frame.at,
+                    number: *frames,
+                    fcs: None,
+                    truncated: frame.truncated,
+                    bytes: frame.bytes,
+                }));
+            }
+            let counters = card.listener.counters()?;
+            for observation in card.watch.poll(clock.now(), counters)? {
+                sink(Heard::Host(observation));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What is on a line that somebody else drives.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Driven {
+    /// EtherCAT frames that were heard.
+    pub frames: u64,
+    /// For how long.
+    pub within: Span,
+    /// Who sent the first of them, where a frame tells.
+    pub source: Option<MacAddress>,
+}
+
+/// Listens on a line that is about to be driven, for 0.3 s; `None` when nobody else drives it.
+///
+/// # Errors
+/// When an interface cannot be used.
+pub fn is_driven(names: &[String]) -> Result<Option<Driven>, LinkError> {
+    let clock = HostClock::start();
+    let mut ears = Ears::open(names, clock)?;
+    let until = clock.now() + BEFORE_DRIVING;
+    let mut driven = Driven { frames: 0, within: BEFORE_DRIVING, source: None };
+    while clock.now() < until {
+        ears.hear(until, |heard| {
+            let Heard::Frame(frame) = heard else { return };
+            driven.frames += 1;
+            let source = frame.bytes.get(6..12).and_then(|bytes| bytes.first_chunk::<6>());
+            driven.source = driven.source.or(source.map(|bytes| MacAddress(*bytes)));
+        })?;
+    }
+    Ok((driven.frames > 0).then_some(driven))
+}
