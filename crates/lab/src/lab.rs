@@ -10,7 +10,7 @@ use linesman_config::project::{Project, ProjectError};
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
 use linesman_diagnosis::{Engine, Setup};
-use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest};
+use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest, Target};
 use linesman_proto::address::{DeviceId, Network, Path};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
@@ -414,10 +414,14 @@ impl Lab {
             self.handle_event(event);
         }
         while let Some(probe) = self.engine.poll_probe() {
+            let device = self.plan.as_ref().and_then(|plan| plan.device(probe.device));
+            // Who is not of the plan has no address that could be asked.
+            let Some(device) = device else { continue };
             let request = ProbeRequest {
-                device: probe.device,
+                target: Target::Station(device.station),
                 register: probe.register,
                 len: probe.len,
+                write: None,
             };
             self.main.probe(self.now, request);
         }
