@@ -78,7 +78,12 @@ impl Ground<'_> {
                 let cabled = self.cabled.get(link).copied().unwrap_or(false);
                 let rate = if cabled { 0.4 } else { 3.0 };
                 let lasts = Span::ms(stream.between(3_000, 5_000));
-                Some(self.on_link(name, link, &[("openings_per_s", rate), ("open_ms", 20.0)], lasts))
+                Some(self.on_link(
+                    name,
+                    link,
+                    &[("openings_per_s", rate), ("open_ms", 20.0)],
+                    lasts,
+                ))
             }
             FaultName::CableDegraded => {
                 let link = self.any_cable(stream)?;

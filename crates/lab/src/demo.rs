@@ -9,8 +9,8 @@ use linesman_diagnosis::report::FindingReport;
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
 use linesman_sim::seed::Seed;
-use linesman_sim::segment_file::{PlantOptions, plant};
 use linesman_sim::segment_file::SegmentFile;
+use linesman_sim::segment_file::{PlantOptions, plant};
 use linesman_sim::truth::{FaultId, Place};
 
 use crate::choice::{Choice, Ground};
@@ -151,10 +151,7 @@ impl Demo {
             .project()
             .devices
             .iter()
-            .map(|device| Label {
-                name: device.name.clone(),
-                type_name: device.type_name.clone(),
-            })
+            .map(|device| Label { name: device.name.clone(), type_name: device.type_name.clone() })
             .collect();
         draw(self.lab.tree(), &labels)
     }
@@ -194,9 +191,9 @@ impl Demo {
         self.lab.run_until(self.lab.now() + QUIET)?;
         self.lab.heal(id);
         let healed = self.lab.now();
-        let back = self.lab.run_while(RECOVERY, Span::ms(5), |lab| {
-            lab.is_up() && lab.open_findings() == 0
-        })?;
+        let back = self
+            .lab
+            .run_while(RECOVERY, Span::ms(5), |lab| lab.is_up() && lab.open_findings() == 0)?;
         episode.healed_in = back.then(|| self.lab.now().since(healed));
         self.lab.run_until(self.lab.now() + QUIET)?;
         Ok(Some(episode))
@@ -236,7 +233,9 @@ impl Demo {
             places.push(self.describe(site));
             episode.marked.extend(match site {
                 Site::Device(id) => vec![id],
-                Site::Link { a, b, .. } => [Some(a), b].into_iter().flatten().filter_map(|end| end.node()).collect(),
+                Site::Link { a, b, .. } => {
+                    [Some(a), b].into_iter().flatten().filter_map(|end| end.node()).collect()
+                }
                 Site::Host | Site::Network => Vec::new(),
             });
         }
@@ -268,8 +267,7 @@ impl Demo {
 fn verdict_on(lab: &Lab, id: FaultId) -> Option<(FindingReport, Match)> {
     let log = lab.truth();
     let truth = truth_of(log, log.fault(id)?);
-    let scene =
-        Scene { tree: lab.tree(), host_counters: true, answered_again: false };
+    let scene = Scene { tree: lab.tree(), host_counters: true, answered_again: false };
     let since = log.fault(id)?.began?.as_nanos();
     let diagnosis = lab.diagnosis();
     let (finding, fits) = best_finding(&diagnosis, &truth, &scene)?;

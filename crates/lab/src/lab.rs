@@ -345,7 +345,11 @@ impl Lab {
             None if up => Ok(()),
             None => {
                 let names: Vec<String> = self.not_up().map(|id| self.state_of(id)).collect();
-                let what = format!("{} in all SubDevices; not there: {}", self.options.target, names.join(", "));
+                let what = format!(
+                    "{} in all SubDevices; not there: {}",
+                    self.options.target,
+                    names.join(", ")
+                );
                 Err(LabError::TooLate { what, within })
             }
         }

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
+use linesman_config::fault::FaultName;
 use linesman_diagnosis::observe::Direction;
 use linesman_lab::lab::Lab;
 use linesman_lab::options::LabOptions;
@@ -13,13 +14,13 @@ use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Seed;
 use linesman_sim::segment_file::FaultEntry;
 use linesman_sim::segment_file::{PlantOptions, plant};
-use linesman_config::fault::FaultName;
 
 /// The capture of a run of a seed, with a fault in it.
 fn capture(seed: u64) -> Vec<u8> {
     let writer = PcapngWriter::new(Vec::new(), "linesman test").unwrap();
     let writer = Arc::new(Mutex::new(Some(writer)));
-    let interface = InterfaceToWrite { name: "lab0", description: "", link_type: LinkType::Ethernet };
+    let interface =
+        InterfaceToWrite { name: "lab0", description: "", link_type: LinkType::Ethernet };
     writer.lock().unwrap().as_mut().unwrap().add_interface(&interface).unwrap();
     let mut file = plant(Seed(seed), &PlantOptions::default());
     let first = file.devices[0].name.clone();

@@ -25,7 +25,8 @@ fn every_story_comes_out_as_it_is_told() {
     let mut failed = Vec::new();
     for file in &files {
         let text = fs::read_to_string(file).unwrap();
-        let story = Story::parse(&text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        let story =
+            Story::parse(&text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
         let load = |name: &str| {
             fs::read_to_string(scenarios().join(name)).map_err(|error| format!("{name}: {error}"))
         };
@@ -34,5 +35,11 @@ fn every_story_comes_out_as_it_is_told() {
             failed.push(format!("{}: {report}", file.file_name().unwrap().to_string_lossy()));
         }
     }
-    assert!(failed.is_empty(), "{} of {} stories:\n{}", failed.len(), files.len(), failed.join("\n"));
+    assert!(
+        failed.is_empty(),
+        "{} of {} stories:\n{}",
+        failed.len(),
+        files.len(),
+        failed.join("\n")
+    );
 }

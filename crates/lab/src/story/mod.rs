@@ -31,6 +31,6 @@ pub mod parse;
 pub mod run;
 pub mod step;
 
-pub use run::{StepReport, StoryReport, exit_status, play};
 pub use parse::{Front, SegmentText, Story, StoryError};
+pub use run::{StepReport, StoryReport, exit_status, play};
 pub use step::{Expectation, Heal, Step, StepAt, What};

@@ -66,7 +66,13 @@ impl fmt::Display for StoryReport {
         writeln!(f, "{}", self.title)?;
         for step in &self.steps {
             let mark = if step.failure.is_none() { "ok  " } else { "FAIL" };
-            writeln!(f, "  {mark} line {:>3} at {:>10}  {}", step.line, step.at.to_string(), step.text)?;
+            writeln!(
+                f,
+                "  {mark} line {:>3} at {:>10}  {}",
+                step.line,
+                step.at.to_string(),
+                step.text
+            )?;
             for line in step.failure.iter().flat_map(|failure| failure.lines()) {
                 writeln!(f, "         {line}")?;
             }
@@ -296,7 +302,8 @@ fn holds(resolved: &Resolved<'_>, lab: &Lab) -> Result<(), String> {
         }
         Expectation::LineUp => {
             let missing: Vec<String> = lab.not_up().map(|id| lab.state_of(id)).collect();
-            let expected = format!("all SubDevices in the target state; not there: {}", missing.join(", "));
+            let expected =
+                format!("all SubDevices in the target state; not there: {}", missing.join(", "));
             check(lab.is_up(), &expected)
         }
         Expectation::Exit(status) => {

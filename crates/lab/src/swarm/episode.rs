@@ -109,8 +109,9 @@ impl<'a> Episode<'a> {
     fn choose(&self, stream: &mut Stream) -> Vec<Choice> {
         let segment = self.lab.segment();
         let tree = segment.tree();
-        let names: Vec<String> =
-            (0..tree.len() as u32).map(|n| segment.name(linesman_proto::address::DeviceId(n)).to_owned()).collect();
+        let names: Vec<String> = (0..tree.len() as u32)
+            .map(|n| segment.name(linesman_proto::address::DeviceId(n)).to_owned())
+            .collect();
         let cabled = cabled(segment);
         let ground = Ground { tree, names: &names, cabled: &cabled };
         let mut draw = || {
@@ -250,7 +251,8 @@ impl<'a> Episode<'a> {
         let bound = healed + self.options.recovery;
         while !self.lab.is_up() {
             if self.lab.now() >= bound {
-                let missing: Vec<String> = self.lab.not_up().map(|id| id.no().to_string()).collect();
+                let missing: Vec<String> =
+                    self.lab.not_up().map(|id| id.no().to_string()).collect();
                 self.violation(format!(
                     "{} after healing these SubDevices are not in the target state: {}",
                     self.options.recovery,
@@ -269,12 +271,7 @@ impl<'a> Episode<'a> {
     fn explain_findings(&mut self) {
         let diagnosis = self.lab.diagnosis();
         for finding in diagnosis.findings.iter().filter(|f| f.severity != Severity::Info) {
-            let graded = explains(
-                self.lab.truth(),
-                self.lab.tree(),
-                self.host_counters,
-                finding,
-            );
+            let graded = explains(self.lab.truth(), self.lab.tree(), self.host_counters, finding);
             if !graded.is_right() {
                 let site = Site::from(&finding.place);
                 let faults: Vec<String> =
@@ -305,9 +302,8 @@ impl<'a> Episode<'a> {
     fn said(&self) -> String {
         let diagnosis = self.lab.diagnosis();
         let open = diagnosis.findings.iter().filter(|f| f.state != FindingState::Closed);
-        let said: Vec<String> = open
-            .map(|f| format!("{} {} at {}", f.code, f.cause, Site::from(&f.place)))
-            .collect();
+        let said: Vec<String> =
+            open.map(|f| format!("{} {} at {}", f.code, f.cause, Site::from(&f.place))).collect();
         if said.is_empty() { "nothing".to_owned() } else { said.join("; ") }
     }
 

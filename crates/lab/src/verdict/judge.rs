@@ -37,14 +37,19 @@ pub fn best_finding<'a>(
         let graded = matches(truth, scene, Claim::of(finding));
         (finding, graded)
     });
-    graded
-        .filter(|(_, graded)| graded.is_right())
-        .max_by_key(|(finding, graded)| (finding.state != FindingState::Closed, graded.cause, graded.place))
+    graded.filter(|(_, graded)| graded.is_right()).max_by_key(|(finding, graded)| {
+        (finding.state != FindingState::Closed, graded.cause, graded.place)
+    })
 }
 
 /// How well a finding fits any of the faults of the run, now or in the past.
 #[must_use]
-pub fn explains(log: &TruthLog, tree: &Tree, host_counters: bool, finding: &FindingReport) -> Match {
+pub fn explains(
+    log: &TruthLog,
+    tree: &Tree,
+    host_counters: bool,
+    finding: &FindingReport,
+) -> Match {
     let claim = Claim::of(finding);
     let mut best = Match::NONE;
     for fault in log.faults().iter().filter(|fault| fault.first_effect.is_some()) {
