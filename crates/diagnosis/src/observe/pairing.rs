@@ -28,8 +28,10 @@ const TIMEOUT: Span = Span::ms(100);
 /// Two equal requests closer than this are one that was recorded twice: the shortest frame takes
 /// longer.
 const RECORDED_TWICE: Span = Span::us(3);
-/// So many requests may be on their way when the input ends.
-const CUT_OFF: usize = 2;
+/// When the input ends, so many requests may be on their way.
+const MOST_IN_FLIGHT: usize = 32;
+/// And for so long.
+const IN_FLIGHT: Span = Span::ms(5);
 /// How many returns are remembered to know one that was recorded twice.
 const REMEMBERED: usize = 8;
 /// Senders kept.
@@ -59,7 +61,7 @@ pub struct Pairing {
     returned: [Option<(Fingerprint, Instant)>; REMEMBERED],
     returned_next: usize,
     senders: Vec<MacAddress>,
-    returns_seen: bool,
+    returns: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -75,6 +77,7 @@ struct Pending {
     /// Copies that are still out.
     out: u8,
     overtaken: u16,
+    returns_before: u64,
     /// Working counters of copies that came back.
     sums: Vec<u16>,
 }
@@ -104,23 +107,24 @@ impl Pairing {
         if !is_return {
             return self.request(frame, source, print, settle);
         }
-        self.returns_seen = true;
         let Some(found) = found else {
             if self.was_returned(print, frame.time) {
                 return Outcome::Duplicate;
             }
             self.remember(print, frame.time);
-            let reply = Some(copy(frame));
             settle(&Exchange {
                 request: None,
-                reply,
+                reply: Some(copy(frame)),
                 earlier: &[],
                 is_last: true,
+                returns_before: self.returns,
                 is_cut_off: false,
             });
+            self.returns += 1;
             return Outcome::ReturnAlone;
         };
         self.remember(print, frame.time);
+        self.returns += 1;
         self.give_back(found, frame, view, settle);
         Outcome::Return
     }
@@ -140,11 +144,16 @@ impl Pairing {
 
     /// Settles all requests that are still out: the input has ended.
     pub fn finish(&mut self, settle: &mut impl FnMut(&Exchange<'_>)) {
-        let is_few =
-            self.pending.iter().filter(|pending| pending.overtaken == 0).count() <= CUT_OFF;
+        // An input that stops between requests and their returns loses nothing.
+        let waiting = || self.pending.iter().filter(|pending| pending.overtaken == 0);
+        let is_short = match (waiting().next(), waiting().next_back()) {
+            (Some(first), Some(last)) => gap(first.time, last.time) <= IN_FLIGHT,
+            (None, _) | (_, None) => true,
+        };
+        let is_few = waiting().count() <= MOST_IN_FLIGHT;
+        let may_return = self.returns > 0 && is_short && is_few;
         while let Some(oldest) = self.pending.front() {
-            // An input that stops between a request and its return loses nothing.
-            let is_cut_off = self.returns_seen && oldest.overtaken == 0 && is_few;
+            let is_cut_off = may_return && oldest.overtaken == 0;
             self.lose(0, is_cut_off, settle);
         }
     }
@@ -174,7 +183,7 @@ impl Pairing {
             (false, marked) => marked,
             // An address that is marked from the start shows nothing. Where answers are known to
             // come, a second frame is the return; else it is the request again.
-            (true, _) => self.returns_seen,
+            (true, _) => self.returns > 0,
         }
     }
 
@@ -224,6 +233,7 @@ impl Pairing {
             sent,
             out: 1,
             overtaken: 0,
+            returns_before: self.returns,
             sums,
         });
         Outcome::Request
@@ -245,6 +255,7 @@ impl Pairing {
             reply: Some(copy(frame)),
             earlier: &pending.sums,
             is_last,
+            returns_before: pending.returns_before,
             is_cut_off: false,
         });
         if is_last {
@@ -282,6 +293,7 @@ impl Pairing {
             reply: None,
             earlier: &pending.sums,
             is_last: true,
+            returns_before: pending.returns_before,
             is_cut_off,
         });
         self.remove(index);
