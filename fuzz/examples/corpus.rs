@@ -24,8 +24,15 @@ type Made = Vec<(&'static str, Vec<u8>)>;
 fn main() -> Result<(), Box<dyn Error>> {
     let frames = frames()?;
     let captures = captures(&frames)?;
-    let targets =
-        [("frame", frames), ("sii", images()?), ("mailbox", messages()), ("capture", captures)];
+    let targets = [
+        ("segment", series(&frames)),
+        ("diagnosis", series(&frames)),
+        ("segment_file", segment_files()),
+        ("frame", frames),
+        ("sii", images()?),
+        ("mailbox", messages()),
+        ("capture", captures),
+    ];
     for (target, inputs) in targets {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
         std::fs::create_dir_all(&folder)?;
@@ -204,4 +211,46 @@ fn captures(frames: &Made) -> Result<Made, Box<dyn Error>> {
         ("cut-off.bin", cut),
         ("empty.bin", Vec::new()),
     ])
+}
+
+/// Series of frames: each alone twice, as if it came back, and all one after the other.
+fn series(frames: &Made) -> Made {
+    let put = |series: &mut Vec<u8>, flags: u8, bytes: &[u8]| {
+        let len = (bytes.len() as u16).to_le_bytes();
+        series.extend([len[0], len[1], flags, 5]);
+        series.extend_from_slice(bytes);
+    };
+    let mut made = Vec::new();
+    let mut all = Vec::new();
+    for (name, bytes) in frames.iter().filter(|(_, bytes)| bytes.len() < 400) {
+        let mut twice = Vec::new();
+        put(&mut twice, 0, bytes);
+        put(&mut twice, 9, bytes);
+        put(&mut all, 2, bytes);
+        made.push((*name, twice));
+    }
+    made.push(("all", all));
+    made
+}
+
+fn segment_files() -> Made {
+    let line = "name = \"line\"\nseed = 7\n[[device]]\nname = \"K1\"\ntype = \"EK1100\"\n\
+        on = \"maindevice\"\ncable_m = 12.5\n[[device]]\nname = \"I1\"\ntype = \"EL1008\"\n\
+        on = \"K1.B\"\ncounters = { \"A.frame\" = 3 }\n[[device]]\nname = \"O1\"\n\
+        type = \"EL2008\"\non = \"I1.B\"\nserial = 5\nclock_ppm = -20.0\n";
+    let tree = "[[device]]\nname = \"J\"\ntype = \"CU1124\"\n\
+        on = \"K1.C\"\n[[device]]\nname = \"K2\"\ntype = \"EK1100\"\non = \"J.C\"\n";
+    let faults = "[[fault]]\nkind = \"emc-noise\"\nat = \"K1.B>I1.A\"\nfrom_ms = 1\nto_ms = 4\n\
+        hits_per_s = 4000.0\n[[fault]]\nkind = \"link-open\"\nat = \"I1.B-O1.A\"\nfrom_ms = 2\n\
+        [[fault]]\nkind = \"device-off\"\ndevice = \"O1\"\nfrom_ms = 3\n";
+    let coupler = "[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n";
+    let text = |parts: &[&str]| parts.concat().into_bytes();
+    let ring = "[ring]\ncloses_at = \"K1.C\"\n";
+    vec![
+        ("line.toml", text(&[line])),
+        ("faults.toml", text(&[line, faults])),
+        ("ring.toml", text(&[coupler, ring])),
+        ("tree.toml", text(&["old_counters = true\n", coupler, tree])),
+        ("unknown-key.toml", text(&[coupler, "colour = \"red\"\n"])),
+    ]
 }

@@ -1,6 +1,8 @@
 //! Frames from anywhere: read, shown, built again.
 
-use linesman_proto::ethernet::{MAX_LEN, MIN_LEN, locate};
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::command::Command;
+use linesman_proto::ethernet::{MAX_LEN, MIN_LEN, MacAddress, locate};
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::frame::size::frame_size;
 use linesman_proto::frame::{DATAGRAM_OVERHEAD, FrameBuilder, FrameView};
@@ -48,4 +50,15 @@ pub fn frame(data: &[u8]) {
         assert_eq!((read.adp(), read.ado()), (kept.adp(), kept.ado()));
         assert_eq!(read.data(), kept.data());
     }
+}
+
+/// A frame with one broadcast read of the AL state.
+pub(crate) fn broadcast_read() -> Vec<u8> {
+    let mut buffer = [0_u8; MAX_LEN];
+    let source = MacAddress([2, 0, 0, 0, 0, 1]);
+    let mut builder = FrameBuilder::new(&mut buffer, source);
+    let address = DatagramAddress::Physical(0, RegisterAddress(0x0130));
+    builder.push(Command::Brd, 1, address, 2).expect("two bytes fit");
+    let len = builder.finish();
+    buffer[..len].to_vec()
 }

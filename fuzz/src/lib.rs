@@ -4,18 +4,32 @@
 //! by an assertion here, such as "what was built reads as what was meant".
 
 mod capture;
+mod diagnosis;
 mod frame;
 mod mailbox;
+mod segment;
+mod segment_file;
+mod series;
 mod sii;
 
 pub use capture::capture;
+pub use diagnosis::diagnosis;
 pub use frame::frame;
 pub use mailbox::mailbox;
+pub use segment::segment;
+pub use segment_file::segment_file;
 pub use sii::sii;
 
 /// A target: its name, which is that of its corpus's folder, and what it does.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: &[Target] =
-    &[("capture", capture), ("frame", frame), ("mailbox", mailbox), ("sii", sii)];
+pub const TARGETS: &[Target] = &[
+    ("capture", capture),
+    ("diagnosis", diagnosis),
+    ("frame", frame),
+    ("mailbox", mailbox),
+    ("segment", segment),
+    ("segment_file", segment_file),
+    ("sii", sii),
+];

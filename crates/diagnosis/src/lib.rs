@@ -8,6 +8,7 @@ pub mod engine;
 pub mod finding;
 pub mod line;
 pub mod locate;
+pub mod observation_file;
 pub mod observe;
 pub mod report;
 pub mod rule;

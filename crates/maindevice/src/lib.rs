@@ -1,1 +1,26 @@
 //! The EtherCAT MainDevice: exchange engine, procedures, cyclic process data.
+//!
+//! [`MainDevice`] is an engine without a clock and without sockets: one instance per network, fed
+//! with frames and time, asked for frames and the next deadline. Inside, [`exchange`] sends
+//! datagrams and matches what comes back; [`executor`] runs procedures ([`procedure`]) that await
+//! answers; `cyclic` exchanges process data; `supervisor` brings each SubDevice to its target and
+//! keeps it there; [`mailbox`] talks to the software of SubDevices.
+//!
+//! Read first: "Shapes" in `ARCHITECTURE.md`.
+
+mod cyclic;
+pub mod event;
+pub mod exchange;
+pub mod executor;
+pub mod mailbox;
+pub mod main_device;
+pub mod options;
+pub mod procedure;
+pub mod statistics;
+mod supervisor;
+
+pub use event::Event;
+pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
+pub use main_device::{MainDevice, ProbeRequest};
+pub use options::Options;
+pub use statistics::Statistics;

@@ -23,6 +23,22 @@ pub struct Silence {
     pub frames: u64,
     /// When something came back again.
     pub ended: Option<Instant>,
+    returns_before: u64,
+}
+
+/// With fewer requests than this it is no silence.
+const SHORT: u64 = 3;
+/// Returns whose times are kept: a request is known to be lost after so many later ones at most.
+const RECENT: u64 = 64;
+
+/// Times of the latest returns, in a circle.
+#[derive(Clone, Debug)]
+struct RecentReturns([Instant; RECENT as usize]);
+
+impl Default for RecentReturns {
+    fn default() -> Self {
+        Self([Instant::default(); RECENT as usize])
+    }
 }
 
 /// What passed the observer.
@@ -46,6 +62,7 @@ pub struct Traffic {
     pub latest_returned: Option<Seen<()>>,
     /// When nothing at all came back, oldest first, at most [`SILENCES_KEPT`].
     pub silences: VecDeque<Silence>,
+    recent_returns: RecentReturns,
     /// The source addresses that requests came from, at most four.
     pub senders: Vec<MacAddress>,
     /// Returns whose request was not seen.
@@ -93,42 +110,49 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// A request was lost.
-    pub fn record_lost(&mut self, at: Instant, frame: u64) {
+    /// A request was lost that went out when `returns_before` frames had come back.
+    pub fn record_lost(&mut self, at: Instant, frame: u64, returns_before: u64) {
         let seen = Seen::new((), at, Some(frame));
         self.lost.add(1, at);
         self.first_lost.get_or_insert(seen);
         self.latest_lost = Some(seen);
-        // Only what was sent after the latest return adds to a silence: the others were overtaken.
-        let returned = self.latest_returned.and_then(|returned| returned.frame);
-        if returned.is_some_and(|returned| returned > frame) {
-            return;
-        }
-        match self.silences.back_mut().filter(|silence| silence.ended.is_none()) {
-            Some(silence) => {
+        let ended = self.return_after(returns_before, at);
+        if let Some(silence) = self.silences.back_mut() {
+            if silence.returns_before == returns_before {
                 silence.last = seen;
                 silence.frames += 1;
+                silence.ended = ended;
+                return;
             }
-            None => {
-                if self.silences.len() == SILENCES_KEPT {
-                    self.silences.pop_front();
-                }
-                self.silences.push_back(Silence {
-                    since: seen,
-                    last: seen,
-                    frames: 1,
-                    ended: None,
-                });
+            if silence.frames < SHORT {
+                // A few frames lost among others are no silence worth keeping.
+                self.silences.pop_back();
+            } else if self.silences.len() == SILENCES_KEPT {
+                self.silences.pop_front();
             }
         }
+        let silence = Silence { since: seen, last: seen, frames: 1, ended, returns_before };
+        self.silences.push_back(silence);
     }
 
     /// A frame came back.
     pub fn record_returned(&mut self, at: Instant, frame: u64) {
+        self.recent_returns.0[(self.returned % RECENT) as usize] = at;
         self.returned += 1;
         self.latest_returned = Some(Seen::new((), at, Some(frame)));
         if let Some(silence) = self.silences.back_mut() {
             silence.ended.get_or_insert(at);
+        }
+    }
+
+    /// When the first frame came back after so many others; `sent`, if that is long ago.
+    fn return_after(&self, returns_before: u64, sent: Instant) -> Option<Instant> {
+        match self.returned.checked_sub(returns_before) {
+            None | Some(0) => None,
+            Some(later) if later <= RECENT => {
+                Some(self.recent_returns.0[(returns_before % RECENT) as usize])
+            }
+            Some(_) => Some(sent),
         }
     }
 

@@ -272,7 +272,8 @@ impl Walk<'_, '_> {
         let lost = line.traffic.lost;
         let (first, last) = (lost.first?, lost.last?);
         let is_silent = self.carried.frames == 0 && !line.host.is_watched;
-        let is_read = self.is_read && (self.survey.has_ended() || self.horizon > first);
+        // Counters that were read before the frame was missed say nothing of it.
+        let is_read = self.is_read && self.horizon >= first;
         let is_explained = self.survey.any_link_changed(first, last);
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,

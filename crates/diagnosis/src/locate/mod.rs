@@ -9,8 +9,10 @@
 
 pub mod cause;
 pub mod damage;
+pub mod drops;
 pub mod survey;
 
 pub use cause::{Suspect, Suspicion};
 pub use damage::{Damage, LastHop, Located};
+pub use drops::{Drop, Drops};
 pub use survey::Survey;

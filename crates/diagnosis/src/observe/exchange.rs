@@ -28,6 +28,9 @@ pub struct Exchange<'a> {
     pub earlier: &'a [u16],
     /// Whether nothing more will come: now it can be judged.
     pub is_last: bool,
+    /// How many frames had come back when the request went out: requests with the same number went
+    /// out one after the other without any return between them.
+    pub returns_before: u64,
     /// Whether the input ended while the return may still have been on its way.
     pub is_cut_off: bool,
 }

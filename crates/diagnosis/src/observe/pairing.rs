@@ -59,7 +59,7 @@ pub struct Pairing {
     returned: [Option<(Fingerprint, Instant)>; REMEMBERED],
     returned_next: usize,
     senders: Vec<MacAddress>,
-    returns_seen: bool,
+    returns: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -75,6 +75,7 @@ struct Pending {
     /// Copies that are still out.
     out: u8,
     overtaken: u16,
+    returns_before: u64,
     /// Working counters of copies that came back.
     sums: Vec<u16>,
 }
@@ -104,23 +105,24 @@ impl Pairing {
         if !is_return {
             return self.request(frame, source, print, settle);
         }
-        self.returns_seen = true;
         let Some(found) = found else {
             if self.was_returned(print, frame.time) {
                 return Outcome::Duplicate;
             }
             self.remember(print, frame.time);
-            let reply = Some(copy(frame));
             settle(&Exchange {
                 request: None,
-                reply,
+                reply: Some(copy(frame)),
                 earlier: &[],
                 is_last: true,
+                returns_before: self.returns,
                 is_cut_off: false,
             });
+            self.returns += 1;
             return Outcome::ReturnAlone;
         };
         self.remember(print, frame.time);
+        self.returns += 1;
         self.give_back(found, frame, view, settle);
         Outcome::Return
     }
@@ -144,7 +146,7 @@ impl Pairing {
             self.pending.iter().filter(|pending| pending.overtaken == 0).count() <= CUT_OFF;
         while let Some(oldest) = self.pending.front() {
             // An input that stops between a request and its return loses nothing.
-            let is_cut_off = self.returns_seen && oldest.overtaken == 0 && is_few;
+            let is_cut_off = (self.returns > 0) && oldest.overtaken == 0 && is_few;
             self.lose(0, is_cut_off, settle);
         }
     }
@@ -174,7 +176,7 @@ impl Pairing {
             (false, marked) => marked,
             // An address that is marked from the start shows nothing. Where answers are known to
             // come, a second frame is the return; else it is the request again.
-            (true, _) => self.returns_seen,
+            (true, _) => self.returns > 0,
         }
     }
 
@@ -224,6 +226,7 @@ impl Pairing {
             sent,
             out: 1,
             overtaken: 0,
+            returns_before: self.returns,
             sums,
         });
         Outcome::Request
@@ -245,6 +248,7 @@ impl Pairing {
             reply: Some(copy(frame)),
             earlier: &pending.sums,
             is_last,
+            returns_before: pending.returns_before,
             is_cut_off: false,
         });
         if is_last {
@@ -282,6 +286,7 @@ impl Pairing {
             reply: None,
             earlier: &pending.sums,
             is_last: true,
+            returns_before: pending.returns_before,
             is_cut_off,
         });
         self.remove(index);

@@ -105,6 +105,10 @@ fn add(
     if suspicion.frames() == 0 {
         condition.severity = Severity::Warning;
     }
+    if is_unknown && suspicion.frames() == 1 {
+        // One frame may get lost on a good line; it is worth knowing, no more.
+        condition.severity = Severity::Info;
+    }
     for other in &suspicion.suspects[1..] {
         let place = place(survey, other.spot);
         condition.alternatives.push(Alternative {

@@ -4,7 +4,9 @@
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
 pub mod frame_errors;
+pub mod link_lost;
 pub mod nobody_answers;
+pub mod not_answering;
 pub mod one_direction;
 pub mod restarted;
 pub mod state_error;
@@ -69,6 +71,8 @@ pub struct View<'a> {
 /// All rules, causes before what may follow from them.
 pub const RULES: &[Rule] = &[
     // Hardware, configuration and host: frame errors, links, devices.
+    link_lost::RULE,
+    not_answering::RULE,
     frame_errors::RULE,
     //
     // The network as a whole, working counters and states.

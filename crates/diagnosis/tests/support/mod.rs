@@ -3,6 +3,8 @@
 #![allow(dead_code, unreachable_pub, reason = "each test file uses a part of it")]
 #![allow(clippy::disallowed_methods, reason = "tests read files")]
 
+pub mod script;
+
 use std::path::{Path, PathBuf};
 
 use linesman_diagnosis::{Diagnosis, Direction, Engine, FrameSeen, Setup};

@@ -4,9 +4,10 @@
 //! link state). The word sums up what the MainDevice knows; no register holds it.
 
 use std::fmt;
+use std::str::FromStr;
 
 use crate::port::{Port, PortMap};
-use crate::state::al_state::StateValue;
+use crate::state::al_state::{AlState, StateValue};
 
 /// A SubDevice's state word: software in the low byte, wiring in the high byte.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug)]
@@ -93,15 +94,6 @@ impl fmt::Display for DeviceState {
     /// The list is not known to write the link error and the disabled bit; they appear here as
     /// `LNK_ERR` and `DISABLED`. Ports stand behind the last link word.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const WORDS: [(u16, &str); 7] = [
-            (DeviceState::WRONG_IDENTITY, "VPRS"),
-            (DeviceState::INIT_ERROR, "INIT_ERR"),
-            (DeviceState::DISABLED, "DISABLED"),
-            (DeviceState::NOT_PRESENT, "NO_COMM"),
-            (DeviceState::LINK_ERROR, "LNK_ERR"),
-            (DeviceState::MISSING_LINK, "LNK_MIS"),
-            (DeviceState::ADDITIONAL_LINK, "LNK_ADD"),
-        ];
         if self.contains(Self::ERROR) {
             f.write_str("ERR ")?;
         }
@@ -120,10 +112,64 @@ impl fmt::Display for DeviceState {
     }
 }
 
+/// The words behind the state in the text, in their order.
+const WORDS: [(u16, &str); 7] = [
+    (DeviceState::WRONG_IDENTITY, "VPRS"),
+    (DeviceState::INIT_ERROR, "INIT_ERR"),
+    (DeviceState::DISABLED, "DISABLED"),
+    (DeviceState::NOT_PRESENT, "NO_COMM"),
+    (DeviceState::LINK_ERROR, "LNK_ERR"),
+    (DeviceState::MISSING_LINK, "LNK_MIS"),
+    (DeviceState::ADDITIONAL_LINK, "LNK_ADD"),
+];
+
+/// Not the text of a state word.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error(
+    "`{given}` is no state: expected a state (INIT, BOOT, PREOP, SAFEOP, OP), before it ERR if it \
+     signals an error, behind it any of VPRS, INIT_ERR, DISABLED, NO_COMM, LNK_ERR, LNK_MIS, LNK_ADD \
+     with the ports A to D, such as `OP LNK_MIS B`"
+)]
+pub struct NoDeviceState {
+    /// What was given.
+    pub given: String,
+}
+
+impl FromStr for DeviceState {
+    type Err = NoDeviceState;
+
+    /// Reads what [`fmt::Display`] writes; also `LNK MIS` and `LNK:MIS`, as some lists have it.
+    fn from_str(given: &str) -> Result<Self, NoDeviceState> {
+        let joined = given.to_ascii_uppercase().replace("LNK ", "LNK_").replace("LNK:", "LNK_");
+        let mut word = Self::default();
+        let mut state = None;
+        for part in joined.split_whitespace() {
+            let mut letters = part.chars();
+            let port = match (letters.next().and_then(Port::from_letter), letters.next()) {
+                (Some(port), None) => Some(port),
+                (Some(_) | None, _) => None,
+            };
+            let bits = WORDS.iter().find(|(_, name)| *name == part).map(|(bits, _)| *bits);
+            match (state, port, bits) {
+                (Some(_), Some(port), _) => word = word.at_port(port),
+                (Some(_), None, Some(bits)) => word = word.with(bits),
+                (None, None, None) if part == "ERR" => word = word.with(Self::ERROR),
+                (None, None, None) => state = AlState::from_name(part),
+                (Some(_) | None, _, _) => state = None,
+            }
+            if state.is_none() && part != "ERR" {
+                return Err(NoDeviceState { given: given.to_owned() });
+            }
+        }
+        let state = state.ok_or_else(|| NoDeviceState { given: given.to_owned() })?;
+        Ok(word.with(u16::from(state.bits())))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::al_state::AlState::{self, Init, Op, PreOp, SafeOp};
+    use AlState::{Init, Op, PreOp, SafeOp};
 
     const VPRS: u16 = DeviceState::WRONG_IDENTITY;
     const INIT_ERR: u16 = DeviceState::INIT_ERROR;
@@ -156,6 +202,19 @@ mod tests {
         for (word, value, text) in table {
             assert_eq!(word.0, value, "{text}");
             assert_eq!(word.to_string(), text);
+            assert_eq!(text.parse(), Ok(word));
+        }
+    }
+
+    #[test]
+    fn texts_of_other_lists_are_read() {
+        let expected = word(Op, MISSING).at_port(Port::B);
+        for text in ["OP LNK MIS B", "op lnk_mis b", "OP  LNK:MIS B"] {
+            assert_eq!(text.parse(), Ok(expected), "{text}");
+        }
+        for wrong in ["", "ERR", "RUN", "OP OP", "OP LNK_MIS E", "B OP", "NO_COMM"] {
+            let error = wrong.parse::<DeviceState>().unwrap_err();
+            assert!(error.to_string().contains("such as `OP LNK_MIS B`"), "{wrong}: {error}");
         }
     }
 

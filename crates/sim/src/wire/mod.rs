@@ -18,3 +18,6 @@ pub(crate) mod world;
 pub use change::{Change, Line, Source};
 pub use history::History;
 pub use link::{CABLE_NS_PER_M, Link};
+
+#[cfg(test)]
+mod tests;

@@ -285,9 +285,9 @@ impl World {
             let event = PortEvent::Count { port: Port::A, kind };
             self.post(node, end, traveller.spoiled_by, event);
         }
-        let controller = &mut self.nodes[node].controller;
         let errors = r::PROCESSING_UNIT_ERROR_COUNTER.address;
-        controller.advance(at, &mut self.signals);
+        self.nodes[node].touch(at, &mut self.signals);
+        let controller = &mut self.nodes[node].controller;
         let before = controller.register(errors);
         let verdict = controller.process(at, &mut traveller.frame, &mut self.signals);
         if controller.register(errors) > before {

@@ -297,7 +297,7 @@ impl Learner {
 fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
     let Ok(view) = FrameView::parse(request.bytes) else { return };
     if exchange.earlier.is_empty() && !exchange.is_cut_off {
-        line.traffic.record_lost(request.time, request.number);
+        line.traffic.record_lost(request.time, request.number, exchange.returns_before);
         line.touch();
     }
     for (index, datagram) in view.datagrams().enumerate() {

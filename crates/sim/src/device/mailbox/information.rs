@@ -3,13 +3,13 @@
 use linesman_proto::mailbox::ErrorReplyCode;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::information::{
-    Answer, Body, EntryDescription, Fragments, ListKind, Message, ObjectDescription, ObjectList,
-    ValueInfo,
+    Access, Answer, Body, EntryDescription, Fragments, ListKind, Message, ObjectDescription,
+    ObjectList, ValueInfo,
 };
-use linesman_proto::mailbox::coe::{Message as CoeMessage, ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::coe::{DataType, Message as CoeMessage, ObjectAddress, ObjectIndex};
 
 use super::coe::{Answers, write};
-use crate::device::dictionary::{Dictionary, LARGEST};
+use crate::device::dictionary::{Dictionary, LARGEST, Object};
 
 /// Answers a question, in as many messages as it takes.
 pub(super) fn answer(
@@ -92,7 +92,9 @@ fn entry(
     buffer: &mut [u8],
 ) -> Result<usize, SdoAbortCode> {
     let object = dictionary.object(address.index).ok_or(SdoAbortCode::NO_OBJECT)?;
-    let entry = object.entry(address.subindex).ok_or(SdoAbortCode::NO_SUBINDEX)?;
+    let Some(entry) = object.entry(address.subindex) else {
+        return gap(object, address, buffer);
+    };
     let maximum = entry.maximum.map(u32::to_le_bytes);
     let maximum = maximum.as_ref().and_then(|bytes| bytes.get(..entry.value.len()));
     let description = EntryDescription {
@@ -108,6 +110,28 @@ fn entry(
         minimum: None,
         maximum: maximum.filter(|_| values.has(ValueInfo::MAXIMUM)),
         name: entry.name.as_bytes(),
+    };
+    description.write(buffer).map_err(|_| SdoAbortCode::OUT_OF_MEMORY)
+}
+
+/// The description of a subindex that is left out: an entry of no type and no bits, so that whoever
+/// walks from 0 to the highest subindex gets an answer to each question.
+fn gap(object: &Object, address: ObjectAddress, buffer: &mut [u8]) -> Result<usize, SdoAbortCode> {
+    let last = object.entries.last().map_or(0, |entry| entry.subindex);
+    if address.subindex > last {
+        return Err(SdoAbortCode::NO_SUBINDEX);
+    }
+    let description = EntryDescription {
+        object: address,
+        values: ValueInfo::default(),
+        data_type: DataType(0),
+        bits: 0,
+        access: Access::default(),
+        unit: None,
+        default: None,
+        minimum: None,
+        maximum: None,
+        name: &[],
     };
     description.write(buffer).map_err(|_| SdoAbortCode::OUT_OF_MEMORY)
 }

@@ -95,22 +95,26 @@ fn listed(dictionary: &Dictionary, index: ObjectIndex) -> impl Iterator<Item = u
     entries.iter().skip(1).take(count).map(|entry| entry.as_number())
 }
 
-/// Puts the lowest `bits` (up to 64) of a value into a buffer.
+/// Puts the lowest `bits` (up to 64) of a value into a buffer that has 0 there.
 fn put_bits(buffer: &mut [u8], at: usize, bits: usize, value: u64) {
-    for bit in 0..bits.min(64) {
-        if value >> bit & 1 != 0
-            && let Some(byte) = buffer.get_mut((at + bit) / 8)
-        {
-            *byte |= 1 << ((at + bit) % 8);
-        }
+    let mut rest = u128::from(value & mask(bits)) << (at % 8);
+    let bytes = (at % 8 + bits.min(64)).div_ceil(8);
+    for byte in buffer.iter_mut().skip(at / 8).take(bytes) {
+        *byte |= rest as u8;
+        rest >>= 8;
     }
 }
 
 fn take_bits(buffer: &[u8], at: usize, bits: usize) -> u64 {
-    (0..bits.min(64)).fold(0, |value, bit| {
-        let byte = buffer.get((at + bit) / 8).copied().unwrap_or(0);
-        value | u64::from(byte >> ((at + bit) % 8) & 1) << bit
-    })
+    let bytes = (at % 8 + bits.min(64)).div_ceil(8);
+    let bytes = (0..).zip(buffer.iter().skip(at / 8).take(bytes));
+    let value = bytes.fold(0, |value, (place, byte)| value | u128::from(*byte) << (8 * place));
+    (value >> (at % 8)) as u64 & mask(bits)
+}
+
+/// The lowest `bits` set.
+const fn mask(bits: usize) -> u64 {
+    if bits >= 64 { u64::MAX } else { (1 << bits) - 1 }
 }
 
 #[cfg(test)]
@@ -128,5 +132,9 @@ mod tests {
         assert_eq!(take_bits(&buffer, 28, 16), 0, "behind the end");
         put_bits(&mut buffer, 30, 8, 0xFF);
         assert_eq!(buffer[3], 0xCB);
+        let mut wide = vec![0; 9];
+        put_bits(&mut wide, 5, 64, 0x8000_0000_0000_0001);
+        assert_eq!(wide, [0x20, 0, 0, 0, 0, 0, 0, 0, 0x10]);
+        assert_eq!(take_bits(&wide, 5, 64), 0x8000_0000_0000_0001);
     }
 }

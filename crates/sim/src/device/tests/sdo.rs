@@ -214,6 +214,14 @@ fn the_dictionary_can_be_asked_for() {
     let entry = EntryDescription::parse(&bytes).unwrap();
     assert_eq!((entry.name_text().as_ref(), entry.bits), ("Velocity", 16));
     assert_eq!(entry.access.0, 0x0047);
+    // 0x7010 has no subindex 4, but others behind it.
+    let body = |subindex| Body::EntryRequest {
+        object: ObjectAddress::new(0x7010, subindex),
+        values: ValueInfo(0),
+    };
+    let (_, bytes) = information(&mut device, body(4)).unwrap();
+    assert_eq!(EntryDescription::parse(&bytes).unwrap().bits, 0);
+    assert_eq!(information(&mut device, body(0x22)), Err(0x0609_0011));
     let body = Body::ObjectRequest { index: ObjectIndex(0x2000) };
     assert_eq!(information(&mut device, body), Err(0x0602_0000));
 }

@@ -1,0 +1,174 @@
+//! When links were lost, and when they came back: from link status and lost-link counters.
+
+use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::{End, Tree};
+
+use crate::line::{CounterTrack, Line};
+
+/// Both ends of a link tell of the same loss, but are read one after the other.
+const SAME_LOSS: Span = Span::ms(500);
+
+/// What is known of one link's losses.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Drops {
+    /// Index in [`Tree::links`].
+    pub link: usize,
+    /// Losses that link status showed, in order of time.
+    pub seen: Vec<Drop>,
+    /// How often the link was lost at least.
+    pub count: u64,
+    /// When the first loss was noticed.
+    pub first: Instant,
+    /// When the latest was.
+    pub last: Instant,
+    /// Whether it is down now, as an end that answers says.
+    pub is_down: bool,
+}
+
+/// One loss.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Drop {
+    /// The end that showed it.
+    pub end: End,
+    /// When link status showed that it is lost.
+    pub at: Instant,
+    /// The frame that showed it.
+    pub frame: Option<u64>,
+    /// When it was back; `None` while it is not.
+    pub back: Option<Instant>,
+}
+
+impl Drops {
+    /// All links of a line that were lost at least once.
+    #[must_use]
+    pub fn all(line: &Line) -> Vec<Self> {
+        let Some(tree) = line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) else {
+            return Vec::new();
+        };
+        (0..tree.links().len()).filter_map(|link| Self::of(line, tree, link)).collect()
+    }
+
+    fn of(line: &Line, tree: &Tree, link: usize) -> Option<Self> {
+        let ends = [tree.links()[link].upstream, tree.links()[link].downstream];
+        let mut seen: Vec<Drop> = Vec::new();
+        for drop in ends.into_iter().flat_map(|end| status_drops(line, end)) {
+            match seen.iter_mut().find(|known| is_same(known, &drop)) {
+                Some(known) => {
+                    // The loss lasted as long as the end says that could be read all the time.
+                    known.at = known.at.min(drop.at);
+                    known.back = known.back.min(drop.back).or(known.back).or(drop.back);
+                }
+                None => seen.push(drop),
+            }
+        }
+        seen.sort_by_key(|drop| drop.at);
+        let tracks: Vec<&CounterTrack> =
+            ends.into_iter().filter_map(|end| lost(line, end)).collect();
+        let losses = tracks.iter().map(|track| track.total.rise()).max().unwrap_or(0);
+        let rises = || tracks.iter().flat_map(|track| track.rises.iter().map(|rise| rise.at));
+        let first = seen.iter().map(|drop| drop.at).chain(rises()).min()?;
+        let last = seen.iter().map(|drop| drop.at).chain(rises()).max()?;
+        let count = losses.max(seen.len() as u64);
+        let is_down = ends.into_iter().any(|end| is_down(line, end));
+        Some(Self { link, seen, count, first, last, is_down })
+    }
+
+    /// How long the longest loss lasted, as far as is known: `None` while the link is down, zero for
+    /// losses that only a counter shows.
+    #[must_use]
+    pub fn longest(&self) -> Option<Span> {
+        if self.is_down {
+            return None;
+        }
+        let spans = self.seen.iter().filter_map(|drop| Some(drop.back?.since(drop.at)));
+        Some(spans.max().unwrap_or(Span::ZERO))
+    }
+
+    /// When the link was back for good; `None` while it is down.
+    #[must_use]
+    pub fn ended(&self) -> Option<Instant> {
+        if self.is_down {
+            return None;
+        }
+        let back = self.seen.iter().filter_map(|drop| drop.back).max();
+        Some(back.map_or(self.last, |back| back.max(self.last)))
+    }
+
+    /// Whether both were lost at the same time, at least once.
+    #[must_use]
+    pub fn falls_with(&self, other: &Self) -> bool {
+        let near = |a: Instant, b: Instant| a <= b + SAME_LOSS && b <= a + SAME_LOSS;
+        near(self.first, other.first) || near(self.last, other.last)
+    }
+}
+
+fn is_same(one: &Drop, other: &Drop) -> bool {
+    let ended = |drop: &Drop| drop.back.map_or(Instant::MAX, |back| back + SAME_LOSS);
+    one.end != other.end
+        && one.at <= ended(other).max(other.at + SAME_LOSS)
+        && other.at <= ended(one).max(one.at + SAME_LOSS)
+}
+
+/// The lost-link counter of an end.
+fn lost(line: &Line, end: End) -> Option<&CounterTrack> {
+    let End::Controller(node, port) = end else { return None };
+    line.devices[node].counters.track(ErrorCounter::LostLink(port))
+}
+
+/// Losses as the link status of an end shows them.
+fn status_drops(line: &Line, end: End) -> Vec<Drop> {
+    match end {
+        End::Controller(node, port) => port_drops(line, end, node, port),
+        End::MainDevice(path) => {
+            let card = line.host.card(path);
+            let Some(carrier) = card.carrier else { return Vec::new() };
+            // Only the latest change is kept.
+            let (at, frame) = (carrier.at, None);
+            match (carrier.value, card.carrier_changes) {
+                (false, _) => vec![Drop { end, at, frame, back: None }],
+                (true, 0) => Vec::new(),
+                (true, _) => vec![Drop { end, at, frame, back: Some(at) }],
+            }
+        }
+    }
+}
+
+fn port_drops(line: &Line, end: End, node: usize, port: Port) -> Vec<Drop> {
+    let dl = &line.devices[node].dl;
+    let Some(first) = dl.first else { return Vec::new() };
+    let mut drops: Vec<Drop> = Vec::new();
+    // A link that was planned and never was there. Without a plan the tree only has links that were.
+    if line.tree_is_planned && !first.value.port_state(port).link {
+        drops.push(Drop { end, at: first.at, frame: first.frame, back: None });
+    }
+    for change in &dl.changes {
+        let (from, to) = (change.from.port_state(port).link, change.to.port_state(port).link);
+        match (from, to) {
+            (true, false) => {
+                drops.push(Drop { end, at: change.at, frame: change.frame, back: None });
+            }
+            (false, true) => {
+                if let Some(drop) = drops.last_mut() {
+                    drop.back.get_or_insert(change.at);
+                }
+            }
+            (true, true) | (false, false) => {}
+        }
+    }
+    drops
+}
+
+/// Whether an end that can be asked has no link.
+fn is_down(line: &Line, end: End) -> bool {
+    match end {
+        End::MainDevice(path) => line.host.card(path).carrier.is_some_and(|carrier| !carrier.value),
+        End::Controller(node, port) => {
+            let device = &line.devices[node];
+            let status = device.dl.last.filter(|_| device.silent.is_none());
+            status.is_some_and(|status| !status.value.port_state(port).link)
+                && !port_drops(line, end, node, port).is_empty()
+        }
+    }
+}

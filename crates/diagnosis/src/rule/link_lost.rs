@@ -1,0 +1,207 @@
+//! # Link lost
+//!
+//! Two devices do not see each other any more, or lost each other for a while.
+//!
+//! **How it is found.** DL status (0x0110) of the nearer device shows that a port has no link where one
+//! belongs, and all behind it does not answer; or the lost-link counter of a port (0x0310 to 0x0313)
+//! rose. The nearer device closes the port, so frames turn back there and the rest of the line goes on.
+//!
+//! **What it means.**
+//!
+//! * The link is down and stays down: the cable or contact is open, or the device behind it is without
+//!   power. On a line without a ring frames cannot tell these two apart, since the device cannot be
+//!   asked; the lamps on it can. When it is back in its old state, it was the cable; when it is back in
+//!   INIT, with its address and counters cleared, it was the supply.
+//! * The link comes and goes: a contact is loose, a plug not locked, a cable broken inside.
+//!
+//! What follows (SubDevices that do not answer, working counters, watchdogs) is listed beneath.
+//!
+//! **What to do.** Look at the lamps on both sides. Seat the plug, exchange the cable; on the terminal
+//! bus press the terminals together and look at the contacts. Measure the supply of the device behind.
+
+use std::collections::BTreeSet;
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::DeviceId;
+use linesman_proto::register::{ErrorCounter, table};
+use linesman_proto::time::Span;
+use linesman_proto::topology::{End, Tree};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
+use crate::line::{Line, Seen};
+use crate::locate::{Drop, Drops};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "H101",
+    name: "link-lost",
+    severity: Severity::Error,
+    class: Class::Hardware,
+    source: include_str!("link_lost.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// A link that was back so soon was not plugged by a hand.
+const SHORT: Span = Span::s(1);
+/// So many losses are no accident.
+const AGAIN: u64 = 3;
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let Some(tree) = &view.line.tree else { return };
+    for drops in Drops::all(view.line) {
+        conditions.push(condition(view.line, tree, &drops));
+    }
+}
+
+fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
+    let link = tree.links()[drops.link];
+    let named = link.map(|node| DeviceId(node as u32));
+    let place = Place::link(line.network, named, Some(LinkDirection::Both));
+    let behind = link.downstream.node();
+    let (cause, confidence, others) = causes(line, tree, drops, behind);
+    let mut condition = Condition::new(&PAGE, place, cause, drops.first)
+        .confidence(confidence)
+        .confirmed(drops.first)
+        .about(ends(line, tree, drops.link))
+        .explaining(follows(line, tree, drops.link));
+    for (cause, at, confidence) in others {
+        condition = match at {
+            Some(node) => {
+                let device = Place::device(line.network, DeviceId(node as u32));
+                condition.or_at(cause, device, confidence)
+            }
+            None => condition.or(cause, confidence),
+        };
+    }
+    for drop in drops.seen.iter().rev().take(3) {
+        condition = condition.shown_by(status_evidence(line, drop));
+    }
+    for end in [link.upstream, link.downstream] {
+        condition.evidence.extend(counter_evidence(line, end));
+    }
+    if let Some(ended) = drops.ended() {
+        condition = condition.ended(ended);
+    }
+    let far = match link.downstream {
+        End::Controller(node, _) => format!("SubDevice {}", line.label(DeviceId(node as u32))),
+        End::MainDevice(_) => "the MainDevice's second card".to_owned(),
+    };
+    condition
+        .advise(format!("Look at {far}: if no lamp is lit, measure its supply first."))
+        .advise(format!("Seat the plugs at both ends of {place}; then exchange the cable."))
+        .advise("On the terminal bus, press the terminals together and look at the contacts.")
+}
+
+type Causes = (FaultName, f64, Vec<(FaultName, Option<usize>, f64)>);
+
+fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Causes {
+    use FaultName::{
+        BrownOut, CableDegraded, DeviceOff, LinkFlapping, LinkOpen, RingOpen, SupplyOff,
+    };
+    let is_repeated = drops.count >= AGAIN;
+    match drops.longest() {
+        None if tree.is_on_ring(drops.link) => (LinkOpen, 0.6, vec![(RingOpen, None, 0.3)]),
+        None => {
+            let off = if behind.is_some_and(|node| is_on_terminal_bus(line, node)) {
+                (0.5, 0.35, 0.05)
+            } else {
+                (0.6, 0.25, 0.1)
+            };
+            let mut others = vec![(DeviceOff, behind, off.1), (SupplyOff, behind, off.2)];
+            if is_repeated {
+                return (LinkFlapping, 0.5, vec![(LinkOpen, None, 0.3), others.remove(0)]);
+            }
+            (LinkOpen, off.0, others)
+        }
+        Some(_) if is_repeated => {
+            (LinkFlapping, 0.75, vec![(BrownOut, behind, 0.1), (CableDegraded, None, 0.05)])
+        }
+        Some(longest) if longest < SHORT => {
+            (LinkFlapping, 0.5, vec![(LinkOpen, None, 0.25), (BrownOut, behind, 0.1)])
+        }
+        Some(_) => (LinkOpen, 0.6, vec![(LinkFlapping, None, 0.15), (DeviceOff, behind, 0.15)]),
+    }
+}
+
+/// Whether a device hangs on the terminal bus, as far as its type tells: there a contact and the device
+/// behind it fail alike.
+fn is_on_terminal_bus(line: &Line, node: usize) -> bool {
+    let name = line.devices[node].type_name.as_deref().unwrap_or_default();
+    ["EL", "ES", "EJ", "EM", "KM"].iter().any(|family| name.starts_with(family))
+}
+
+/// What the loss is about: both ends, and the card's link if it is one of them.
+fn ends(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
+    let ends = [tree.links()[link].upstream, tree.links()[link].downstream];
+    let symptom = |end: End| match end {
+        End::Controller(node, port) => Some(Symptom::LinkDown(DeviceId(node as u32), port)),
+        End::MainDevice(path) => {
+            let carrier = line.host.card(path).carrier;
+            carrier.is_some_and(|carrier| !carrier.value).then_some(Symptom::NoCarrier)
+        }
+    };
+    ends.into_iter().filter_map(symptom).collect()
+}
+
+/// What can follow from the loss.
+pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
+    let mut follows: BTreeSet<Symptom> = ends(line, tree, link).into_iter().collect();
+    follows.extend([Symptom::FramesLost, Symptom::CardErrors]);
+    for end in [tree.links()[link].upstream, tree.links()[link].downstream] {
+        match end {
+            End::Controller(node, port) => {
+                follows.insert(Symptom::PortErrors(DeviceId(node as u32), port));
+            }
+            End::MainDevice(_) => {
+                follows.insert(Symptom::NoCarrier);
+            }
+        }
+    }
+    if let End::Controller(node, _) = tree.links()[link].downstream {
+        for &node in tree.subtree(node) {
+            let id = DeviceId(node as u32);
+            follows.extend([
+                Symptom::Silent(id),
+                Symptom::WorkingCounter(id),
+                Symptom::StateLost(id),
+            ]);
+        }
+    }
+    follows.into_iter().collect()
+}
+
+fn status_evidence(line: &Line, drop: &Drop) -> Evidence {
+    let seen = Seen::new((), drop.at, drop.frame);
+    match drop.end {
+        End::Controller(node, port) => {
+            let id = DeviceId(node as u32);
+            let label = line.label(id);
+            let text = match drop.back {
+                Some(back) => {
+                    format!("DL status of SubDevice {label}: port {port} had no link until {back}")
+                }
+                None => format!(
+                    "DL status of SubDevice {label}: port {port} has no link, and one belongs there"
+                ),
+            };
+            Evidence::register(id, table::DL_STATUS.address, &seen, text)
+                .port(port)
+                .values(Some(1), Some(0))
+        }
+        End::MainDevice(path) => Evidence::host(Some(drop.at), format!("card {path} has no link")),
+    }
+}
+
+fn counter_evidence(line: &Line, end: End) -> Option<Evidence> {
+    let End::Controller(node, port) = end else { return None };
+    let counter = ErrorCounter::LostLink(port);
+    let track = line.devices[node].counters.track(counter)?;
+    let rise = track.last_rise()?;
+    let id = DeviceId(node as u32);
+    let count = track.total.rise();
+    let text = format!("SubDevice {} lost the link of port {port} {count} times", line.label(id));
+    Some(Evidence::rise(id, counter.address(), Some(port), rise, text))
+}

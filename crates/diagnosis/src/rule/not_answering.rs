@@ -1,0 +1,73 @@
+//! # SubDevice does not answer
+//!
+//! A SubDevice that answered before, or that should be there, does not answer.
+//!
+//! **How it is found.** A datagram to its address came back with working counter 0 from a register that
+//! every controller has, and no later one was answered; or an online list says so.
+//!
+//! **What it means.** It is without power, cut off, or has lost its station address by starting anew.
+//! When the link to it is lost, that finding stands above this one.
+//!
+//! **What to do.** Look at the nearest SubDevice before it that answers: the trouble is between the two,
+//! or in this one.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::register::table;
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::locate::Drops;
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "H102",
+    name: "not-answering",
+    severity: Severity::Error,
+    class: Class::Hardware,
+    source: include_str!("not_answering.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    let silent = || line.devices.iter().filter(|device| device.silent.is_some());
+    if silent().next().is_none() {
+        return;
+    }
+    let down: Vec<usize> =
+        Drops::all(line).iter().filter(|drops| drops.is_down).map(|drops| drops.link).collect();
+    let is_cut_off = |node: usize| {
+        line.tree.as_ref().filter(|tree| node < tree.len()).is_some_and(|tree| {
+            let mut way = tree.path_to(node).into_iter();
+            way.any(|node| tree.link_above(node).is_some_and(|link| down.contains(&link)))
+        })
+    };
+    for device in silent() {
+        let Some(silent) = device.silent else { continue };
+        let place = Place::device(line.network, device.id);
+        let label = line.label(device.id);
+        let condition = Condition::new(&PAGE, place, FaultName::DeviceOff, silent.at);
+        let mut condition = if is_cut_off(device.id.index()) {
+            // Why is for the finding above.
+            condition.confidence(0.3).or(FaultName::LinkOpen, 0.6)
+        } else {
+            condition
+                .confidence(0.5)
+                .or(FaultName::LinkOpen, 0.25)
+                .or(FaultName::BrownOut, 0.1)
+                .advise(format!(
+                    "Look at SubDevice {label} and at the way to it: lamps, supply, plugs."
+                ))
+        };
+        let text = format!("SubDevice {label} does not answer");
+        let address = table::AL_STATUS.address;
+        condition = condition
+            .confirmed(silent.at)
+            .about([Symptom::Silent(device.id)])
+            .explaining([Symptom::WorkingCounter(device.id), Symptom::StateLost(device.id)])
+            .shown_by(Evidence::register(device.id, address, &silent, text));
+        conditions.push(condition);
+    }
+}

@@ -1,0 +1,188 @@
+//! What a MainDevice tells its user.
+
+use linesman_config::identity::Mismatch;
+use linesman_config::inventory::Inventory;
+use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::mailbox::MailboxType;
+use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
+use linesman_proto::register::{AlStatus, DlStatus, ErrorCounters};
+use linesman_proto::sii::Identity;
+use linesman_proto::state::{AlState, AlStatusCode};
+
+use crate::exchange::{ExchangeError, Reply};
+use crate::mailbox::SdoError;
+use crate::main_device::ProbeRequest;
+use crate::procedure::{Look, LookError, ScanError};
+
+/// Something that happened. Events come in the order in which it did.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// [`MainDevice::look`](crate::MainDevice::look) is done.
+    Looked(Box<Look>),
+    /// It could not be done.
+    LookFailed(LookError),
+    /// [`MainDevice::scan`](crate::MainDevice::scan) is done.
+    Scanned(Box<Inventory>),
+    /// It could not be done.
+    ScanFailed(ScanError),
+    /// A SubDevice is in another state, or shows another error, than before.
+    DeviceState {
+        /// Whose.
+        id: DeviceId,
+        /// State and error bit.
+        status: AlStatus,
+        /// Why, when it reports an error.
+        code: AlStatusCode,
+    },
+    /// A SubDevice has reached its target.
+    TargetReached {
+        /// Which.
+        id: DeviceId,
+        /// The target.
+        state: AlState,
+    },
+    /// All SubDevices of the plan have reached their targets.
+    AllReached,
+    /// A SubDevice refused a step. It will be tried again later.
+    Refused {
+        /// Which.
+        id: DeviceId,
+        /// The state it was asked to enter.
+        to: AlState,
+        /// The state it is in.
+        status: AlStatus,
+        /// Its reason.
+        code: AlStatusCode,
+    },
+    /// A SubDevice did not complete a step in time. It will be tried again later.
+    StepTimedOut {
+        /// Which.
+        id: DeviceId,
+        /// The state it was asked to enter.
+        to: AlState,
+        /// The state it is in.
+        status: AlStatus,
+    },
+    /// A SubDevice that the plan wants was not found on the line, or does not answer any more.
+    DeviceLost {
+        /// Which.
+        id: DeviceId,
+    },
+    /// It answers again.
+    DeviceBack {
+        /// Which.
+        id: DeviceId,
+        /// It had lost its station address: it was without power.
+        restarted: bool,
+    },
+    /// Where a SubDevice of the plan should be there is another.
+    WrongDevice {
+        /// Which one is planned.
+        id: DeviceId,
+        /// In what they differ.
+        mismatch: Mismatch,
+        /// Who is planned.
+        expected: Identity,
+        /// Who is there.
+        found: Identity,
+    },
+    /// How many SubDevices answer a broadcast has changed.
+    Responding {
+        /// Before.
+        before: WorkingCounter,
+        /// Now.
+        now: WorkingCounter,
+    },
+    /// A SubDevice's error counters have changed, or were read for the first time.
+    Counters {
+        /// Whose.
+        id: DeviceId,
+        /// As they stand.
+        counters: ErrorCounters,
+    },
+    /// A SubDevice's ports have changed, or were read for the first time.
+    Links {
+        /// Whose.
+        id: DeviceId,
+        /// As they stand.
+        status: DlStatus,
+    },
+    /// A cyclic datagram came back with another working counter than expected. Told when it begins
+    /// and when the number changes; [`Event::WorkingCounterGood`] ends it.
+    WorkingCounter {
+        /// Index of the task in the plan.
+        task: usize,
+        /// Index of the frame.
+        frame: usize,
+        /// Index of the datagram.
+        datagram: usize,
+        /// What it should have been.
+        expected: WorkingCounter,
+        /// What it was.
+        received: WorkingCounter,
+    },
+    /// It comes back as expected again.
+    WorkingCounterGood {
+        /// Index of the task in the plan.
+        task: usize,
+        /// Index of the frame.
+        frame: usize,
+        /// Index of the datagram.
+        datagram: usize,
+    },
+    /// Cyclic frames do not come back. Told when it begins; [`Event::CyclicFramesBack`] ends it.
+    CyclicFramesLost {
+        /// Index of the task in the plan.
+        task: usize,
+    },
+    /// They come back again.
+    CyclicFramesBack {
+        /// Index of the task in the plan.
+        task: usize,
+        /// How many were lost.
+        lost: u64,
+    },
+    /// A SubDevice reports an error on its own account.
+    Emergency {
+        /// Which.
+        id: DeviceId,
+        /// What it says.
+        emergency: Emergency,
+    },
+    /// A mailbox message that nobody had asked for.
+    Mailbox {
+        /// Whose.
+        id: DeviceId,
+        /// Its protocol.
+        kind: MailboxType,
+        /// What follows the mailbox header.
+        data: Vec<u8>,
+    },
+    /// An upload is done.
+    SdoUploaded {
+        /// From whom.
+        id: DeviceId,
+        /// What.
+        object: ObjectAddress,
+        /// The data.
+        result: Result<Vec<u8>, SdoError>,
+    },
+    /// A download is done.
+    SdoDownloaded {
+        /// To whom.
+        id: DeviceId,
+        /// What.
+        object: ObjectAddress,
+        /// Whether it was taken.
+        result: Result<(), SdoError>,
+    },
+    /// A probe is done.
+    Probed {
+        /// What was asked.
+        request: ProbeRequest,
+        /// What came back.
+        result: Result<Reply, ExchangeError>,
+    },
+    /// [`MainDevice::stop`](crate::MainDevice::stop) is done.
+    Stopped,
+}

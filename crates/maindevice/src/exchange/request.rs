@@ -1,0 +1,207 @@
+//! What a procedure asks of the line: one datagram, and what came back.
+
+use std::fmt;
+
+use linesman_proto::address::{Position, RegisterAddress, StationAddress, WorkingCounter};
+use linesman_proto::command::Command;
+use linesman_proto::frame::builder::DatagramAddress;
+use linesman_proto::time::Span;
+
+/// Whom a register access means.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Target {
+    /// The controller at a place in the order of processing. For scanning only: places move.
+    Position(Position),
+    /// The controller with this station address.
+    Station(StationAddress),
+    /// All controllers.
+    All,
+}
+
+impl Target {
+    /// The command that reads from it.
+    #[must_use]
+    pub const fn read_command(self) -> Command {
+        match self {
+            Self::Position(_) => Command::Aprd,
+            Self::Station(_) => Command::Fprd,
+            Self::All => Command::Brd,
+        }
+    }
+
+    /// The command that writes to it.
+    #[must_use]
+    pub const fn write_command(self) -> Command {
+        match self {
+            Self::Position(_) => Command::Apwr,
+            Self::Station(_) => Command::Fpwr,
+            Self::All => Command::Bwr,
+        }
+    }
+
+    /// The address of one of its registers.
+    #[must_use]
+    pub const fn register(self, address: RegisterAddress) -> DatagramAddress {
+        let adp = match self {
+            Self::Position(position) => position.auto_increment(),
+            Self::Station(station) => station.0,
+            Self::All => 0,
+        };
+        DatagramAddress::Physical(adp, address)
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Position(position) => write!(f, "position {position}"),
+            Self::Station(station) => write!(f, "station {station}"),
+            Self::All => f.write_str("all SubDevices"),
+        }
+    }
+}
+
+/// One datagram to be exchanged.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Request {
+    /// What it asks.
+    pub command: Command,
+    /// Of whom.
+    pub address: DatagramAddress,
+    /// What is sent; zeros for a read. At most
+    /// [`MAX_DATAGRAM_DATA`](linesman_proto::frame::MAX_DATAGRAM_DATA) bytes.
+    pub data: Vec<u8>,
+    /// How often it is sent again when its frame does not come back.
+    pub repeats: u8,
+}
+
+impl Request {
+    /// Reads `len` bytes from a register on.
+    #[must_use]
+    pub fn read(target: Target, address: RegisterAddress, len: u16) -> Self {
+        Self {
+            command: target.read_command(),
+            address: target.register(address),
+            data: vec![0; usize::from(len)],
+            repeats: 0,
+        }
+    }
+
+    /// Writes bytes from a register on.
+    #[must_use]
+    pub fn write(target: Target, address: RegisterAddress, data: &[u8]) -> Self {
+        Self {
+            command: target.write_command(),
+            address: target.register(address),
+            data: data.to_vec(),
+            repeats: 0,
+        }
+    }
+
+    /// The same, sent again up to `repeats` times when its frame is lost.
+    #[must_use]
+    pub fn repeated(self, repeats: u8) -> Self {
+        Self { repeats, ..self }
+    }
+
+    /// What it asks, without the data: for messages.
+    #[must_use]
+    pub fn access(&self) -> Access {
+        Access { command: self.command, address: self.address, len: self.data.len() }
+    }
+}
+
+/// A datagram without its data, as messages name it: "FPRD 0x1001:0x0130, 2 bytes".
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Access {
+    /// What was asked.
+    pub command: Command,
+    /// Of whom.
+    pub address: DatagramAddress,
+    /// Bytes of data.
+    pub len: usize,
+}
+
+impl fmt::Display for Access {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { command, address, len } = self;
+        match (address, command.increments_position()) {
+            (DatagramAddress::Physical(_, ado), _) if matches!(command.name(), "BRD" | "BWR") => {
+                write!(f, "{command} {ado}, {len} bytes")
+            }
+            (DatagramAddress::Physical(adp, ado), true) => {
+                let position = Position::from_auto_increment(*adp);
+                write!(f, "{command} position {position}:{ado}, {len} bytes")
+            }
+            (DatagramAddress::Physical(adp, ado), false) => {
+                write!(f, "{command} {}:{ado}, {len} bytes", StationAddress(*adp))
+            }
+            (DatagramAddress::Logical(logical), _) => {
+                write!(f, "{command} {logical}, {len} bytes")
+            }
+        }
+    }
+}
+
+/// What came back.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Reply {
+    /// How many accesses succeeded.
+    pub wkc: WorkingCounter,
+    /// The data as they came back.
+    pub data: Vec<u8>,
+}
+
+impl Reply {
+    /// Whether at least one controller answered.
+    #[must_use]
+    pub const fn answered(&self) -> bool {
+        self.wkc.0 > 0
+    }
+
+    /// `N` bytes of the data from `at` on; zeros where there are none.
+    #[must_use]
+    pub fn bytes<const N: usize>(&self, at: usize) -> [u8; N] {
+        let slice = self.data.get(at..).and_then(|rest| rest.first_chunk());
+        slice.copied().unwrap_or([0; N])
+    }
+
+    /// A word of the data; 0 where there is none.
+    #[must_use]
+    pub fn word(&self, at: usize) -> u16 {
+        u16::from_le_bytes(self.bytes(at))
+    }
+}
+
+/// A datagram that was not delivered.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum ExchangeError {
+    /// No frame with it came back.
+    #[error(
+        "{access}: sent {frames} times, no frame came back within {patience}; check carrier, cable \
+         and supply between the network card and the first SubDevice"
+    )]
+    NoReply {
+        /// What was asked.
+        access: Access,
+        /// How many frames were sent.
+        frames: u32,
+        /// How long each was waited for.
+        patience: Span,
+    },
+    /// It came back, but was not executed by as many controllers as expected.
+    #[error(
+        "{access}: working counter {received}, expected {expected}, sent {frames} times; the \
+         SubDevice is not there, has lost its address, or denies the access"
+    )]
+    WorkingCounter {
+        /// What was asked.
+        access: Access,
+        /// What the working counter should have been.
+        expected: WorkingCounter,
+        /// What it was.
+        received: WorkingCounter,
+        /// How many frames were sent.
+        frames: u32,
+    },
+}

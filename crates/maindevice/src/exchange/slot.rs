@@ -1,0 +1,129 @@
+//! A slot: one frame on its way, with up to two copies.
+
+use linesman_proto::address::Path;
+use linesman_proto::command::{Addressing, Command};
+use linesman_proto::frame::{DATAGRAM_HEADER_LEN, FrameView, WKC_LEN};
+use linesman_proto::time::Instant;
+
+use super::queue::Queued;
+
+/// Whose frame it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Purpose {
+    /// Datagrams of procedures, listed in the slot.
+    Acyclic,
+    /// A frame of the plan.
+    Cyclic {
+        /// Index of the task.
+        task: usize,
+        /// Index of the frame within the task.
+        frame: usize,
+    },
+}
+
+/// What has become of a frame.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) enum SlotState {
+    /// Never used.
+    #[default]
+    Free,
+    /// Out on the line.
+    Waiting,
+    /// All copies came back.
+    Answered,
+    /// Given up.
+    GivenUp,
+}
+
+/// One frame on its way.
+#[derive(Debug)]
+pub(crate) struct Slot {
+    pub(crate) state: SlotState,
+    pub(crate) purpose: Purpose,
+    /// The frame as card A sends it.
+    pub(crate) sent: Vec<u8>,
+    /// What came back: the first copy, later with the second merged in.
+    pub(crate) reply: Vec<u8>,
+    pub(crate) sent_at: Instant,
+    pub(crate) deadline: Instant,
+    /// Copies by the card that sent them: on their way, or come back.
+    pub(crate) outstanding: [bool; 2],
+    pub(crate) arrived: [bool; 2],
+    /// The datagrams in it, in order; empty for cyclic frames.
+    pub(crate) requests: Vec<Queued>,
+}
+
+impl Default for Slot {
+    fn default() -> Self {
+        Self {
+            state: SlotState::Free,
+            purpose: Purpose::Acyclic,
+            sent: Vec::new(),
+            reply: Vec::new(),
+            sent_at: Instant::ZERO,
+            deadline: Instant::MAX,
+            outstanding: [false; 2],
+            arrived: [false; 2],
+            requests: Vec::new(),
+        }
+    }
+}
+
+impl Slot {
+    /// Whether `reply` is a copy of this frame that card `sender` sent, come back from the line:
+    /// the same datagrams with the same marks.
+    pub(crate) fn matches(&self, reply: &[u8], sender: Path) -> bool {
+        let (Ok(sent), Ok(came)) = (FrameView::parse(&self.sent), FrameView::parse(reply)) else {
+            return false;
+        };
+        let mut came = came.datagrams();
+        for sent in sent.datagrams() {
+            let (Ok(sent), Some(Ok(came))) = (sent, came.next()) else { return false };
+            let Some(command) = sent.command() else { return false };
+            let same = came.code() == as_sent_by(command, sender).code()
+                && came.index() == sent.index()
+                && came.offset() == sent.offset()
+                && came.data_len() == sent.data_len()
+                && came.more_follow() == sent.more_follow()
+                && came.ado() == sent.ado()
+                && (command.increments_position() || came.adp() == sent.adp());
+            if !same {
+                return false;
+            }
+        }
+        came.next().is_none()
+    }
+
+    /// Whether all copies that were sent have come back.
+    pub(crate) fn is_complete(&self) -> bool {
+        !self.outstanding.into_iter().zip(self.arrived).any(|(out, back)| out && !back)
+    }
+}
+
+/// Positions are counted from the other end by card B: there it would mean another controller.
+pub(crate) fn as_sent_by(command: Command, sender: Path) -> Command {
+    match (sender, command.addressing()) {
+        (Path::B, Addressing::Position) => Command::Nop,
+        (Path::A, Addressing::Position)
+        | (
+            Path::A | Path::B,
+            Addressing::None | Addressing::Station | Addressing::Broadcast | Addressing::Logical,
+        ) => command,
+    }
+}
+
+/// Turns a frame of card A into the copy that card B sends.
+pub(crate) fn mask_positions(frame: &mut [u8]) {
+    let mut at = linesman_proto::ethernet::HEADER_LEN + linesman_proto::frame::ETHERCAT_HEADER_LEN;
+    // The frame is our own: its lengths are right, and it ends where the last datagram ends.
+    while let Some(header) = frame.get_mut(at..at + DATAGRAM_HEADER_LEN) {
+        if let Some(command) = Command::from_code(header[0]) {
+            header[0] = as_sent_by(command, Path::B).code();
+        }
+        let len = u16::from_le_bytes([header[6], header[7]]);
+        if len & 0x8000 == 0 {
+            return;
+        }
+        at += DATAGRAM_HEADER_LEN + usize::from(len & 0x07FF) + WKC_LEN;
+    }
+}

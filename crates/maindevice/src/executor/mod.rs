@@ -1,0 +1,198 @@
+//! Procedures as `async fn`s, on a poller of our own: no runtime, no clock, no chance.
+//!
+//! A procedure awaits the answer to a datagram or a point in time through its [`Wire`]. Tasks are
+//! polled in the order in which they were woken, and they are woken in the order in which answers
+//! came, so that the same frames at the same times always do the same.
+
+mod task;
+pub mod wire;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Wake, Waker};
+
+use linesman_proto::time::Instant;
+
+use crate::event::Event;
+use crate::exchange::{ExchangeError, Reply, Request, Ticket};
+use task::Spawned;
+
+pub use task::Handle;
+pub use wire::Wire;
+
+/// Tasks that end together.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) struct Group(pub(crate) u32);
+
+/// Locks what tasks share. A task that panicked does not make it unusable.
+pub(crate) fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The answer to a request, or who waits for it.
+#[derive(Default)]
+pub(crate) struct Answer {
+    pub(crate) result: Option<Result<Reply, ExchangeError>>,
+    pub(crate) waker: Option<Waker>,
+}
+
+/// What tasks and the engine share.
+pub(crate) struct Shared {
+    pub(crate) now: Instant,
+    pub(crate) next_ticket: u64,
+    pub(crate) submitted: VecDeque<(Ticket, Request)>,
+    pub(crate) cancelled: Vec<Ticket>,
+    pub(crate) answers: BTreeMap<Ticket, Answer>,
+    pub(crate) next_timer: u64,
+    pub(crate) timers: BTreeMap<(Instant, u64), Waker>,
+    pub(crate) spawned: VecDeque<Spawned>,
+    pub(crate) events: VecDeque<Event>,
+}
+
+type Ready = Arc<Mutex<VecDeque<u64>>>;
+
+/// Wakes one task by putting it into the queue of those that are ready.
+struct TaskWaker {
+    id: u64,
+    ready: Ready,
+}
+
+impl Wake for TaskWaker {
+    fn wake(self: Arc<Self>) {
+        self.wake_by_ref();
+    }
+
+    fn wake_by_ref(self: &Arc<Self>) {
+        let mut ready = lock(&self.ready);
+        if !ready.contains(&self.id) {
+            ready.push_back(self.id);
+        }
+    }
+}
+
+struct Task {
+    group: Group,
+    future: task::BoxFuture,
+    waker: Waker,
+}
+
+/// The poller.
+pub(crate) struct Executor {
+    shared: Arc<Mutex<Shared>>,
+    ready: Ready,
+    tasks: BTreeMap<u64, Task>,
+    next_task: u64,
+    next_group: u32,
+}
+
+impl Executor {
+    pub(crate) fn new() -> Self {
+        let shared = Shared {
+            now: Instant::ZERO,
+            next_ticket: 0,
+            submitted: VecDeque::new(),
+            cancelled: Vec::new(),
+            answers: BTreeMap::new(),
+            next_timer: 0,
+            timers: BTreeMap::new(),
+            spawned: VecDeque::new(),
+            events: VecDeque::new(),
+        };
+        Self {
+            shared: Arc::new(Mutex::new(shared)),
+            ready: Ready::default(),
+            tasks: BTreeMap::new(),
+            next_task: 0,
+            next_group: 0,
+        }
+    }
+
+    pub(crate) fn shared(&self) -> MutexGuard<'_, Shared> {
+        lock(&self.shared)
+    }
+
+    /// A wire for a new group of tasks.
+    pub(crate) fn group(&mut self, repeats: u8) -> Wire {
+        self.next_group += 1;
+        Wire::new(Arc::clone(&self.shared), Group(self.next_group), repeats)
+    }
+
+    /// Drops all tasks of a group; their requests are forgotten.
+    pub(crate) fn cancel(&mut self, group: Group) {
+        let spawned: Vec<Spawned> = {
+            let mut shared = self.shared();
+            let all = std::mem::take(&mut shared.spawned);
+            let (drop, keep) = all.into_iter().partition::<Vec<_>, _>(|task| task.group == group);
+            shared.spawned = keep.into();
+            drop
+        };
+        drop(spawned);
+        // Dropping a task locks what is shared: not while it is held here.
+        self.tasks.retain(|_, task| task.group != group);
+    }
+
+    /// Time has come to `now`: wakes whoever slept until then.
+    pub(crate) fn advance(&mut self, now: Instant) {
+        let mut shared = lock(&self.shared);
+        shared.now = shared.now.max(now);
+        let later = shared.timers.split_off(&(now + linesman_proto::time::Span::ns(1), 0));
+        let due = std::mem::replace(&mut shared.timers, later);
+        drop(shared);
+        for waker in due.into_values() {
+            waker.wake();
+        }
+    }
+
+    /// The answer to a request.
+    pub(crate) fn answer(&mut self, ticket: Ticket, result: Result<Reply, ExchangeError>) {
+        let mut shared = lock(&self.shared);
+        let Some(answer) = shared.answers.get_mut(&ticket) else { return };
+        answer.result = Some(result);
+        let waker = answer.waker.take();
+        drop(shared);
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+    }
+
+    /// Polls whoever is ready until nobody is.
+    pub(crate) fn run(&mut self) {
+        loop {
+            self.adopt();
+            let Some(id) = lock(&self.ready).pop_front() else { break };
+            let Some(task) = self.tasks.get_mut(&id) else { continue };
+            let waker = task.waker.clone();
+            match task.future.as_mut().poll(&mut Context::from_waker(&waker)) {
+                Poll::Pending => {}
+                Poll::Ready(()) => {
+                    self.tasks.remove(&id);
+                }
+            }
+        }
+    }
+
+    fn adopt(&mut self) {
+        loop {
+            let Some(Spawned { group, future }) = self.shared().spawned.pop_front() else { return };
+            let id = self.next_task;
+            self.next_task += 1;
+            let waker = Waker::from(Arc::new(TaskWaker { id, ready: Arc::clone(&self.ready) }));
+            self.tasks.insert(id, Task { group, future, waker });
+            lock(&self.ready).push_back(id);
+        }
+    }
+
+    /// When the first sleeper wants to be woken.
+    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+        self.shared().timers.first_key_value().map(|((at, _), _)| *at)
+    }
+}
+
+impl std::fmt::Debug for Executor {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Executor").field("tasks", &self.tasks.len()).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,206 @@
+//! What a procedure holds in its hand: the line and the clock.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll};
+
+use linesman_proto::address::{RegisterAddress, WorkingCounter};
+use linesman_proto::time::{Instant, Span};
+
+use super::task::{Handle, Spawned, with_handle};
+use super::{Answer, Group, Shared, lock};
+use crate::event::Event;
+use crate::exchange::{ExchangeError, Reply, Request, Target, Ticket};
+
+/// The line as procedures see it. Clones mean the same line.
+#[derive(Clone)]
+pub struct Wire {
+    shared: Arc<Mutex<Shared>>,
+    group: Group,
+    repeats: u8,
+}
+
+impl Wire {
+    pub(crate) fn new(shared: Arc<Mutex<Shared>>, group: Group, repeats: u8) -> Self {
+        Self { shared, group, repeats }
+    }
+
+    pub(crate) fn group(&self) -> Group {
+        self.group
+    }
+
+    /// The present time.
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        lock(&self.shared).now
+    }
+
+    /// Queues a datagram at once; await the result for its answer. Dropping it gives the answer up.
+    pub fn submit(&self, request: Request) -> Exchanging {
+        let mut shared = lock(&self.shared);
+        let ticket = Ticket(shared.next_ticket);
+        shared.next_ticket += 1;
+        shared.submitted.push_back((ticket, request));
+        shared.answers.insert(ticket, Answer::default());
+        Exchanging { shared: Arc::clone(&self.shared), ticket }
+    }
+
+    /// Reads registers; lost frames are repeated. The working counter is the caller's to judge.
+    pub fn read(&self, target: Target, address: RegisterAddress, len: u16) -> Exchanging {
+        self.submit(Request::read(target, address, len).repeated(self.repeats))
+    }
+
+    /// Writes registers; lost frames are repeated. The working counter is the caller's to judge.
+    pub fn write(&self, target: Target, address: RegisterAddress, data: &[u8]) -> Exchanging {
+        self.submit(Request::write(target, address, data).repeated(self.repeats))
+    }
+
+    /// Reads registers of one SubDevice; asks again when it did not answer.
+    ///
+    /// # Errors
+    /// [`ExchangeError`] when no frame came back, or never with working counter 1.
+    pub async fn read_one(
+        &self,
+        target: Target,
+        address: RegisterAddress,
+        len: u16,
+    ) -> Result<Reply, ExchangeError> {
+        self.delivered(Request::read(target, address, len)).await
+    }
+
+    /// Writes registers of one SubDevice; writes again when it did not take them.
+    ///
+    /// # Errors
+    /// [`ExchangeError`] when no frame came back, or never with working counter 1.
+    pub async fn write_one(
+        &self,
+        target: Target,
+        address: RegisterAddress,
+        data: &[u8],
+    ) -> Result<Reply, ExchangeError> {
+        self.delivered(Request::write(target, address, data)).await
+    }
+
+    /// Sends a datagram to one SubDevice until it is executed, or often enough.
+    async fn delivered(&self, request: Request) -> Result<Reply, ExchangeError> {
+        let request = request.repeated(self.repeats);
+        let mut received = WorkingCounter(0);
+        let attempts = u32::from(self.repeats) + 1;
+        for _ in 0..attempts {
+            let reply = self.submit(request.clone()).await?;
+            if reply.wkc == WorkingCounter(1) {
+                return Ok(reply);
+            }
+            received = reply.wkc;
+        }
+        Err(ExchangeError::WorkingCounter {
+            access: request.access(),
+            expected: WorkingCounter(1),
+            received,
+            frames: attempts,
+        })
+    }
+
+    /// Sleeps.
+    pub fn sleep(&self, span: Span) -> Sleep {
+        self.sleep_until(self.now() + span)
+    }
+
+    /// Sleeps until then.
+    pub fn sleep_until(&self, until: Instant) -> Sleep {
+        Sleep { shared: Arc::clone(&self.shared), until, timer: None }
+    }
+
+    /// Starts another procedure beside this one; it ends with the same group.
+    pub fn spawn<T: Send + 'static>(
+        &self,
+        future: impl Future<Output = T> + Send + 'static,
+    ) -> Handle<T> {
+        let (future, handle) = with_handle(future);
+        lock(&self.shared).spawned.push_back(Spawned { group: self.group, future });
+        handle
+    }
+
+    /// Tells the user of the MainDevice.
+    pub fn emit(&self, event: Event) {
+        lock(&self.shared).events.push_back(event);
+    }
+}
+
+impl std::fmt::Debug for Wire {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Wire").field("group", &self.group).finish_non_exhaustive()
+    }
+}
+
+/// The answer to a datagram, to be awaited.
+pub struct Exchanging {
+    shared: Arc<Mutex<Shared>>,
+    ticket: Ticket,
+}
+
+impl Future for Exchanging {
+    type Output = Result<Reply, ExchangeError>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let mut shared = lock(&self.shared);
+        let Some(answer) = shared.answers.get_mut(&self.ticket) else { return Poll::Pending };
+        match answer.result.take() {
+            Some(result) => {
+                shared.answers.remove(&self.ticket);
+                Poll::Ready(result)
+            }
+            None => {
+                answer.waker = Some(context.waker().clone());
+                Poll::Pending
+            }
+        }
+    }
+}
+
+impl Drop for Exchanging {
+    fn drop(&mut self) {
+        let mut shared = lock(&self.shared);
+        if shared.answers.remove(&self.ticket).is_some() {
+            shared.cancelled.push(self.ticket);
+        }
+    }
+}
+
+/// A point in time, to be awaited.
+pub struct Sleep {
+    shared: Arc<Mutex<Shared>>,
+    until: Instant,
+    timer: Option<u64>,
+}
+
+impl Future for Sleep {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        let until = self.until;
+        let shared = Arc::clone(&self.shared);
+        let mut shared = lock(&shared);
+        let timer = match self.timer {
+            _ if shared.now >= until => return Poll::Ready(()),
+            Some(timer) => timer,
+            None => {
+                let timer = shared.next_timer;
+                shared.next_timer += 1;
+                self.timer = Some(timer);
+                timer
+            }
+        };
+        shared.timers.insert((until, timer), context.waker().clone());
+        Poll::Pending
+    }
+}
+
+impl Drop for Sleep {
+    fn drop(&mut self) {
+        if let Some(timer) = self.timer {
+            lock(&self.shared).timers.remove(&(self.until, timer));
+        }
+    }
+}

@@ -1,0 +1,427 @@
+//! The engine: what comes in, what goes out, and the commands of its user.
+
+use std::sync::{Arc, Mutex};
+
+use linesman_config::plan::Plan;
+use linesman_proto::address::{DeviceId, Network, Path, RegisterAddress};
+use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::state::AlState;
+use linesman_proto::time::Instant;
+
+use crate::cyclic::Cyclic;
+use crate::event::Event;
+use crate::exchange::{
+    Exchange, ExchangeError, Purpose, Queued, Received, Reply, SlotState, Target, Ticket, Transmit,
+};
+use crate::executor::{Executor, Wire, lock};
+use crate::mailbox::{Job, Queues, SdoError};
+use crate::options::Options;
+use crate::procedure::{look, scan, state};
+use crate::statistics::Statistics;
+use crate::supervisor::{self, Context, Line};
+
+/// One register access beside the cycle, for those who want to know more.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ProbeRequest {
+    /// Whom.
+    pub target: Target,
+    /// From where.
+    pub register: RegisterAddress,
+    /// Bytes to be read; with `write`, its length counts.
+    pub len: u16,
+    /// What is written, if it is a write. Whoever asks for it answers for what it does.
+    pub write: Option<Vec<u8>>,
+}
+
+/// The MainDevice of one network.
+///
+/// After each `handle_*` and each command, fetch frames until [`MainDevice::poll_transmit`] gives
+/// none and events until [`MainDevice::poll_event`] gives none; call
+/// [`MainDevice::handle_timeout`] when [`MainDevice::poll_timeout`] has come.
+#[derive(Debug)]
+pub struct MainDevice {
+    network: Network,
+    options: Arc<Options>,
+    exchange: Exchange,
+    executor: Executor,
+    statistics: Statistics,
+    /// What is being done: one command at a time.
+    control: Option<Wire>,
+    /// Probes, which outlive commands.
+    aside: Wire,
+    running: Option<Running>,
+    /// How many frames of procedures may still go out in this cycle.
+    acyclic_left: usize,
+}
+
+#[derive(Debug)]
+struct Running {
+    cyclic: Cyclic,
+    plan: Arc<Plan>,
+    line: Arc<Mutex<Line>>,
+    mailboxes: Queues,
+}
+
+impl MainDevice {
+    /// A MainDevice that does nothing yet.
+    #[must_use]
+    pub fn new(network: Network, options: Options) -> Self {
+        let mut executor = Executor::new();
+        let aside = executor.group(options.repeats);
+        Self {
+            network,
+            exchange: Exchange::new(options.sources, options.ring, options.patience),
+            options: Arc::new(options),
+            executor,
+            statistics: Statistics::default(),
+            control: None,
+            aside,
+            running: None,
+            acyclic_left: 0,
+        }
+    }
+
+    /// Which network it drives.
+    #[must_use]
+    pub fn network(&self) -> Network {
+        self.network
+    }
+
+    // ---- frames and time ----
+
+    /// The next frame to be sent, written into `buffer`, which must hold 1514 bytes.
+    pub fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
+        self.executor.advance(now);
+        if let Some(running) = &mut self.running
+            && running.cyclic.send_due(now, &mut self.exchange, &mut self.statistics)
+        {
+            self.acyclic_left = self.options.frames_at_once;
+        }
+        self.submit();
+        if !self.exchange.has_outgoing() {
+            self.send_acyclic(now);
+        }
+        let transmit = self.exchange.poll_transmit(now, buffer)?;
+        self.statistics.frames_sent += 1;
+        Some(transmit)
+    }
+
+    /// Packs requests of procedures: beside a cycle so many frames each cycle.
+    fn send_acyclic(&mut self, now: Instant) {
+        if !self.exchange.has_queued() || self.exchange.acyclic_out() >= self.options.frames_at_once
+        {
+            return;
+        }
+        if self.running.is_some() {
+            let Some(left) = self.acyclic_left.checked_sub(1) else { return };
+            self.acyclic_left = left;
+        }
+        self.exchange.send_acyclic(now);
+    }
+
+    fn submit(&mut self) {
+        let mut shared = self.executor.shared();
+        let submitted = std::mem::take(&mut shared.submitted);
+        let cancelled = std::mem::take(&mut shared.cancelled);
+        drop(shared);
+        for (ticket, request) in submitted {
+            if let Err(queued) = self.exchange.submit(Queued { ticket, request, frames: 0 }) {
+                self.fail(queued);
+            }
+        }
+        if !cancelled.is_empty() {
+            self.exchange.forget(|ticket| cancelled.contains(&ticket));
+        }
+    }
+
+    /// A frame has arrived at a card, with a good check sequence.
+    pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
+        self.executor.advance(now);
+        match self.exchange.receive(path, frame) {
+            Received::Complete(slot) => {
+                self.statistics.frames_received += 1;
+                self.complete(slot);
+            }
+            Received::FirstCopy => self.statistics.frames_received += 1,
+            Received::Late => self.statistics.frames_late += 1,
+            Received::Duplicate => self.statistics.frames_duplicate += 1,
+            Received::Foreign => self.statistics.frames_foreign += 1,
+            Received::Echo => {}
+        }
+        self.work(now);
+    }
+
+    /// Time has come to `now`.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.executor.advance(now);
+        self.work(now);
+    }
+
+    /// Gives up what is overdue, then runs whoever is ready.
+    fn work(&mut self, now: Instant) {
+        while let Some(slot) = self.exchange.expire(now) {
+            if self.exchange.slot(slot).state == SlotState::Answered {
+                self.complete(slot);
+            } else {
+                self.give_up(slot);
+            }
+        }
+        self.executor.run();
+        self.submit();
+        if let Some(running) = &mut self.running {
+            running.cyclic.refresh();
+        }
+    }
+
+    /// All that comes back of a frame is back.
+    fn complete(&mut self, slot: usize) {
+        match self.exchange.slot(slot).purpose {
+            Purpose::Cyclic { task, frame } => {
+                let Some(running) = &mut self.running else { return };
+                let reply = &self.exchange.slot(slot).reply;
+                let shared = &self.executor;
+                running.cyclic.received(task, frame, reply, &mut self.statistics, &mut |event| {
+                    shared.shared().events.push_back(event);
+                });
+            }
+            Purpose::Acyclic => {
+                let requests = self.exchange.take_requests(slot);
+                let replies = replies(&self.exchange.slot(slot).reply);
+                for (queued, reply) in requests.into_iter().zip(replies) {
+                    self.executor.answer(queued.ticket, Ok(reply));
+                }
+            }
+        }
+    }
+
+    fn give_up(&mut self, slot: usize) {
+        self.statistics.frames_lost += 1;
+        match self.exchange.slot(slot).purpose {
+            Purpose::Cyclic { task, .. } => {
+                self.statistics.cyclic_lost += 1;
+                let Some(running) = &mut self.running else { return };
+                let shared = &self.executor;
+                running.cyclic.lost(task, &mut |event| shared.shared().events.push_back(event));
+            }
+            Purpose::Acyclic => {
+                for queued in self.exchange.take_requests(slot) {
+                    match self.exchange.again(queued) {
+                        None => self.statistics.repeats += 1,
+                        Some(queued) => self.fail(queued),
+                    }
+                }
+            }
+        }
+    }
+
+    fn fail(&mut self, queued: Queued) {
+        let access = queued.request.access();
+        let (frames, patience) = (queued.frames, self.exchange.patience());
+        let error = ExchangeError::NoReply { access, frames, patience };
+        let ticket: Ticket = queued.ticket;
+        self.executor.answer(ticket, Err(error));
+    }
+
+    /// When [`MainDevice::handle_timeout`] is to be called, if nothing comes before.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        let cycle = self.running.as_ref().and_then(|running| running.cyclic.poll_timeout());
+        [cycle, self.exchange.poll_timeout(), self.executor.poll_timeout()]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// What has happened, oldest first.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.executor.shared().events.pop_front()
+    }
+
+    // ---- commands ----
+
+    /// Looks at the line: nothing but reads. Ends in [`Event::Looked`] or [`Event::LookFailed`]. Runs
+    /// beside whatever else is going on.
+    pub fn look(&mut self, now: Instant) {
+        let (wire, network) = (self.aside.clone(), self.network);
+        let _ = self.aside.spawn(async move {
+            wire.emit(match look::look(wire.clone(), network).await {
+                Ok(look) => Event::Looked(Box::new(look)),
+                Err(error) => Event::LookFailed(error),
+            });
+        });
+        self.handle_timeout(now);
+    }
+
+    /// Finds out what is there; see [`scan`](crate::procedure::scan) for what that writes. Ends in
+    /// [`Event::Scanned`] or [`Event::ScanFailed`]. Another command that is going on is ended.
+    pub fn scan(&mut self, now: Instant) {
+        let (wire, network) = (self.command(), self.network);
+        let _ = wire.clone().spawn(async move {
+            wire.emit(match scan::scan(wire.clone(), network).await {
+                Ok(inventory) => Event::Scanned(Box::new(inventory)),
+                Err(error) => Event::ScanFailed(error),
+            });
+        });
+        self.handle_timeout(now);
+    }
+
+    /// Drives every SubDevice of the plan to its target and keeps it there, and exchanges process
+    /// data. Another command that is going on is ended.
+    pub fn start(&mut self, now: Instant, plan: Plan) {
+        let wire = self.command();
+        let plan = Arc::new(plan);
+        let line = Arc::new(Mutex::new(Line::new(&plan)));
+        let with_mailbox = plan.devices.iter().filter(|device| device.mailbox.is_some());
+        let mailboxes = Queues::of(with_mailbox.map(|device| device.id));
+        let context = Context {
+            wire: wire.clone(),
+            network: self.network,
+            plan: Arc::clone(&plan),
+            line: Arc::clone(&line),
+            options: Arc::clone(&self.options),
+            mailboxes: mailboxes.clone(),
+        };
+        let _ = wire.spawn(supervisor::supervise(context));
+        let cyclic = Cyclic::new(Arc::clone(&plan), Arc::clone(&line), now);
+        self.running = Some(Running { cyclic, plan, line, mailboxes });
+        self.acyclic_left = self.options.frames_at_once;
+        self.handle_timeout(now);
+    }
+
+    /// Ends the exchange of process data and drives every SubDevice that is there down to `to`. Ends
+    /// in [`Event::Stopped`].
+    pub fn stop(&mut self, now: Instant, to: AlState) {
+        let plan = self.running.as_ref().map(|running| Arc::clone(&running.plan));
+        let wire = self.command();
+        let options = Arc::clone(&self.options);
+        let _ = wire.clone().spawn(async move {
+            let devices = plan.iter().flat_map(|plan| &plan.devices);
+            let steps: Vec<_> = devices
+                .map(|device| {
+                    let wire = wire.clone();
+                    let step = state::Step {
+                        to,
+                        limit: options.state_timeouts.of(AlState::Op, to),
+                        emulated: device.device_emulation,
+                    };
+                    let target = Target::Station(device.station);
+                    // Who does not follow was lost or refuses; the line is left all the same.
+                    wire.clone().spawn(async move { state::request(&wire, target, step).await })
+                })
+                .collect();
+            for step in steps {
+                let _ = step.await;
+            }
+            wire.emit(Event::Stopped);
+        });
+        self.handle_timeout(now);
+    }
+
+    /// Ends what is going on and gives a wire for the next command.
+    fn command(&mut self) -> Wire {
+        if let Some(control) = self.control.take() {
+            self.executor.cancel(control.group());
+        }
+        self.running = None;
+        let wire = self.executor.group(self.options.repeats);
+        self.control = Some(wire.clone());
+        wire
+    }
+
+    /// One register access beside all else. Ends in [`Event::Probed`]; whoever sees the frames sees
+    /// the answer there, too.
+    pub fn probe(&mut self, now: Instant, request: ProbeRequest) {
+        let wire = self.aside.clone();
+        let _ = self.aside.spawn(async move {
+            let ProbeRequest { target, register, len, .. } = request;
+            let result = match &request.write {
+                Some(data) => wire.write(target, register, data).await,
+                None => wire.read(target, register, len).await,
+            };
+            wire.emit(Event::Probed { request, result });
+        });
+        self.handle_timeout(now);
+    }
+
+    /// Fetches an object of a running SubDevice. Ends in [`Event::SdoUploaded`].
+    pub fn sdo_upload(
+        &mut self,
+        now: Instant,
+        id: DeviceId,
+        object: ObjectAddress,
+        complete: bool,
+    ) {
+        if !self.queue_job(id, Job::Upload { object, complete }) {
+            let result = Err(SdoError::NotOpen { id });
+            self.aside.emit(Event::SdoUploaded { id, object, result });
+        }
+        self.handle_timeout(now);
+    }
+
+    /// Brings an object to a running SubDevice. Ends in [`Event::SdoDownloaded`].
+    pub fn sdo_download(
+        &mut self,
+        now: Instant,
+        id: DeviceId,
+        object: ObjectAddress,
+        complete: bool,
+        data: &[u8],
+    ) {
+        if !self.queue_job(id, Job::Download { object, complete, data: data.to_vec() }) {
+            let result = Err(SdoError::NotOpen { id });
+            self.aside.emit(Event::SdoDownloaded { id, object, result });
+        }
+        self.handle_timeout(now);
+    }
+
+    fn queue_job(&mut self, id: DeviceId, job: Job) -> bool {
+        match &self.running {
+            Some(running) => running.mailboxes.push(id, job).is_ok(),
+            None => false,
+        }
+    }
+
+    // ---- what is there ----
+
+    /// Whether a plan is running.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        self.running.is_some()
+    }
+
+    /// Whether all SubDevices of the running plan are where they shall be.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| {
+            let line = lock(&running.line);
+            running.plan.devices.iter().all(|device| line.is_settled(device.id))
+        })
+    }
+
+    /// The outputs of the process image; empty unless a plan is running.
+    pub fn outputs_mut(&mut self) -> &mut [u8] {
+        self.running.as_mut().map_or(&mut [], |running| &mut running.cyclic.outputs)
+    }
+
+    /// The inputs of the process image as they last came back whole; empty unless a plan is running.
+    #[must_use]
+    pub fn inputs(&self) -> &[u8] {
+        self.running.as_ref().map_or(&[], |running| &running.cyclic.inputs)
+    }
+
+    /// What has been sent and received.
+    #[must_use]
+    pub fn statistics(&self) -> Statistics {
+        self.statistics
+    }
+}
+
+/// The answers in a frame that came back, in order.
+fn replies(frame: &[u8]) -> Vec<Reply> {
+    let Ok(view) = linesman_proto::frame::FrameView::parse(frame) else { return Vec::new() };
+    let reply = |datagram: linesman_proto::frame::Datagram<'_>| Reply {
+        wkc: datagram.wkc(),
+        data: datagram.data().to_vec(),
+    };
+    view.datagrams().map_while(Result::ok).map(reply).collect()
+}

@@ -1,0 +1,51 @@
+//! What the user of a MainDevice chooses.
+
+use linesman_proto::ethernet::MacAddress;
+use linesman_proto::state::StateTimeouts;
+use linesman_proto::time::Span;
+
+/// Choices for one network.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Source addresses of the frames of card A and card B; they must differ, and bit 0x02 of the
+    /// first byte must be clear, since controllers set it.
+    pub sources: [MacAddress; 2],
+    /// Whether a second card closes a ring: every frame is sent by both.
+    pub ring: bool,
+    /// How long a frame of procedures is waited for. Cyclic frames are waited for one cycle.
+    pub patience: Span,
+    /// How often a datagram is sent again after its frame was lost, or it was not executed.
+    pub repeats: u8,
+    /// Most frames of procedures that are out at once, without and beside a cycle.
+    pub frames_at_once: usize,
+    /// How often each SubDevice's error counters, DL status and AL status are read while running.
+    pub watch_interval: Span,
+    /// How often mailboxes are looked into, when nothing is expected.
+    pub mailbox_interval: Span,
+    /// How long a SubDevice may take to answer a mailbox request.
+    pub mailbox_patience: Span,
+    /// How long a SubDevice may take for a step between states.
+    pub state_timeouts: StateTimeouts,
+    /// After a refused step: when it is tried again; the wait doubles up to the second value.
+    pub retry_after: [Span; 2],
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            sources: [
+                MacAddress([0x00, 0x01, 0x05, 0, 0, 0xA0]),
+                MacAddress([0x00, 0x01, 0x05, 0, 0, 0xB0]),
+            ],
+            ring: false,
+            patience: Span::ms(10),
+            repeats: 3,
+            frames_at_once: 4,
+            watch_interval: Span::ms(100),
+            mailbox_interval: Span::ms(50),
+            mailbox_patience: Span::s(2),
+            state_timeouts: StateTimeouts::DEFAULT,
+            retry_after: [Span::s(1), Span::s(16)],
+        }
+    }
+}

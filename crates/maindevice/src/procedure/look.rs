@@ -1,0 +1,149 @@
+//! Looking at a line without touching it: nothing but reads.
+//!
+//! A broadcast read counts who is there; then each SubDevice is read by its position, since station
+//! addresses may be missing or doubled. Reading AL status and DL status clears their event request
+//! bits in a controller (0x0210): do not look at a line that another MainDevice drives.
+
+use linesman_proto::address::{Network, Position, RegisterAddress, StationAddress, StationAlias};
+use linesman_proto::register::{self, AlStatus, DlStatus, ErrorCounters, EscInformation};
+use linesman_proto::state::{AlStatusCode, OredStates};
+use linesman_proto::time::Instant;
+
+use crate::exchange::{ExchangeError, Reply, Target};
+use crate::executor::Wire;
+
+/// What a look at a line has shown.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Look {
+    /// Which network.
+    pub network: Network,
+    /// When it was done.
+    pub at: Instant,
+    /// States of all, ORed together as the broadcast read brings them.
+    pub states: OredStates,
+    /// Who is there, in the order of processing.
+    pub devices: Vec<LookedDevice>,
+}
+
+/// One SubDevice as it was read. What it did not answer is `None`.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct LookedDevice {
+    /// Its place in the order of processing.
+    pub position: Position,
+    /// Its controller, 0x0000.
+    pub information: Option<EscInformation>,
+    /// Its station address, 0x0010; 0 if it has none.
+    pub station: Option<StationAddress>,
+    /// Its alias, 0x0012; 0 if it has none.
+    pub alias: Option<StationAlias>,
+    /// Its ports, 0x0110.
+    pub dl_status: Option<DlStatus>,
+    /// Its state, 0x0130.
+    pub al_status: Option<AlStatus>,
+    /// Its AL status code, 0x0134; it means something when the error bit of the state is set.
+    pub al_code: Option<AlStatusCode>,
+    /// Its error counters, 0x0300 to 0x0313.
+    pub counters: Option<ErrorCounters>,
+}
+
+/// Nothing to look at.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum LookError {
+    /// No frame came back.
+    #[error("the line does not answer: {0}")]
+    Silent(ExchangeError),
+    /// Frames come back, but no SubDevice has processed them.
+    #[error(
+        "network {network}: frames come back with working counter 0, so no SubDevice processes \
+         them; is this the card of an EtherCAT line, and is its cable in the IN port?"
+    )]
+    Nobody {
+        /// Which network.
+        network: Network,
+    },
+}
+
+/// AL status, reserved word, AL status code: 0x0130 to 0x0135, read at once so that they agree.
+pub(crate) const AL_LEN: u16 = register::AL_STATUS_CODE.end().0 - register::AL_STATUS.address.0;
+
+/// State and code out of [`AL_LEN`] bytes from 0x0130.
+pub(crate) fn al_of(reply: &Reply) -> (AlStatus, AlStatusCode) {
+    (AlStatus(reply.word(0)), AlStatusCode(reply.word(4)))
+}
+
+/// How many SubDevices process frames, and their states.
+///
+/// # Errors
+/// [`LookError`] when there are none.
+pub async fn count(wire: &Wire, network: Network) -> Result<(u16, OredStates), LookError> {
+    let status = register::AL_STATUS;
+    let reply =
+        wire.read(Target::All, status.address, status.len).await.map_err(LookError::Silent)?;
+    match reply.wkc.0 {
+        0 => Err(LookError::Nobody { network }),
+        count => Ok((count, linesman_proto::state::AlState::from_or(reply.bytes::<1>(0)[0]))),
+    }
+}
+
+/// Looks at a line.
+///
+/// # Errors
+/// [`LookError`] when nobody is there. A single SubDevice that does not answer is no error.
+pub async fn look(wire: Wire, network: Network) -> Result<Look, LookError> {
+    let (count, states) = count(&wire, network).await?;
+    let reading: Vec<_> =
+        (0..count).map(|position| wire.spawn(look_at(wire.clone(), Position(position)))).collect();
+    let mut devices = Vec::with_capacity(reading.len());
+    for device in reading {
+        devices.push(device.await);
+    }
+    Ok(Look { network, at: wire.now(), states, devices })
+}
+
+async fn look_at(wire: Wire, position: Position) -> LookedDevice {
+    let target = Target::Position(position);
+    // All at once, so that they share frames; what was not answered is asked for again.
+    let asked = [
+        (register::ESC_TYPE.address, EscInformation::LEN as u16),
+        (register::STATION_ADDRESS.address, 4),
+        (register::DL_STATUS.address, register::DL_STATUS.len),
+        (register::AL_STATUS.address, AL_LEN),
+        (ErrorCounters::START, ErrorCounters::LEN as u16),
+    ];
+    let first = asked.map(|(address, len)| wire.read(target, address, len));
+    let mut replies = Vec::with_capacity(asked.len());
+    for (first, (address, len)) in first.into_iter().zip(asked) {
+        replies.push(answered(&wire, target, address, len, first.await).await);
+    }
+    let mut replies = replies.into_iter();
+    let mut next = || replies.next().flatten();
+    let information = next().map(|reply| EscInformation::from_bytes(reply.bytes(0)));
+    let addresses = next();
+    let dl_status = next().map(|reply| DlStatus(reply.word(0)));
+    let al = next().map(|reply| al_of(&reply));
+    let counters = next().map(|reply| ErrorCounters::from_bytes(&reply.data, ErrorCounters::START));
+    LookedDevice {
+        position,
+        information,
+        station: addresses.as_ref().map(|reply| StationAddress(reply.word(0))),
+        alias: addresses.as_ref().map(|reply| StationAlias(reply.word(2))),
+        dl_status,
+        al_status: al.map(|(status, _)| status),
+        al_code: al.map(|(_, code)| code),
+        counters,
+    }
+}
+
+async fn answered(
+    wire: &Wire,
+    target: Target,
+    address: RegisterAddress,
+    len: u16,
+    first: Result<Reply, ExchangeError>,
+) -> Option<Reply> {
+    match first {
+        Ok(reply) if reply.answered() => Some(reply),
+        Ok(_) => wire.read_one(target, address, len).await.ok(),
+        Err(_) => None,
+    }
+}

@@ -1,0 +1,13 @@
+//! What reads "do this, then that": look, scan, SII access, set-up, change of state.
+
+pub mod address;
+pub mod look;
+pub mod scan;
+pub mod set_up;
+pub mod sii;
+pub mod state;
+
+pub use look::{Look, LookError, LookedDevice};
+pub use scan::ScanError;
+pub use sii::SiiAccessError;
+pub use state::StepError;

@@ -1,0 +1,175 @@
+//! Finding out what is there: look, station addresses, EEPROMs, wiring.
+//!
+//! What a scan writes: station addresses (0x0010) of SubDevices that have none or share theirs, the
+//! command registers of the EEPROM interface (0x0500 to 0x0507), and once the broadcast that latches
+//! receive times (0x0900). States, outputs and counters stay as they are.
+
+use linesman_config::inventory::{FoundDevice, Inventory};
+use linesman_config::profile::DeviceProfile;
+use linesman_proto::address::{DeviceId, Network, Path, Position, StationAddress};
+use linesman_proto::port::{Port, PortMap};
+use linesman_proto::register::{self, AlStatus, DlStatus};
+use linesman_proto::state::AlStatusCode;
+use linesman_proto::time::DcTime32;
+use linesman_proto::topology::{Reconstruction, SeenController};
+
+use super::look::{self, Look, LookError, LookedDevice};
+use super::{address, sii};
+use crate::exchange::{ExchangeError, Target};
+use crate::executor::Wire;
+
+/// A scan that came to no result.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum ScanError {
+    /// There is nothing to scan.
+    #[error(transparent)]
+    Look(#[from] LookError),
+    /// A SubDevice was counted but does not answer, or not alone.
+    #[error("position {position}, of {count} that were counted, cannot be addressed: {error}")]
+    Address {
+        /// Which.
+        position: Position,
+        /// How many were counted.
+        count: usize,
+        /// What failed.
+        error: ExchangeError,
+    },
+    /// The number of SubDevices changed meanwhile.
+    #[error(
+        "{before} SubDevices at first, {after} at the end of the scan: a link or supply comes and \
+         goes; scan again, or watch the line with `diagnose`"
+    )]
+    Changing {
+        /// Before.
+        before: u16,
+        /// After.
+        after: u16,
+    },
+}
+
+/// How often a scan begins anew when SubDevices come or go meanwhile.
+const ATTEMPTS: u32 = 3;
+
+/// Scans a line.
+///
+/// # Errors
+/// [`ScanError`].
+pub async fn scan(wire: Wire, network: Network) -> Result<Inventory, ScanError> {
+    let mut attempt = 1;
+    loop {
+        match scan_once(&wire, network).await {
+            Ok(inventory) => return Ok(inventory),
+            Err(error) if attempt >= ATTEMPTS => return Err(error),
+            Err(ScanError::Look(error)) => return Err(error.into()),
+            Err(ScanError::Address { .. } | ScanError::Changing { .. }) => attempt += 1,
+        }
+    }
+}
+
+async fn scan_once(wire: &Wire, network: Network) -> Result<Inventory, ScanError> {
+    let look = look::look(wire.clone(), network).await?;
+    let stations = give_addresses(wire, &look).await?;
+    let seen = latch(wire, &look, &stations).await;
+    let reading: Vec<_> = (look.devices.into_iter().zip(0..))
+        .zip(&stations)
+        .map(|((looked, id), station)| {
+            wire.spawn(found(wire.clone(), DeviceId(id), looked, *station))
+        })
+        .collect();
+    let mut devices = Vec::with_capacity(reading.len());
+    for device in reading {
+        devices.push(device.await);
+    }
+    let before = devices.len() as u16;
+    let (after, _) = look::count(wire, network).await?;
+    if after != before {
+        return Err(ScanError::Changing { before, after });
+    }
+    Ok(Inventory { devices, wiring: Reconstruction::of(Path::A, &seen) })
+}
+
+async fn give_addresses(wire: &Wire, look: &Look) -> Result<Vec<StationAddress>, ScanError> {
+    let present: Vec<StationAddress> =
+        look.devices.iter().map(|device| device.station.unwrap_or_default()).collect();
+    let chosen = address::choose(&present);
+    let giving: Vec<_> = (look.devices.iter().zip(&present).zip(&chosen))
+        .filter(|((_, present), chosen)| present != chosen)
+        .map(|((device, _), chosen)| {
+            let (wire, position, station) = (wire.clone(), device.position, *chosen);
+            let task = async move { (position, address::assign(&wire, position, station).await) };
+            task
+        })
+        .map(|task| wire.spawn(task))
+        .collect();
+    let count = present.len();
+    for given in giving {
+        let (position, outcome) = given.await;
+        outcome.map_err(|error| ScanError::Address { position, count, error })?;
+    }
+    Ok(chosen)
+}
+
+/// Ports and receive times of one and the same frame, for the wiring.
+async fn latch(wire: &Wire, look: &Look, stations: &[StationAddress]) -> Vec<SeenController> {
+    let receive_time = register::RECEIVE_TIME;
+    // Who has no clocks does not take it: the working counter says nothing.
+    let latched = wire.write(Target::All, receive_time.address, &[0; 4]).await.is_ok();
+    let reading: Vec<_> = (look.devices.iter())
+        .zip(stations)
+        .map(|(device, station)| {
+            let clocks = device.information.is_some_and(|it| it.features.distributed_clocks());
+            let times = (latched && clocks)
+                .then(|| wire.read(Target::Station(*station), receive_time.address, 16));
+            (device.dl_status.unwrap_or_default(), times)
+        })
+        .collect();
+    let mut seen = Vec::with_capacity(reading.len());
+    for (dl_status, times) in reading {
+        let times = match times {
+            Some(times) => times.await.ok().filter(crate::exchange::Reply::answered),
+            None => None,
+        };
+        let open = open_ports(dl_status);
+        let received = |port: Port| {
+            let times = times.as_ref().filter(|_| open[port])?;
+            Some(DcTime32(u32::from_le_bytes(times.bytes(4 * port.index()))))
+        };
+        seen.push(SeenController { open, received: PortMap::from_fn(received) });
+    }
+    seen
+}
+
+fn open_ports(status: DlStatus) -> PortMap<bool> {
+    PortMap::from_fn(|port| status.port_state(port).is_active())
+}
+
+async fn found(
+    wire: Wire,
+    id: DeviceId,
+    looked: LookedDevice,
+    station: StationAddress,
+) -> FoundDevice {
+    let image = sii::read_image(&wire, Target::Station(station)).await;
+    let (identity, profile, trouble) = match image {
+        Ok(image) => {
+            let odd: Vec<String> = image.oddities.iter().map(ToString::to_string).collect();
+            let trouble = (!odd.is_empty()).then(|| odd.join("; "));
+            (Some(image.identity), DeviceProfile::from_sii(&image), trouble)
+        }
+        Err(error) => (None, DeviceProfile::default(), Some(error.to_string())),
+    };
+    FoundDevice {
+        id,
+        position: looked.position,
+        station,
+        alias: looked.alias.unwrap_or_default(),
+        identity,
+        profile,
+        information: looked.information.unwrap_or_default(),
+        al_status: looked.al_status.unwrap_or(AlStatus(0)),
+        al_code: looked.al_code.unwrap_or(AlStatusCode::NO_ERROR),
+        dl_status: looked.dl_status.unwrap_or_default(),
+        counters: looked.counters.unwrap_or_default(),
+        sii_trouble: trouble,
+    }
+}

@@ -1,0 +1,226 @@
+//! Reading a SubDevice's EEPROM through its controller, 0x0500 to 0x050F.
+//!
+//! A command takes the controller some hundred microseconds; all SubDevices are read at once, so
+//! that the line is not idle meanwhile. A lost frame may have been executed: what was asked for is
+//! told by the address register, which is read along with the data.
+//! Reference: S2 2.11; S1 chapter 11.
+
+use linesman_proto::register::{
+    SII_ACCESS_ECAT, SII_ADDRESS, SII_CONTROL_STATUS, SII_DATA, SiiCommand, SiiControl,
+};
+use linesman_proto::sii::word::VENDOR_ID;
+use linesman_proto::sii::{Identity, Image, Reader, SiiError, WordAddress};
+use linesman_proto::time::Span;
+
+use crate::exchange::{ExchangeError, Reply, Target};
+use crate::executor::Wire;
+
+/// Control, address and data lie behind each other: one read brings all.
+const ALL_LEN: u16 = SII_DATA.end().0 - SII_CONTROL_STATUS.address.0;
+const ADDRESS_AT: usize = (SII_ADDRESS.address.0 - SII_CONTROL_STATUS.address.0) as usize;
+const DATA_AT: usize = (SII_DATA.address.0 - SII_CONTROL_STATUS.address.0) as usize;
+
+/// How long a controller may be busy: it may be loading the first words after power-on.
+const BUSY_LIMIT: Span = Span::ms(500);
+const POLL_AFTER: Span = Span::us(200);
+/// How long the SubDevice's processor may keep the EEPROM once it was asked for.
+const RELEASE_LIMIT: Span = Span::ms(20);
+const ATTEMPTS: u32 = 5;
+/// An EEPROM that writes does not answer for some milliseconds.
+const RETRY_AFTER: Span = Span::ms(5);
+
+/// An EEPROM could not be read.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum SiiAccessError {
+    /// The controller does not answer.
+    #[error("EEPROM of {target}: {error}")]
+    Exchange {
+        /// Whose.
+        target: Target,
+        /// What failed.
+        error: ExchangeError,
+    },
+    /// The controller stays busy.
+    #[error(
+        "EEPROM of {target}: still busy at word {word} after {BUSY_LIMIT} (0x0502 = 0x{status:04X}); \
+         switch the SubDevice off and on, else replace it"
+    )]
+    Busy {
+        /// Whose.
+        target: Target,
+        /// Which word was asked for.
+        word: WordAddress,
+        /// What 0x0502 says.
+        status: u16,
+    },
+    /// The EEPROM does not answer the controller.
+    #[error(
+        "EEPROM of {target}: word {word} was refused {ATTEMPTS} times (0x0502 = 0x{status:04X}); the \
+         EEPROM is missing or damaged"
+    )]
+    Refused {
+        /// Whose.
+        target: Target,
+        /// Which word was asked for.
+        word: WordAddress,
+        /// What 0x0502 says.
+        status: u16,
+    },
+    /// What was read is no image.
+    #[error("EEPROM of {target}: {error}")]
+    Image {
+        /// Whose.
+        target: Target,
+        /// What is wrong.
+        error: SiiError,
+    },
+}
+
+/// Reads the used part of an EEPROM.
+///
+/// The right to the EEPROM is taken from the SubDevice's processor if it has it, and given back.
+///
+/// # Errors
+/// [`SiiAccessError`].
+pub async fn read_image(wire: &Wire, target: Target) -> Result<Image, SiiAccessError> {
+    let session = Session::open(wire, target).await?;
+    let mut reader = Reader::new();
+    let read = async {
+        while let Some(words) = reader.needs() {
+            let chunk = session.read(words.start).await?;
+            reader.supply(&chunk);
+        }
+        Ok(())
+    };
+    let outcome: Result<(), SiiAccessError> = read.await;
+    session.close().await;
+    outcome?;
+    reader.finish().map_err(|error| SiiAccessError::Image { target, error })
+}
+
+/// Reads who a SubDevice is: words 8 to 15.
+///
+/// # Errors
+/// [`SiiAccessError`].
+pub async fn read_identity(wire: &Wire, target: Target) -> Result<Identity, SiiAccessError> {
+    let session = Session::open(wire, target).await?;
+    let outcome = session.identity().await;
+    session.close().await;
+    outcome
+}
+
+struct Session<'a> {
+    wire: &'a Wire,
+    target: Target,
+    /// It was the SubDevice's before and is to be given back.
+    give_back: bool,
+}
+
+impl<'a> Session<'a> {
+    async fn open(wire: &'a Wire, target: Target) -> Result<Session<'a>, SiiAccessError> {
+        let access = SII_ACCESS_ECAT.address;
+        let failed = |error| SiiAccessError::Exchange { target, error };
+        let owner = wire.read_one(target, access, 2).await.map_err(failed)?;
+        let give_back = owner.bytes::<2>(0)[0] & 1 != 0;
+        let session = Self { wire, target, give_back };
+        if give_back {
+            wire.write_one(target, access, &[0]).await.map_err(failed)?;
+        }
+        let limit = wire.now() + RELEASE_LIMIT;
+        let mut taken = owner;
+        while taken.bytes::<2>(0)[1] & 1 != 0 {
+            if wire.now() >= limit {
+                // Its processor does not let go: bit 1 takes it away.
+                wire.write_one(target, access, &[2]).await.map_err(failed)?;
+                wire.write_one(target, access, &[0]).await.map_err(failed)?;
+                break;
+            }
+            wire.sleep(POLL_AFTER).await;
+            taken = wire.read_one(target, access, 2).await.map_err(failed)?;
+        }
+        Ok(session)
+    }
+
+    async fn close(self) {
+        if self.give_back {
+            // Whoever does not answer now has nothing to be given.
+            let _ = self.wire.write_one(self.target, SII_ACCESS_ECAT.address, &[1]).await;
+        }
+    }
+
+    async fn identity(&self) -> Result<Identity, SiiAccessError> {
+        let mut bytes = Vec::with_capacity(16);
+        while bytes.len() < 16 {
+            let word = WordAddress(VENDOR_ID.0 + bytes.len() as u32 / 2);
+            bytes.extend(self.read(word).await?);
+        }
+        let long = |at: usize| {
+            let four = bytes.get(at..at + 4).and_then(|slice| slice.first_chunk());
+            u32::from_le_bytes(four.copied().unwrap_or_default())
+        };
+        Ok(Identity {
+            vendor_id: long(0),
+            product_code: long(4),
+            revision: long(8),
+            serial_number: long(12),
+        })
+    }
+
+    /// Four or eight bytes from `word` on.
+    async fn read(&self, word: WordAddress) -> Result<Vec<u8>, SiiAccessError> {
+        let mut status = SiiControl::default();
+        for attempt in 0..ATTEMPTS {
+            if attempt > 0 {
+                self.wire.sleep(RETRY_AFTER).await;
+            }
+            let before = self.idle(word).await?;
+            if SiiControl(before.word(0)).command_failed() {
+                self.command(SiiCommand::None, word).await?;
+            }
+            self.command(SiiCommand::Read, word).await?;
+            let reply = self.idle(word).await?;
+            status = SiiControl(reply.word(0));
+            let answered = u32::from_le_bytes(reply.bytes(ADDRESS_AT)) == word.value();
+            if answered && !status.command_failed() {
+                let end = DATA_AT + status.read_len();
+                return Ok(reply.data.get(DATA_AT..end).unwrap_or_default().to_vec());
+            }
+        }
+        let target = self.target;
+        Err(SiiAccessError::Refused { target, word, status: status.0 })
+    }
+
+    /// Command and address in one datagram. The working counter is not looked at: when the frame
+    /// before was lost on its way back, the controller is busy with the command already.
+    async fn command(&self, command: SiiCommand, word: WordAddress) -> Result<(), SiiAccessError> {
+        let [low, high] = SiiControl::start(command).to_bytes();
+        let [a, b, c, d] = word.value().to_le_bytes();
+        let bytes = [low, high, a, b, c, d];
+        let sent = self.wire.write(self.target, SII_CONTROL_STATUS.address, &bytes).await;
+        match sent {
+            Ok(_) => Ok(()),
+            Err(error) => Err(SiiAccessError::Exchange { target: self.target, error }),
+        }
+    }
+
+    /// Control, address and data once the controller is no longer busy.
+    async fn idle(&self, word: WordAddress) -> Result<Reply, SiiAccessError> {
+        let target = self.target;
+        let limit = self.wire.now() + BUSY_LIMIT;
+        loop {
+            let reply = self
+                .wire
+                .read_one(target, SII_CONTROL_STATUS.address, ALL_LEN)
+                .await
+                .map_err(|error| SiiAccessError::Exchange { target, error })?;
+            let status = SiiControl(reply.word(0));
+            if !status.busy() {
+                return Ok(reply);
+            }
+            if self.wire.now() >= limit {
+                return Err(SiiAccessError::Busy { target, word, status: status.0 });
+            }
+            self.wire.sleep(POLL_AFTER).await;
+        }
+    }
+}

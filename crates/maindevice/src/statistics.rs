@@ -1,0 +1,30 @@
+//! What has been sent and what has come back.
+
+/// Counts since the MainDevice was made.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Statistics {
+    /// Frames handed out to be sent; both copies of a ring count.
+    pub frames_sent: u64,
+    /// Of those, frames with process data.
+    pub cyclic_sent: u64,
+    /// Frames of ours that came back in time.
+    pub frames_received: u64,
+    /// Frames that did not come back in time.
+    pub frames_lost: u64,
+    /// Of those, frames with process data.
+    pub cyclic_lost: u64,
+    /// Frames that came back after they had been given up.
+    pub frames_late: u64,
+    /// Frames that came back once more.
+    pub frames_duplicate: u64,
+    /// Frames that are not ours, or not as we sent them.
+    pub frames_foreign: u64,
+    /// Datagrams of procedures that were sent again because their frame was lost.
+    pub repeats: u64,
+    /// Cycles begun.
+    pub cycles: u64,
+    /// Cycles left out because the MainDevice was called too late.
+    pub cycles_missed: u64,
+    /// Cyclic datagrams whose working counter was not the expected one.
+    pub working_counter_errors: u64,
+}

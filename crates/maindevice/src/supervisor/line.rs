@@ -1,0 +1,182 @@
+//! What is known of each SubDevice right now: shared by the cyclic exchange, which judges by it, and
+//! by the keepers, which find it out.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll, Waker};
+
+use linesman_config::plan::Plan;
+use linesman_config::plan::expect::{Presence, Served};
+use linesman_proto::address::{DeviceId, Path, WorkingCounter};
+use linesman_proto::state::{AlState, OredStates};
+
+use crate::executor::lock;
+use crate::executor::wire::Sleep;
+
+/// Whether and how a SubDevice can be reached.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) enum Found {
+    /// It has not been looked for yet.
+    #[default]
+    Unknown,
+    /// It does not answer.
+    Lost,
+    /// It answers at its station address.
+    There {
+        /// It has just been given that address: it must be set up from INIT.
+        restarted: bool,
+    },
+}
+
+#[derive(Clone, Copy, Default, Debug)]
+struct Live {
+    found: Found,
+    served: bool,
+    settled: bool,
+    mailbox: bool,
+}
+
+/// The SubDevices of a network as they are.
+#[derive(Debug, Default)]
+pub(crate) struct Line {
+    devices: Vec<Live>,
+    version: u64,
+    alerts: u64,
+    waiting: Vec<Waker>,
+    responding: Option<WorkingCounter>,
+    states: Option<OredStates>,
+    all_reached: bool,
+}
+
+impl Line {
+    pub(crate) fn new(plan: &Plan) -> Self {
+        Self { devices: vec![Live::default(); plan.devices.len()], ..Self::default() }
+    }
+
+    /// Changes whenever presence or "settled" changes.
+    pub(crate) fn version(&self) -> u64 {
+        self.version
+    }
+
+    pub(crate) fn copy_presence(&self, presence: &mut Presence) {
+        for (live, id) in self.devices.iter().zip(0..) {
+            let there = matches!(live.found, Found::There { .. });
+            let reached_by = there.then_some(Path::A);
+            let serves = there && live.served;
+            presence.set(DeviceId(id), Served { reached_by, inputs: serves, outputs: serves });
+        }
+    }
+
+    fn live(&mut self, id: DeviceId) -> Option<&mut Live> {
+        self.devices.get_mut(id.index())
+    }
+
+    pub(crate) fn is_settled(&self, id: DeviceId) -> bool {
+        self.devices.get(id.index()).is_some_and(|live| live.settled)
+    }
+
+    pub(crate) fn found(&self, id: DeviceId) -> Found {
+        self.devices.get(id.index()).map_or(Found::Unknown, |live| live.found)
+    }
+
+    /// Notes where a SubDevice is; returns where it was.
+    pub(crate) fn set_found(&mut self, id: DeviceId, found: Found) -> Found {
+        self.version += 1;
+        let Some(live) = self.live(id) else { return Found::Unknown };
+        let before = std::mem::replace(&mut live.found, found);
+        match found {
+            Found::There { .. } => {}
+            // Its process data are missed on purpose from now on.
+            Found::Lost | Found::Unknown => (live.served, live.mailbox) = (false, false),
+        }
+        live.settled &= !matches!(found, Found::There { .. });
+        before
+    }
+
+    /// Notes that a SubDevice is on its way between states, and what it serves meanwhile.
+    pub(crate) fn set_moving(&mut self, id: DeviceId, state: Option<AlState>) {
+        self.set(id, state, false);
+    }
+
+    /// Notes that a SubDevice is where it shall be, or stays where it is.
+    pub(crate) fn set_settled(&mut self, id: DeviceId, state: Option<AlState>) {
+        self.set(id, state, true);
+    }
+
+    fn set(&mut self, id: DeviceId, state: Option<AlState>, settled: bool) {
+        let Some(live) = self.live(id) else { return };
+        live.served = state.is_some_and(AlState::has_inputs);
+        live.mailbox = state.is_some_and(AlState::has_mailbox);
+        live.settled = settled;
+        self.version += 1;
+    }
+
+    /// Whether the mailbox of a SubDevice can be used.
+    pub(crate) fn has_mailbox(&self, id: DeviceId) -> bool {
+        self.devices.get(id.index()).is_some_and(|live| live.mailbox)
+    }
+
+    /// Notes that all have reached their targets; true the first time.
+    pub(crate) fn set_all_reached(&mut self) -> bool {
+        !std::mem::replace(&mut self.all_reached, true)
+    }
+
+    /// What the cyclic broadcast read brought. Returns the number that answered before if it has
+    /// changed.
+    pub(crate) fn broadcast(
+        &mut self,
+        responding: WorkingCounter,
+        states: OredStates,
+    ) -> Option<WorkingCounter> {
+        let before = self.responding.replace(responding);
+        let states_before = self.states.replace(states);
+        let fewer_or_more = before.filter(|before| *before != responding);
+        if fewer_or_more.is_some() || states_before.is_some_and(|before| before != states) {
+            self.alert();
+        }
+        fewer_or_more
+    }
+
+    /// How many answered the last cyclic broadcast read.
+    pub(crate) fn responding(&self) -> Option<WorkingCounter> {
+        self.responding
+    }
+
+    /// Something is not as it was: all keepers shall look at once.
+    pub(crate) fn alert(&mut self) {
+        self.alerts += 1;
+        for waker in self.waiting.drain(..) {
+            waker.wake();
+        }
+    }
+
+    pub(crate) fn alerts(&self) -> u64 {
+        self.alerts
+    }
+}
+
+/// Sleeps, but no longer than until the next alert.
+pub(crate) struct Nap {
+    pub(crate) line: Arc<Mutex<Line>>,
+    /// The last alert that was acted upon.
+    pub(crate) seen: u64,
+    pub(crate) sleep: Sleep,
+}
+
+impl Future for Nap {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        {
+            let mut line = lock(&self.line);
+            if line.alerts != self.seen {
+                return Poll::Ready(());
+            }
+            if !line.waiting.iter().any(|waker| waker.will_wake(context.waker())) {
+                line.waiting.push(context.waker().clone());
+            }
+        }
+        Pin::new(&mut self.sleep).poll(context)
+    }
+}

@@ -1,0 +1,127 @@
+//! Finding the SubDevices of the plan on the line, and giving them their station addresses.
+//!
+//! Those that already answer at a planned address are landmarks. Between two landmarks the line
+//! keeps its order: as many unknown ones as planned ones are the planned ones, one by one, and are
+//! compared; more or fewer are aligned by identity.
+
+use linesman_config::identity::mismatch;
+use linesman_proto::address::{DeviceId, Position, StationAddress};
+use linesman_proto::register::STATION_ADDRESS;
+use linesman_proto::sii::Identity;
+
+use super::align::align;
+use super::{Context, Found, find, lose};
+use crate::event::Event;
+use crate::exchange::Target;
+use crate::executor::lock;
+use crate::procedure::look::{self, LookError};
+use crate::procedure::{address, sii};
+
+/// One controller on the line.
+struct Seen {
+    position: Position,
+    /// Which of the plan, if its address tells.
+    known: Option<DeviceId>,
+}
+
+/// Looks for those that are not there; `from_scratch`: for all, whatever addresses they have.
+///
+/// # Errors
+/// [`LookError`] when the line is silent.
+pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), LookError> {
+    let wire = &context.wire;
+    let (count, _) = look::count(wire, context.network).await?;
+    if from_scratch {
+        // Addresses of an earlier run must not meet those of the plan.
+        let _ = wire.write(Target::All, STATION_ADDRESS.address, &[0; 2]).await;
+    }
+    let reads: Vec<_> = (0..count)
+        .map(|position| {
+            let target = Target::Position(Position(position));
+            wire.read(target, STATION_ADDRESS.address, STATION_ADDRESS.len)
+        })
+        .collect();
+    let mut stations = Vec::with_capacity(reads.len());
+    for read in reads {
+        stations.push(read.await.map_or(StationAddress(0), |reply| StationAddress(reply.word(0))));
+    }
+    let known = |station: StationAddress| {
+        let unique = stations.iter().filter(|other| **other == station).count() == 1;
+        let planned = context.plan.devices.iter().find(|device| device.station == station);
+        planned.filter(|_| unique && station.0 != 0 && !from_scratch).map(|device| device.id)
+    };
+    let seen: Vec<Seen> = (stations.iter().zip(0..))
+        .map(|(station, position)| Seen { position: Position(position), known: known(*station) })
+        .collect();
+    // Stretches between landmarks.
+    let (mut first_seen, mut first_planned) = (0, 0);
+    for end in 0..=seen.len() {
+        let landmark = seen.get(end).map(|seen| seen.known);
+        if landmark == Some(None) {
+            continue;
+        }
+        let end_planned = landmark.flatten().map_or(context.plan.devices.len(), DeviceId::index);
+        if first_planned <= end_planned {
+            let planned = first_planned..end_planned;
+            stretch(context, &seen[first_seen..end], planned).await;
+            first_planned = end_planned + 1;
+        }
+        first_seen = end + 1;
+    }
+    for device in &context.plan.devices {
+        if lock(&context.line).found(device.id) == Found::Unknown {
+            lose(context, device.id);
+        }
+    }
+    Ok(())
+}
+
+/// Identifies unknown controllers, of which the plan has these.
+async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usize>) {
+    let planned: Vec<DeviceId> = (context.plan.devices[planned].iter())
+        .map(|device| device.id)
+        .filter(|id| !matches!(lock(&context.line).found(*id), Found::There { .. }))
+        .collect();
+    if seen.is_empty() || planned.is_empty() {
+        return;
+    }
+    let reading: Vec<_> = (seen.iter())
+        .map(|seen| {
+            let (wire, target) = (context.wire.clone(), Target::Position(seen.position));
+            context.wire.spawn(async move { sii::read_identity(&wire, target).await })
+        })
+        .collect();
+    let mut identities = Vec::with_capacity(reading.len());
+    for reading in reading {
+        // Who cannot say who it is fits nobody.
+        identities.push(reading.await.unwrap_or_default());
+    }
+    let differs = |id: DeviceId, found: &Identity| {
+        let device = &context.plan.devices[id.index()];
+        let anyone = device.identity == Identity::default();
+        mismatch(&device.identity, found, device.revision_rule).filter(|_| !anyone)
+    };
+    let pairs = if seen.len() == planned.len() {
+        (0..seen.len()).map(|at| (at, at)).collect()
+    } else {
+        align(seen.len(), planned.len(), |at, of| differs(planned[of], &identities[at]).is_none())
+    };
+    for (at, of) in pairs {
+        let (id, found) = (planned[of], identities[at]);
+        match differs(id, &found) {
+            None => give_address(context, seen[at].position, id).await,
+            Some(mismatch) => {
+                let expected = context.plan.devices[id.index()].identity;
+                context.wire.emit(Event::WrongDevice { id, mismatch, expected, found });
+            }
+        }
+    }
+}
+
+async fn give_address(context: &Context, position: Position, id: DeviceId) {
+    let station = context.plan.devices[id.index()].station;
+    match address::assign(&context.wire, position, station).await {
+        Ok(()) => find(context, id, true),
+        Err(_) => lose(context, id),
+    }
+}

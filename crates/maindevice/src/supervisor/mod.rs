@@ -1,0 +1,135 @@
+//! Bringing every SubDevice to its target, and keeping it there.
+//!
+//! [`locate`] finds the SubDevices of the plan on the line and gives them their addresses; one
+//! [`keeper`] per SubDevice drives it to its target, watches it, and drives it again when it fell
+//! out; [`supervise`] starts them and looks for those that are lost. [`line`] is what they know.
+
+mod align;
+pub(crate) mod keeper;
+pub(crate) mod line;
+mod locate;
+
+use std::sync::{Arc, Mutex};
+
+use linesman_config::plan::Plan;
+use linesman_proto::address::{DeviceId, Network};
+use linesman_proto::register;
+use linesman_proto::time::Span;
+
+use crate::event::Event;
+use crate::exchange::Target;
+use crate::executor::{Wire, lock};
+use crate::options::Options;
+use crate::procedure::look::AL_LEN;
+
+pub(crate) use line::{Found, Line, Nap};
+
+/// What keepers share.
+#[derive(Clone)]
+pub(crate) struct Context {
+    pub(crate) wire: Wire,
+    pub(crate) network: Network,
+    pub(crate) plan: Arc<Plan>,
+    pub(crate) line: Arc<Mutex<Line>>,
+    pub(crate) options: Arc<Options>,
+    pub(crate) mailboxes: crate::mailbox::Queues,
+}
+
+impl Context {
+    /// Sleeps until the next alert after `seen`, at most `span`.
+    pub(crate) fn nap(&self, seen: u64, span: Span) -> Nap {
+        Nap { line: Arc::clone(&self.line), seen, sleep: self.wire.sleep(span) }
+    }
+
+    pub(crate) fn alerts(&self) -> u64 {
+        lock(&self.line).alerts()
+    }
+}
+
+/// How often lost SubDevices are looked for.
+const SEARCH_INTERVAL: Span = Span::ms(100);
+/// How often they are looked for by position, which takes more reads, when nothing has changed.
+const THOROUGH_INTERVAL: Span = Span::s(2);
+/// Alerts are acted upon no more often than this.
+pub(crate) const CALM: Span = Span::ms(5);
+
+/// Runs a network according to its plan; never ends.
+pub(crate) async fn supervise(context: Context) {
+    while locate::locate(&context, true).await.is_err() {
+        // The whole line is silent.
+        for device in &context.plan.devices {
+            lose(&context, device.id);
+        }
+        context.wire.sleep(SEARCH_INTERVAL).await;
+    }
+    for device in &context.plan.devices {
+        // Who is not there yet has its keeper, too: it waits.
+        context.wire.spawn(keeper::keep(context.clone(), device.id));
+        if device.mailbox.is_some() {
+            context.wire.spawn(crate::mailbox::serve_mailbox(context.clone(), device.id));
+        }
+    }
+    let mut thorough_at = context.wire.now() + THOROUGH_INTERVAL;
+    let mut located_at = None;
+    loop {
+        let seen = context.alerts();
+        context.nap(seen, SEARCH_INTERVAL).await;
+        context.wire.sleep(CALM).await;
+        if !search(&context).await {
+            continue;
+        }
+        let responding = lock(&context.line).responding();
+        let now = context.wire.now();
+        if responding != located_at || now >= thorough_at {
+            thorough_at = now + THOROUGH_INTERVAL;
+            // A silent line is found out by the keepers; the next round tries again.
+            if locate::locate(&context, false).await.is_ok() {
+                located_at = responding;
+            }
+        }
+    }
+}
+
+/// Asks those that are lost at their addresses. Returns whether any is still lost.
+async fn search(context: &Context) -> bool {
+    let lost: Vec<_> = (context.plan.devices.iter())
+        .filter(|device| lock(&context.line).found(device.id) == Found::Lost)
+        .collect();
+    let asked: Vec<_> = (lost.iter())
+        .map(|device| {
+            let target = Target::Station(device.station);
+            let request =
+                crate::exchange::Request::read(target, register::AL_STATUS.address, AL_LEN);
+            (device.id, context.wire.submit(request))
+        })
+        .collect();
+    let mut missing = false;
+    for (id, reply) in asked {
+        match reply.await {
+            Ok(reply) if reply.wkc.0 == 1 => find(context, id, false),
+            Ok(_) | Err(_) => missing = true,
+        }
+    }
+    missing
+}
+
+/// A SubDevice does not answer.
+pub(crate) fn lose(context: &Context, id: DeviceId) {
+    let before = lock(&context.line).set_found(id, Found::Lost);
+    if before != Found::Lost {
+        context.wire.emit(Event::DeviceLost { id });
+        lock(&context.line).alert();
+    }
+}
+
+/// A SubDevice answers.
+pub(crate) fn find(context: &Context, id: DeviceId, restarted: bool) {
+    let before = lock(&context.line).set_found(id, Found::There { restarted });
+    if before == Found::Lost {
+        context.wire.emit(Event::DeviceBack { id, restarted });
+    }
+    lock(&context.line).alert();
+}
+
+#[cfg(test)]
+mod tests;

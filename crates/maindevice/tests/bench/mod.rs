@@ -1,0 +1,154 @@
+//! A MainDevice and a virtual segment in virtual time.
+
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
+use linesman_config::inventory::Inventory;
+use linesman_config::plan::{Plan, PlanOptions};
+use linesman_maindevice::{Event, MainDevice, Options};
+use linesman_proto::address::{DeviceId, Network, Path};
+use linesman_proto::state::AlState;
+use linesman_proto::time::{Instant, Span};
+use linesman_sim::segment::Segment;
+use linesman_sim::segment_file::SegmentFile;
+
+/// Frames that the bench itself drops or doubles on their way back, by their number.
+pub(crate) type Tamper = Box<dyn FnMut(u64) -> Fate>;
+
+/// What becomes of a frame that comes back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Fate {
+    Arrives,
+    Lost,
+    Doubled,
+    Late(Span),
+}
+
+pub(crate) struct Bench {
+    pub(crate) now: Instant,
+    pub(crate) device: MainDevice,
+    pub(crate) segment: Segment,
+    pub(crate) events: Vec<(Instant, Event)>,
+    pub(crate) tamper: Option<Tamper>,
+    arrivals: u64,
+    delayed: Vec<(Instant, Path, Vec<u8>)>,
+}
+
+impl Bench {
+    pub(crate) fn new(toml: &str) -> Self {
+        Self::with_options(toml, Options::default())
+    }
+
+    pub(crate) fn with_options(toml: &str, options: Options) -> Self {
+        let file = SegmentFile::parse(toml).expect("segment file");
+        Self::of(&file, options)
+    }
+
+    pub(crate) fn of(file: &SegmentFile, options: Options) -> Self {
+        Self {
+            now: Instant::ZERO,
+            device: MainDevice::new(Network(0), options),
+            segment: Segment::build(file).expect("segment"),
+            events: Vec::new(),
+            tamper: None,
+            arrivals: 0,
+            delayed: Vec::new(),
+        }
+    }
+
+    /// Runs until `done` says so of an event, at most until `limit` has passed.
+    pub(crate) fn run_until(&mut self, limit: Span, mut done: impl FnMut(&Event) -> bool) -> bool {
+        let end = self.now + limit;
+        let mut buffer = vec![0; 1514];
+        let mut arrival_buffer = Vec::new();
+        loop {
+            while let Some(transmit) = self.device.poll_transmit(self.now, &mut buffer) {
+                self.segment.handle_frame(transmit.at, transmit.path, &buffer[..transmit.len]);
+            }
+            let mut finished = false;
+            while let Some(event) = self.device.poll_event() {
+                finished |= done(&event);
+                self.events.push((self.now, event));
+            }
+            if finished {
+                return true;
+            }
+            let delayed = self.delayed.iter().map(|(at, ..)| *at).min();
+            let next = [self.device.poll_timeout(), self.segment.poll_timeout(), delayed];
+            let next = next.into_iter().flatten().min().unwrap_or(Instant::MAX);
+            if next > end {
+                self.now = end;
+                self.segment.advance(end);
+                return false;
+            }
+            self.now = self.now.max(next);
+            self.segment.advance(self.now);
+            while let Some(arrival) = self.segment.poll_arrival(&mut arrival_buffer) {
+                assert!(arrival.at <= self.now, "{:?} arrives after {:?}", arrival.at, self.now);
+                if arrival.intact {
+                    self.arrive(arrival.path, &arrival_buffer);
+                }
+            }
+            while let Some(due) = self.delayed.iter().position(|(at, ..)| *at <= self.now) {
+                let (_, path, frame) = self.delayed.remove(due);
+                self.device.handle_frame(self.now, path, &frame);
+            }
+            if self.device.poll_timeout().is_some_and(|at| at <= self.now) {
+                self.device.handle_timeout(self.now);
+            }
+        }
+    }
+
+    fn arrive(&mut self, path: Path, frame: &[u8]) {
+        self.arrivals += 1;
+        let fate = self.tamper.as_mut().map_or(Fate::Arrives, |tamper| tamper(self.arrivals));
+        match fate {
+            Fate::Arrives => self.device.handle_frame(self.now, path, frame),
+            Fate::Lost => {}
+            Fate::Doubled => {
+                self.device.handle_frame(self.now, path, frame);
+                self.device.handle_frame(self.now, path, frame);
+            }
+            Fate::Late(span) => self.delayed.push((self.now + span, path, frame.to_vec())),
+        }
+    }
+
+    pub(crate) fn run_for(&mut self, span: Span) {
+        self.run_until(span, |_| false);
+    }
+
+    pub(crate) fn scan(&mut self) -> Inventory {
+        self.device.scan(self.now);
+        let done = |event: &Event| matches!(event, Event::Scanned(_) | Event::ScanFailed(_));
+        assert!(self.run_until(Span::s(20), done), "the scan does not end");
+        match self.events.pop() {
+            Some((_, Event::Scanned(inventory))) => *inventory,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Scans, plans everything to `target`, and starts.
+    pub(crate) fn start(&mut self, target: AlState) -> Plan {
+        let inventory = self.scan();
+        let tree = inventory.tree().clone();
+        let plan = Plan::build(&inventory.planned(target), tree, &PlanOptions::default()).unwrap();
+        self.device.start(self.now, plan.clone());
+        let done = |event: &Event| matches!(event, Event::AllReached);
+        assert!(
+            self.run_until(Span::s(30), done),
+            "not all reach {target}; {:#?}",
+            self.events.iter().rev().take(30).collect::<Vec<_>>()
+        );
+        plan
+    }
+
+    /// Number of a device by its name in the segment file.
+    pub(crate) fn id(&self, name: &str) -> DeviceId {
+        let found = self.segment.devices().find(|id| self.segment.name(*id) == name);
+        found.unwrap_or_else(|| panic!("no {name}"))
+    }
+
+    pub(crate) fn state(&self, name: &str) -> String {
+        let controller = self.segment.controller(self.id(name)).expect(name);
+        controller.al_status().to_string()
+    }
+}
