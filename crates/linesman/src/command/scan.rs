@@ -2,7 +2,6 @@
 
 mod cards;
 pub(crate) mod report;
-mod segment;
 mod table;
 
 use std::fs;
@@ -19,7 +18,7 @@ use crate::output::Output;
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
-    /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
+    /// Where the line is: eth0 or eth0+eth1 (a ring)
     #[arg(value_name = "WHERE")]
     place: String,
     /// Identities, controllers and error counters too
@@ -47,8 +46,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     }
     let scan = match &selector {
         Selector::Cards(names) => cards::scan(names)?,
-        Selector::Segment(path) => segment::scan(path)?,
-        Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
+        Selector::Segment(_)
+        | Selector::Listen(_)
+        | Selector::Capture(_)
+        | Selector::Observations(_) => {
             let reason = format!("`{selector}`: a scan sends frames, and nobody answers there");
             let advice = format!("judge it with `linesman diagnose {}`", arguments.place);
             return Err(Failure::new(reason, advice));
