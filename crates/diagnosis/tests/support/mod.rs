@@ -4,6 +4,7 @@
 #![allow(clippy::disallowed_methods, reason = "tests read files")]
 
 pub mod script;
+pub mod watcher;
 
 use std::path::{Path, PathBuf};
 
