@@ -41,7 +41,8 @@ def check(function):
 
 def peer(line, *command, cycles=CYCLES):
     """Runs a foreign MainDevice on the near end and returns what it says."""
-    status, out, err = line.run(line.near, *command, NEAR, cycles, CYCLE_US, seconds=60)
+    quiet = ("env", "RUST_BACKTRACE=0")
+    status, out, err = line.run(line.near, *quiet, *command, NEAR, cycles, CYCLE_US, seconds=60)
     assert status == 0, f"status {status}: {err[-600:]}"
     # Some stacks print words of their own before.
     return parse(out.strip().splitlines()[-1] if out.strip() else out, err)

@@ -28,8 +28,10 @@ const TIMEOUT: Span = Span::ms(100);
 /// Two equal requests closer than this are one that was recorded twice: the shortest frame takes
 /// longer.
 const RECORDED_TWICE: Span = Span::us(3);
-/// So many requests may be on their way when the input ends.
-const CUT_OFF: usize = 2;
+/// When the input ends, so many requests may be on their way.
+const MOST_IN_FLIGHT: usize = 32;
+/// And for so long.
+const IN_FLIGHT: Span = Span::ms(5);
 /// How many returns are remembered to know one that was recorded twice.
 const REMEMBERED: usize = 8;
 /// Senders kept.
@@ -142,11 +144,16 @@ impl Pairing {
 
     /// Settles all requests that are still out: the input has ended.
     pub fn finish(&mut self, settle: &mut impl FnMut(&Exchange<'_>)) {
-        let is_few =
-            self.pending.iter().filter(|pending| pending.overtaken == 0).count() <= CUT_OFF;
+        // An input that stops between requests and their returns loses nothing.
+        let waiting = || self.pending.iter().filter(|pending| pending.overtaken == 0);
+        let is_short = match (waiting().next(), waiting().next_back()) {
+            (Some(first), Some(last)) => gap(first.time, last.time) <= IN_FLIGHT,
+            (None, _) | (_, None) => true,
+        };
+        let is_few = waiting().count() <= MOST_IN_FLIGHT;
+        let may_return = self.returns > 0 && is_short && is_few;
         while let Some(oldest) = self.pending.front() {
-            // An input that stops between a request and its return loses nothing.
-            let is_cut_off = (self.returns > 0) && oldest.overtaken == 0 && is_few;
+            let is_cut_off = may_return && oldest.overtaken == 0;
             self.lose(0, is_cut_off, settle);
         }
     }

@@ -1,7 +1,12 @@
 //! What the tests share: real captures, and captures made by hand.
 
 #![allow(dead_code, unreachable_pub, reason = "each test file uses a part of it")]
-#![allow(clippy::disallowed_methods, reason = "tests read files")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_macros,
+    reason = "tests read files and say so"
+)]
+#![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 pub mod script;
 pub mod watcher;

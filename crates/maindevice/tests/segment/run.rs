@@ -1,0 +1,246 @@
+//! Running a plant: to OP, process data both ways, faults and what becomes of them.
+
+use crate::bench::{Bench, Fate};
+use linesman_config::fault::FaultName;
+use linesman_maindevice::Event;
+use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
+use linesman_sim::segment_file::FaultEntry;
+
+/// Outputs of T2 wired to nothing, inputs of T1 driven by nobody; smart devices at the end.
+const PLANT: &str = r#"
+name = "plant"
+seed = 5
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "T1"
+type = "EL1008"
+on = "K1.B"
+[[device]]
+name = "T2"
+type = "EL2004"
+on = "T1.B"
+[[device]]
+name = "T3"
+type = "EL3102"
+on = "T2.B"
+[[device]]
+name = "T4"
+type = "EL4102"
+on = "T3.B"
+[[device]]
+name = "K2"
+type = "EK1100"
+on = "K1.C"
+[[device]]
+name = "T5"
+type = "EL2008"
+on = "K2.B"
+[[device]]
+name = "T6"
+type = "EL1004"
+on = "T5.B"
+[[device]]
+name = "T7"
+type = "EL7041"
+on = "T6.B"
+[[device]]
+name = "T8"
+type = "EL2014"
+on = "T7.B"
+"#;
+
+fn fault(kind: &str) -> FaultEntry {
+    let name: FaultName = toml_name(kind);
+    FaultEntry::new(name)
+}
+
+fn toml_name(kind: &str) -> FaultName {
+    kind.parse().expect("a fault name")
+}
+
+fn count(bench: &Bench, which: impl Fn(&Event) -> bool) -> usize {
+    bench.events.iter().filter(|(_, event)| which(event)).count()
+}
+
+#[test]
+fn a_plant_of_ten_comes_to_op_and_stays_there() {
+    let mut bench = Bench::new(PLANT);
+    bench.start(AlState::Op);
+    for name in ["K1", "T1", "T2", "T3", "T4", "K2", "T5", "T6", "T7", "T8"] {
+        assert_eq!(bench.state(name), "OP", "{name}");
+    }
+    bench.events.clear();
+    let before = bench.device.statistics();
+    bench.run_for(Span::s(2));
+    let after = bench.device.statistics();
+    assert_eq!(after.cycles - before.cycles, 2000);
+    assert_eq!(after.working_counter_errors, before.working_counter_errors);
+    assert_eq!(after.frames_lost, before.frames_lost);
+    assert!(bench.device.is_settled());
+    let trouble =
+        count(&bench, |event| !matches!(event, Event::Links { .. } | Event::Counters { .. }));
+    assert_eq!(trouble, 0, "{:#?}", bench.events);
+}
+
+#[test]
+fn process_data_go_both_ways() {
+    let mut bench = Bench::new(PLANT);
+    let plan = bench.start(AlState::Op);
+    let id = bench.id("T2");
+    let outputs = plan.device(id).unwrap().outputs.clone();
+    assert_eq!(outputs.len(), 1);
+    bench.device.outputs_mut()[outputs.start] = 0b0101;
+    let inputs = plan.device(bench.id("T1")).unwrap().inputs.clone();
+    assert_eq!(bench.device.inputs()[inputs.start], 0);
+    let signals = bench.segment.inputs(bench.id("T1")).to_vec();
+    bench.segment.signals_mut().set(signals[3], 1);
+    bench.run_for(Span::ms(5));
+    let driven: Vec<i32> = bench
+        .segment
+        .outputs(id)
+        .iter()
+        .map(|signal| bench.segment.signals().value(*signal))
+        .collect();
+    assert_eq!(driven, [1, 0, 1, 0]);
+    assert_eq!(bench.device.inputs()[inputs.start], 0b1000);
+}
+
+#[test]
+fn a_cut_loses_what_is_behind_it_and_healing_brings_it_back() {
+    let mut bench = Bench::new(PLANT);
+    bench.start(AlState::Op);
+    bench.events.clear();
+    let entry = fault("link-open").at("K1.C-K2.A");
+    let cut = bench.segment.inject(bench.now, &entry).unwrap();
+    bench.run_for(Span::s(1));
+    let behind = ["K2", "T5", "T6", "T7", "T8"].map(|name| bench.id(name));
+    for id in behind {
+        let lost =
+            count(&bench, |event| matches!(event, Event::DeviceLost { id: lost } if *lost == id));
+        assert_eq!(lost, 1, "{id}");
+    }
+    assert_eq!(count(&bench, |event| matches!(event, Event::DeviceLost { .. })), 5);
+    assert_eq!(bench.state("T2"), "OP");
+    bench.events.clear();
+    bench.segment.heal(bench.now, cut);
+    bench.run_for(Span::s(6));
+    assert!(bench.device.is_settled(), "{:#?}", bench.events);
+    for name in ["K2", "T5", "T6", "T7", "T8"] {
+        assert_eq!(bench.state(name), "OP", "{name}");
+    }
+    assert_eq!(
+        count(&bench, |event| matches!(event, Event::DeviceBack { restarted: false, .. })),
+        5
+    );
+    let before = bench.device.statistics().working_counter_errors;
+    bench.run_for(Span::ms(500));
+    assert_eq!(bench.device.statistics().working_counter_errors, before);
+}
+
+#[test]
+fn the_first_cable_cut_and_healed() {
+    let mut bench = Bench::new(PLANT);
+    bench.start(AlState::Op);
+    let cut = bench.segment.inject(bench.now, &fault("link-open").at("maindevice-K1.A")).unwrap();
+    bench.run_for(Span::s(1));
+    assert_eq!(count(&bench, |event| matches!(event, Event::DeviceLost { .. })), 10);
+    assert_eq!(count(&bench, |event| matches!(event, Event::CyclicFramesLost { .. })), 1);
+    bench.segment.heal(bench.now, cut);
+    bench.run_for(Span::s(8));
+    assert!(
+        bench.device.is_settled(),
+        "{:#?}",
+        bench.events.iter().rev().take(40).collect::<Vec<_>>()
+    );
+    assert_eq!(bench.state("T8"), "OP");
+}
+
+#[test]
+fn a_device_that_was_without_power_is_addressed_and_set_up_anew() {
+    let mut bench = Bench::new(PLANT);
+    bench.start(AlState::Op);
+    bench.events.clear();
+    let off = bench.segment.inject(bench.now, &fault("device-off").device("T8")).unwrap();
+    bench.run_for(Span::s(1));
+    let id = bench.id("T8");
+    assert_eq!(
+        count(&bench, |event| matches!(event, Event::DeviceLost { id: lost } if *lost == id)),
+        1
+    );
+    bench.segment.heal(bench.now, off);
+    bench.run_for(Span::s(8));
+    assert_eq!(
+        count(&bench, |event| matches!(event, Event::DeviceBack { restarted: true, .. })),
+        1
+    );
+    assert_eq!(bench.state("T8"), "OP", "{:#?}", bench.events);
+    assert!(bench.device.is_settled());
+}
+
+#[test]
+fn a_brown_out_is_noticed_and_made_good() {
+    let mut bench = Bench::new(PLANT);
+    bench.start(AlState::Op);
+    bench.events.clear();
+    bench.segment.inject(bench.now, &fault("brown-out").device("T7")).unwrap();
+    bench.run_for(Span::s(10));
+    assert!(count(&bench, |event| matches!(event, Event::DeviceLost { .. })) > 0);
+    for name in ["T6", "T7", "T8"] {
+        assert_eq!(bench.state(name), "OP", "{name} {:#?}", bench.events);
+    }
+    assert!(bench.device.is_settled());
+}
+
+#[test]
+fn a_refusal_is_reported_and_tried_again_more_and_more_seldom() {
+    let mut bench = Bench::new(PLANT);
+    let entry = fault("init-refused").device("T3");
+    let refused = bench.segment.inject(bench.now, &entry).unwrap();
+    let inventory = bench.scan();
+    let tree = inventory.tree().clone();
+    let plan = linesman_config::plan::Plan::build(
+        &inventory.planned(AlState::Op),
+        tree,
+        &linesman_config::plan::PlanOptions::default(),
+    );
+    bench.device.start(bench.now, plan.unwrap());
+    bench.run_for(Span::s(12));
+    let id = bench.id("T3");
+    let refusals: Vec<_> = bench
+        .events
+        .iter()
+        .filter(|(_, event)| matches!(event, Event::Refused { id: which, .. } if *which == id))
+        .map(|(at, _)| *at)
+        .collect();
+    assert!((3..=6).contains(&refusals.len()), "{refusals:?}");
+    assert_eq!(bench.state("T8"), "OP");
+    bench.segment.heal(bench.now, refused);
+    bench.run_for(Span::s(25));
+    assert_eq!(bench.state("T3"), "OP");
+    assert_eq!(count(&bench, |event| matches!(event, Event::AllReached)), 1);
+}
+
+#[test]
+fn one_of_thirty_frames_lost_does_not_stop_a_start() {
+    let mut bench = Bench::new(PLANT);
+    bench.tamper =
+        Some(Box::new(|number| if number % 31 == 0 { Fate::Lost } else { Fate::Arrives }));
+    bench.start(AlState::Op);
+    assert_eq!(count(&bench, |event| matches!(event, Event::DeviceLost { .. })), 0);
+    assert!(bench.device.statistics().frames_lost > 10);
+}
+
+#[test]
+fn stopping_leaves_all_in_the_state_that_was_asked_for() {
+    let mut bench = Bench::new(PLANT);
+    bench.start(AlState::Op);
+    bench.device.stop(bench.now, AlState::Init);
+    assert!(bench.run_until(Span::s(6), |event| matches!(event, Event::Stopped)));
+    for name in ["K1", "T3", "T8"] {
+        assert_eq!(bench.state(name), "INIT", "{name}");
+    }
+}
