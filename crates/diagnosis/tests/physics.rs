@@ -1,5 +1,7 @@
 //! Faults in the wires of a virtual segment, judged by the frames that come back and nothing else.
 
+#![allow(clippy::unwrap_used, clippy::wildcard_enum_match_arm, reason = "helpers of tests")]
+
 mod support;
 
 use linesman_config::fault::FaultName;
