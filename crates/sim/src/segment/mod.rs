@@ -101,7 +101,7 @@ impl Segment {
             return;
         }
         card.counts.tx_frames += 1;
-        let mut traveller = Traveller { frame, spoiled_by: None };
+        let mut traveller = Traveller::new(frame);
         match self.world.walk(path, now, &mut traveller) {
             Outcome::Arrived(path, at) => {
                 let number = traveller.frame.number;
