@@ -1,0 +1,17 @@
+//! The swarm's invariants. Two hundred seeds run in a release build: `linesman lab swarm`.
+
+use linesman_lab::swarm::{SwarmOptions, swarm};
+
+/// Seeds of this test, which also runs unoptimised.
+const SEEDS: std::ops::Range<u64> = 1..13;
+
+#[test]
+fn the_first_seeds_are_green() {
+    let report = swarm(SEEDS, &SwarmOptions::default(), |_| {});
+    let failed: Vec<String> = report.failed().map(ToString::to_string).collect();
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+    let (effective, all) = (report.with_effect(), report.seeds.len());
+    assert!(effective * 2 > all, "{effective} of {all} seeds had a fault with an effect");
+    let checked: u64 = report.seeds.iter().map(|seed| seed.counters_checked).sum();
+    assert!(checked > 1_000, "only {checked} working counters were checked");
+}
