@@ -148,7 +148,19 @@ impl MainDevice {
             Received::Foreign => self.statistics.frames_foreign += 1,
             Received::Echo => {}
         }
+        self.watch_ring();
         self.work(now);
+    }
+
+    fn watch_ring(&mut self) {
+        let ring_intact = self.exchange.ring_intact();
+        let mut shared = self.executor.shared();
+        if shared.ring_intact != ring_intact {
+            shared.ring_intact = ring_intact;
+            if let Some(intact) = ring_intact {
+                shared.events.push_back(Event::Ring { intact });
+            }
+        }
     }
 
     /// Time has come to `now`.

@@ -1,8 +1,6 @@
 //! Running a plant: to OP, process data both ways, faults and what becomes of them.
 
-mod bench;
-
-use bench::{Bench, Fate};
+use crate::bench::{Bench, Fate};
 use linesman_config::fault::FaultName;
 use linesman_maindevice::Event;
 use linesman_proto::state::AlState;

@@ -1,7 +1,5 @@
 //! A MainDevice and a virtual segment in virtual time.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
-
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{Plan, PlanOptions};
 use linesman_maindevice::{Event, MainDevice, Options};
