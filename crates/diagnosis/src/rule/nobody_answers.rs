@@ -35,6 +35,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// So many requests in a row without a return are no accident.
 const CERTAIN: u64 = 8;
+/// More in a row than noise takes from a line that still answers.
+const LONG: u64 = 32;
 /// With fewer, the end of the input may have cut off the answer.
 const FEW: u64 = 3;
 
@@ -99,6 +101,10 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     }
     if let Some(ended) = silence.ended {
         condition = condition.ended(ended);
+    }
+    if was_answered && (silence.ended.is_some() || silence.frames < LONG) {
+        // Frames that are damaged on their way are missing, too.
+        condition = condition.about([Symptom::FramesLost]);
     }
     let devices = line.devices.iter().map(|device| device.id);
     let follows = devices

@@ -18,9 +18,10 @@ use linesman_proto::address::RegisterAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
-use super::{Rule, RulePage, View};
+use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{AlChange, Device};
+use crate::line::{AlChange, Device, Line};
+use crate::locate::Drops;
 
 /// Back in INIT.
 pub const RESTARTED: RulePage = RulePage {
@@ -97,8 +98,28 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         {
             condition = condition.ended(at.at);
         }
+        if is_restart {
+            condition = condition.explaining(links_lost_with(view.line, device));
+        }
         conditions.push(advise(condition, is_restart, together.len()));
     }
+}
+
+/// What follows from a restart at the links of the device: without supply it has no link, so its
+/// neighbours lose theirs. Not so where a link was lost more often than the device restarted.
+fn links_lost_with(line: &Line, device: &Device) -> Vec<Symptom> {
+    let Some(tree) = &line.tree else { return Vec::new() };
+    let falls = device.al.changes.iter().filter(|change| change.is_own_fall()).count() as u64;
+    let mut follows = Vec::new();
+    for drops in Drops::all(line) {
+        let link = tree.links()[drops.link];
+        let ends = [link.upstream, link.downstream];
+        let is_its = ends.iter().any(|end| end.node() == Some(device.id.index()));
+        if is_its && drops.count <= falls {
+            follows.extend(link_lost::follows(line, tree, drops.link));
+        }
+    }
+    follows
 }
 
 fn is_near(one: &AlChange, other: &AlChange) -> bool {
