@@ -242,22 +242,21 @@ impl<'a> Episode<'a> {
             Place::Direction(_, End::Controller(..)) | Place::Link(..) | Place::Device(_) => true,
         };
         self.lab.truth().entries().iter().any(|entry| match entry {
-            Entry::Effect { fault: Some(id), place, effect, .. } if *id == fault.id => {
-                match effect {
-                    Effect::SymbolError => seen(place, false),
-                    Effect::FrameSpoiled { .. } => seen(place, true),
-                    Effect::FrameLost { .. }
-                    | Effect::ContentRefused { .. }
-                    | Effect::SignalLost
-                    | Effect::SignalBack
-                    | Effect::PowerLost
-                    | Effect::PowerBack
-                    | Effect::StateRefused { .. }
-                    | Effect::OldCounters
-                    | Effect::WrongDevice
-                    | Effect::MissingDevice => false,
-                }
-            }
+            Entry::Effect { fault: Some(id), place, effect, .. } if *id == fault.id => match effect
+            {
+                Effect::SymbolError => seen(place, false),
+                Effect::FrameSpoiled { .. } => seen(place, true),
+                Effect::FrameLost { .. }
+                | Effect::ContentRefused { .. }
+                | Effect::SignalLost
+                | Effect::SignalBack
+                | Effect::PowerLost
+                | Effect::PowerBack
+                | Effect::StateRefused { .. }
+                | Effect::OldCounters
+                | Effect::WrongDevice
+                | Effect::MissingDevice => false,
+            },
             Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => false,
         })
     }
