@@ -1,7 +1,14 @@
 //! MainDevice, segment and diagnosis in virtual time.
 //!
-//! [`verdict`] holds what was said against what was done; [`drawing`] shows the line.
+//! [`lab`] joins the three; [`story`] plays what Markdown tells, [`swarm`] what chance draws,
+//! [`demo`] what people want to see. [`verdict`] holds what was said against what was done,
+//! [`choice`] draws faults, [`drawing`] shows the line.
 
+pub mod choice;
+pub mod demo;
 pub mod drawing;
+pub mod lab;
+pub mod options;
 pub mod story;
+pub mod swarm;
 pub mod verdict;

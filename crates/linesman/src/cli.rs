@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{completion, diagnose, explain, interfaces, schema, sim};
+use crate::command::{completion, diagnose, explain, interfaces, scan, schema, sim};
 use crate::version::VERSION;
 
 /// The whole command line.
@@ -42,6 +42,8 @@ pub(crate) enum ColorChoice {
 /// The commands.
 #[derive(Subcommand, Debug)]
 pub(crate) enum Command {
+    /// Which SubDevices there are and how they are wired
+    Scan(scan::Arguments),
     /// What is wrong with a line: where, why, and what to do
     Diagnose(diagnose::Arguments),
     /// Network cards: link, driver, suitability, EtherCAT seen
@@ -60,6 +62,7 @@ impl Command {
     /// Whether the answer is to be JSON, a failure included.
     pub(crate) fn wants_json(&self) -> bool {
         match self {
+            Self::Scan(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
             Self::Explain(_) | Self::Sim(_) | Self::Schema(_) | Self::Completion(_) => false,

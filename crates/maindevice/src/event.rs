@@ -93,6 +93,12 @@ pub enum Event {
         /// Now.
         now: WorkingCounter,
     },
+    /// With two cards: frames go round the ring, or do so no longer. Told when it is first known, and
+    /// when it changes.
+    Ring {
+        /// Whether what card A sends arrives at card B.
+        intact: bool,
+    },
     /// A SubDevice's error counters have changed, or were read for the first time.
     Counters {
         /// Whose.

@@ -1,11 +1,13 @@
 //! Threads, selectors and recorders: what joins the cores to a real interface.
 //!
 //! [`selector`] says what a word like `eth0+eth1` means, wherever it is written; [`capture`] reads
-//! files, [`listen`] hears what is on a card,
+//! files, [`drive`] runs a
+//! MainDevice on cards, [`listen`] hears what is on a card,
 //! [`host_watch`] asks about a card, [`serve`] puts a segment on real
 //! interfaces, [`stop`] is the wish to stop.
 
 pub mod capture;
+pub mod drive;
 pub mod host_watch;
 pub mod listen;
 pub mod selector;

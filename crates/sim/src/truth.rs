@@ -13,8 +13,8 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
 
-pub(crate) use audit::Ledger;
 pub use audit::Unexplained;
+pub(crate) use audit::{Cause, Ledger};
 
 /// How many entries are kept; what comes later is counted in the [`FaultRecord`]s only, so that a
 /// segment may run for days.

@@ -26,7 +26,15 @@ fn main() -> Result<()> {
 async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
     let (transmit, receive, pdus) =
         STORAGE.try_split().map_err(|()| anyhow!("the storage is split already"))?;
-    let timeouts = Timeouts { pdu: Duration::from_millis(100), ..Timeouts::default() };
+    // The host is no real-time system, and may be busy: what is tried is the line, not the host.
+    let timeouts = Timeouts {
+        pdu: Duration::from_millis(200),
+        eeprom: Duration::from_secs(1),
+        mailbox_echo: Duration::from_secs(1),
+        mailbox_response: Duration::from_secs(2),
+        state_transition: Duration::from_secs(10),
+        ..Timeouts::default()
+    };
     let maindevice = MainDevice::new(pdus, timeouts, MainDeviceConfig::default());
     smol::spawn(tx_rx_task(interface, transmit, receive).context(interface.to_owned())?).detach();
 
@@ -41,8 +49,27 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
         devices.push([identity.vendor_id, identity.product_id, identity.revision]);
         names.push(subdevice.name().to_owned());
     }
-    let group =
-        group.into_op(&maindevice).await.map_err(|error| anyhow!("on the way to OP: {error:?}"))?;
+    let group = group
+        .into_safe_op(&maindevice)
+        .await
+        .map_err(|error| anyhow!("on the way to SAFEOP: {error:?}"))?;
+    // SubDevices with outputs want process data before they go to OP, so it is not waited for here.
+    let group = group
+        .request_into_op(&maindevice)
+        .await
+        .map_err(|error| anyhow!("on the way to OP: {error:?}"))?;
+    let mut tries = 0;
+    loop {
+        let answer = group.tx_rx(&maindevice).await;
+        if answer.is_ok_and(|answer| answer.all_op()) {
+            break;
+        }
+        tries += 1;
+        if tries > 2000 {
+            return Err(anyhow!("OP is not reached after {tries} exchanges"));
+        }
+        smol::Timer::after(cycle).await;
+    }
 
     let mut wkc = 0;
     let mut complete = 0_u64;
@@ -67,7 +94,6 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
     let result = serde_json::json!({
         "devices": devices,
         "names": names,
-        // `into_op` has waited until every SubDevice said so.
         "state": "OP",
         "expected_wkc": wkc,
         "cycles": cycles,

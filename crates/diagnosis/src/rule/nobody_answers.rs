@@ -35,6 +35,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// So many requests in a row without a return are no accident.
 const CERTAIN: u64 = 8;
+/// More in a row than noise takes from a line that still answers.
+const LONG: u64 = 32;
 /// With fewer, the end of the input may have cut off the answer.
 const FEW: u64 = 3;
 
@@ -101,13 +103,15 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     if let Some(ended) = silence.ended {
         condition = condition.ended(ended);
     }
+    // Frames that are damaged on their way are missing, too, and a few in a row may be noise.
+    let may_be_noise = was_answered && (silence.ended.is_some() || silence.frames < LONG);
+    let symptom = if may_be_noise { Symptom::FramesLost } else { Symptom::NobodyAnswers };
+    condition = condition.about([symptom]);
     let devices = line.devices.iter().map(|device| device.id);
     let follows = devices
         .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
     condition = condition.explaining(follows);
-    condition = condition
-        .explaining([Symptom::FramesLost, Symptom::NoCarrier])
-        .about([Symptom::NobodyAnswers]);
+    condition = condition.explaining([Symptom::FramesLost, Symptom::NoCarrier]);
     advise(condition, carrier)
 }
 

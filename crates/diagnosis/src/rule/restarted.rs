@@ -19,14 +19,14 @@ use std::collections::BTreeSet;
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, RegisterAddress};
-use linesman_proto::port::Port;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
-use super::{Rule, RulePage, View};
+use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::line::{AlChange, Device, Line, Seen};
+use crate::locate::Drops;
 
 /// Back in INIT.
 pub const RESTARTED: RulePage = RulePage {
@@ -198,19 +198,7 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
 
 /// All that a device without power brings about.
 fn consequences(line: &Line, id: DeviceId) -> Vec<Symptom> {
-    let mut follows = vec![Symptom::FramesLost, Symptom::CardErrors];
-    for port in Port::ALL {
-        follows.extend([Symptom::LinkDown(id, port), Symptom::PortErrors(id, port)]);
-        match line.opposite(id, port) {
-            Some(End::Controller(other, port)) => {
-                follows.extend([Symptom::LinkDown(other, port), Symptom::PortErrors(other, port)]);
-            }
-            Some(End::MainDevice(_)) => {
-                follows.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
-            }
-            None => {}
-        }
-    }
+    let mut follows = links_lost_with(line, id);
     follows.extend([Symptom::Silent(id), Symptom::WorkingCounter(id)]);
     if let Some(tree) = line.tree.as_ref().filter(|tree| id.index() < tree.len()) {
         for behind in tree.subtree(id.index()).iter().map(|node| DeviceId(*node as u32)) {
@@ -221,6 +209,28 @@ fn consequences(line: &Line, id: DeviceId) -> Vec<Symptom> {
                     Symptom::StateLost(behind),
                 ]);
             }
+        }
+        if tree.upstream(id.index()).is_some_and(|end| end.node().is_none()) {
+            follows.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
+        }
+    }
+    // Its own fall is what it is about, not what follows.
+    follows.retain(|symptom| *symptom != Symptom::StateLost(id));
+    follows
+}
+
+/// What follows from a restart at the links of the device: without supply it has no link, so its
+/// neighbours lose theirs. Not so where a link was lost more often than the device restarted.
+fn links_lost_with(line: &Line, id: DeviceId) -> Vec<Symptom> {
+    let (Some(tree), Some(device)) = (&line.tree, line.device(id)) else { return Vec::new() };
+    let falls = device.al.changes.iter().filter(|change| change.is_own_fall()).count() as u64;
+    let mut follows = Vec::new();
+    for drops in Drops::all(line) {
+        let link = tree.links()[drops.link];
+        let ends = [link.upstream, link.downstream];
+        let is_its = ends.iter().any(|end| end.node() == Some(id.index()));
+        if is_its && drops.count <= falls {
+            follows.extend(link_lost::follows(line, tree, drops.link));
         }
     }
     follows

@@ -28,7 +28,9 @@
 //! they stand.
 
 pub mod parse;
+pub mod run;
 pub mod step;
 
 pub use parse::{Front, SegmentText, Story, StoryError};
+pub use run::{StepReport, StoryReport, exit_status, play};
 pub use step::{Expectation, Heal, Step, StepAt, What};

@@ -1,10 +1,11 @@
 //! The steps of a story and their grammar.
 //!
 //! ```text
-//! [at TIME] inject FAULT at PLACE [with KEY = VALUE, …]
-//! [at TIME] inject FAULT at device NAME [with …]
+//! [at TIME] inject FAULT at PLACE [for TIME] [with KEY = VALUE, …]
+//! [at TIME] inject FAULT at device NAME [for TIME] [with …]
 //! [at TIME] heal [FAULT]
 //! at TIME
+//! [at TIME] expect verdict [on FAULT] [within TIME]
 //! [at TIME] expect finding CODE|FAULT [at PLACE] [within TIME]
 //! [at TIME] expect no finding [CODE|FAULT]
 //! [at TIME] expect N finding(s)
@@ -37,8 +38,13 @@ pub struct StepAt {
 pub enum Step {
     /// Time passes.
     Wait,
-    /// A fault begins: the text of a `[[fault]]` entry of a segment file.
-    Inject(String),
+    /// A fault begins.
+    Inject {
+        /// The text of a `[[fault]]` entry of a segment file.
+        entry: String,
+        /// When it ends by itself; `None` for never.
+        lasts: Option<Span>,
+    },
     /// Faults end.
     Heal(Heal),
     /// Something must be so.
@@ -71,6 +77,9 @@ pub enum What {
 /// What must be so.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Expectation {
+    /// There is a finding whose place and cause fit what was injected, as far as evidence can
+    /// tell; of this fault, or of each that acts.
+    Verdict(Option<FaultName>),
     /// There is a finding, not a consequence of another, with this code or cause.
     Finding {
         /// Its code or cause.
@@ -101,7 +110,7 @@ pub(crate) fn parse(text: &str) -> Result<(Option<Span>, Step), String> {
     let at = if words.take("at") { Some(words.time()?) } else { None };
     let step = match words.next() {
         "" if at.is_some() => Step::Wait,
-        "inject" => Step::Inject(inject(&mut words)?),
+        "inject" => inject(&mut words)?,
         "heal" => match words.next() {
             "" | "all" => Step::Heal(Heal::All),
             name => Step::Heal(Heal::Named(fault(name)?)),
@@ -120,7 +129,7 @@ pub(crate) fn parse(text: &str) -> Result<(Option<Span>, Step), String> {
     }
 }
 
-fn inject(words: &mut Words<'_>) -> Result<String, String> {
+fn inject(words: &mut Words<'_>) -> Result<Step, String> {
     let name = fault(words.next())?;
     let mut entry = format!("kind = \"{name}\"\n");
     if !words.take("at") {
@@ -129,6 +138,10 @@ fn inject(words: &mut Words<'_>) -> Result<String, String> {
     let (place, parameters) = match words.rest.split_once(" with ") {
         Some((place, parameters)) => (place, Some(parameters)),
         None => (words.rest, None),
+    };
+    let (place, lasts) = match place.rsplit_once(" for ") {
+        Some((place, time)) => (place, Some(Words { rest: time.trim() }.time()?)),
+        None => (place, None),
     };
     match place.trim().strip_prefix("device ") {
         Some(device) => entry += &format!("device = {:?}\n", device.trim()),
@@ -139,7 +152,7 @@ fn inject(words: &mut Words<'_>) -> Result<String, String> {
         entry.push('\n');
     }
     words.rest = "";
-    Ok(entry)
+    Ok(Step::Inject { entry, lasts })
 }
 
 /// Splits `a = 1, b = ["x", "y"]` at the commas between parameters.
@@ -164,7 +177,7 @@ fn split_outside_brackets(text: &str) -> Vec<&str> {
 fn expect(words: &mut Words<'_>) -> Result<Step, String> {
     let within = match words.rest.rsplit_once(" within ") {
         Some((rest, time)) => {
-            words.rest = rest;
+            words.rest = rest.trim_end();
             Words { rest: time.trim() }.time()?
         }
         None => Span::ZERO,
@@ -174,6 +187,10 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             let what = named(words.next())?;
             let place = words.take("at").then(|| std::mem::take(&mut words.rest).to_owned());
             Expectation::Finding { what, place }
+        }
+        "verdict" => {
+            let on = words.take("on").then(|| fault(words.next())).transpose()?;
+            Expectation::Verdict(on)
         }
         "no" => {
             words.expect("finding")?;
@@ -197,7 +214,7 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
         other => {
             let count = other.parse().map_err(|_| {
                 format!(
-                    "`{other}` cannot be expected: expected `finding`, `no finding`, `N findings`, \
+                    "`{other}` cannot be expected: expected `verdict`, `finding`, `no finding`, `N findings`, \
                      `healthy`, `inconclusive`, `all closed`, `line up` or `exit N`"
                 )
             })?;
@@ -276,14 +293,15 @@ mod tests {
         let (at, step) =
             read("at 2 s: inject `emc-noise` at `K1.C>B3.A` with hits = 10, also = [\"a\", \"b\"]");
         assert_eq!(at, Some(Span::s(2)));
-        let Step::Inject(entry) = step else { panic!("{step:?}") };
+        let Step::Inject { entry, lasts: None } = step else { panic!("{step:?}") };
         assert_eq!(
             entry,
             "kind = \"emc-noise\"\nat = \"K1.C>B3.A\"\nhits = 10\nalso = [\"a\", \"b\"]\n"
         );
-        let (at, step) = read("inject device-off at device K1");
+        let (at, step) = read("inject device-off at device K1 for 20 ms");
         assert_eq!(at, None);
-        assert_eq!(step, Step::Inject("kind = \"device-off\"\ndevice = \"K1\"\n".to_owned()));
+        let entry = "kind = \"device-off\"\ndevice = \"K1\"\n".to_owned();
+        assert_eq!(step, Step::Inject { entry, lasts: Some(Span::ms(20)) });
     }
 
     #[test]
@@ -299,6 +317,12 @@ mod tests {
             (
                 "expect finding device-off at device K1",
                 finding(What::Cause(FaultName::DeviceOff), "device K1"),
+                Span::ZERO,
+            ),
+            ("expect verdict within 1 s", Expectation::Verdict(None), Span::s(1)),
+            (
+                "expect verdict on device-off",
+                Expectation::Verdict(Some(FaultName::DeviceOff)),
                 Span::ZERO,
             ),
             ("expect no finding", Expectation::NoFinding(None), Span::ZERO),

@@ -5,6 +5,7 @@
 
 use linesman_config::fault::FaultName::{self, *};
 use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::port::Port;
 use linesman_proto::topology::{End, Tree};
 
 use super::site::{Site, named};
@@ -65,6 +66,7 @@ const LAST_HOP: &str = "on the last hop a card counts bad frames but no symbols"
 const UNCOUNTED: &str = "without the card's counters frames that the card drops just do not come \
                          back";
 const MII: &str = "between its PHY and its controller the receiver may spoil what came clean";
+const MAY_COME_AGAIN: &str = "an opening that is over may have been the first of many";
 const ONCE: &str = "each opening of a flapping contact is an open link";
 const RESTART: &str = "a dip of a supply and a short time without power are the same to a device";
 const SHARED: &str = "one device of a supply looks the same from outside as a supply of one device";
@@ -100,36 +102,33 @@ impl Set<'_> {
         match place {
             TruthPlace::Link(one, other) => {
                 self.add(name, Site::link(tree, one, other), None);
-                match name {
-                    LinkOpen => self.open(one, other),
-                    LinkFlapping => {
-                        self.add(LinkOpen, Site::link(tree, one, other), Some(ONCE));
-                        self.open(one, other);
-                    }
-                    CableDegraded | EmcNoise => {
-                        self.symbols(one, other);
-                        self.symbols(other, one);
-                    }
-                    _ => {}
+                if name == LinkFlapping {
+                    self.add(LinkOpen, Site::link(tree, one, other), Some(ONCE));
+                }
+                if matches!(name, LinkOpen | LinkFlapping) {
+                    self.open(one, other);
+                }
+                if matches!(name, CableDegraded | EmcNoise) {
+                    self.symbols(one, other);
+                    self.symbols(other, one);
                 }
             }
             TruthPlace::Hop(from, to) => {
                 self.add(name, Site::hop(tree, from, to), None);
-                match name {
-                    TransmitterDamaged => self.end(name, from, None),
-                    ReceiverDamaged => self.end(name, to, None),
-                    _ => {}
+                if matches!(name, TransmitterDamaged | DeviceInternal) {
+                    self.end(name, from, None);
                 }
-                match name {
-                    DeviceInternal => {
-                        self.end(name, from, None);
-                        self.clean(from, to);
-                    }
-                    CableDegraded | EmcNoise | TransmitterDamaged | ReceiverDamaged => {
-                        self.symbols(from, to);
-                    }
-                    NicDamaged => self.card(from, to),
-                    _ => {}
+                if name == ReceiverDamaged {
+                    self.end(name, to, None);
+                }
+                if name == DeviceInternal {
+                    self.clean(from, to);
+                }
+                if name == NicDamaged {
+                    self.card(from, to);
+                }
+                if matches!(name, CableDegraded | EmcNoise | TransmitterDamaged | ReceiverDamaged) {
+                    self.symbols(from, to);
                 }
             }
             TruthPlace::Device(id) => {
@@ -139,11 +138,10 @@ impl Set<'_> {
             TruthPlace::Host(path) => {
                 self.add(name, Site::Host, None);
                 let card = End::MainDevice(path);
-                if let Some(far) = opposite(tree, card) {
-                    if name == NicDamaged {
-                        self.card(card, far);
-                        self.card(far, card);
-                    }
+                let far = opposite(tree, card).filter(|_| name == NicDamaged);
+                if let Some(far) = far {
+                    self.card(card, far);
+                    self.card(far, card);
                 }
             }
         }
@@ -164,6 +162,9 @@ impl Set<'_> {
         else {
             return;
         };
+        if self.scene.answered_again {
+            self.add(LinkFlapping, Site::link(tree, one, other), Some(MAY_COME_AGAIN));
+        }
         // In a ring both neighbours of a dead device see it; a cut shows at two live ends.
         if tree.closes_at().is_none() && !self.scene.answered_again {
             self.add(DeviceOff, Site::Device(behind), Some(SILENT));
@@ -210,59 +211,63 @@ impl Set<'_> {
     }
 
     fn device(&mut self, truth: &Truth, id: DeviceId) {
-        let tree = self.scene.tree;
-        match truth.name {
-            DeviceOff | SupplyOff | BrownOut => {
-                for cause in [DeviceOff, SupplyOff, BrownOut] {
-                    let why = if cause == SupplyOff || truth.name == SupplyOff {
-                        SHARED
-                    } else {
-                        RESTART
-                    };
-                    // A dip is over by its nature: one that lasts is no dip.
-                    if cause != BrownOut || self.scene.answered_again {
-                        self.add(cause, Site::Device(id), Some(why));
-                    }
-                }
-                if let (Some(above), false) = (Site::above(tree, id), self.scene.answered_again) {
-                    self.add(LinkOpen, above, Some(SILENT));
-                    self.add(DeviceOff, above, Some(SILENT));
-                }
+        let name = truth.name;
+        if matches!(name, DeviceOff | SupplyOff | BrownOut) {
+            self.unpowered(name, id);
+        }
+        if name == DeviceInternal {
+            for (here, far) in self.links_of(id) {
+                self.add(DeviceInternal, Site::hop(self.scene.tree, here, far), None);
+                self.clean(here, far);
             }
-            DeviceInternal => {
-                let node = id.index();
-                for port in linesman_proto::port::Port::ALL {
-                    let from = End::Controller(id, port);
-                    if let Some(to) = opposite(tree, from) {
-                        self.add(DeviceInternal, Site::hop(tree, from, to), None);
-                        self.clean(from, to);
-                    }
-                }
-                debug_assert!(node < tree.len());
+        }
+        if name == TransmitterDamaged {
+            for (here, far) in self.links_of(id) {
+                self.symbols(here, far);
             }
-            TransmitterDamaged | ReceiverDamaged => {
-                for port in linesman_proto::port::Port::ALL {
-                    let here = End::Controller(id, port);
-                    if let Some(far) = opposite(tree, here) {
-                        match truth.name {
-                            TransmitterDamaged => self.symbols(here, far),
-                            _ => self.symbols(far, here),
-                        }
-                    }
-                }
+        }
+        if name == ReceiverDamaged {
+            for (here, far) in self.links_of(id) {
+                self.symbols(far, here);
             }
-            InitRefused => {
-                if truth.al_code.is_some_and(is_configuration) {
-                    self.add(ConfigMismatch, Site::Device(id), Some(CODE));
-                }
-                if truth.al_code == Some(0x001B) {
-                    self.add(WatchdogStarved, Site::Device(id), Some(CODE));
-                }
+        }
+        if name == InitRefused {
+            if truth.al_code.is_some_and(is_configuration) {
+                self.add(ConfigMismatch, Site::Device(id), Some(CODE));
             }
-            _ => {}
+            if truth.al_code == Some(OUTPUT_WATCHDOG) {
+                self.add(WatchdogStarved, Site::Device(id), Some(CODE));
+            }
         }
     }
+
+    /// A device that is, or was, without supply.
+    fn unpowered(&mut self, name: FaultName, id: DeviceId) {
+        let shared = |cause| if cause == SupplyOff || name == SupplyOff { SHARED } else { RESTART };
+        for cause in [DeviceOff, SupplyOff] {
+            self.add(cause, Site::Device(id), Some(shared(cause)));
+        }
+        if self.scene.answered_again {
+            self.add(BrownOut, Site::Device(id), Some(shared(BrownOut)));
+            return;
+        }
+        // A dip is over by its nature: one that lasts is no dip, but may be a cut.
+        if let Some(above) = Site::above(self.scene.tree, id) {
+            self.add(LinkOpen, above, Some(SILENT));
+            self.add(DeviceOff, above, Some(SILENT));
+        }
+    }
+
+    /// The links of a device, its own end first.
+    fn links_of(&self, id: DeviceId) -> Vec<(End<DeviceId>, End<DeviceId>)> {
+        let here = Port::ALL.map(|port| End::Controller(id, port));
+        let links = here.iter().map(|here| (*here, opposite(self.scene.tree, *here)));
+        links.filter_map(|(here, far)| far.map(|far| (here, far))).collect()
+    }
 }
+
+/// AL status code of an expired SyncManager watchdog. Reference: ETG.1000.6, AL status codes.
+const OUTPUT_WATCHDOG: u16 = 0x001B;
 
 /// AL status codes that blame what the MainDevice configured: mailbox and process data
 /// SyncManagers, mappings, watchdog. Reference: ETG.1000.6, AL status codes.

@@ -5,21 +5,13 @@
 //! What is admitted follows from physics ([`admit`]), never from what the diagnosis likes to say.
 
 pub mod admit;
+pub mod claim;
+pub mod judge;
 pub mod site;
 
-use linesman_config::fault::FaultName;
-
-pub use admit::{Admitted, Scene, Truth};
+pub use admit::{Admitted, Scene, Truth, TruthPlace};
+pub use claim::Claim;
 pub use site::{Site, Way};
-
-/// What a diagnosis says: one cause at one place.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Claim {
-    /// The cause.
-    pub cause: FaultName,
-    /// Where.
-    pub site: Site,
-}
 
 /// How well a claim fits.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]

@@ -12,7 +12,6 @@ use linesman_diagnosis::{Engine, Setup};
 use linesman_proto::address::Network;
 use linesman_proto::time::Instant;
 use linesman_runtime::selector::Selector;
-use linesman_runtime::stop::Stop;
 
 use self::follow::Follower;
 use crate::exit::Status;
@@ -111,11 +110,6 @@ impl Session {
         }
         status(&diagnosis)
     }
-}
-
-/// The wish to stop.
-fn stop() -> Result<Stop, Failure> {
-    Stop::on_signals().map_err(|error| Failure::new(format!("listening for Ctrl-C: {error}"), ""))
 }
 
 /// The diagnosis as text.

@@ -2,8 +2,10 @@
 
 pub(crate) mod completion;
 pub(crate) mod diagnose;
+pub(crate) mod driven;
 pub(crate) mod explain;
 pub(crate) mod interfaces;
+pub(crate) mod scan;
 pub(crate) mod schema;
 pub(crate) mod sim;
 
@@ -15,6 +17,7 @@ use crate::output::Output;
 /// Does what was asked.
 pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failure> {
     match command {
+        Command::Scan(arguments) => scan::run(&arguments, output),
         Command::Diagnose(arguments) => diagnose::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
         Command::Explain(arguments) => explain::run(&arguments, output),

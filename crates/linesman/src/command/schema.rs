@@ -7,6 +7,7 @@ use schemars::{Schema, schema_for};
 
 use super::diagnose::follow::EventReport;
 use super::interfaces;
+use super::scan::report::Scan;
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::output::Output;
@@ -26,6 +27,8 @@ pub(crate) enum Name {
     Segment,
     /// What was planned (TOML)
     Project,
+    /// `scan --json`
+    Scan,
     /// `diagnose --json`
     Diagnosis,
     /// A line of `diagnose --follow --json`
@@ -46,6 +49,7 @@ fn schema(name: Name) -> Schema {
     match name {
         Name::Segment => schema_for!(SegmentFile),
         Name::Project => schema_for!(Project),
+        Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),
         Name::Interfaces => schema_for!(interfaces::Report),

@@ -6,9 +6,9 @@ use linesman_lab::drawing;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::selector::Selector;
 use linesman_runtime::serve::{Served, Server};
-use linesman_runtime::stop::Stop;
 use linesman_runtime::wiring::Wiring;
 
+use super::driven;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files::Plant;
@@ -38,8 +38,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     };
     let plant = Plant::open(&arguments.segment)?;
     let until = until(arguments.seconds)?;
-    let stop = Stop::on_signals()
-        .map_err(|error| Failure::new(format!("listening for Ctrl-C: {error}"), ""))?;
+    let stop = driven::stop()?;
     for row in drawing::draw(plant.segment.tree(), &labels(&plant)) {
         output.line(&row.text);
     }

@@ -70,6 +70,8 @@ pub(crate) struct Exchange {
     acyclic_out: usize,
     number: u32,
     patience: Span,
+    /// Whether what card A sends arrives at card B: `None` before the first frame, or with one card.
+    ring_intact: Option<bool>,
 }
 
 impl Exchange {
@@ -77,13 +79,14 @@ impl Exchange {
         Self {
             sources,
             paths: [true, ring],
-            slots: (0..SLOTS).map(|_| Slot::default()).collect(),
+            slots: (0..SLOTS).map(|_| Slot::new()).collect(),
             waiting: Vec::with_capacity(SLOTS),
             outgoing: VecDeque::with_capacity(2 * SLOTS),
             queue: VecDeque::new(),
             acyclic_out: 0,
             number: 0,
             patience,
+            ring_intact: None,
         }
     }
 
@@ -119,7 +122,7 @@ impl Exchange {
         let deadline = now + self.patience;
         let mut queue = std::mem::take(&mut self.queue);
         let sent = self.send(now, deadline, Purpose::Acyclic, |builder, slot, index| {
-            queue::pack(builder, &mut queue, &mut slot.requests, MAX_ACYCLIC_DATAGRAMS, index);
+            queue::pack(builder, &mut queue, slot.requests, MAX_ACYCLIC_DATAGRAMS, index);
         });
         self.queue = queue;
         if sent.is_some() {
@@ -203,7 +206,7 @@ impl Exchange {
         let Some(Ok(first)) = first else { return Received::Foreign };
         let at = usize::from(first.index());
         let slot = &mut self.slots[at];
-        if slot.state == SlotState::Free || !slot.matches(frame, sender) {
+        if slot.state == SlotState::Free || frame.len() > MAX_LEN || !slot.matches(frame, sender) {
             return Received::Foreign;
         }
         let unmarked = ethernet::source(frame).is_some_and(|source| !source.is_marked());
@@ -221,6 +224,9 @@ impl Exchange {
             return Received::Duplicate;
         }
         slot.arrived[copy] = true;
+        if self.paths[Path::B.index()] && sender == Path::A {
+            self.ring_intact = Some(path == Path::B);
+        }
         if slot.reply.is_empty() {
             slot.reply.extend_from_slice(frame);
         } else {
@@ -280,6 +286,10 @@ impl Exchange {
     /// Forgets all datagrams of procedures that have not been sent yet.
     pub(crate) fn forget(&mut self, cancelled: impl Fn(Ticket) -> bool) {
         self.queue.retain(|queued| !cancelled(queued.ticket));
+    }
+
+    pub(crate) fn ring_intact(&self) -> Option<bool> {
+        self.ring_intact
     }
 
     pub(crate) fn slot(&self, at: usize) -> &Slot {

@@ -2,6 +2,7 @@
 
 use linesman_proto::address::Path;
 use linesman_proto::command::{Addressing, Command};
+use linesman_proto::ethernet::MAX_LEN;
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, FrameView, WKC_LEN};
 use linesman_proto::time::Instant;
 
@@ -53,13 +54,14 @@ pub(crate) struct Slot {
     pub(crate) requests: Vec<Queued>,
 }
 
-impl Default for Slot {
-    fn default() -> Self {
+impl Slot {
+    /// A slot with room for the longest frame, so that using it allocates nothing.
+    pub(crate) fn new() -> Self {
         Self {
             state: SlotState::Free,
             purpose: Purpose::Acyclic,
-            sent: Vec::new(),
-            reply: Vec::new(),
+            sent: Vec::with_capacity(MAX_LEN),
+            reply: Vec::with_capacity(MAX_LEN),
             sent_at: Instant::ZERO,
             deadline: Instant::MAX,
             outstanding: [false; 2],
@@ -67,9 +69,7 @@ impl Default for Slot {
             requests: Vec::new(),
         }
     }
-}
 
-impl Slot {
     /// Whether `reply` is a copy of this frame that card `sender` sent, come back from the line:
     /// the same datagrams with the same marks.
     pub(crate) fn matches(&self, reply: &[u8], sender: Path) -> bool {

@@ -1,1 +1,181 @@
+//! Slots against frames made by hand: an answering line of a few bytes.
 
+use linesman_proto::address::{RegisterAddress, StationAddress};
+use linesman_proto::ethernet::SOURCE_MARK;
+
+use super::*;
+
+const SOURCES: [MacAddress; 2] =
+    [MacAddress([0x00, 1, 2, 3, 4, 0xA]), MacAddress([0x00, 1, 2, 3, 4, 0xB])];
+const NOW: Instant = Instant::ZERO;
+
+fn exchange(ring: bool) -> Exchange {
+    Exchange::new(SOURCES, ring, Span::ms(10))
+}
+
+fn queued(ticket: u64, request: Request) -> Queued {
+    Queued { ticket: Ticket(ticket), request, frames: 0 }
+}
+
+fn read(station: u16, repeats: u8) -> Request {
+    let target = Target::Station(StationAddress(station));
+    Request::read(target, RegisterAddress(0x0130), 2).repeated(repeats)
+}
+
+/// Sends all that is queued and gives the frames by card.
+fn transmit(exchange: &mut Exchange) -> Vec<(Path, Vec<u8>)> {
+    exchange.send_acyclic(NOW);
+    let mut buffer = vec![0; MAX_LEN];
+    let mut frames = Vec::new();
+    while let Some(Transmit { path, len, .. }) = exchange.poll_transmit(NOW, &mut buffer) {
+        frames.push((path, buffer[..len].to_vec()));
+    }
+    frames
+}
+
+/// A frame as it comes back: marked, with data and working counter at the first datagram.
+fn answered(frame: &[u8], data: [u8; 2], wkc: u8) -> Vec<u8> {
+    let mut back = frame.to_vec();
+    back[6] |= SOURCE_MARK;
+    back[26..28].copy_from_slice(&data);
+    back[28] = wkc;
+    back
+}
+
+fn reply_of(exchange: &Exchange, slot: usize) -> ([u8; 2], u8) {
+    let reply = &exchange.slot(slot).reply;
+    ([reply[26], reply[27]], reply[28])
+}
+
+#[test]
+fn datagrams_of_many_share_a_frame() {
+    let mut exchange = exchange(false);
+    for ticket in 0..20 {
+        exchange.submit(queued(ticket, read(0x1001, 0))).unwrap();
+    }
+    let frames = transmit(&mut exchange);
+    assert_eq!(frames.len(), 1);
+    // 14 + 2 + 15 x (10 + 2 + 2) bytes.
+    assert_eq!(frames[0].1.len(), 16 + 15 * 14);
+    assert!(exchange.has_queued());
+    let Received::Complete(slot) = exchange.receive(Path::A, &answered(&frames[0].1, [8, 0], 1))
+    else {
+        panic!()
+    };
+    let tickets: Vec<u64> = exchange.take_requests(slot).iter().map(|it| it.ticket.0).collect();
+    assert_eq!(tickets, (0..15).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_no_frame_can_carry_is_given_back() {
+    let mut exchange = exchange(false);
+    let target = Target::Station(StationAddress(1));
+    let long = Request::read(target, RegisterAddress(0x1000), 1487);
+    assert!(exchange.submit(queued(0, long)).is_err());
+}
+
+#[test]
+fn lost_late_duplicate_foreign_and_echo() {
+    let mut exchange = exchange(false);
+    exchange.submit(queued(1, read(0x1001, 0))).unwrap();
+    let (_, frame) = transmit(&mut exchange).remove(0);
+    assert_eq!(exchange.receive(Path::A, &frame), Received::Echo);
+    let good = answered(&frame, [8, 0], 1);
+    let mut other_source = good.clone();
+    other_source[11] = 0x77;
+    assert_eq!(exchange.receive(Path::A, &other_source), Received::Foreign);
+    let mut other_register = good.clone();
+    other_register[20] = 0x34;
+    assert_eq!(exchange.receive(Path::A, &other_register), Received::Foreign);
+    assert_eq!(exchange.receive(Path::A, &good), Received::Complete(0));
+    assert_eq!(exchange.receive(Path::A, &good), Received::Duplicate);
+
+    exchange.submit(queued(2, read(0x1001, 0))).unwrap();
+    let (_, frame) = transmit(&mut exchange).remove(0);
+    assert_eq!(exchange.poll_timeout(), Some(NOW + Span::ms(10)));
+    assert_eq!(exchange.expire(NOW + Span::ms(9)), None);
+    assert_eq!(exchange.expire(NOW + Span::ms(10)), Some(1));
+    assert_eq!(exchange.slot(1).state, SlotState::GivenUp);
+    assert_eq!(exchange.receive(Path::A, &answered(&frame, [8, 0], 1)), Received::Late);
+}
+
+#[test]
+fn a_lost_datagram_is_sent_as_often_as_it_may() {
+    let mut exchange = exchange(false);
+    exchange.submit(queued(1, read(0x1001, 2))).unwrap();
+    for attempt in 1..=3 {
+        assert_eq!(transmit(&mut exchange).len(), 1, "attempt {attempt}");
+        let slot = exchange.expire(NOW + Span::ms(10)).unwrap();
+        let queued = exchange.take_requests(slot).remove(0);
+        assert_eq!(queued.frames, attempt);
+        assert_eq!(exchange.again(queued).is_some(), attempt == 3);
+    }
+}
+
+#[test]
+fn a_slot_that_waits_is_passed_over() {
+    let mut exchange = exchange(false);
+    exchange.submit(queued(0, read(0x1001, 0))).unwrap();
+    transmit(&mut exchange);
+    for ticket in 1..300 {
+        exchange.submit(queued(ticket, read(0x1001, 0))).unwrap();
+        let (_, frame) = transmit(&mut exchange).remove(0);
+        let back = answered(&frame, [8, 0], 1);
+        let Received::Complete(slot) = exchange.receive(Path::A, &back) else { panic!() };
+        assert_ne!(slot, 0);
+    }
+    assert_eq!(exchange.slot(0).state, SlotState::Waiting);
+}
+
+#[test]
+fn two_copies_of_an_intact_ring() {
+    let mut exchange = exchange(true);
+    exchange.submit(queued(1, read(0x1001, 0))).unwrap();
+    let frames = transmit(&mut exchange);
+    assert_eq!(frames.iter().map(|(path, _)| *path).collect::<Vec<_>>(), [Path::A, Path::B]);
+    assert_eq!(frames[1].1[6..12], SOURCES[1].0);
+    // The copy of card A went through all and comes in at card B; the other one went by.
+    let first = answered(&frames[0].1, [8, 0], 1);
+    assert_eq!(exchange.receive(Path::B, &first), Received::FirstCopy);
+    assert_eq!(exchange.receive(Path::A, &frames[1].1), Received::Complete(0));
+    assert_eq!(reply_of(&exchange, 0), ([8, 0], 1));
+}
+
+#[test]
+fn two_copies_of_a_broken_ring() {
+    let mut exchange = exchange(true);
+    let all = Request::read(Target::All, RegisterAddress(0x0130), 2);
+    exchange.submit(queued(1, all)).unwrap();
+    let frames = transmit(&mut exchange);
+    // Three on the side of card A are in OP, two on the other one in SAFEOP.
+    exchange.receive(Path::A, &answered(&frames[0].1, [8, 0], 3));
+    assert_eq!(
+        exchange.receive(Path::B, &answered(&frames[1].1, [4, 0], 2)),
+        Received::Complete(0)
+    );
+    assert_eq!(reply_of(&exchange, 0), ([0x0C, 0], 5));
+}
+
+#[test]
+fn one_copy_is_enough_when_the_other_does_not_come() {
+    let mut exchange = exchange(true);
+    exchange.submit(queued(1, read(0x1001, 0))).unwrap();
+    let frames = transmit(&mut exchange);
+    exchange.receive(Path::A, &answered(&frames[0].1, [4, 0], 1));
+    assert_eq!(exchange.expire(NOW + Span::ms(10)), Some(0));
+    assert_eq!(exchange.slot(0).state, SlotState::Answered);
+    assert_eq!(reply_of(&exchange, 0), ([4, 0], 1));
+}
+
+#[test]
+fn card_b_asks_nobody_by_position() {
+    let mut exchange = exchange(true);
+    let target = Target::Position(linesman_proto::address::Position(2));
+    exchange.submit(queued(1, Request::read(target, RegisterAddress(0x0130), 2))).unwrap();
+    let frames = transmit(&mut exchange);
+    assert_eq!((frames[0].1[16], frames[1].1[16]), (1, 0), "APRD and NOP");
+    exchange.receive(Path::B, &frames[1].1);
+    let back = answered(&frames[0].1, [2, 0], 1);
+    assert_eq!(exchange.receive(Path::A, &back), Received::Complete(0));
+    assert_eq!(reply_of(&exchange, 0), ([2, 0], 1));
+}

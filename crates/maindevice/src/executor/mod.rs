@@ -39,6 +39,8 @@ pub(crate) struct Answer {
 /// What tasks and the engine share.
 pub(crate) struct Shared {
     pub(crate) now: Instant,
+    /// Whether what card A sends arrives at card B.
+    pub(crate) ring_intact: Option<bool>,
     pub(crate) next_ticket: u64,
     pub(crate) submitted: VecDeque<(Ticket, Request)>,
     pub(crate) cancelled: Vec<Ticket>,
@@ -89,6 +91,7 @@ impl Executor {
     pub(crate) fn new() -> Self {
         let shared = Shared {
             now: Instant::ZERO,
+            ring_intact: None,
             next_ticket: 0,
             submitted: VecDeque::new(),
             cancelled: Vec::new(),
@@ -135,11 +138,11 @@ impl Executor {
     pub(crate) fn advance(&mut self, now: Instant) {
         let mut shared = lock(&self.shared);
         shared.now = shared.now.max(now);
-        let later = shared.timers.split_off(&(now + linesman_proto::time::Span::ns(1), 0));
-        let due = std::mem::replace(&mut shared.timers, later);
-        drop(shared);
-        for waker in due.into_values() {
-            waker.wake();
+        while let Some(first) = shared.timers.first_entry()
+            && first.key().0 <= now
+        {
+            // Waking touches only the queue of those that are ready.
+            first.remove().wake();
         }
     }
 

@@ -36,6 +36,12 @@ impl Wire {
         lock(&self.shared).now
     }
 
+    /// Whether what card A sends arrives at card B; `None` with one card.
+    #[must_use]
+    pub fn ring_intact(&self) -> Option<bool> {
+        lock(&self.shared).ring_intact
+    }
+
     /// Queues a datagram at once; await the result for its answer. Dropping it gives the answer up.
     pub fn submit(&self, request: Request) -> Exchanging {
         let mut shared = lock(&self.shared);

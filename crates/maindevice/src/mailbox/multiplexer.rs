@@ -132,10 +132,11 @@ impl<'a> Multiplexer<'a> {
         // A SubDevice that talks without end must not keep its jobs waiting.
         for _ in 0..16 {
             match self.fetch().await {
-                Ok(Some(buffer)) => match self.dispatch(&buffer) {
-                    Ok(Some(data)) => self.unasked(MailboxType::Coe, data),
-                    Ok(None) | Err(_) => {}
-                },
+                Ok(Some(buffer)) => {
+                    if let Ok(Some(data)) = self.dispatch(&buffer) {
+                        self.unasked(MailboxType::Coe, data);
+                    }
+                }
                 Ok(None) | Err(_) => return,
             }
         }

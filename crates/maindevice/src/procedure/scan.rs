@@ -96,8 +96,7 @@ async fn give_addresses(wire: &Wire, look: &Look) -> Result<Vec<StationAddress>,
         .filter(|((_, present), chosen)| present != chosen)
         .map(|((device, _), chosen)| {
             let (wire, position, station) = (wire.clone(), device.position, *chosen);
-            let task = async move { (position, address::assign(&wire, position, station).await) };
-            task
+            async move { (position, address::assign(&wire, position, station).await) }
         })
         .map(|task| wire.spawn(task))
         .collect();
@@ -114,6 +113,8 @@ async fn latch(wire: &Wire, look: &Look, stations: &[StationAddress]) -> Vec<See
     let receive_time = register::RECEIVE_TIME;
     // Who has no clocks does not take it: the working counter says nothing.
     let latched = wire.write(Target::All, receive_time.address, &[0; 4]).await.is_ok();
+    // In a closed ring the frame does not come back to the ports it left by.
+    let latched = latched && wire.ring_intact() != Some(true);
     let reading: Vec<_> = (look.devices.iter())
         .zip(stations)
         .map(|(device, station)| {

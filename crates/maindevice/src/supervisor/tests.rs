@@ -1,1 +1,69 @@
+use linesman_config::plan::expect::Presence;
+use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::state::AlState;
 
+use super::line::Line;
+use super::*;
+
+fn line(devices: usize) -> Line {
+    let tree = linesman_proto::topology::derive(&[]).unwrap();
+    let device = |id| linesman_config::plan::DevicePlan {
+        id: DeviceId(id),
+        name: String::new(),
+        station: linesman_proto::address::StationAddress(0x1001),
+        identity: linesman_proto::sii::Identity::default(),
+        revision_rule: linesman_config::identity::RevisionRule::Any,
+        mailbox: None,
+        sync_managers: Vec::new(),
+        fmmus: Vec::new(),
+        device_emulation: true,
+        target: AlState::Op,
+        outputs: 0..0,
+        inputs: 0..0,
+    };
+    let devices = (0..devices as u32).map(device).collect();
+    Line::new(&Plan { devices, tree, tasks: Vec::new(), outputs_len: 0, inputs_len: 0 })
+}
+
+#[test]
+fn who_is_lost_serves_nothing() {
+    let mut line = line(2);
+    let id = DeviceId(1);
+    line.set_found(id, Found::There { restarted: true });
+    line.set_reached(id, AlState::Op);
+    let mut presence = Presence::none(2);
+    line.copy_presence(&mut presence);
+    assert!(presence.of(id).inputs && presence.of(id).outputs);
+    assert!(!presence.of(DeviceId(0)).inputs);
+    let before = line.version();
+    assert_eq!(line.set_found(id, Found::Lost), Found::There { restarted: true });
+    assert_ne!(line.version(), before);
+    line.copy_presence(&mut presence);
+    assert_eq!(presence.of(id).reached_by, None);
+    // That it serves nothing is known: the counter of the others is judged.
+    assert!(line.is_settled(id) && !line.has_reached(id));
+}
+
+#[test]
+fn in_pre_op_there_is_a_mailbox_and_no_process_data() {
+    let mut line = line(1);
+    let id = DeviceId(0);
+    line.set_found(id, Found::There { restarted: true });
+    line.set_moving(id, Some(AlState::PreOp));
+    let mut presence = Presence::none(1);
+    line.copy_presence(&mut presence);
+    assert!(line.has_mailbox(id) && !presence.of(id).inputs && !line.is_settled(id));
+}
+
+#[test]
+fn only_changes_of_the_broadcast_are_alerts() {
+    let mut line = line(2);
+    let states = |byte| AlState::from_or(byte);
+    assert_eq!(line.broadcast(WorkingCounter(2), states(8)), None);
+    assert_eq!(line.broadcast(WorkingCounter(2), states(8)), None);
+    assert_eq!(line.alerts(), 0);
+    assert_eq!(line.broadcast(WorkingCounter(1), states(8)), Some(WorkingCounter(2)));
+    assert_eq!(line.alerts(), 1);
+    assert_eq!(line.broadcast(WorkingCounter(1), states(0x1C)), None);
+    assert_eq!(line.alerts(), 2);
+}

@@ -9,6 +9,32 @@ use linesman_proto::register::ErrorCounter;
 
 use super::{FaultId, TruthLog};
 
+/// Why a controller sees an error.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Cause {
+    /// A fault of the log.
+    Fault(FaultId),
+    /// What the MainDevice itself put into a frame.
+    Content,
+    /// Nobody knows: a hole in the model.
+    Unknown,
+}
+
+impl From<Option<FaultId>> for Cause {
+    fn from(fault: Option<FaultId>) -> Self {
+        fault.map_or(Self::Unknown, Self::Fault)
+    }
+}
+
+impl Cause {
+    pub(crate) fn fault(self) -> Option<FaultId> {
+        match self {
+            Self::Fault(fault) => Some(fault),
+            Self::Content | Self::Unknown => None,
+        }
+    }
+}
+
 /// What one counter may have counted.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub(crate) struct Ledger {
@@ -39,23 +65,14 @@ pub struct Unexplained {
 
 impl TruthLog {
     /// A controller is made to see an error.
-    pub(crate) fn may_move(
-        &mut self,
-        device: DeviceId,
-        counter: ErrorCounter,
-        fault: Option<FaultId>,
-    ) {
+    pub(crate) fn may_move(&mut self, device: DeviceId, counter: ErrorCounter, cause: Cause) {
         let ledger = self.ledger.entry((device, counter)).or_default();
         ledger.seen += 1;
-        match fault {
-            Some(_) => ledger.last = fault,
-            None => ledger.without_cause += 1,
+        match cause {
+            Cause::Fault(fault) => ledger.last = Some(fault),
+            Cause::Content => {}
+            Cause::Unknown => ledger.without_cause += 1,
         }
-    }
-
-    /// A frame's own content moves a counter: a cause, but no fault.
-    pub(crate) fn content_moves(&mut self, device: DeviceId, counter: ErrorCounter) {
-        self.ledger.entry((device, counter)).or_default().seen += 1;
     }
 
     /// A counter is given a value.
@@ -112,12 +129,12 @@ mod tests {
     fn what_moves_without_an_entry_is_found() {
         let mut log = TruthLog::default();
         assert_eq!(audit(&mut log, 0), []);
-        log.may_move(DEVICE, COUNTER, Some(FaultId(0)));
+        log.may_move(DEVICE, COUNTER, Cause::Fault(FaultId(0)));
         assert_eq!(audit(&mut log, 1), []);
         assert_eq!(audit(&mut log, 2), [(1, 0)], "nothing was entered since");
-        log.may_move(DEVICE, COUNTER, Some(FaultId(0)));
+        log.may_move(DEVICE, COUNTER, Cause::Fault(FaultId(0)));
         assert_eq!(audit(&mut log, 4), [(2, 1)]);
-        log.may_move(DEVICE, COUNTER, None);
+        log.may_move(DEVICE, COUNTER, Cause::Unknown);
         assert_eq!(audit(&mut log, 5), [(1, 0)], "an error without a cause");
         assert_eq!(audit(&mut log, 5), []);
     }
@@ -127,11 +144,11 @@ mod tests {
         let mut log = TruthLog::default();
         log.set(DEVICE, COUNTER, 200);
         assert_eq!(audit(&mut log, 200), [], "old errors");
-        log.may_move(DEVICE, COUNTER, Some(FaultId(1)));
+        log.may_move(DEVICE, COUNTER, Cause::Fault(FaultId(1)));
         assert_eq!(audit(&mut log, 200), [], "seen at a closed port: not counted");
-        log.may_move(DEVICE, COUNTER, Some(FaultId(1)));
+        log.may_move(DEVICE, COUNTER, Cause::Fault(FaultId(1)));
         assert_eq!(audit(&mut log, 1), [], "cleared in between");
-        log.content_moves(DEVICE, COUNTER);
+        log.may_move(DEVICE, COUNTER, Cause::Content);
         assert_eq!(audit(&mut log, 2), []);
         assert_eq!(log.last_cause(DEVICE, COUNTER), Some(FaultId(1)));
     }

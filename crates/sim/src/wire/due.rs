@@ -113,7 +113,7 @@ impl World {
         match place {
             End::MainDevice(path) => self.cards[path.index()].set_carrier(at, false),
             End::Controller(node, port) => {
-                self.post(node, at, fault, PortEvent::Link { port, up: false });
+                self.post(node, at, fault.into(), PortEvent::Link { port, up: false });
             }
         }
     }
@@ -129,7 +129,7 @@ impl World {
             match place {
                 End::MainDevice(path) => self.cards[path.index()].set_carrier(at, true),
                 End::Controller(node, port) => {
-                    self.post(node, at, fault, PortEvent::Link { port, up: true });
+                    self.post(node, at, fault.into(), PortEvent::Link { port, up: true });
                 }
             }
         }

@@ -8,6 +8,7 @@
 //! (S1 figure 2); a line takes its transit time.
 
 use linesman_proto::address::Path;
+use linesman_proto::frame::size::BYTE_NS;
 use linesman_proto::port::Port;
 use linesman_proto::register::{self as r, ErrorCounter};
 use linesman_proto::time::{Instant, Span};
@@ -17,8 +18,7 @@ use super::change::Line;
 use super::world::World;
 use crate::controller::{CountKind, PortEvent, Verdict};
 use crate::frame::{PREAMBLE_LEN, WireFrame};
-use crate::truth::{Effect, FaultId, Place};
-use linesman_proto::frame::size::BYTE_NS;
+use crate::truth::{Cause, Effect, FaultId, Place};
 
 /// A frame in one controller meets each port at most this often: the rule on circulating frames
 /// destroys it in its second round, unless the MainDevice has switched that off.
@@ -30,6 +30,24 @@ pub(crate) struct Traveller {
     pub(crate) frame: WireFrame,
     /// Who spoiled it first.
     pub(crate) spoiled_by: Option<FaultId>,
+    /// A processing unit marked it for what the MainDevice put into it.
+    pub(crate) refused: bool,
+}
+
+impl Traveller {
+    /// A frame that leaves a card.
+    pub(crate) const fn new(frame: WireFrame) -> Self {
+        Self { frame, spoiled_by: None, refused: false }
+    }
+
+    /// Why a receiver finds it damaged.
+    fn cause(&self) -> Cause {
+        match self.spoiled_by {
+            Some(fault) => Cause::Fault(fault),
+            None if self.refused => Cause::Content,
+            None => Cause::Unknown,
+        }
+    }
 }
 
 /// Where a walk ended.
@@ -70,7 +88,7 @@ impl World {
                 }
             };
             if made_anew {
-                self.symbol_error(arrives, traveller.spoiled_by, line);
+                self.symbol_error(arrives, traveller.cause(), line);
             }
             let Some((left_by, left_at)) =
                 self.pass(node, port, line, arrives, spoiled || made_anew, traveller)
@@ -148,7 +166,7 @@ impl World {
             let bytes = traveller.frame.bytes.len() as u64;
             let byte = PREAMBLE_LEN as u64 + bytes * u64::from(ambush.part) / (1 << 16);
             let offset = Span::ns(byte * BYTE_NS);
-            self.symbol_error(arrives + offset, Some(ambush.fault), line);
+            self.symbol_error(arrives + offset, Cause::Fault(ambush.fault), line);
             let at = arrives + offset;
             self.spoil(at, offset, ambush.flip, ambush.fault, place, traveller);
             spoiled = true;
@@ -171,7 +189,7 @@ impl World {
             End::Controller(node, port) => {
                 if self.nodes[node].controller.hardware().counting.counts_missing_start {
                     let kind = CountKind::InvalidFrame;
-                    self.post(node, end, fault, PortEvent::Count { port, kind });
+                    self.post(node, end, fault.into(), PortEvent::Count { port, kind });
                 }
             }
         }
@@ -274,7 +292,7 @@ impl World {
         };
         damage.marked = true;
         let end = at + traveller.frame.duration();
-        self.post(node, end, traveller.spoiled_by, PortEvent::Count { port, kind });
+        self.post(node, end, traveller.cause(), PortEvent::Count { port, kind });
     }
 
     fn process(&mut self, node: usize, at: Instant, traveller: &mut Traveller) -> Verdict {
@@ -283,16 +301,19 @@ impl World {
             let end = at + traveller.frame.duration();
             let kind = CountKind::ProcessingUnitError;
             let event = PortEvent::Count { port: Port::A, kind };
-            self.post(node, end, traveller.spoiled_by, event);
+            self.post(node, end, traveller.cause(), event);
         }
         let errors = r::PROCESSING_UNIT_ERROR_COUNTER.address;
         self.nodes[node].touch(at, &mut self.signals);
         let controller = &mut self.nodes[node].controller;
         let before = controller.register(errors);
         let verdict = controller.process(at, &mut traveller.frame, &mut self.signals);
-        if controller.register(errors) > before {
+        // At 255 the counter stands still, and the frame is marked all the same.
+        let marked = intact && !traveller.frame.damage.is_intact();
+        if marked || controller.register(errors) > before {
             let id = controller.id();
-            self.truth.content_moves(id, ErrorCounter::ProcessingUnit);
+            self.truth.may_move(id, ErrorCounter::ProcessingUnit, Cause::Content);
+            traveller.refused = true;
             let effect = Effect::ContentRefused { frame: traveller.frame.number };
             self.truth.effect(at, traveller.spoiled_by, Place::Device(id), effect);
         }

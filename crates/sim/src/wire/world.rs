@@ -14,7 +14,7 @@ use crate::device::{Refusal, Signals};
 use crate::fault::Running;
 use crate::hardware::PortKind;
 use crate::segment::card::Card;
-use crate::truth::{Effect, FaultId, Place, TruthLog};
+use crate::truth::{Cause, Effect, FaultId, Place, TruthLog};
 
 /// Hits are kept this long: longer than any frame is on its way.
 const MEMORY: Span = Span::ms(2);
@@ -297,26 +297,20 @@ impl World {
             return;
         }
         link.noise[usize::from(line.downstream)].push_hit(Hit { at, flip, fault });
-        self.symbol_error(at, Some(fault), line);
+        self.symbol_error(at, Cause::Fault(fault), line);
     }
 
     /// The receiver of a line sees a symbol that it cannot decode.
-    pub(super) fn symbol_error(&mut self, at: Instant, fault: Option<FaultId>, line: Line) {
-        self.truth.effect(at, fault, self.line_place(line), Effect::SymbolError);
+    pub(super) fn symbol_error(&mut self, at: Instant, cause: Cause, line: Line) {
+        self.truth.effect(at, cause.fault(), self.line_place(line), Effect::SymbolError);
         let (_, to) = self.links[line.link].from_to(line.downstream);
         if let End::Controller(node, port) = to {
-            self.post(node, at, fault, PortEvent::Count { port, kind: CountKind::SymbolError });
+            self.post(node, at, cause, PortEvent::Count { port, kind: CountKind::SymbolError });
         }
     }
 
     /// Tells a controller, and the log what may move because of it.
-    pub(super) fn post(
-        &mut self,
-        node: usize,
-        at: Instant,
-        fault: Option<FaultId>,
-        event: PortEvent,
-    ) {
+    pub(super) fn post(&mut self, node: usize, at: Instant, cause: Cause, event: PortEvent) {
         self.nodes[node].controller.post(at, event);
         let counter = match event {
             PortEvent::Link { up: true, .. } => return,
@@ -329,7 +323,7 @@ impl World {
                 CountKind::LostLink => ErrorCounter::LostLink(port),
             },
         };
-        self.truth.may_move(self.id(node), counter, fault);
+        self.truth.may_move(self.id(node), counter, cause);
     }
 
     // ---- blame ----

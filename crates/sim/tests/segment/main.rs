@@ -1,5 +1,8 @@
 //! The segment from outside: frames in, frames out, counters, and the truth beside them.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
+
 mod faults;
 mod rig;
+mod swarm;
 mod walk;

@@ -6,6 +6,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_runtime::listen::{Ears, Heard};
 
 use super::Session;
+use crate::command::driven;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Progress};
@@ -22,7 +23,7 @@ pub(super) fn run(
     session: Session,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    let stop = super::stop()?;
+    let stop = driven::stop()?;
     let clock = HostClock::start();
     let until = session.until(SECONDS)?;
     let mut ears = Ears::open(names, clock)?;

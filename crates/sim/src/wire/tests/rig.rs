@@ -109,7 +109,7 @@ impl Bench {
         let frame = WireFrame { number: self.world.frames, ..frame };
         self.world.look_ahead(self.now, frame.duration());
         self.world.advance(self.now);
-        let mut traveller = Traveller { frame, spoiled_by: None };
+        let mut traveller = Traveller::new(frame);
         let outcome = self.world.walk(card, self.now, &mut traveller);
         self.now += Span::ms(1);
         self.world.advance(self.now);

@@ -1,8 +1,6 @@
 //! Looking and scanning, over a virtual segment.
 
-mod bench;
-
-use bench::{Bench, Fate};
+use crate::bench::{Bench, Fate};
 use linesman_maindevice::Event;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;

@@ -1,7 +1,5 @@
 //! A MainDevice and a virtual segment in virtual time.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
-
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{Plan, PlanOptions};
 use linesman_maindevice::{Event, MainDevice, Options};
@@ -130,7 +128,8 @@ impl Bench {
     pub(crate) fn start(&mut self, target: AlState) -> Plan {
         let inventory = self.scan();
         let tree = inventory.tree().clone();
-        let plan = Plan::build(&inventory.planned(target), tree, &PlanOptions::default()).unwrap();
+        let plan = Plan::build(&inventory.planned(target), tree, &PlanOptions::default());
+        let plan = plan.expect("a plan");
         self.device.start(self.now, plan.clone());
         let done = |event: &Event| matches!(event, Event::AllReached);
         assert!(

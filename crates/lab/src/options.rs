@@ -1,0 +1,50 @@
+//! How a lab is set up.
+
+use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
+
+/// What a lab does with its line from the start.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum Begin {
+    /// Nothing is sent until told.
+    Idle,
+    /// The line is scanned, which changes no state.
+    Scan,
+    /// The line is scanned, driven to the target state and kept there.
+    #[default]
+    Run,
+}
+
+/// Choices for a lab.
+#[derive(Clone, Debug)]
+pub struct LabOptions {
+    /// State the line is driven to.
+    pub target: AlState,
+    /// Cycle of the process data.
+    pub cycle: Span,
+    /// Whether the counters of the card are shown to the diagnosis. Without them nobody counts what
+    /// is spoiled on the last hop.
+    pub host_counters: bool,
+    /// Whether the diagnosis is given the project, as planned.
+    pub project: bool,
+    /// Whether the diagnosis may ask for registers by itself.
+    pub probes: bool,
+    /// What is done with the line from the start.
+    pub begin: Begin,
+    /// What the report says was looked at; empty for the segment's name.
+    pub source: String,
+}
+
+impl Default for LabOptions {
+    fn default() -> Self {
+        Self {
+            target: AlState::Op,
+            cycle: Span::ms(2),
+            host_counters: true,
+            project: true,
+            probes: true,
+            begin: Begin::Run,
+            source: String::new(),
+        }
+    }
+}

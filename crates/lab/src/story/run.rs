@@ -1,0 +1,394 @@
+//! Playing a story.
+
+use std::fmt;
+
+use linesman_config::attachment::Attachment;
+use linesman_config::fault::FaultName;
+use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, Severity, Verdict};
+use linesman_proto::address::DeviceId;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
+use linesman_sim::segment_file::{FaultEntry, SegmentFile};
+use linesman_sim::truth::{FaultId, FaultRecord};
+
+use super::parse::{SegmentText, Story};
+use super::step::{Expectation, Heal, Step, StepAt, What};
+use crate::lab::Lab;
+use crate::options::LabOptions;
+use crate::verdict::judge::{best_finding, truth_of};
+use crate::verdict::{Claim, Scene, Site};
+
+/// How long a line may take to be brought up.
+const BRING_UP: Span = Span::s(20);
+/// A line on which nobody comes nearer to the target for this long is as far up as it gets.
+const NO_PROGRESS: Span = Span::s(4);
+/// How often an expectation that may take time is looked at.
+const LOOK: Span = Span::ms(1);
+
+/// What came of a story.
+#[derive(Clone, Debug)]
+pub struct StoryReport {
+    /// Its title.
+    pub title: String,
+    /// Each step that was played.
+    pub steps: Vec<StepReport>,
+    /// Why it could not be played to its end, apart from steps.
+    pub trouble: Option<String>,
+    /// How long the line took to be up.
+    pub up_in: Span,
+    /// The last word of the diagnosis.
+    pub diagnosis: Option<Diagnosis>,
+}
+
+/// What came of a step.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct StepReport {
+    /// Line in the story.
+    pub line: usize,
+    /// As it was written.
+    pub text: String,
+    /// When it was over, since the line was up.
+    pub at: Span,
+    /// What was found instead; `None` when it held.
+    pub failure: Option<String>,
+}
+
+impl StoryReport {
+    /// Whether all expectations held.
+    #[must_use]
+    pub fn held(&self) -> bool {
+        self.trouble.is_none() && self.steps.iter().all(|step| step.failure.is_none())
+    }
+}
+
+impl fmt::Display for StoryReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.title)?;
+        for step in &self.steps {
+            let mark = if step.failure.is_none() { "ok  " } else { "FAIL" };
+            writeln!(
+                f,
+                "  {mark} line {:>3} at {:>10}  {}",
+                step.line,
+                step.at.to_string(),
+                step.text
+            )?;
+            for line in step.failure.iter().flat_map(|failure| failure.lines()) {
+                writeln!(f, "         {line}")?;
+            }
+        }
+        match &self.trouble {
+            Some(trouble) => writeln!(f, "  FAIL {trouble}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Plays a story; `load` reads the segment file that it names.
+pub fn play(story: &Story, load: impl FnOnce(&str) -> Result<String, String>) -> StoryReport {
+    let mut report = StoryReport {
+        title: story.front.title.clone(),
+        steps: Vec::new(),
+        trouble: None,
+        up_in: Span::ZERO,
+        diagnosis: None,
+    };
+    if let Err(trouble) = try_play(story, load, &mut report) {
+        report.trouble = Some(trouble);
+    }
+    report
+}
+
+fn try_play(
+    story: &Story,
+    load: impl FnOnce(&str) -> Result<String, String>,
+    report: &mut StoryReport,
+) -> Result<(), String> {
+    let text = match &story.segment {
+        SegmentText::Inline(text) => text.clone(),
+        SegmentText::File(file) => load(file)?,
+    };
+    let mut file = SegmentFile::parse(&text).map_err(|error| format!("its segment: {error}"))?;
+    file.seed.get_or_insert(story.front.seed);
+    let options = LabOptions {
+        target: story.front.target,
+        cycle: story.front.cycle,
+        host_counters: story.front.host_counters,
+        project: story.front.project,
+        ..LabOptions::default()
+    };
+    let lab = Lab::new(&file, options).map_err(|error| error.to_string())?;
+    let mut stage = Stage { lab, start: Instant::ZERO, faults: Vec::new() };
+    // A line that does not come up is for the steps to judge: it may be what the story is about.
+    stage.bring_up()?;
+    stage.start = stage.lab.now();
+    report.up_in = stage.start.since(Instant::ZERO);
+    for step in &story.steps {
+        let failure = stage.step(step).err();
+        let failed = failure.is_some();
+        let at = stage.lab.now().since(stage.start);
+        report.steps.push(StepReport { line: step.line, text: step.text.clone(), at, failure });
+        if failed {
+            break;
+        }
+    }
+    report.diagnosis = Some(stage.lab.diagnosis());
+    Ok(())
+}
+
+struct Stage {
+    lab: Lab,
+    start: Instant,
+    faults: Vec<FaultId>,
+}
+
+impl Stage {
+    /// Waits until the line is up, or nothing has come of it for a while.
+    fn bring_up(&mut self) -> Result<(), String> {
+        let mut best = (usize::MAX, self.lab.now());
+        let end = |lab: &Lab| {
+            let missing = lab.not_up().count();
+            if missing < best.0 {
+                best = (missing, lab.now());
+            }
+            let waits = lab.now().since(best.1) > NO_PROGRESS;
+            lab.is_up() || lab.failure().is_some() || waits
+        };
+        let done = self.lab.run_while(BRING_UP, LOOK, end);
+        done.map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    fn step(&mut self, step: &StepAt) -> Result<(), String> {
+        if let Some(at) = step.at {
+            self.lab.run_until(self.start + at).map_err(|error| error.to_string())?;
+        }
+        match &step.step {
+            Step::Wait => Ok(()),
+            Step::Inject { entry, lasts } => {
+                let mut entry: FaultEntry =
+                    toml::from_str(entry).map_err(|error| error.to_string())?;
+                if let Some(lasts) = lasts {
+                    let end = self.lab.now() + *lasts;
+                    entry.to_ms = Some(end.as_nanos() as f64 / 1e6);
+                }
+                let id = self.lab.inject(&entry).map_err(|error| error.to_string())?;
+                self.faults.push(id);
+                Ok(())
+            }
+            Step::Heal(heal) => self.heal(*heal),
+            Step::Expect { what, within } => self.expect(what, *within),
+        }
+    }
+
+    fn heal(&mut self, heal: Heal) -> Result<(), String> {
+        let log = self.lab.truth();
+        let chosen: Vec<FaultId> = log
+            .faults()
+            .iter()
+            .filter(|fault| match heal {
+                Heal::All => true,
+                Heal::Named(name) => fault.name == name,
+            })
+            .map(|fault| fault.id)
+            .collect();
+        if chosen.is_empty() {
+            return Err("there is no such fault to heal".to_owned());
+        }
+        for id in chosen {
+            self.lab.heal(id);
+        }
+        Ok(())
+    }
+
+    fn expect(&mut self, what: &Expectation, within: Span) -> Result<(), String> {
+        let what = self.resolve(what)?;
+        let held = self
+            .lab
+            .run_while(within, LOOK, |lab| holds(&what, lab).is_ok())
+            .map_err(|error| error.to_string())?;
+        if held { Ok(()) } else { holds(&what, &self.lab) }
+    }
+
+    fn resolve<'a>(&self, what: &'a Expectation) -> Result<Resolved<'a>, String> {
+        let site = if let Expectation::Finding { place: Some(place), .. } = what {
+            Some(self.site(place)?)
+        } else {
+            None
+        };
+        Ok(Resolved { what, site })
+    }
+
+    /// The place that a text names.
+    fn site(&self, text: &str) -> Result<Site, String> {
+        let unknown = |name: &str| format!("no SubDevice of this line is called `{name}`");
+        match text {
+            "host" => return Ok(Site::Host),
+            "network" => return Ok(Site::Network),
+            _ => {}
+        }
+        if let Some(name) = text.strip_prefix("device ") {
+            return self.device(name).map(Site::Device).ok_or_else(|| unknown(name));
+        }
+        let tree = self.lab.tree();
+        // Names may hold `-`, so every way of parting the text is tried.
+        for (at, separator) in text.match_indices(['>', '-']) {
+            let (one, other) = (&text[..at], &text[at + 1..]);
+            if let (Some(one), Some(other)) = (self.end(one), self.end(other)) {
+                return Ok(match separator {
+                    ">" => Site::hop(tree, one, other),
+                    _ => Site::link(tree, one, other),
+                });
+            }
+        }
+        Err(format!(
+            "`{text}` is no place of this line: expected `K1.C-B3.A`, `K1.C>B3.A`, `device K1`, \
+             `host` or `network`"
+        ))
+    }
+
+    fn end(&self, text: &str) -> Option<End<DeviceId>> {
+        match text.parse().ok()? {
+            Attachment::MainDevice(path) => Some(End::MainDevice(path)),
+            Attachment::Device { name, port } => {
+                self.device(&name).map(|id| End::Controller(id, port))
+            }
+        }
+    }
+
+    fn device(&self, name: &str) -> Option<DeviceId> {
+        let names = self.lab.project().devices.iter();
+        let at = names.into_iter().position(|device| device.name == name)?;
+        Some(DeviceId(at as u32))
+    }
+}
+
+struct Resolved<'a> {
+    what: &'a Expectation,
+    site: Option<Site>,
+}
+
+/// Whether an expectation holds now; what is so instead if not.
+fn holds(resolved: &Resolved<'_>, lab: &Lab) -> Result<(), String> {
+    let diagnosis = lab.diagnosis();
+    let check = |held: bool, expected: &str| {
+        if held { Ok(()) } else { Err(format!("expected {expected}\n{}", said(&diagnosis))) }
+    };
+    let real = || diagnosis.findings.iter().filter(|f| f.severity != Severity::Info);
+    match resolved.what {
+        Expectation::Finding { what, place } => {
+            let fits = |finding: &FindingReport| {
+                let site = Claim::of(finding).site;
+                is(what, finding) && resolved.site.is_none_or(|wanted| wanted.covers(site))
+            };
+            let expected = format!("a finding {}{}", named(what), at(place.as_deref()));
+            check(diagnosis.findings.iter().any(fits), &expected)
+        }
+        Expectation::Verdict(on) => verdict(*on, lab, &diagnosis),
+        Expectation::NoFinding(None) => check(real().next().is_none(), "no finding"),
+        Expectation::NoFinding(Some(what)) => {
+            let expected = format!("no finding {}", named(what));
+            check(!diagnosis.findings.iter().any(|finding| is(what, finding)), &expected)
+        }
+        Expectation::Findings(count) => {
+            check(real().count() == *count, &format!("{count} findings, found {}", real().count()))
+        }
+        Expectation::Healthy => check(diagnosis.verdict == Verdict::Healthy, "a healthy line"),
+        Expectation::Inconclusive => {
+            check(diagnosis.verdict == Verdict::Inconclusive, "no conclusion")
+        }
+        Expectation::AllClosed => {
+            let all = real().all(|finding| finding.state == FindingState::Closed);
+            check(all, "all findings closed")
+        }
+        Expectation::LineUp => {
+            let missing: Vec<String> = lab.not_up().map(|id| lab.state_of(id)).collect();
+            let expected =
+                format!("all SubDevices in the target state; not there: {}", missing.join(", "));
+            check(lab.is_up(), &expected)
+        }
+        Expectation::Exit(status) => {
+            let found = exit_status(&diagnosis);
+            check(found == *status, &format!("exit status {status}, found {found}"))
+        }
+    }
+}
+
+/// Whether each fault that acts, or the one named, has a finding that fits.
+fn verdict(on: Option<FaultName>, lab: &Lab, diagnosis: &Diagnosis) -> Result<(), String> {
+    let log = lab.truth();
+    let meant = |fault: &&FaultRecord| match on {
+        Some(name) => fault.name == name,
+        None => fault.is_active(),
+    };
+    let mut none = true;
+    for fault in log.faults().iter().filter(meant) {
+        none = false;
+        let truth = truth_of(log, fault);
+        let host_counters = lab.options().host_counters;
+        let fits = [false, true].into_iter().any(|answered_again| {
+            // Once it is over and the line is back, memories tell more than silence did.
+            let over = !fault.is_active();
+            let scene = Scene { tree: lab.tree(), host_counters, answered_again };
+            (over || !answered_again) && best_finding(diagnosis, &truth, &scene).is_some()
+        });
+        if !fits {
+            return Err(format!(
+                "expected a finding that fits {} at {:?}\n{}",
+                fault.name,
+                fault.places,
+                said(diagnosis)
+            ));
+        }
+    }
+    if none { Err("no fault acts that a verdict could be on".to_owned()) } else { Ok(()) }
+}
+
+/// What `diagnose` exits with: 0 healthy, 1 an error or warning even if closed since, 3
+/// inconclusive.
+#[must_use]
+pub fn exit_status(diagnosis: &Diagnosis) -> u8 {
+    match diagnosis.verdict {
+        Verdict::Healthy => 0,
+        Verdict::Faulty => 1,
+        Verdict::Inconclusive => 3,
+    }
+}
+
+fn is(what: &What, finding: &FindingReport) -> bool {
+    match what {
+        What::Code(code) => finding.code == *code,
+        What::Cause(cause) => finding.cause == *cause,
+    }
+}
+
+fn named(what: &What) -> String {
+    match what {
+        What::Code(code) => code.clone(),
+        What::Cause(cause) => cause.to_string(),
+    }
+}
+
+fn at(place: Option<&str>) -> String {
+    place.map(|place| format!(" at {place}")).unwrap_or_default()
+}
+
+/// What the diagnosis says, one line each.
+fn said(diagnosis: &Diagnosis) -> String {
+    let mut text = format!("verdict: {:?}", diagnosis.verdict).to_lowercase();
+    for finding in &diagnosis.findings {
+        text += &format!(
+            "\n{} {} {} at {} ({:?}, {:.2}, {} consequences)",
+            finding.id,
+            finding.code,
+            finding.cause,
+            Claim::of(finding).site,
+            finding.state,
+            finding.confidence,
+            finding.consequences.len()
+        );
+        for evidence in finding.evidence.iter().take(3) {
+            text += &format!("\n    {}", evidence.text);
+        }
+    }
+    text
+}

@@ -1,0 +1,14 @@
+//! The swarm: many seeds, each a plant, faults and a schedule, and what must hold after each step.
+//!
+//! * Working counters are those of the line as the truth log tells it ([`reach`], [`counter`]).
+//! * No counter of a controller moves without a logged cause.
+//! * Every fault that acts and can be seen has a finding; every finding has a logged cause.
+//! * After healing all SubDevices reach the target state within a bound.
+
+pub mod counter;
+pub mod episode;
+pub mod reach;
+pub mod run;
+
+pub use episode::{EpisodeReport, FaultOutcome};
+pub use run::{SeedReport, SwarmOptions, SwarmReport, run_seed, swarm};

@@ -1,0 +1,67 @@
+//! Judging a diagnosis: which finding belongs to which fault, and what is left over.
+
+use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState};
+use linesman_proto::topology::Tree;
+use linesman_sim::truth::{Effect, Entry, FaultRecord, Place, TruthLog};
+
+use super::{Claim, Match, Scene, Truth, TruthPlace, matches};
+
+/// The fault of a truth log as it is held against a verdict.
+#[must_use]
+pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
+    let place = |place: &Place| match *place {
+        Place::Direction(from, to) => TruthPlace::Hop(from, to),
+        Place::Link(one, other) => TruthPlace::Link(one, other),
+        Place::Device(id) => TruthPlace::Device(id),
+        Place::Host(path) => TruthPlace::Host(path),
+    };
+    let al_code = log.entries().iter().rev().find_map(|entry| match entry {
+        Entry::Effect { fault: Some(id), effect: Effect::StateRefused { code }, .. }
+            if *id == fault.id =>
+        {
+            Some(*code)
+        }
+        Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
+    });
+    Truth { name: fault.name, places: fault.places.iter().map(place).collect(), al_code }
+}
+
+/// The finding that fits `fault` best, with how well; open ones are preferred to closed ones.
+#[must_use]
+pub fn best_finding<'a>(
+    diagnosis: &'a Diagnosis,
+    truth: &Truth,
+    scene: &Scene<'_>,
+) -> Option<(&'a FindingReport, Match)> {
+    let graded = diagnosis.findings.iter().map(|finding| {
+        let graded = matches(truth, scene, Claim::of(finding));
+        (finding, graded)
+    });
+    graded.filter(|(_, graded)| graded.is_right()).max_by_key(|(finding, graded)| {
+        (finding.state != FindingState::Closed, graded.cause, graded.place)
+    })
+}
+
+/// How well a finding fits any of the faults of the run, now or in the past.
+#[must_use]
+pub fn explains(
+    log: &TruthLog,
+    tree: &Tree,
+    host_counters: bool,
+    finding: &FindingReport,
+) -> Match {
+    let claim = Claim::of(finding);
+    let mut best = Match::NONE;
+    for fault in log.faults().iter().filter(|fault| fault.first_effect.is_some()) {
+        let truth = truth_of(log, fault);
+        // A finding may have been made while the line was silent, or since.
+        for answered_again in [false, true] {
+            let scene = Scene { tree, host_counters, answered_again };
+            let graded = matches(&truth, &scene, claim);
+            if graded.cause > best.cause {
+                best = graded;
+            }
+        }
+    }
+    best
+}

@@ -1,0 +1,88 @@
+//! `linesman scan`: which SubDevices there are and how they are wired.
+
+mod cards;
+pub(crate) mod report;
+mod table;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use linesman_config::inventory::Inventory;
+use linesman_config::project::Project;
+use linesman_runtime::selector::Selector;
+
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// What can be asked.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Arguments {
+    /// Where the line is: eth0 or eth0+eth1 (a ring)
+    #[arg(value_name = "WHERE")]
+    place: String,
+    /// Identities, controllers and error counters too
+    #[arg(long, short)]
+    verbose: bool,
+    /// Write what was found as a project, to hold the line against later
+    #[arg(long, value_name = "machine.toml")]
+    save: Option<PathBuf>,
+    /// JSON, schema linesman.scan/1
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// A scan, with when it began.
+struct Scan {
+    inventory: Inventory,
+    start: Option<String>,
+}
+
+/// Scans what the selector names.
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    let selector: Selector = arguments.place.parse()?;
+    if let Some(path) = &arguments.save {
+        refuse_to_overwrite(path)?;
+    }
+    let scan = match &selector {
+        Selector::Cards(names) => cards::scan(names)?,
+        Selector::Segment(_)
+        | Selector::Listen(_)
+        | Selector::Capture(_)
+        | Selector::Observations(_) => {
+            let reason = format!("`{selector}`: a scan sends frames, and nobody answers there");
+            let advice = format!("judge it with `linesman diagnose {}`", arguments.place);
+            return Err(Failure::new(reason, advice));
+        }
+    };
+    let Scan { inventory, start } = &scan;
+    if arguments.json {
+        output.json(&report::report(inventory, start.clone()));
+    } else {
+        output.text(&table::text(inventory, arguments.verbose, output));
+    }
+    if let Some(path) = &arguments.save {
+        save(path, inventory)?;
+        if !arguments.json {
+            output.line(&format!("\nSaved as {}.", path.display()));
+        }
+    }
+    Ok(Status::Good)
+}
+
+fn refuse_to_overwrite(path: &Path) -> Result<(), Failure> {
+    if path.exists() {
+        let reason = format!("{}: the file is there already", path.display());
+        return Err(Failure::new(reason, "name another one, or move this one away"));
+    }
+    Ok(())
+}
+
+fn save(path: &Path, inventory: &Inventory) -> Result<(), Failure> {
+    let name = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
+    let text = Project::from_inventory(&name, inventory).to_toml();
+    fs::write(path, text).map_err(|error| {
+        let reason = format!("{}: writing the project: {error}", path.display());
+        Failure::new(reason, "check the rights of the directory and its free space")
+    })
+}

@@ -1,0 +1,121 @@
+//! Lines on virtual cables: a segment at one end, this program at the other, each test in a network
+//! namespace of its own. Needs root and `ip`.
+
+mod support;
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use support::{PROGRAM, Run, assert_valid, run};
+use tempfile::TempDir;
+
+const PLANT: &str = r#"
+name = "live"
+seed = 3
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "I1"
+type = "EL1008"
+on = "K1.B"
+[[device]]
+name = "O1"
+type = "EL2008"
+on = "I1.B"
+"#;
+
+/// A virtual cable from `near0` to `far0`, with a segment on the far end while the script runs.
+const BENCH: &str = r#"
+set -e
+ip link add near0 type veth peer name far0
+for card in near0 far0; do
+    sysctl -q -w net.ipv6.conf.$card.disable_ipv6=1
+    ip link set $card up
+done
+"$LINESMAN" sim "$PLANT" --on far0 > "$DIRECTORY/sim.out" &
+sim=$!
+trap 'kill -INT $sim 2> /dev/null; wait $sim || true' EXIT
+for try in $(seq 100); do
+    grep -q Ctrl-C "$DIRECTORY/sim.out" 2> /dev/null && break
+    sleep 0.05
+done
+set +e
+"#;
+
+/// Runs a script beside a segment; `None`, said aloud, where that cannot be.
+fn beside_segment(script: &str) -> Option<Run> {
+    let in_namespace = |script: &str| {
+        let mut command = Command::new("unshare");
+        command.args(["--net", "bash", "-c", script]).stdin(Stdio::null());
+        command
+    };
+    let probe = "ip link add near0 type veth peer name far0";
+    if !in_namespace(probe).output().is_ok_and(|output| output.status.success()) {
+        eprintln!("SKIPPED: a network namespace with a virtual cable cannot be made here");
+        return None;
+    }
+    let directory = TempDir::new().expect("a temporary directory");
+    let plant: PathBuf = directory.path().join("plant.toml");
+    std::fs::write(&plant, PLANT).expect("a file can be written");
+    let mut command = in_namespace(&format!("{BENCH}{script}"));
+    command.env("LINESMAN", PROGRAM).env("PLANT", &plant).env("DIRECTORY", directory.path());
+    Some(run(&mut command))
+}
+
+#[test]
+fn a_scan_finds_each_subdevice_and_its_neighbours() {
+    let Some(run) = beside_segment(r#""$LINESMAN" scan near0 --json"#) else { return };
+    assert_eq!(run.status, 0, "{}", run.all());
+    let scan = run.json();
+    assert_valid(&scan, "scan");
+    let devices = scan["devices"].as_array().unwrap();
+    let types: Vec<_> = devices.iter().map(|device| device["type"].as_str().unwrap()).collect();
+    assert_eq!(types, ["EK1100", "EL1008", "EL2008"]);
+    let products: Vec<_> = devices.iter().map(|device| device["product_code"].as_u64()).collect();
+    assert_eq!(products, [0x044C_2C52, 0x03F0_3052, 0x07D8_3052].map(Some));
+    for (index, device) in devices.iter().enumerate() {
+        assert_eq!(
+            (device["no"].as_u64(), device["position"].as_u64()),
+            (Some(index as u64 + 1), Some(index as u64))
+        );
+        let ports = device["ports"].as_array().unwrap();
+        let port = |name| ports.iter().find(|port| port["port"] == name).expect("a port");
+        let before = if index == 0 { "A" } else { "B" };
+        assert_eq!(port("A")["to"], serde_json::json!({ "no": index, "port": before }));
+        let after = serde_json::json!({ "no": index + 2, "port": "A" });
+        let after = if index == 2 { serde_json::Value::Null } else { after };
+        assert_eq!(port("B")["to"], after, "SubDevice {}", index + 1);
+        assert_eq!(port("B")["open"], index < 2);
+    }
+}
+
+#[test]
+fn what_a_scan_saves_is_a_project() {
+    let script = r#"
+        "$LINESMAN" scan near0 --save "$DIRECTORY/machine.toml" || exit 9
+        cat "$DIRECTORY/machine.toml"
+        "$LINESMAN" scan near0 --save "$DIRECTORY/machine.toml"
+    "#;
+    let Some(run) = beside_segment(script) else { return };
+    assert_eq!(run.status, 2, "a file that is there stays: {}", run.all());
+    assert!(run.stderr.contains("is there already"), "{}", run.stderr);
+    assert!(run.stdout.contains("3 SubDevices"), "{}", run.stdout);
+    let start = run.stdout.find("name = ").expect("a project");
+    let end = run.stdout.rfind("\n").unwrap();
+    let project: toml::Value = toml::from_str(&run.stdout[start..end]).expect("TOML");
+    assert_eq!(project["device"].as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn a_line_where_nobody_answers_is_told_with_what_to_check() {
+    // A cable whose far end nobody holds: frames vanish.
+    let script = r#"kill -INT $sim; wait $sim; "$LINESMAN" scan near0 --json"#;
+    let Some(run) = beside_segment(script) else { return };
+    assert_eq!(run.status, 2, "{}", run.all());
+    let error = run.json();
+    assert_valid(&error, "error");
+    assert!(error["reason"].as_str().unwrap().contains("near0"), "{error}");
+    assert!(error["next_step"].as_str().unwrap().contains("IN port"), "{error}");
+}

@@ -1,0 +1,8 @@
+//! A MainDevice on a virtual segment, in virtual time.
+
+mod bench;
+mod mailbox;
+mod ring;
+mod robust;
+mod run;
+mod scan;

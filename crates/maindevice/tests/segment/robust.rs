@@ -1,0 +1,148 @@
+//! Hostile frames, two networks, the same run twice, and no allocation in the cycle.
+
+use crate::bench::Bench;
+use linesman_maindevice::{MainDevice, Options};
+use linesman_proto::address::{Network, Path};
+use linesman_proto::state::AlState;
+use linesman_proto::time::{Instant, Span};
+use proptest::prelude::*;
+
+const SMALL: &str = r#"
+name = "small"
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "T1"
+type = "EL1008"
+on = "K1.B"
+[[device]]
+name = "T2"
+type = "EL2008"
+on = "T1.B"
+"#;
+
+/// A MainDevice in the middle of a scan, and the frames it has sent.
+fn scanning() -> (MainDevice, Vec<Vec<u8>>) {
+    let mut device = MainDevice::new(Network(0), Options::default());
+    device.scan(Instant::ZERO);
+    (device, Vec::new())
+}
+
+fn fetch(device: &mut MainDevice, now: Instant, sent: &mut Vec<Vec<u8>>) {
+    let mut buffer = vec![0; 1514];
+    while let Some(transmit) = device.poll_transmit(now, &mut buffer) {
+        sent.push(buffer[..transmit.len].to_vec());
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_bytes_make_it_panic(frames in prop::collection::vec(
+        prop::collection::vec(any::<u8>(), 0..200), 1..40)) {
+        let (mut device, mut sent) = scanning();
+        for (at, frame) in (1..).zip(&frames) {
+            let now = Instant::from_nanos(at * 1_000_000);
+            device.handle_frame(now, Path::A, frame);
+            fetch(&mut device, now, &mut sent);
+        }
+    }
+
+    /// Its own frames come back with bytes changed at will: answers that lie.
+    #[test]
+    fn lying_answers_do_not_make_it_panic(
+        changes in prop::collection::vec((16usize..200, any::<u8>()), 0..60),
+        cuts in prop::collection::vec(14usize..1514, 1..30),
+    ) {
+        let (mut device, mut sent) = scanning();
+        let mut changes = changes.iter().cycle();
+        for (step, cut) in (1u64..).zip(&cuts) {
+            let now = Instant::from_nanos(step * 20_000);
+            fetch(&mut device, now, &mut sent);
+            let Some(frame) = sent.pop() else {
+                device.handle_timeout(now + Span::ms(20));
+                continue;
+            };
+            let mut frame = frame;
+            frame[6] |= 0x02;
+            let len = frame.len();
+            if let Some((at, byte)) = changes.next() {
+                if let Some(slot) = frame.get_mut(at % len.max(1)) {
+                    *slot = *byte;
+                }
+                // A working counter of some number, wherever the first datagram ends.
+                let end = len.min(28);
+                frame[end - 2] = byte % 9;
+            }
+            frame.truncate((*cut).max(20));
+            device.handle_frame(now, Path::A, &frame);
+            while device.poll_event().is_some() {}
+        }
+    }
+}
+
+#[test]
+fn two_networks_in_one_process_do_not_meet() {
+    let (mut first, mut second) = (Bench::new(SMALL), Bench::new(SMALL));
+    first.start(AlState::Op);
+    second.start(AlState::PreOp);
+    first.run_for(Span::ms(50));
+    second.run_for(Span::ms(50));
+    assert_eq!((first.state("T2"), second.state("T2")), ("OP".to_owned(), "PREOP".to_owned()));
+}
+
+#[test]
+fn the_same_run_twice_is_the_same() {
+    let run = || {
+        let mut bench = Bench::new(SMALL);
+        bench.start(AlState::Op);
+        bench.run_for(Span::ms(100));
+        (format!("{:?}", bench.events), bench.device.statistics())
+    };
+    assert_eq!(run(), run());
+}
+
+/// Whole cycles without a single allocation: procedures may allocate, the cycle may not.
+#[test]
+fn the_cycle_allocates_nothing() {
+    let mut bench = Bench::with_options(
+        SMALL,
+        Options {
+            watch_interval: Span::s(60),
+            mailbox_interval: Span::s(60),
+            ..Options::default()
+        },
+    );
+    bench.start(AlState::Op);
+    bench.run_for(Span::ms(400));
+    let mut buffer = vec![0; 1514];
+    let mut arrival = Vec::with_capacity(2048);
+    let mut quiet = 0;
+    for _ in 0..200 {
+        let next = bench.device.poll_timeout().unwrap();
+        bench.now = bench.now.max(next);
+        let mut allocations = 0;
+        let mut cycle = |work: &mut dyn FnMut()| {
+            allocations += allocation_counter::measure(work).count_total;
+        };
+        cycle(&mut || bench.device.handle_timeout(bench.now));
+        loop {
+            let mut transmit = None;
+            cycle(&mut || transmit = bench.device.poll_transmit(bench.now, &mut buffer));
+            let Some(transmit) = transmit else { break };
+            bench.segment.handle_frame(transmit.at, transmit.path, &buffer[..transmit.len]);
+        }
+        while let Some(at) = bench.segment.poll_timeout() {
+            bench.now = bench.now.max(at);
+            bench.segment.advance(bench.now);
+            while bench.segment.poll_arrival(&mut arrival).is_some() {
+                cycle(&mut || bench.device.handle_frame(bench.now, Path::A, &arrival));
+            }
+        }
+        quiet += u32::from(allocations == 0);
+        while bench.device.poll_event().is_some() {}
+    }
+    // The search for lost SubDevices sleeps and wakes ten times a second; that is no cycle.
+    assert!(quiet >= 190, "{quiet} of 200 cycles without allocation");
+}
