@@ -87,9 +87,13 @@ impl<'a> Multiplexer<'a> {
             let request = Request::write(self.target, self.areas.receive.offset, &buffer);
             match self.wire.submit(request).await {
                 Ok(reply) if reply.answered() => return Ok(()),
-                // Full. After a lost frame it is our own message that fills it.
-                Ok(_) if uncertain && self.is_full(OUT).await? => return Ok(()),
-                Ok(_) => {}
+                // Full, unless the SubDevice does not answer at all. After a lost frame it is our own
+                // message that fills it.
+                Ok(_) => {
+                    if self.is_full(OUT).await? && uncertain {
+                        return Ok(());
+                    }
+                }
                 Err(error @ ExchangeError::WorkingCounter { .. }) => return Err(error.into()),
                 Err(ExchangeError::NoReply { .. }) => uncertain = true,
             }

@@ -127,6 +127,14 @@ fn a_cut_loses_what_is_behind_it_and_healing_brings_it_back() {
     }
     assert_eq!(count(&bench, |event| matches!(event, Event::DeviceLost { .. })), 5);
     assert_eq!(bench.state("T2"), "OP");
+    // The working counter was short until it was clear who is missing.
+    let short = |event: &Event| matches!(event, Event::WorkingCounter { expected, received, .. } if received < expected);
+    assert!(count(&bench, short) > 0);
+    assert!(count(&bench, |event| matches!(event, Event::WorkingCounterGood { .. })) > 0);
+    let before = bench.device.statistics().working_counter_errors;
+    assert!(before < 50, "{before} cycles until it was clear");
+    bench.run_for(Span::ms(100));
+    assert_eq!(bench.device.statistics().working_counter_errors, before);
     bench.events.clear();
     bench.segment.heal(bench.now, cut);
     bench.run_for(Span::s(6));
@@ -250,8 +258,8 @@ fn started_on(other: &str) -> Bench {
     let mut healthy = Bench::new(PLANT);
     let inventory = healthy.scan();
     let tree = inventory.tree().clone();
-    let plan =
-        Plan::build(&inventory.planned(AlState::Op), tree, &plan::PlanOptions::default()).unwrap();
+    let plan = Plan::build(&inventory.planned(AlState::Op), tree, &plan::PlanOptions::default())
+        .expect("a plan");
     let mut bench = Bench::new(&format!("{PLANT}{other}"));
     bench.device.start(bench.now, plan);
     bench.run_for(Span::s(3));
@@ -262,10 +270,9 @@ fn started_on(other: &str) -> Bench {
 fn a_missing_device_is_named_and_the_others_run() {
     let bench = started_on("[[fault]]\nkind = \"device-missing\"\ndevice = \"T3\"\n");
     let lost: Vec<_> = (bench.events.iter())
-        .filter_map(|(_, event)| match event {
-            Event::DeviceLost { id } => Some(id.no()),
-            _ => None,
-        })
+        .filter_map(
+            |(_, event)| if let Event::DeviceLost { id } = event { Some(id.no()) } else { None },
+        )
         .collect();
     assert_eq!(lost, [4]);
     let reached = count(&bench, |event| matches!(event, Event::TargetReached { .. }));
@@ -280,9 +287,9 @@ fn a_wrong_device_is_told_from_the_planned_one_and_not_driven() {
     let bench =
         started_on("[[fault]]\nkind = \"device-wrong\"\ndevice = \"T3\"\ntype = \"EL3104\"\n");
     let wrong: Vec<_> = (bench.events.iter())
-        .filter_map(|(_, event)| match event {
-            Event::WrongDevice { id, mismatch, .. } => Some((id.no(), *mismatch)),
-            _ => None,
+        .filter_map(|(_, event)| {
+            let Event::WrongDevice { id, mismatch, .. } = event else { return None };
+            Some((id.no(), *mismatch))
         })
         .collect();
     assert!(wrong.contains(&(4, linesman_config::identity::Mismatch::Product)), "{wrong:?}");
