@@ -66,6 +66,15 @@ impl CounterHistory {
         self.record_counters(&ErrorCounters::from_bytes(data, start), at, frame)
     }
 
+    /// Whether any counter that `data` covers stands higher than at its latest reading.
+    #[must_use]
+    pub fn rise_in(&self, start: RegisterAddress, data: &[u8]) -> bool {
+        let reading = ErrorCounters::from_bytes(data, start);
+        reading
+            .iter()
+            .any(|(counter, value)| self.last.value(counter).is_some_and(|last| value > last))
+    }
+
     /// Takes a reading of some counters. Says whether any of them rose or fell, or is new.
     ///
     /// Where one counter of a group fell, all that were read with it count as cleared.
@@ -200,6 +209,14 @@ impl CounterTrack {
             });
         }
         difference.rise > 0 || difference.cleared
+    }
+
+    /// The same counter, as if it had been read first at `from`, when its total stood as `base`, and
+    /// last before `to`.
+    #[must_use]
+    pub fn between(&self, base: &Total, end: &Total, from: Instant, to: Instant) -> Self {
+        let inside = self.rises.iter().filter(|rise| from <= rise.at && rise.at < to);
+        Self { rises: inside.copied().collect(), total: end.since(base), ..self.clone() }
     }
 
     /// The first rise that is still kept.

@@ -64,6 +64,15 @@ impl Tally {
         self.first.get_or_insert(at);
         self.last = Some(at);
     }
+
+    /// Counts what was counted elsewhere after it.
+    pub fn absorb(&mut self, later: Self) {
+        self.sum = self.sum.saturating_add(later.sum);
+        self.largest = self.largest.max(later.largest);
+        self.times += later.times;
+        self.first = self.first.or(later.first);
+        self.last = later.last.or(self.last);
+    }
 }
 
 impl HostHistory {

@@ -6,6 +6,7 @@
 pub mod counters;
 pub mod cyclic;
 pub mod device;
+pub mod era;
 pub mod host;
 pub mod learn;
 pub mod sii_image;
@@ -24,6 +25,7 @@ pub use device::{
     Absence, AlChange, AlError, AlHistory, Device, DlChange, DlHistory, Planned, SeenIdentity,
     Trouble,
 };
+pub use era::{Era, Eras};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
 pub use sii_image::SiiImage;
@@ -65,6 +67,8 @@ pub struct Line {
     pub cyclic: Vec<Cyclic>,
     /// Frames and datagrams.
     pub traffic: Traffic,
+    /// Times of trouble, with quiet between them.
+    pub eras: Eras,
     /// The time of the latest frame or observation.
     pub now: Instant,
     revision: u64,

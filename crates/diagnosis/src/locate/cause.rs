@@ -438,7 +438,7 @@ fn link_spot(group: &Group) -> Spot {
 }
 
 /// The rises of the receiving port that show a damage.
-fn rises<'a>(survey: &Survey<'a>, damage: &Damage) -> Vec<&'a Rise> {
+fn rises<'s>(survey: &'s Survey<'_>, damage: &Damage) -> Vec<&'s Rise> {
     let End::Controller(node, port) = damage.hop.to else { return Vec::new() };
     let counters = [ErrorCounter::PhysicalLayer(port), ErrorCounter::InvalidFrame(port)];
     counters

@@ -178,7 +178,12 @@ impl Walk<'_, '_> {
         let invalid = self.read(hop, invalid);
         let forwarded = read(ErrorCounter::Forwarded(port)).unwrap_or_default();
         let physical = read(ErrorCounter::PhysicalLayer(port));
-        let is_physical_read = physical.is_some();
+        // A counter that stood at its end all the time has not counted.
+        let stood_at_end = self
+            .survey
+            .track(node, ErrorCounter::PhysicalLayer(port))
+            .is_some_and(|track| track.total.rise() == 0 && track.last.value == u8::MAX);
+        let is_physical_read = physical.is_some() && !stood_at_end;
         let physical = physical.unwrap_or_default();
         let before = self.carried;
 
@@ -246,7 +251,7 @@ impl Walk<'_, '_> {
     fn card(&self, route: &Route) -> Option<LastHop> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
-        let errors = self.survey.line().host.card(card).crc;
+        let errors = self.survey.card_errors(card);
         let (first, last) = (errors.first?, errors.last?);
         let read_since = |at: Instant| self.survey.has_ended() || self.horizon > at;
         let frames = errors.sum.saturating_sub(self.carried.frames);
@@ -269,7 +274,7 @@ impl Walk<'_, '_> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
         let line = self.survey.line();
-        let lost = line.traffic.lost;
+        let lost = self.survey.lost();
         let (first, last) = (lost.first?, lost.last?);
         let is_silent = self.carried.frames == 0 && !line.host.is_watched;
         // Counters that were read before the frame was missed say nothing of it.

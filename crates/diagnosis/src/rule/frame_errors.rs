@@ -74,11 +74,28 @@ const QUIET: Span = Span::s(2);
 pub const RULE: Rule = Rule { pages: &[ON_LINK, INSIDE, LAST_HOP], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let Some(survey) = Survey::of(view.line, view.has_ended) else { return };
-    let located = Located::on(&survey);
-    for suspicion in Suspicion::all(&survey, &located) {
-        add(view, &survey, &suspicion, None, conditions);
+    let mut found: Vec<Condition> = Vec::new();
+    for survey in Survey::of_eras(view.line, view.has_ended) {
+        let mut of_era = Vec::new();
+        let located = Located::on(&survey);
+        for suspicion in Suspicion::all(&survey, &located) {
+            add(view, &survey, &suspicion, None, &mut of_era);
+        }
+        for mut condition in of_era {
+            let same = found.iter().position(|known| {
+                known.page.code == condition.page.code && known.place.is_same_spot(&condition.place)
+            });
+            // The same trouble has come again: it began when it first did.
+            if let Some(known) = same.map(|index| found.remove(index)) {
+                condition.since = condition.since.min(known.since);
+                condition.severity = condition.severity.max(known.severity);
+                condition.is_confirmed |= known.is_confirmed;
+                condition.confirmed_at = known.confirmed_at.or(condition.confirmed_at);
+            }
+            found.push(condition);
+        }
     }
+    conditions.append(&mut found);
 }
 
 fn add(
