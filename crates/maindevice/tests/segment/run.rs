@@ -2,10 +2,14 @@
 
 use crate::bench::{Bench, Fate};
 use linesman_config::fault::FaultName;
-use linesman_maindevice::Event;
+use linesman_config::plan::{self, Plan};
+use linesman_maindevice::{Event, Options, ProbeRequest, Target};
+use linesman_proto::port::Port;
+use linesman_proto::register::{DL_STATUS, PortState};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
-use linesman_sim::segment_file::FaultEntry;
+use linesman_sim::seed::Seed;
+use linesman_sim::segment_file::{FaultEntry, PlantOptions, plant};
 
 /// Outputs of T2 wired to nothing, inputs of T1 driven by nobody; smart devices at the end.
 const PLANT: &str = r#"
@@ -66,6 +70,7 @@ fn count(bench: &Bench, which: impl Fn(&Event) -> bool) -> usize {
     bench.events.iter().filter(|(_, event)| which(event)).count()
 }
 
+// proves: FRM-16 partial: against full controllers
 #[test]
 fn a_plant_of_ten_comes_to_op_and_stays_there() {
     let mut bench = Bench::new(PLANT);
@@ -86,6 +91,7 @@ fn a_plant_of_ten_comes_to_op_and_stays_there() {
     assert_eq!(trouble, 0, "{:#?}", bench.events);
 }
 
+// proves: FRM-15 partial: on LRW
 #[test]
 fn process_data_go_both_ways() {
     let mut bench = Bench::new(PLANT);
@@ -109,6 +115,7 @@ fn process_data_go_both_ways() {
     assert_eq!(bench.device.inputs()[inputs.start], 0b1000);
 }
 
+// proves: FRM-29
 #[test]
 fn a_cut_loses_what_is_behind_it_and_healing_brings_it_back() {
     let mut bench = Bench::new(PLANT);
@@ -125,6 +132,20 @@ fn a_cut_loses_what_is_behind_it_and_healing_brings_it_back() {
     }
     assert_eq!(count(&bench, |event| matches!(event, Event::DeviceLost { .. })), 5);
     assert_eq!(bench.state("T2"), "OP");
+    // The port towards the cut is closed.
+    let closed = |event: &Event| {
+        matches!(event, Event::Links { id, status }
+            if id.no() == 1 && status.port_state(Port::C) == PortState::UNUSED)
+    };
+    assert_eq!(count(&bench, closed), 1);
+    // The working counter was short until it was clear who is missing.
+    let short = |event: &Event| matches!(event, Event::WorkingCounter { expected, received, .. } if received < expected);
+    assert!(count(&bench, short) > 0);
+    assert!(count(&bench, |event| matches!(event, Event::WorkingCounterGood { .. })) > 0);
+    let before = bench.device.statistics().working_counter_errors;
+    assert!(before < 50, "{before} cycles until it was clear");
+    bench.run_for(Span::ms(100));
+    assert_eq!(bench.device.statistics().working_counter_errors, before);
     bench.events.clear();
     bench.segment.heal(bench.now, cut);
     bench.run_for(Span::s(6));
@@ -202,11 +223,7 @@ fn a_refusal_is_reported_and_tried_again_more_and_more_seldom() {
     let refused = bench.segment.inject(bench.now, &entry).unwrap();
     let inventory = bench.scan();
     let tree = inventory.tree().clone();
-    let plan = linesman_config::plan::Plan::build(
-        &inventory.planned(AlState::Op),
-        tree,
-        &linesman_config::plan::PlanOptions::default(),
-    );
+    let plan = Plan::build(&inventory.planned(AlState::Op), tree, &plan::PlanOptions::default());
     bench.device.start(bench.now, plan.unwrap());
     bench.run_for(Span::s(12));
     let id = bench.id("T3");
@@ -218,10 +235,40 @@ fn a_refusal_is_reported_and_tried_again_more_and_more_seldom() {
         .collect();
     assert!((3..=6).contains(&refusals.len()), "{refusals:?}");
     assert_eq!(bench.state("T8"), "OP");
+    assert!(!bench.device.is_settled());
+    assert_eq!(count(&bench, |event| matches!(event, Event::AllReached)), 0);
     bench.segment.heal(bench.now, refused);
     bench.run_for(Span::s(25));
     assert_eq!(bench.state("T3"), "OP");
     assert_eq!(count(&bench, |event| matches!(event, Event::AllReached)), 1);
+}
+
+/// A controller with device emulation shows its refusal, too; and what the others give goes on.
+#[test]
+fn a_stuck_device_does_not_stop_the_inputs_of_the_others() {
+    let mut bench = Bench::new(PLANT);
+    let inventory = bench.scan();
+    let tree = inventory.tree().clone();
+    let plan = Plan::build(&inventory.planned(AlState::Op), tree, &plan::PlanOptions::default());
+    let plan = plan.unwrap();
+    for (name, to) in [("T2", "SAFEOP"), ("T4", "OP")] {
+        let entry = fault("init-refused").device(name).with("to", to);
+        bench.segment.inject(bench.now, &entry).unwrap();
+    }
+    bench.device.start(bench.now, plan.clone());
+    bench.run_for(Span::s(3));
+    for name in ["T2", "T4"] {
+        let id = bench.id(name);
+        let refused = |event: &Event| matches!(event, Event::Refused { id: it, .. } if *it == id);
+        assert!(count(&bench, refused) > 0, "{name}");
+    }
+    assert_eq!(bench.state("T1"), "OP");
+    let inputs = plan.device(bench.id("T1")).unwrap().inputs.clone();
+    let signals = bench.segment.inputs(bench.id("T1")).to_vec();
+    bench.segment.signals_mut().set(signals[0], 1);
+    bench.run_for(Span::ms(5));
+    assert_eq!(bench.device.inputs()[inputs.start], 1);
+    assert_eq!(count(&bench, |event| matches!(event, Event::WorkingCounter { .. })), 0);
 }
 
 #[test]
@@ -243,4 +290,95 @@ fn stopping_leaves_all_in_the_state_that_was_asked_for() {
     for name in ["K1", "T3", "T8"] {
         assert_eq!(bench.state(name), "INIT", "{name}");
     }
+}
+
+/// A plan made of the healthy line, started on a line where something is otherwise.
+fn started_on(other: &str) -> Bench {
+    let mut healthy = Bench::new(PLANT);
+    let inventory = healthy.scan();
+    let tree = inventory.tree().clone();
+    let plan = Plan::build(&inventory.planned(AlState::Op), tree, &plan::PlanOptions::default())
+        .expect("a plan");
+    let mut bench = Bench::new(&format!("{PLANT}{other}"));
+    bench.device.start(bench.now, plan);
+    bench.run_for(Span::s(3));
+    bench
+}
+
+#[test]
+fn a_missing_device_is_named_and_the_others_run() {
+    let bench = started_on("[[fault]]\nkind = \"device-missing\"\ndevice = \"T3\"\n");
+    let lost: Vec<_> = (bench.events.iter())
+        .filter_map(
+            |(_, event)| if let Event::DeviceLost { id } = event { Some(id.no()) } else { None },
+        )
+        .collect();
+    assert_eq!(lost, [4]);
+    let reached = count(&bench, |event| matches!(event, Event::TargetReached { .. }));
+    assert_eq!(reached, 9);
+    for name in ["T2", "T4", "T8"] {
+        assert_eq!(bench.state(name), "OP", "{name}");
+    }
+}
+
+#[test]
+fn an_extra_device_is_told_once_and_left_alone() {
+    let bench = started_on(
+        "[[fault]]\nkind = \"device-missing\"\ndevice = \"T5\"\n\
+         [[device]]\nname = \"X\"\ntype = \"EL3004\"\non = \"T8.B\"\n\
+         [[device]]\nname = \"Y\"\ntype = \"EL1018\"\non = \"X.B\"\n",
+    );
+    let extra = count(&bench, |event| matches!(event, Event::UnplannedDevice { .. }));
+    assert_eq!(extra, 2, "{:#?}", bench.events);
+    assert_eq!((bench.state("X"), bench.state("T8")), ("INIT".to_owned(), "OP".to_owned()));
+}
+
+// proves: HC-03 partial: by position, without serial
+#[test]
+fn a_wrong_device_is_told_from_the_planned_one_and_not_driven() {
+    let bench =
+        started_on("[[fault]]\nkind = \"device-wrong\"\ndevice = \"T3\"\ntype = \"EL3104\"\n");
+    let wrong: Vec<_> = (bench.events.iter())
+        .filter_map(|(_, event)| {
+            let Event::WrongDevice { id, mismatch, .. } = event else { return None };
+            Some((id.no(), *mismatch))
+        })
+        .collect();
+    assert!(wrong.contains(&(4, linesman_config::identity::Mismatch::Product)), "{wrong:?}");
+    assert_eq!(bench.state("T3"), "INIT");
+    assert_eq!(bench.state("T8"), "OP");
+}
+
+/// The wiring that a scan derives is the one that there is, and all of it comes to OP.
+#[test]
+fn random_plants_are_scanned_right_and_run() {
+    for seed in 0..6 {
+        let options = PlantOptions { min_devices: 3, max_devices: 40, ..PlantOptions::default() };
+        let file = plant(Seed(seed), &options);
+        let mut bench = Bench::of(&file, Options::default());
+        let inventory = bench.scan();
+        let really = bench.segment.tree();
+        assert_eq!(inventory.devices.len(), really.len(), "seed {seed}");
+        for (node, place) in really.order().iter().enumerate() {
+            let upstream = really.upstream(*place).map(|end| end.map(|at| really.position(at)));
+            let found = inventory.tree().upstream(node).map(|end| end.map(Some));
+            assert_eq!(found, upstream, "seed {seed}, position {node}");
+        }
+        bench.start(AlState::Op);
+    }
+}
+
+#[test]
+fn a_probe_reads_beside_the_cycle() {
+    let mut bench = Bench::new(PLANT);
+    let plan = bench.start(AlState::Op);
+    let station = plan.device(bench.id("T2")).unwrap().station;
+    let target = Target::Station(station);
+    let request = ProbeRequest { target, register: DL_STATUS.address, len: 2, write: None };
+    bench.device.probe(bench.now, request.clone());
+    assert!(bench.run_until(Span::ms(10), |event| matches!(event, Event::Probed { .. })));
+    let Some((_, Event::Probed { request: asked, result })) = bench.events.pop() else { panic!() };
+    assert_eq!(asked, request);
+    let status = bench.segment.controller(bench.id("T2")).unwrap().dl_status();
+    assert_eq!(result.unwrap().word(0), status.value());
 }

@@ -10,9 +10,14 @@ const TYPES: [&str; 7] = ["EK1101", "EL2008", "EL2014", "EL3102", "EL4102", "EL7
 /// What a bad MainDevice, or a bad supply, may do.
 #[derive(Clone, Debug)]
 enum Deed {
-    Write { at: u16, data: Vec<u8> },
+    Write {
+        at: u16,
+        data: Vec<u8>,
+    },
     AlControl(u8),
     SetUp,
+    /// The way to OP, as far as it leads.
+    Climb,
     Exchange(Vec<u8>),
     Wait(u64),
     Restart,
@@ -25,7 +30,8 @@ fn deed() -> impl Strategy<Value = Deed> {
     prop_oneof![
         4 => prop::sample::select(vec![1u8, 2, 4, 8, 0x11, 0x12, 0x14, 0x18, 3, 5])
             .prop_map(Deed::AlControl),
-        3 => Just(Deed::SetUp),
+        2 => Just(Deed::SetUp),
+        3 => Just(Deed::Climb),
         3 => bytes(4).prop_map(Deed::Exchange),
         2 => (near_registers, bytes(9)).prop_map(|(at, data)| Deed::Write { at, data }),
         1 => (0x0F00u16..0x1400, bytes(64)).prop_map(|(at, data)| Deed::Write { at, data }),
@@ -48,6 +54,16 @@ fn act(device: &mut Device, deed: &Deed) {
             }
             device.set_up_mailbox();
             device.set_up_process_data();
+        }
+        Deed::Climb => {
+            act(device, &Deed::AlControl(0x11));
+            act(device, &Deed::Wait(2_000));
+            act(device, &Deed::SetUp);
+            for state in [2, 4, 8] {
+                act(device, &Deed::AlControl(state));
+                act(device, &Deed::Wait(40_000));
+                act(device, &Deed::Exchange(vec![0x55, 0x2A, 0x55]));
+            }
         }
         Deed::Exchange(outputs) => {
             let len = device.profile.process_len(linesman_proto::sii::Direction::Outputs);
