@@ -237,6 +237,17 @@ impl Dictionary {
         }
     }
 
+    /// The device starts anew: every value is again as in `fresh`, a dictionary of the same objects,
+    /// but for settings that are kept for a replacement. Those were stored when they were written.
+    pub fn restart(&mut self, fresh: &Self) {
+        let entries = self.objects.iter_mut().flat_map(|object| &mut object.entries);
+        for (entry, fresh) in entries.zip(fresh.objects.iter().flat_map(|object| &object.entries)) {
+            if !entry.access.has(Access::BACKUP) {
+                entry.value.clone_from(&fresh.value);
+            }
+        }
+    }
+
     /// The indices of a list of SDO information.
     pub fn list(&self, kind: ListKind) -> impl Iterator<Item = ObjectIndex> {
         let wanted = match kind {

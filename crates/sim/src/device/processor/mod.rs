@@ -344,7 +344,7 @@ fn watchdog_ran_out(pdi: &mut Pdi<'_>) -> bool {
 
 impl Firmware for Processor {
     fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        self.dictionary = self.description.dictionary.clone();
+        self.dictionary.restart(&self.description.dictionary);
         self.mailbox.restart();
         (self.inputs, self.outputs) = (ProcessImage::default(), ProcessImage::default());
         self.step = None;
