@@ -4,6 +4,7 @@
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
 pub mod frame_errors;
+pub mod identity;
 pub mod link_lost;
 pub mod nobody_answers;
 pub mod not_answering;
@@ -74,6 +75,7 @@ pub const RULES: &[Rule] = &[
     link_lost::RULE,
     not_answering::RULE,
     frame_errors::RULE,
+    identity::RULE,
     //
     // The network as a whole, working counters and states.
     nobody_answers::RULE,
