@@ -5,6 +5,7 @@
 
 pub mod frame_errors;
 pub mod host_trouble;
+pub mod identity;
 pub mod link_lost;
 pub mod nobody_answers;
 pub mod not_answering;
@@ -76,6 +77,7 @@ pub const RULES: &[Rule] = &[
     link_lost::RULE,
     not_answering::RULE,
     frame_errors::RULE,
+    identity::RULE,
     //
     // The network as a whole, working counters and states.
     nobody_answers::RULE,
