@@ -13,6 +13,8 @@ import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 NEAR, FAR = "veth0", "veth1"
+# The second cable, for the other end of a ring.
+NEAR_B, FAR_B = "veth2", "veth3"
 
 
 class Bench:
@@ -25,8 +27,10 @@ class Bench:
         try:
             for name in (self.near, self.far):
                 ip("netns", "add", name)
-            ip("link", "add", NEAR, "netns", self.near, "type", "veth", "peer", "name", FAR, "netns", self.far)
-            for name, interface in ((self.near, NEAR), (self.far, FAR)):
+            ends = ((self.near, NEAR), (self.far, FAR), (self.near, NEAR_B), (self.far, FAR_B))
+            for (_, near), (_, far) in (ends[:2], ends[2:]):
+                ip("link", "add", near, "netns", self.near, "type", "veth", "peer", "name", far, "netns", self.far)
+            for name, interface in ends:
                 # No neighbour discovery: nothing is to be on the cable but what is tried.
                 inside(name, "sysctl", "-q", "-w", f"net.ipv6.conf.{interface}.disable_ipv6=1")
                 inside(name, "ip", "link", "set", "lo", "up")
@@ -79,17 +83,18 @@ class Bench:
 class Segment:
     """A virtual segment on the far end; use it in `with`."""
 
-    def __init__(self, bench, linesman, file):
-        self.bench, self.linesman, self.file = bench, linesman, file
+    def __init__(self, bench, linesman, file, on=FAR):
+        self.bench, self.linesman, self.file, self.on = bench, linesman, file, on
+        self.near = NEAR if on == FAR else f"{NEAR}+{NEAR_B}"
 
     def __enter__(self):
-        self.process = self.bench.start(self.bench.far, self.linesman, "sim", self.file, "--on", FAR)
+        self.process = self.bench.start(self.bench.far, self.linesman, "sim", self.file, "--on", self.on)
         end_at = time.monotonic() + 10
         while time.monotonic() < end_at:
             if self.process.poll() is not None:
                 _, out, err = self.bench.finish(self.process)
                 raise RuntimeError(f"the segment did not start: {err or out}")
-            status, out, _ = self.bench.python(self.bench.near, "probe.py", NEAR)
+            status, out, _ = self.bench.python(self.bench.near, "probe.py", self.near)
             if status == 0:
                 self.present = int(out)
                 return self

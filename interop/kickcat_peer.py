@@ -9,8 +9,8 @@ import peer
 
 
 def main():
-    interface, cycles, cycle_s = peer.arguments()
-    link = kickcat.create_link(interface, "")
+    interfaces, cycles, cycle_s = peer.arguments()
+    link = kickcat.create_link(interfaces[0], interfaces[1] if len(interfaces) > 1 else "")
     link.set_timeout(timedelta(milliseconds=20))
     bus = kickcat.Bus(link)
     bus.init(timedelta(milliseconds=500))

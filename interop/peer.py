@@ -1,6 +1,6 @@
 """What every foreign MainDevice written in Python does with its result.
 
-A peer is run as `PEER.py INTERFACE CYCLES CYCLE_US`. It takes the line to OP, writes the pattern A5 to
+A peer is run as `PEER.py INTERFACE[+INTERFACE] CYCLES CYCLE_US`. It takes the line to OP, writes the pattern A5 to
 every output for half of the cycles and 5A for the other half, and prints one JSON object:
 
     devices   what the scan found: [vendor, product, revision] or what this stack can tell
@@ -16,9 +16,9 @@ PATTERNS = (0xA5, 0x5A)
 
 
 def arguments():
-    """Interface, cycles, cycle in seconds."""
-    _, interface, cycles, cycle_us = sys.argv
-    return interface, int(cycles), int(cycle_us) / 1e6
+    """Interfaces (two for a ring), cycles, cycle in seconds."""
+    _, interfaces, cycles, cycle_us = sys.argv
+    return interfaces.split("+"), int(cycles), int(cycle_us) / 1e6
 
 
 def report(**result):

@@ -11,7 +11,7 @@ import sys
 import time
 import traceback
 
-from bench import FAR, HERE, NEAR, Bench, Segment, parse
+from bench import FAR, FAR_B, HERE, NEAR, NEAR_B, Bench, Segment, parse
 
 LINESMAN = os.environ.get("LINESMAN", "linesman")
 ETHERCRAB = os.environ.get("ETHERCRAB_PEER", "")
@@ -39,10 +39,10 @@ def check(function):
     return function
 
 
-def peer(line, *command, cycles=CYCLES):
+def peer(line, *command, cycles=CYCLES, on=NEAR):
     """Runs a foreign MainDevice on the near end and returns what it says."""
     quiet = ("env", "RUST_BACKTRACE=0")
-    status, out, err = line.run(line.near, *quiet, *command, NEAR, cycles, CYCLE_US, seconds=60)
+    status, out, err = line.run(line.near, *quiet, *command, on, cycles, CYCLE_US, seconds=60)
     assert status == 0, f"status {status}: {err[-600:]}"
     # Some stacks print words of their own before.
     return parse(out.strip().splitlines()[-1] if out.strip() else out, err)
@@ -111,6 +111,48 @@ def one_foreign_maindevice_after_the_other(line):
             result = python_peer(line, "pysoem", "soem.py", cycles=100)
             is_the_line(result)
             ran(result)
+
+
+# proves: RED-01 partial: a foreign MainDevice in a ring that breaks while it runs
+@check
+def soem_keeps_a_ring_that_breaks(line):
+    ring(line, "pysoem", "soem.py")
+
+
+@check
+def kickcat_keeps_a_ring_that_breaks(line):
+    ring(line, "kickcat", "kickcat_peer.py")
+
+
+def ring(line, module, script):
+    """The break comes five seconds after the start, amid the exchanges of some twelve seconds."""
+    with Segment(line, LINESMAN, HERE / "ring.toml", on=f"{FAR}+{FAR_B}") as segment:
+        assert segment.present == 4, f"{segment.present} answered before the break"
+        result = python_peer(line, module, script, cycles=5000, on=f"{NEAR}+{NEAR_B}")
+        assert result["state"] == "OP", result["state"]
+        # One frame may have been crossing the break; a few more may be late on a busy host.
+        assert result["complete"] >= result["cycles"] * 0.99, result["complete"]
+        for pattern, inputs in result["inputs"].items():
+            assert inputs[DIGITAL_IN] == pattern.lower(), (pattern, inputs)
+        status, out, _ = line.python(line.near, "probe.py", f"{NEAR}+{NEAR_B}")
+        assert (status, out) == (0, "2\n"), f"the ring did not break: {out!r} answer on the first card"
+
+
+# proves: FRM-19 partial: seen from beside, without the acyclic reading
+@check
+def a_listener_beside_soem_sees_the_line_cut(line):
+    with Segment(line, LINESMAN, HERE / "cut.toml"):
+        listener = line.start(line.near, LINESMAN, "diagnose", f"listen:{NEAR}", "--seconds", 12, "--json")
+        time.sleep(0.7)
+        result = python_peer(line, "pysoem", "soem.py", cycles=4000)
+        assert 0 < result["complete"] < result["cycles"], f"no cut: {result['complete']} complete"
+        status, out, err = line.finish(listener)
+        diagnosis = parse(out, err)
+        assert status == 1 and diagnosis["verdict"] == "faulty", (status, diagnosis["verdict"])
+        assert diagnosis["network"]["devices"] == len(PRODUCTS), diagnosis["network"]
+        texts = [one["text"] for finding in diagnosis["findings"] for one in finding["evidence"]]
+        # Two of the terminals are cut off: one with inputs (1), one with outputs (2).
+        assert any("3 instead of 6" in text for text in texts), (names(diagnosis), texts)
 
 
 @check

@@ -8,9 +8,9 @@ import peer
 
 
 def main():
-    interface, cycles, cycle_s = peer.arguments()
+    interfaces, cycles, cycle_s = peer.arguments()
     master = pysoem.Master()
-    master.open(interface)
+    master.open(*interfaces)
     try:
         found = master.config_init()
         if found <= 0:

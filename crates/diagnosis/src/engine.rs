@@ -18,6 +18,13 @@ use crate::rule::{RULES, View};
 /// The rules are asked at most this often; what they find keeps the time of its evidence.
 const JUDGE_EVERY: Span = Span::ms(10);
 
+/// Rules are asked again after so long although nothing new was learnt, while something is open: a
+/// counter that did *not* rise since tells as much as one that did.
+const JUDGE_AGAIN: Span = Span::ms(100);
+
+/// For so long after its last rise a counter is watched in this way.
+const WATCHED_AFTER_RISE: Span = Span::s(15);
+
 /// What the engine is told before it begins.
 #[derive(Clone, Default, Debug)]
 pub struct Setup {
@@ -82,6 +89,8 @@ struct Watched {
     learner: Learner,
     pairing: Pairing,
     judged: u64,
+    /// When to ask the rules again, though nothing new was learnt.
+    again: Option<Instant>,
     conditions: Vec<Condition>,
     probed: Option<Instant>,
     probed_for: (u64, u64),
@@ -95,10 +104,25 @@ impl Watched {
             learner,
             pairing: Pairing::default(),
             judged: 0,
+            again: None,
             conditions: Vec::new(),
             probed: None,
             probed_for: (0, 0),
         }
+    }
+
+    /// Whether the rules have something to do at `now`.
+    fn is_due(&self, now: Instant) -> bool {
+        self.line.revision() != self.judged || self.again.is_some_and(|again| again <= now)
+    }
+
+    /// Whether time alone can change what the rules say.
+    fn is_watched(&self, now: Instant) -> bool {
+        let is_open = self.conditions.iter().any(|condition| condition.ended.is_none());
+        is_open
+            || self.line.devices.iter().any(|device| {
+                device.counters.last_rise().is_some_and(|at| now < at + WATCHED_AFTER_RISE)
+            })
     }
 
     /// What makes it worth asking: frames lost, and working counters that fell.
@@ -192,7 +216,12 @@ impl Engine {
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let lost = self.networks.iter().filter_map(|watched| watched.pairing.timeout()).min();
-        let judgement = self.has_news().then_some(self.next_judgement);
+        let again = self.networks.iter().filter_map(|watched| watched.again).min();
+        let news = self.has_news().then_some(self.next_judgement);
+        let judgement = match (news, again) {
+            (Some(one), Some(other)) => Some(one.min(other)),
+            (one, other) => one.or(other),
+        };
         match (lost, judgement) {
             (Some(one), Some(other)) => Some(one.min(other)),
             (one, other) => one.or(other),
@@ -270,7 +299,8 @@ impl Engine {
     }
 
     fn judge_if_due(&mut self) {
-        if self.now >= self.next_judgement && self.has_news() {
+        let now = self.now;
+        if now >= self.next_judgement && self.networks.iter().any(|watched| watched.is_due(now)) {
             self.judge();
         }
     }
@@ -279,7 +309,7 @@ impl Engine {
         self.next_judgement = self.now + JUDGE_EVERY;
         let (now, has_ended) = (self.now, self.has_ended);
         for watched in &mut self.networks {
-            if watched.line.revision() == watched.judged {
+            if !watched.is_due(now) {
                 continue;
             }
             watched.line.derive_tree();
@@ -289,6 +319,8 @@ impl Engine {
             for rule in RULES {
                 (rule.judge)(&view, &mut watched.conditions);
             }
+            let is_watched = watched.is_watched(now) && !has_ended;
+            watched.again = is_watched.then_some(now + JUDGE_AGAIN);
         }
         let all = self.networks.iter().flat_map(|watched| watched.conditions.iter().cloned());
         let events = &mut self.events;

@@ -3,6 +3,8 @@
 //! The bench below counts as the data sheet says (S1 14: first detector, forwarded or counted again,
 //! processing unit); it knows nothing of how the search works.
 
+#![allow(clippy::unwrap_used, clippy::wildcard_enum_match_arm, reason = "helpers of tests")]
+
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::finding::{LinkDirection, Place};
 use linesman_diagnosis::line::Line;

@@ -1,5 +1,7 @@
 //! Observation files through the public surface: the fixtures of the sources, and bad input.
 
+#![allow(clippy::unwrap_used, clippy::wildcard_enum_match_arm, reason = "helpers of tests")]
+
 use std::path::PathBuf;
 
 use linesman_config::fault::FaultName;

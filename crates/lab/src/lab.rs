@@ -4,12 +4,14 @@
 //! the diagnosis, and a tap if there is one; what the card counts becomes host observations, as it
 //! does with a real card.
 
+use std::collections::VecDeque;
+
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{Plan, PlanOptions};
 use linesman_config::project::{Project, ProjectError};
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
-use linesman_diagnosis::{Engine, Setup};
+use linesman_diagnosis::{Engine, Event as FindingEvent, Setup};
 use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest, Target};
 use linesman_proto::address::{DeviceId, Network, Path};
 use linesman_proto::time::{Instant, Span};
@@ -83,6 +85,7 @@ pub struct Lab {
     tap: Option<Tap>,
     frames: u64,
     events: Vec<(Instant, Event)>,
+    finding_events: VecDeque<FindingEvent>,
     failure: Option<String>,
     inventory: Option<Inventory>,
     plan: Option<Plan>,
@@ -130,6 +133,7 @@ impl Lab {
             tap: None,
             frames: 0,
             events: Vec::new(),
+            finding_events: VecDeque::new(),
             failure: None,
             inventory: None,
             plan: None,
@@ -230,6 +234,11 @@ impl Lab {
         &self.events
     }
 
+    /// What happened to a finding, oldest first; each is given once.
+    pub fn poll_finding_event(&mut self) -> Option<FindingEvent> {
+        self.finding_events.pop_front()
+    }
+
     /// Frames seen by the diagnosis, both directions.
     #[must_use]
     pub fn frames(&self) -> u64 {
@@ -251,6 +260,7 @@ impl Lab {
     /// Ends the input of the diagnosis, and gives its last word.
     pub fn finish(&mut self) -> Diagnosis {
         self.engine.finish(self.now, true);
+        self.finding_events.extend(std::iter::from_fn(|| self.engine.poll_event()));
         self.engine.diagnosis()
     }
 
@@ -429,7 +439,12 @@ impl Lab {
             };
             self.main.probe(self.now, request);
         }
-        while self.engine.poll_event().is_some() {}
+        while let Some(event) = self.engine.poll_event() {
+            if self.finding_events.len() >= KEPT_EVENTS {
+                self.finding_events.pop_front();
+            }
+            self.finding_events.push_back(event);
+        }
         Ok(())
     }
 

@@ -119,3 +119,66 @@ fn a_line_where_nobody_answers_is_told_with_what_to_check() {
     assert!(error["reason"].as_str().unwrap().contains("near0"), "{error}");
     assert!(error["next_step"].as_str().unwrap().contains("IN port"), "{error}");
 }
+
+#[test]
+fn an_idle_line_is_healthy_for_both_who_look() {
+    // A second program hears all that goes over the cable.
+    let script = r#"
+        "$LINESMAN" diagnose listen:near0 --seconds 2 --json > "$DIRECTORY/heard.json" &
+        heard=$!
+        sleep 0.5
+        "$LINESMAN" diagnose near0 --seconds 0.7 --json
+        status=$?
+        wait $heard
+        cat "$DIRECTORY/heard.json" >&2
+        exit $status
+    "#;
+    let Some(run) = beside_segment(script) else { return };
+    assert_eq!(run.status, 0, "{}", run.all());
+    let diagnosis = run.json();
+    assert_valid(&diagnosis, "diagnosis");
+    assert_eq!(diagnosis["verdict"], "healthy");
+    assert_eq!(diagnosis["network"]["devices"], 3);
+    assert_eq!(diagnosis["network"]["al_state_highest"], "INIT", "states are left alone");
+    let heard: serde_json::Value = serde_json::from_str(&run.stderr).expect("what was heard");
+    assert_eq!(heard["network"]["devices"], 3, "{heard}");
+}
+
+#[test]
+fn a_line_that_another_maindevice_drives_is_left_alone() {
+    let script = r#"
+        "$LINESMAN" diagnose near0 --seconds 2 > /dev/null &
+        other=$!
+        sleep 0.8
+        "$LINESMAN" scan near0; echo "scan $?"
+        "$LINESMAN" diagnose near0 --seconds 0.1; echo "diagnose $?"
+        wait $other; echo "other $?"
+    "#;
+    let Some(run) = beside_segment(script) else { return };
+    assert_eq!(run.stdout, "scan 2\ndiagnose 2\nother 0\n", "{}", run.stderr);
+    assert_eq!(run.stderr.matches("another MainDevice drives this line").count(), 2);
+    assert_eq!(run.stderr.matches("`linesman diagnose listen:near0`").count(), 2);
+}
+
+#[test]
+fn silence_is_told_with_what_to_check() {
+    let script = r#""$LINESMAN" diagnose listen:near0 --seconds 0.2 --json"#;
+    let Some(run) = beside_segment(script) else { return };
+    assert_eq!(run.status, 2, "{}", run.all());
+    assert_valid(&run.json(), "error");
+    assert!(run.stderr.contains("no EtherCAT frame was heard"), "{}", run.stderr);
+}
+
+#[test]
+fn an_interface_that_vanishes_ends_the_look_with_what_was_seen() {
+    let script = r#"
+        (sleep 1; ip link delete near0) &
+        "$LINESMAN" diagnose near0 --seconds 20 --json
+    "#;
+    let Some(run) = beside_segment(script) else { return };
+    let diagnosis = run.json();
+    assert_valid(&diagnosis, "diagnosis");
+    assert_eq!(diagnosis["complete"], false, "{diagnosis}");
+    assert_eq!(diagnosis["network"]["devices"], 3);
+    assert!(run.stderr.contains("near0") && run.stderr.contains("judged as far"), "{}", run.stderr);
+}

@@ -163,7 +163,8 @@ impl MainDevice {
         }
     }
 
-    /// Time has come to `now`.
+    /// Time has come to `now`. Hand over frames that have arrived first: whatever is overdue then is
+    /// given up.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.executor.advance(now);
         self.work(now);
@@ -255,7 +256,7 @@ impl MainDevice {
     /// beside whatever else is going on.
     pub fn look(&mut self, now: Instant) {
         let (wire, network) = (self.aside.clone(), self.network);
-        let _ = self.aside.spawn(async move {
+        self.aside.spawn(async move {
             wire.emit(match look::look(wire.clone(), network).await {
                 Ok(look) => Event::Looked(Box::new(look)),
                 Err(error) => Event::LookFailed(error),
@@ -268,7 +269,7 @@ impl MainDevice {
     /// [`Event::Scanned`] or [`Event::ScanFailed`]. Another command that is going on is ended.
     pub fn scan(&mut self, now: Instant) {
         let (wire, network) = (self.command(), self.network);
-        let _ = wire.clone().spawn(async move {
+        wire.clone().spawn(async move {
             wire.emit(match scan::scan(wire.clone(), network).await {
                 Ok(inventory) => Event::Scanned(Box::new(inventory)),
                 Err(error) => Event::ScanFailed(error),
@@ -293,7 +294,7 @@ impl MainDevice {
             options: Arc::clone(&self.options),
             mailboxes: mailboxes.clone(),
         };
-        let _ = wire.spawn(supervisor::supervise(context));
+        wire.spawn(supervisor::supervise(context));
         let cyclic = Cyclic::new(Arc::clone(&plan), Arc::clone(&line), now);
         self.running = Some(Running { cyclic, plan, line, mailboxes });
         self.acyclic_left = self.options.frames_at_once;
@@ -306,7 +307,7 @@ impl MainDevice {
         let plan = self.running.as_ref().map(|running| Arc::clone(&running.plan));
         let wire = self.command();
         let options = Arc::clone(&self.options);
-        let _ = wire.clone().spawn(async move {
+        wire.clone().spawn(async move {
             let devices = plan.iter().flat_map(|plan| &plan.devices);
             let steps: Vec<_> = devices
                 .map(|device| {
@@ -344,7 +345,7 @@ impl MainDevice {
     /// the answer there, too.
     pub fn probe(&mut self, now: Instant, request: ProbeRequest) {
         let wire = self.aside.clone();
-        let _ = self.aside.spawn(async move {
+        self.aside.spawn(async move {
             let ProbeRequest { target, register, len, .. } = request;
             let result = match &request.write {
                 Some(data) => wire.write(target, register, data).await,
@@ -406,7 +407,7 @@ impl MainDevice {
     pub fn is_settled(&self) -> bool {
         self.running.as_ref().is_some_and(|running| {
             let line = lock(&running.line);
-            running.plan.devices.iter().all(|device| line.is_settled(device.id))
+            running.plan.devices.iter().all(|device| line.has_reached(device.id))
         })
     }
 

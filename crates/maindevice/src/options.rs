@@ -33,9 +33,10 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
+            // Addresses for documentation (RFC 7042); whoever has a real card gives its own.
             sources: [
-                MacAddress([0x00, 0x01, 0x05, 0, 0, 0xA0]),
-                MacAddress([0x00, 0x01, 0x05, 0, 0, 0xB0]),
+                MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x0A]),
+                MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x0B]),
             ],
             ring: false,
             patience: Span::ms(10),

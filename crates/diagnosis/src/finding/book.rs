@@ -4,9 +4,13 @@
 //! what it says no longer it took back, and the finding goes without a trace, since it never was
 //! true. A condition that is over stays as a closed finding.
 
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::{Condition, Severity};
+
+/// What follows from a condition may show so long after its end: SubDevices are asked one by one, and
+/// links need seconds to come back.
+const AFTER: Span = Span::s(3);
 
 /// A condition with a life.
 #[derive(Clone, PartialEq, Debug)]
@@ -172,7 +176,7 @@ fn is_same(one: &Condition, other: &Condition) -> bool {
 
 fn explains(cause: &Finding, effect: &Finding) -> bool {
     let symptoms = &effect.condition.symptoms;
-    let was_over = cause.closed.is_some_and(|closed| closed < effect.opened);
+    let was_over = cause.closed.is_some_and(|closed| closed + AFTER < effect.opened);
     !symptoms.is_empty()
         && !was_over
         && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))

@@ -94,6 +94,8 @@ pub enum Symptom {
     LinkDown(DeviceId, Port),
     /// The card has no link any more.
     NoCarrier,
+    /// Nothing comes back at all.
+    NobodyAnswers,
 }
 
 /// Another explanation.

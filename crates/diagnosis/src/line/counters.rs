@@ -20,6 +20,8 @@ pub struct CounterHistory {
     last: ErrorCounters,
     /// Falls without a write that was seen: the line has another reader, or the supply was gone.
     clears: u32,
+    /// When a rise was last read.
+    last_rise: Option<Instant>,
 }
 
 /// One counter over time.
@@ -95,6 +97,9 @@ impl CounterHistory {
                 }
             });
             news |= track.record(value, fell[group], at, frame);
+            if track.last_rise().is_some_and(|rise| rise.at == at) {
+                self.last_rise = Some(at);
+            }
         }
         news
     }
@@ -151,6 +156,12 @@ impl CounterHistory {
     #[must_use]
     pub fn is_known(&self) -> bool {
         !self.tracks.is_empty()
+    }
+
+    /// When a rise of any of them was last read.
+    #[must_use]
+    pub const fn last_rise(&self) -> Option<Instant> {
+        self.last_rise
     }
 
     /// How often a group of counters fell without a write that was seen.

@@ -358,6 +358,13 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
             (TransmitterDamaged, 0.05),
             (ReceiverDamaged, 0.05),
         ],
+        (None, false) if at_card => vec![
+            // The first cable, with an end that no controller knows.
+            (CableDegraded, 0.4),
+            (TransmitterDamaged, 0.25),
+            (EmcNoise, 0.15),
+            (ReceiverDamaged, 0.1),
+        ],
         (None, false) if hits >= MANY && is_steady(survey, group) => vec![
             (TransmitterDamaged, 0.35),
             (ReceiverDamaged, 0.25),

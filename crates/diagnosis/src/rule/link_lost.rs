@@ -156,7 +156,7 @@ pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
                 follows.insert(Symptom::PortErrors(DeviceId(node as u32), port));
             }
             End::MainDevice(_) => {
-                follows.insert(Symptom::NoCarrier);
+                follows.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
             }
         }
     }

@@ -35,6 +35,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// So many requests in a row without a return are no accident.
 const CERTAIN: u64 = 8;
+/// More in a row than noise takes from a line that still answers.
+const LONG: u64 = 32;
 /// With fewer, the end of the input may have cut off the answer.
 const FEW: u64 = 3;
 
@@ -58,7 +60,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     let line = view.line;
     let was_answered = line.traffic.answered > 0;
-    let carrier = line.host.card(Path::A).carrier.map(|carrier| carrier.value);
+    let carrier = carrier_during(line, silence);
     // Without a carrier it is the first hop for sure; with one, something forwards nothing.
     let (open, off, dead_link, card) = match carrier {
         Some(false) => (0.6, 0.3, 0.0, 0.1),
@@ -82,9 +84,10 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
             condition = condition.shown_by(Evidence::frame(returned.at, frame, text));
         }
     }
-    if let Some(carrier) = line.host.card(Path::A).carrier {
-        let text = if carrier.value { "card A has a link" } else { "card A has no link" };
-        condition = condition.shown_by(Evidence::host(Some(carrier.at), text));
+    if let Some(carrier) = carrier {
+        let text = if carrier { "card A has a link" } else { "card A had no link meanwhile" };
+        let at = line.host.card(Path::A).carrier.map(|carrier| carrier.at);
+        condition = condition.shown_by(Evidence::host(at, text));
     }
     condition = match first_device(line) {
         Some(id) => condition.or_at(FaultName::DeviceOff, Place::device(line.network, id), off),
@@ -100,12 +103,24 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     if let Some(ended) = silence.ended {
         condition = condition.ended(ended);
     }
+    // Frames that are damaged on their way are missing, too, and a few in a row may be noise.
+    let may_be_noise = was_answered && (silence.ended.is_some() || silence.frames < LONG);
+    let symptom = if may_be_noise { Symptom::FramesLost } else { Symptom::NobodyAnswers };
+    condition = condition.about([symptom]);
     let devices = line.devices.iter().map(|device| device.id);
     let follows = devices
         .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
     condition = condition.explaining(follows);
     condition = condition.explaining([Symptom::FramesLost, Symptom::NoCarrier]);
     advise(condition, carrier)
+}
+
+/// Whether the card had a link during a silence; `None` when the host does not say.
+fn carrier_during(line: &Line, silence: &Silence) -> Option<bool> {
+    let card = line.host.card(Path::A);
+    let carrier = card.carrier?;
+    let came_back = carrier.value && card.carrier_changes > 0 && carrier.at >= silence.since.at;
+    Some(carrier.value && !came_back)
 }
 
 /// Frames come back as they went out.

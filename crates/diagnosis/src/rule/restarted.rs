@@ -4,23 +4,29 @@
 //!
 //! **How it is found.** AL status (0x0130) falls while AL control (0x0120) last asked for the state
 //! before. A controller that starts anew comes up in INIT with its station address, its SyncManagers and
-//! its counters cleared, so it often answers only to its position at first.
+//! its counters cleared, so it answers only to its position at first, and its neighbours have lost the
+//! links to it for a while. Links that are lost while the device keeps its state are no restart.
 //!
-//! **What it means.** For a fall to INIT the supply dipped (brown-out), or the firmware reset itself.
-//! When several SubDevices fall at the same moment, they share the supply that failed. A fall to another
-//! state without an error code is the doing of the firmware.
+//! **What it means.** For a fall to INIT the supply was gone: for a moment (brown-out), or for longer
+//! (device or supply off). When several SubDevices fall at the same moment, they share the supply that
+//! failed. A fall to another state without an error code is the doing of the firmware. The links that
+//! the device lost meanwhile are listed beneath.
 //!
 //! **What to do.** Measure the supply of the SubDevice under load, at the device; look what is switched
 //! at these moments.
 
-use linesman_config::fault::{Class, FaultName};
-use linesman_proto::address::RegisterAddress;
-use linesman_proto::state::AlState;
-use linesman_proto::time::Span;
+use std::collections::BTreeSet;
 
-use super::{Rule, RulePage, View};
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::state::AlState;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
+
+use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{AlChange, Device};
+use crate::line::{AlChange, Device, Line, Seen};
+use crate::locate::Drops;
 
 /// Back in INIT.
 pub const RESTARTED: RulePage = RulePage {
@@ -44,87 +50,226 @@ pub const FELL: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[RESTARTED, FELL], judge };
 
 const AL_STATUS: RegisterAddress = RegisterAddress(0x0130);
-/// States are polled one after the other: falls so close together are one event.
+/// Outages that begin so close together have one cause; states are polled one after the other.
 const TOGETHER: Span = Span::ms(500);
+/// An outage that ended so long before the state was seen may belong to it: addresses are given and
+/// states read only after a scan.
+const BEFORE: Span = Span::s(10);
+/// A link needs up to two seconds to come up again: only a longer outage was no mere dip.
+const LONG: Span = Span::ms(2500);
+
+/// A fall, with the time in which the device was gone.
+#[derive(Clone, Copy)]
+struct Fall<'a> {
+    device: &'a Device,
+    change: &'a AlChange,
+    is_restart: bool,
+    gone: Option<(Instant, Instant)>,
+}
+
+impl Fall<'_> {
+    fn began(&self) -> Instant {
+        self.gone.map_or(self.change.at, |(since, _)| since)
+    }
+
+    fn was_long(&self) -> bool {
+        self.gone.is_some_and(|(since, until)| until.since(since) >= LONG)
+    }
+}
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let mut falls: Vec<(&Device, &AlChange)> = Vec::new();
-    for device in &view.line.devices {
+    let line = view.line;
+    let mut falls: Vec<Fall<'_>> = Vec::new();
+    for device in &line.devices {
         let mut own = device.al.changes.iter().filter(|change| change.is_own_fall());
         if let Some(change) = own.next_back() {
-            falls.push((device, change));
+            let is_restart = change.to.state().state() == Some(AlState::Init);
+            let gone = if is_restart { outage(line, device, change) } else { None };
+            falls.push(Fall { device, change, is_restart, gone });
         }
     }
-    for (device, change) in &falls {
-        let is_restart = change.to.state().state() == Some(AlState::Init);
+    for fall in &falls {
         let together: Vec<_> = falls
             .iter()
-            .filter(|(other, at)| other.id != device.id && is_near(at, change))
-            .map(|(other, _)| other.id)
+            .filter(|other| other.is_restart && is_near(other.began(), fall.began()))
+            .copied()
             .collect();
-        let page = if is_restart { &RESTARTED } else { &FELL };
-        let cause = if is_restart { FaultName::BrownOut } else { FaultName::FirmwareFault };
-        let text = format!(
-            "AL status: {} before, {} now, not asked for",
-            change.from.state(),
-            change.to.state()
-        );
-        let seen = crate::line::Seen::new((), change.at, change.frame);
-        let evidence = Evidence::register(device.id, AL_STATUS, &seen, text)
-            .values(Some(u64::from(change.from.0)), Some(u64::from(change.to.0)));
-        let place = Place::device(view.line.network, device.id);
-        let mut condition = Condition::new(page, place, cause, change.at)
-            .confidence(0.7)
-            .confirmed(change.at)
-            .shown_by(evidence)
-            .explaining([Symptom::WorkingCounter(device.id), Symptom::Silent(device.id)]);
-        condition = if is_restart {
-            condition.or(FaultName::FirmwareFault, 0.15).or(FaultName::DeviceOff, 0.1)
+        conditions.push(if fall.is_restart {
+            restarted(line, fall, &together)
         } else {
-            condition.or(FaultName::BrownOut, 0.1)
-        };
-        let is_first = together.iter().all(|other| device.id < *other);
-        if is_restart && is_first {
-            condition =
-                condition.explaining(together.iter().map(|other| Symptom::StateLost(*other)));
-        } else if is_restart {
-            condition = condition.about([Symptom::StateLost(device.id)]);
-        }
-        if let Some(back) = device.al.state().filter(|state| *state >= came_from(change))
-            && let Some(at) = device.al.status
-            && at.at > change.at
-            && back > AlState::Init
-        {
-            condition = condition.ended(at.at);
-        }
-        conditions.push(advise(condition, is_restart, together.len()));
+            fell(line, fall)
+        });
     }
 }
 
-fn is_near(one: &AlChange, other: &AlChange) -> bool {
-    let (early, late) = if one.at < other.at { (one, other) } else { (other, one) };
-    late.at.since(early.at) <= TOGETHER
-}
-
-fn came_from(change: &AlChange) -> AlState {
-    change.from.state().state().unwrap_or(AlState::Init)
-}
-
-fn advise(condition: Condition, is_restart: bool, others: usize) -> Condition {
-    if !is_restart {
-        return condition
-            .advise("Read the SubDevice's diagnosis history (object 0x10F3), if it has one.")
-            .advise("Note its firmware version and ask the manufacturer, with a capture.");
+/// When the device was gone before it came back in INIT: as long as its neighbour had no link to it,
+/// or, where that is not known, as long as it did not answer.
+fn outage(line: &Line, device: &Device, change: &AlChange) -> Option<(Instant, Instant)> {
+    let is_recent =
+        |since: Instant, until: Instant| since <= change.at && until + BEFORE >= change.at;
+    let entry = line.tree.as_ref().filter(|tree| device.id.index() < tree.len());
+    let upstream = entry.and_then(|tree| line.opposite(device.id, tree.entry(device.id.index())));
+    if let Some(End::Controller(parent, port)) = upstream
+        && let Some(parent) = line.device(parent)
+    {
+        let mut down = None;
+        let mut latest = None;
+        for seen in &parent.dl.changes {
+            let is_active = seen.to.port_state(port).is_active();
+            match (down, is_active) {
+                (None, false) if seen.from.port_state(port).is_active() => down = Some(seen.at),
+                (Some(since), true) => {
+                    latest =
+                        Some((since, seen.at)).filter(|_| is_recent(since, seen.at)).or(latest);
+                    down = None;
+                }
+                (None | Some(_), _) => {}
+            }
+        }
+        if latest.is_some() {
+            return latest;
+        }
     }
-    let condition = if others > 0 {
-        condition.advise(
-            "Several SubDevices started anew at the same moment: look for the supply that they share.",
-        )
-    } else {
-        condition
+    let absences = device.absences.iter().rev();
+    let mut spans = absences.map(|absence| (absence.since.at, absence.ended.unwrap_or(change.at)));
+    spans.find(|(since, until)| is_recent(*since, *until))
+}
+
+fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
+    let device = fall.device;
+    let is_several = together.len() > 1;
+    let is_first = together.iter().all(|other| device.id <= other.device.id);
+    let was_long = together.iter().any(Fall::was_long);
+    let (cause, others) = match (was_long, is_several) {
+        (true, true) => {
+            (FaultName::SupplyOff, [(FaultName::BrownOut, 0.15), (FaultName::DeviceOff, 0.1)])
+        }
+        (true, false) => {
+            (FaultName::DeviceOff, [(FaultName::BrownOut, 0.15), (FaultName::SupplyOff, 0.1)])
+        }
+        (false, _) => {
+            (FaultName::BrownOut, [(FaultName::DeviceOff, 0.15), (FaultName::FirmwareFault, 0.1)])
+        }
     };
+    let place = Place::device(line.network, device.id);
+    let mut condition = Condition::new(&RESTARTED, place, cause, fall.began())
+        .confidence(0.7)
+        .confirmed(fall.change.at)
+        .shown_by(state_evidence(fall));
+    for (cause, confidence) in others {
+        condition = condition.or(cause, confidence);
+    }
+    if let Some((since, until)) = fall.gone {
+        let text = format!(
+            "SubDevice {} was gone for {:.0} ms before that",
+            line.label(device.id),
+            until.since(since).as_secs_f64() * 1000.0
+        );
+        let seen = Seen::new((), since, None);
+        condition = condition.shown_by(Evidence::register(device.id, AL_STATUS, &seen, text));
+    }
+    if is_first {
+        let mut follows = BTreeSet::new();
+        for other in together {
+            follows.extend(consequences(line, other.device.id));
+            if other.device.id != device.id {
+                follows.insert(Symptom::StateLost(other.device.id));
+            }
+        }
+        condition = condition.explaining(follows);
+    } else {
+        condition = condition.about([Symptom::StateLost(device.id)]);
+    }
+    if is_back(fall)
+        && let Some(status) = device.al.status
+    {
+        condition = condition.ended(status.at);
+    }
+    if is_several {
+        condition = condition.advise(
+            "Several SubDevices started anew at the same moment: look for the supply that they share.",
+        );
+    }
     condition
         .advise("Measure the supply of this SubDevice under load, at its terminals.")
         .advise("Check plug and clamp of the supply; move them while watching the line.")
         .advise("Look what is switched on at the moments of the restarts.")
+}
+
+/// All that a device without power brings about.
+fn consequences(line: &Line, id: DeviceId) -> Vec<Symptom> {
+    let mut follows = links_lost_with(line, id);
+    follows.extend([Symptom::Silent(id), Symptom::WorkingCounter(id)]);
+    if let Some(tree) = line.tree.as_ref().filter(|tree| id.index() < tree.len()) {
+        for behind in tree.subtree(id.index()).iter().map(|node| DeviceId(*node as u32)) {
+            if behind != id {
+                follows.extend([
+                    Symptom::Silent(behind),
+                    Symptom::WorkingCounter(behind),
+                    Symptom::StateLost(behind),
+                ]);
+            }
+        }
+        if tree.upstream(id.index()).is_some_and(|end| end.node().is_none()) {
+            follows.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
+        }
+    }
+    // Its own fall is what it is about, not what follows.
+    follows.retain(|symptom| *symptom != Symptom::StateLost(id));
+    follows
+}
+
+/// What follows from a restart at the links of the device: without supply it has no link, so its
+/// neighbours lose theirs. Not so where a link was lost more often than the device restarted.
+fn links_lost_with(line: &Line, id: DeviceId) -> Vec<Symptom> {
+    let (Some(tree), Some(device)) = (&line.tree, line.device(id)) else { return Vec::new() };
+    let falls = device.al.changes.iter().filter(|change| change.is_own_fall()).count() as u64;
+    let mut follows = Vec::new();
+    for drops in Drops::all(line) {
+        let link = tree.links()[drops.link];
+        let ends = [link.upstream, link.downstream];
+        let is_its = ends.iter().any(|end| end.node() == Some(id.index()));
+        if is_its && drops.count <= falls {
+            follows.extend(link_lost::follows(line, tree, drops.link));
+        }
+    }
+    follows
+}
+
+fn fell(line: &Line, fall: &Fall<'_>) -> Condition {
+    let id = fall.device.id;
+    let place = Place::device(line.network, id);
+    let condition = Condition::new(&FELL, place, FaultName::FirmwareFault, fall.change.at)
+        .confidence(0.7)
+        .or(FaultName::BrownOut, 0.1)
+        .confirmed(fall.change.at)
+        .shown_by(state_evidence(fall))
+        .explaining([Symptom::WorkingCounter(id)])
+        .advise("Read the SubDevice's diagnosis history (object 0x10F3), if it has one.")
+        .advise("Note its firmware version and ask the manufacturer, with a capture.");
+    match fall.device.al.status {
+        Some(status) if is_back(fall) => condition.ended(status.at),
+        Some(_) | None => condition,
+    }
+}
+
+fn state_evidence(fall: &Fall<'_>) -> Evidence {
+    let change = fall.change;
+    let (from, to) = (change.from.state(), change.to.state());
+    let text = format!("AL status: {from} before, {to} now, not asked for");
+    let seen = Seen::new((), change.at, change.frame);
+    Evidence::register(fall.device.id, AL_STATUS, &seen, text)
+        .values(Some(u64::from(change.from.0)), Some(u64::from(change.to.0)))
+}
+
+/// Whether it is where it was before.
+fn is_back(fall: &Fall<'_>) -> bool {
+    let state = fall.device.al.state();
+    let is_later = fall.device.al.status.is_some_and(|status| status.at > fall.change.at);
+    is_later && state >= fall.change.from.state().state()
+}
+
+fn is_near(one: Instant, other: Instant) -> bool {
+    let (early, late) = if one < other { (one, other) } else { (other, one) };
+    late.since(early) <= TOGETHER
 }

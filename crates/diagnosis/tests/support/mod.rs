@@ -9,6 +9,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 pub mod script;
+pub mod watcher;
 
 use std::path::{Path, PathBuf};
 

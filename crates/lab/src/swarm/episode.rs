@@ -8,9 +8,9 @@ use linesman_diagnosis::observe::{Direction, FrameSeen};
 use linesman_diagnosis::report::{FindingState, Severity};
 use linesman_proto::frame::view::FrameView;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::Tree;
+use linesman_proto::topology::{End, Tree};
 use linesman_sim::seed::Stream;
-use linesman_sim::truth::FaultId;
+use linesman_sim::truth::{Effect, Entry, FaultId, FaultRecord, Place};
 
 use super::counter::{Kind, Returned, expected};
 use super::reach::Reach;
@@ -229,21 +229,36 @@ impl<'a> Episode<'a> {
     }
 
     /// Whether a fault has left a trace that can be read from the MainDevice.
-    fn can_be_seen(&self, fault: &linesman_sim::truth::FaultRecord) -> bool {
-        use linesman_proto::topology::End;
-        use linesman_sim::truth::Place;
-        let only_to_card = fault.places.iter().all(|place| match place {
-            Place::Direction(_, to) => matches!(to, End::MainDevice(_)),
-            Place::Link(..) | Place::Device(_) | Place::Host(_) => false,
-        });
-        if only_to_card {
-            // A card counts no symbols; without its counters only what is lost is seen.
-            return fault.frames_spoiled > 0 && self.host_counters;
+    fn can_be_seen(&self, fault: &FaultRecord) -> bool {
+        if fault.links_lost > 0 || fault.supplies_lost > 0 {
+            return true;
         }
-        fault.symbol_errors > 0
-            || fault.frames_spoiled > 0
-            || fault.links_lost > 0
-            || fault.supplies_lost > 0
+        let seen = |place: &Place, is_frame: bool| match place {
+            // A card counts no symbols; without its counters only what does not come back is seen,
+            // and a few frames may get lost on a good line.
+            Place::Direction(_, End::MainDevice(_)) | Place::Host(_) => {
+                is_frame && self.host_counters
+            }
+            Place::Direction(_, End::Controller(..)) | Place::Link(..) | Place::Device(_) => true,
+        };
+        self.lab.truth().entries().iter().any(|entry| match entry {
+            Entry::Effect { fault: Some(id), place, effect, .. } if *id == fault.id => match effect
+            {
+                Effect::SymbolError => seen(place, false),
+                Effect::FrameSpoiled { .. } => seen(place, true),
+                Effect::FrameLost { .. }
+                | Effect::ContentRefused { .. }
+                | Effect::SignalLost
+                | Effect::SignalBack
+                | Effect::PowerLost
+                | Effect::PowerBack
+                | Effect::StateRefused { .. }
+                | Effect::OldCounters
+                | Effect::WrongDevice
+                | Effect::MissingDevice => false,
+            },
+            Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => false,
+        })
     }
 
     /// Waits until the line is up again.

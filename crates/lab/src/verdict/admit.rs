@@ -66,6 +66,7 @@ const LAST_HOP: &str = "on the last hop a card counts bad frames but no symbols"
 const UNCOUNTED: &str = "without the card's counters frames that the card drops just do not come \
                          back";
 const MII: &str = "between its PHY and its controller the receiver may spoil what came clean";
+const MAY_COME_AGAIN: &str = "an opening that is over may have been the first of many";
 const ONCE: &str = "each opening of a flapping contact is an open link";
 const RESTART: &str = "a dip of a supply and a short time without power are the same to a device";
 const SHARED: &str = "one device of a supply looks the same from outside as a supply of one device";
@@ -161,6 +162,9 @@ impl Set<'_> {
         else {
             return;
         };
+        if self.scene.answered_again {
+            self.add(LinkFlapping, Site::link(tree, one, other), Some(MAY_COME_AGAIN));
+        }
         // In a ring both neighbours of a dead device see it; a cut shows at two live ends.
         if tree.closes_at().is_none() && !self.scene.answered_again {
             self.add(DeviceOff, Site::Device(behind), Some(SILENT));

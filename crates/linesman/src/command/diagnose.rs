@@ -1,8 +1,10 @@
 //! `linesman diagnose`: what is wrong with a line, where, why, and what to do.
 
 mod capture;
+mod cards;
 pub(crate) mod follow;
 mod listen;
+mod segment;
 
 use std::path::PathBuf;
 
@@ -10,6 +12,7 @@ use linesman_config::project::Project;
 use linesman_diagnosis::report::{Diagnosis, Verdict};
 use linesman_diagnosis::{Engine, Setup};
 use linesman_proto::address::Network;
+use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
 use linesman_runtime::selector::Selector;
 
@@ -40,9 +43,41 @@ pub(crate) struct Arguments {
     /// How long to look; Ctrl-C ends it too
     #[arg(long, value_name = "N")]
     seconds: Option<f64>,
+    /// On a card: also what writes, that is station addresses and the reading of each SII. States
+    /// and counters are left alone in any case
+    #[arg(long)]
+    active: bool,
+    /// On a virtual segment: the state that its SubDevices are driven to
+    #[arg(long, value_enum, value_name = "STATE", default_value_t, ignore_case = true)]
+    to: Target,
     /// JSON, schema linesman.diagnosis/1
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// A state to drive to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, clap::ValueEnum)]
+enum Target {
+    /// No communication but registers
+    Init,
+    /// Mailboxes
+    Preop,
+    /// Mailboxes and inputs
+    Safeop,
+    /// Everything
+    #[default]
+    Op,
+}
+
+impl From<Target> for AlState {
+    fn from(target: Target) -> Self {
+        match target {
+            Target::Init => Self::Init,
+            Target::Preop => Self::PreOp,
+            Target::Safeop => Self::SafeOp,
+            Target::Op => Self::Op,
+        }
+    }
 }
 
 /// Judges what the selector names.
@@ -57,9 +92,21 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Selector::Listen(names) => {
             listen::run(names, Session::new(arguments, &selector, project), output)
         }
-        Selector::Observations(_) | Selector::Segment(_) | Selector::Cards(_) => Err(Failure::new(
-            format!("`{}`: only captures and listening can be judged so far", arguments.place),
-            "record one with `tcpdump -i eth0 -w trace.pcap`, and name the file",
+        Selector::Cards(names) => {
+            let session = Session::new(arguments, &selector, project);
+            cards::run(names, arguments.active, session, output)
+        }
+        Selector::Segment(path) => {
+            if arguments.project.is_some() {
+                let reason = format!("`{selector}`: a segment file says itself what was planned");
+                return Err(Failure::new(reason, "leave out `--project`"));
+            }
+            let session = Session::new(arguments, &selector, None);
+            segment::run(path, arguments.to.into(), session, output)
+        }
+        Selector::Observations(_) => Err(Failure::new(
+            format!("`{}`: observation files cannot be judged so far", arguments.place),
+            "for a virtual segment say `sim:` in front of the file's name",
         )),
     }
 }
@@ -86,8 +133,9 @@ impl Session {
 
     /// Tells what happened to findings, where that was asked for.
     fn follow(&self, engine: &mut Engine, output: &mut Output) {
-        if let Some(follower) = &self.follower {
-            follower.tell(engine, output);
+        let Some(follower) = &self.follower else { return };
+        while let Some(event) = engine.poll_event() {
+            follower.tell(event, &names(engine), output);
         }
     }
 
@@ -101,12 +149,22 @@ impl Session {
     ) -> Status {
         engine.finish(at, complete);
         self.follow(&mut engine, output);
-        let mut diagnosis = engine.diagnosis();
+        self.answer(engine.diagnosis(), &names(&engine), at, output)
+    }
+
+    /// Gives the answer.
+    fn answer(
+        &self,
+        mut diagnosis: Diagnosis,
+        names: &Names,
+        at: Instant,
+        output: &mut Output,
+    ) -> Status {
         diagnosis.tool = version::tool();
         match (&self.follower, self.json) {
             (Some(follower), true) => follower.end(at, &diagnosis, output),
             (None, true) => output.json(&diagnosis),
-            (_, false) => print(&diagnosis, &names(&engine), output),
+            (_, false) => print(&diagnosis, names, output),
         }
         status(&diagnosis)
     }

@@ -2,6 +2,7 @@
 
 mod cards;
 pub(crate) mod report;
+mod segment;
 mod table;
 
 use std::fs;
@@ -18,7 +19,7 @@ use crate::output::Output;
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
-    /// Where the line is: eth0 or eth0+eth1 (a ring)
+    /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
     #[arg(value_name = "WHERE")]
     place: String,
     /// Identities, controllers and error counters too
@@ -46,10 +47,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     }
     let scan = match &selector {
         Selector::Cards(names) => cards::scan(names)?,
-        Selector::Segment(_)
-        | Selector::Listen(_)
-        | Selector::Capture(_)
-        | Selector::Observations(_) => {
+        Selector::Segment(path) => segment::scan(path)?,
+        Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             let reason = format!("`{selector}`: a scan sends frames, and nobody answers there");
             let advice = format!("judge it with `linesman diagnose {}`", arguments.place);
             return Err(Failure::new(reason, advice));

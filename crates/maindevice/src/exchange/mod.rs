@@ -122,7 +122,7 @@ impl Exchange {
         let deadline = now + self.patience;
         let mut queue = std::mem::take(&mut self.queue);
         let sent = self.send(now, deadline, Purpose::Acyclic, |builder, slot, index| {
-            queue::pack(builder, &mut queue, &mut slot.requests, MAX_ACYCLIC_DATAGRAMS, index);
+            queue::pack(builder, &mut queue, slot.requests, MAX_ACYCLIC_DATAGRAMS, index);
         });
         self.queue = queue;
         if sent.is_some() {

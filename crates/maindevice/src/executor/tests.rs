@@ -24,7 +24,7 @@ fn tasks_run_in_the_order_of_their_answers() {
     let order = Arc::new(Mutex::new(Vec::new()));
     for name in 0..3 {
         let (wire, order) = (wire.clone(), Arc::clone(&order));
-        let _ = wire.clone().spawn(async move {
+        wire.clone().spawn(async move {
             let _ = wire.read(TARGET, REGISTER, 2).await;
             lock(&order).push(name);
         });
@@ -45,7 +45,7 @@ fn sleepers_wake_in_the_order_of_time() {
     let order = Arc::new(Mutex::new(Vec::new()));
     for millis in [3, 1, 2] {
         let (wire, order) = (wire.clone(), Arc::clone(&order));
-        let _ = wire.clone().spawn(async move {
+        wire.clone().spawn(async move {
             wire.sleep(Span::ms(millis)).await;
             lock(&order).push(millis);
         });
@@ -67,7 +67,7 @@ fn a_bad_working_counter_is_asked_again_and_then_reported() {
     let outcome = Arc::new(Mutex::new(None));
     let seen = Arc::clone(&outcome);
     let wire = executor.group(0);
-    let _ = wire.spawn(async move {
+    wire.spawn(async move {
         let result = handle.await;
         *lock(&seen) = Some(result);
     });
@@ -102,7 +102,7 @@ fn a_cancelled_group_leaves_nothing_behind() {
     let drops = Arc::new(AtomicUsize::new(0));
     for wire in [&wire, &other] {
         let (wire, dropped) = (wire.clone(), Dropped(Arc::clone(&drops)));
-        let _ = wire.clone().spawn(async move {
+        wire.clone().spawn(async move {
             let asked = wire.read(TARGET, REGISTER, 2);
             wire.sleep(Span::ms(1)).await;
             let _ = asked.await;

@@ -63,3 +63,6 @@ fn refuse(context: &Context, id: DeviceId, job: Job) {
         Job::Download { object, .. } => Event::SdoDownloaded { id, object, result: Err(error) },
     });
 }
+
+#[cfg(test)]
+mod tests;

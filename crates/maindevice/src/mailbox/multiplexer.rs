@@ -87,9 +87,13 @@ impl<'a> Multiplexer<'a> {
             let request = Request::write(self.target, self.areas.receive.offset, &buffer);
             match self.wire.submit(request).await {
                 Ok(reply) if reply.answered() => return Ok(()),
-                // Full. After a lost frame it is our own message that fills it.
-                Ok(_) if uncertain && self.is_full(OUT).await? => return Ok(()),
-                Ok(_) => {}
+                // Full, unless the SubDevice does not answer at all. After a lost frame it is our own
+                // message that fills it.
+                Ok(_) => {
+                    if self.is_full(OUT).await? && uncertain {
+                        return Ok(());
+                    }
+                }
                 Err(error @ ExchangeError::WorkingCounter { .. }) => return Err(error.into()),
                 Err(ExchangeError::NoReply { .. }) => uncertain = true,
             }
@@ -132,10 +136,11 @@ impl<'a> Multiplexer<'a> {
         // A SubDevice that talks without end must not keep its jobs waiting.
         for _ in 0..16 {
             match self.fetch().await {
-                Ok(Some(buffer)) => match self.dispatch(&buffer) {
-                    Ok(Some(data)) => self.unasked(MailboxType::Coe, data),
-                    Ok(None) | Err(_) => {}
-                },
+                Ok(Some(buffer)) => {
+                    if let Ok(Some(data)) = self.dispatch(&buffer) {
+                        self.unasked(MailboxType::Coe, data);
+                    }
+                }
                 Ok(None) | Err(_) => return,
             }
         }

@@ -96,8 +96,7 @@ async fn give_addresses(wire: &Wire, look: &Look) -> Result<Vec<StationAddress>,
         .filter(|((_, present), chosen)| present != chosen)
         .map(|((device, _), chosen)| {
             let (wire, position, station) = (wire.clone(), device.position, *chosen);
-            let task = async move { (position, address::assign(&wire, position, station).await) };
-            task
+            async move { (position, address::assign(&wire, position, station).await) }
         })
         .map(|task| wire.spawn(task))
         .collect();

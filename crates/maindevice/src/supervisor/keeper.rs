@@ -120,7 +120,7 @@ impl Keeper<'_> {
         let wait = self.backoff.max(first);
         self.backoff = (wait * 2).min(longest);
         // It stays where it is: what it does not serve meanwhile is no news.
-        lock(&self.context.line).set_settled(self.device.id, status.state().state());
+        lock(&self.context.line).set_stuck(self.device.id, status.state().state());
         let until = self.context.wire.now() + wait;
         while self.context.wire.now() < until {
             self.context.wire.sleep(self.context.options.watch_interval.min(wait)).await;
@@ -134,9 +134,9 @@ impl Keeper<'_> {
     fn reached(&mut self) {
         let (id, state) = (self.device.id, self.device.target);
         let mut line = lock(&self.context.line);
-        line.set_settled(id, Some(state));
-        let settled = |device: &DevicePlan| line.is_settled(device.id);
-        let all = self.context.plan.devices.iter().all(settled);
+        line.set_reached(id, state);
+        let reached = |device: &DevicePlan| line.has_reached(device.id);
+        let all = self.context.plan.devices.iter().all(reached);
         let all = all && line.set_all_reached();
         drop(line);
         self.context.wire.emit(Event::TargetReached { id, state });

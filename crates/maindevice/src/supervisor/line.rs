@@ -33,7 +33,10 @@ pub(crate) enum Found {
 struct Live {
     found: Found,
     served: bool,
+    /// What it serves is known; else it is on its way.
     settled: bool,
+    /// It is at its target.
+    reached: bool,
     mailbox: bool,
 }
 
@@ -85,30 +88,40 @@ impl Line {
         self.version += 1;
         let Some(live) = self.live(id) else { return Found::Unknown };
         let before = std::mem::replace(&mut live.found, found);
-        match found {
-            Found::There { .. } => {}
-            // Its process data are missed on purpose from now on.
-            Found::Lost | Found::Unknown => (live.served, live.mailbox) = (false, false),
-        }
-        live.settled &= !matches!(found, Found::There { .. });
+        // Whoever is lost serves nothing, and that is known; whoever comes is on its way.
+        let settled = match found {
+            Found::Lost => true,
+            Found::There { .. } | Found::Unknown => false,
+        };
+        *live = Live { found, settled, ..Live::default() };
         before
     }
 
     /// Notes that a SubDevice is on its way between states, and what it serves meanwhile.
     pub(crate) fn set_moving(&mut self, id: DeviceId, state: Option<AlState>) {
-        self.set(id, state, false);
+        self.set(id, state, false, false);
     }
 
-    /// Notes that a SubDevice is where it shall be, or stays where it is.
-    pub(crate) fn set_settled(&mut self, id: DeviceId, state: Option<AlState>) {
-        self.set(id, state, true);
+    /// Notes that a SubDevice stays where it is, short of its target.
+    pub(crate) fn set_stuck(&mut self, id: DeviceId, state: Option<AlState>) {
+        self.set(id, state, true, false);
     }
 
-    fn set(&mut self, id: DeviceId, state: Option<AlState>, settled: bool) {
+    /// Notes that a SubDevice is where it shall be.
+    pub(crate) fn set_reached(&mut self, id: DeviceId, state: AlState) {
+        self.set(id, Some(state), true, true);
+    }
+
+    /// Whether a SubDevice is where it shall be.
+    pub(crate) fn has_reached(&self, id: DeviceId) -> bool {
+        self.devices.get(id.index()).is_some_and(|live| live.reached)
+    }
+
+    fn set(&mut self, id: DeviceId, state: Option<AlState>, settled: bool, reached: bool) {
         let Some(live) = self.live(id) else { return };
         live.served = state.is_some_and(AlState::has_inputs);
         live.mailbox = state.is_some_and(AlState::has_mailbox);
-        live.settled = settled;
+        (live.settled, live.reached) = (settled, reached);
         self.version += 1;
     }
 

@@ -30,7 +30,7 @@ fn who_is_lost_serves_nothing() {
     let mut line = line(2);
     let id = DeviceId(1);
     line.set_found(id, Found::There { restarted: true });
-    line.set_settled(id, Some(AlState::Op));
+    line.set_reached(id, AlState::Op);
     let mut presence = Presence::none(2);
     line.copy_presence(&mut presence);
     assert!(presence.of(id).inputs && presence.of(id).outputs);
@@ -40,6 +40,8 @@ fn who_is_lost_serves_nothing() {
     assert_ne!(line.version(), before);
     line.copy_presence(&mut presence);
     assert_eq!(presence.of(id).reached_by, None);
+    // That it serves nothing is known: the counter of the others is judged.
+    assert!(line.is_settled(id) && !line.has_reached(id));
 }
 
 #[test]

@@ -128,7 +128,8 @@ impl Bench {
     pub(crate) fn start(&mut self, target: AlState) -> Plan {
         let inventory = self.scan();
         let tree = inventory.tree().clone();
-        let plan = Plan::build(&inventory.planned(target), tree, &PlanOptions::default()).unwrap();
+        let plan = Plan::build(&inventory.planned(target), tree, &PlanOptions::default());
+        let plan = plan.expect("a plan");
         self.device.start(self.now, plan.clone());
         let done = |event: &Event| matches!(event, Event::AllReached);
         assert!(

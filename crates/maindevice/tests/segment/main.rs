@@ -6,3 +6,4 @@ mod ring;
 mod robust;
 mod run;
 mod scan;
+mod soak;

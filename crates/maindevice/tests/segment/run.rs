@@ -2,10 +2,12 @@
 
 use crate::bench::{Bench, Fate};
 use linesman_config::fault::FaultName;
-use linesman_maindevice::Event;
+use linesman_config::plan::{self, Plan};
+use linesman_maindevice::{Event, Options};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
-use linesman_sim::segment_file::FaultEntry;
+use linesman_sim::seed::Seed;
+use linesman_sim::segment_file::{FaultEntry, PlantOptions, plant};
 
 /// Outputs of T2 wired to nothing, inputs of T1 driven by nobody; smart devices at the end.
 const PLANT: &str = r#"
@@ -125,6 +127,14 @@ fn a_cut_loses_what_is_behind_it_and_healing_brings_it_back() {
     }
     assert_eq!(count(&bench, |event| matches!(event, Event::DeviceLost { .. })), 5);
     assert_eq!(bench.state("T2"), "OP");
+    // The working counter was short until it was clear who is missing.
+    let short = |event: &Event| matches!(event, Event::WorkingCounter { expected, received, .. } if received < expected);
+    assert!(count(&bench, short) > 0);
+    assert!(count(&bench, |event| matches!(event, Event::WorkingCounterGood { .. })) > 0);
+    let before = bench.device.statistics().working_counter_errors;
+    assert!(before < 50, "{before} cycles until it was clear");
+    bench.run_for(Span::ms(100));
+    assert_eq!(bench.device.statistics().working_counter_errors, before);
     bench.events.clear();
     bench.segment.heal(bench.now, cut);
     bench.run_for(Span::s(6));
@@ -202,11 +212,7 @@ fn a_refusal_is_reported_and_tried_again_more_and_more_seldom() {
     let refused = bench.segment.inject(bench.now, &entry).unwrap();
     let inventory = bench.scan();
     let tree = inventory.tree().clone();
-    let plan = linesman_config::plan::Plan::build(
-        &inventory.planned(AlState::Op),
-        tree,
-        &linesman_config::plan::PlanOptions::default(),
-    );
+    let plan = Plan::build(&inventory.planned(AlState::Op), tree, &plan::PlanOptions::default());
     bench.device.start(bench.now, plan.unwrap());
     bench.run_for(Span::s(12));
     let id = bench.id("T3");
@@ -218,6 +224,8 @@ fn a_refusal_is_reported_and_tried_again_more_and_more_seldom() {
         .collect();
     assert!((3..=6).contains(&refusals.len()), "{refusals:?}");
     assert_eq!(bench.state("T8"), "OP");
+    assert!(!bench.device.is_settled());
+    assert_eq!(count(&bench, |event| matches!(event, Event::AllReached)), 0);
     bench.segment.heal(bench.now, refused);
     bench.run_for(Span::s(25));
     assert_eq!(bench.state("T3"), "OP");
@@ -242,5 +250,68 @@ fn stopping_leaves_all_in_the_state_that_was_asked_for() {
     assert!(bench.run_until(Span::s(6), |event| matches!(event, Event::Stopped)));
     for name in ["K1", "T3", "T8"] {
         assert_eq!(bench.state(name), "INIT", "{name}");
+    }
+}
+
+/// A plan made of the healthy line, started on a line where something is otherwise.
+fn started_on(other: &str) -> Bench {
+    let mut healthy = Bench::new(PLANT);
+    let inventory = healthy.scan();
+    let tree = inventory.tree().clone();
+    let plan = Plan::build(&inventory.planned(AlState::Op), tree, &plan::PlanOptions::default())
+        .expect("a plan");
+    let mut bench = Bench::new(&format!("{PLANT}{other}"));
+    bench.device.start(bench.now, plan);
+    bench.run_for(Span::s(3));
+    bench
+}
+
+#[test]
+fn a_missing_device_is_named_and_the_others_run() {
+    let bench = started_on("[[fault]]\nkind = \"device-missing\"\ndevice = \"T3\"\n");
+    let lost: Vec<_> = (bench.events.iter())
+        .filter_map(
+            |(_, event)| if let Event::DeviceLost { id } = event { Some(id.no()) } else { None },
+        )
+        .collect();
+    assert_eq!(lost, [4]);
+    let reached = count(&bench, |event| matches!(event, Event::TargetReached { .. }));
+    assert_eq!(reached, 9);
+    for name in ["T2", "T4", "T8"] {
+        assert_eq!(bench.state(name), "OP", "{name}");
+    }
+}
+
+#[test]
+fn a_wrong_device_is_told_from_the_planned_one_and_not_driven() {
+    let bench =
+        started_on("[[fault]]\nkind = \"device-wrong\"\ndevice = \"T3\"\ntype = \"EL3104\"\n");
+    let wrong: Vec<_> = (bench.events.iter())
+        .filter_map(|(_, event)| {
+            let Event::WrongDevice { id, mismatch, .. } = event else { return None };
+            Some((id.no(), *mismatch))
+        })
+        .collect();
+    assert!(wrong.contains(&(4, linesman_config::identity::Mismatch::Product)), "{wrong:?}");
+    assert_eq!(bench.state("T3"), "INIT");
+    assert_eq!(bench.state("T8"), "OP");
+}
+
+/// The wiring that a scan derives is the one that there is, and all of it comes to OP.
+#[test]
+fn random_plants_are_scanned_right_and_run() {
+    for seed in 0..6 {
+        let options = PlantOptions { min_devices: 3, max_devices: 40, ..PlantOptions::default() };
+        let file = plant(Seed(seed), &options);
+        let mut bench = Bench::of(&file, Options::default());
+        let inventory = bench.scan();
+        let really = bench.segment.tree();
+        assert_eq!(inventory.devices.len(), really.len(), "seed {seed}");
+        for (node, place) in really.order().iter().enumerate() {
+            let upstream = really.upstream(*place).map(|end| end.map(|at| really.position(at)));
+            let found = inventory.tree().upstream(node).map(|end| end.map(Some));
+            assert_eq!(found, upstream, "seed {seed}, position {node}");
+        }
+        bench.start(AlState::Op);
     }
 }

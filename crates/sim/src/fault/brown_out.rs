@@ -1,5 +1,6 @@
 //! `brown-out`: a supply dips, once or again and again. Devices start anew: in INIT, with station
-//! address and counters cleared; their neighbours have lost a link.
+//! address and counters cleared; their neighbours have lost a link. The supply of a coupler is that
+//! of its terminals, too.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};

@@ -1,4 +1,5 @@
-//! `device-off`: a device is without power, or its controller is dead.
+//! `device-off`: a device is without power, or its controller is dead: it alone. Terminals that a
+//! coupler feeds keep their supply, unlike with `supply-off` and `brown-out`.
 
 use linesman_config::fault::FaultName;
 

@@ -1,7 +1,7 @@
 //! What can go wrong: one file per kind of fault.
 //!
 //! A [`Kind`] says where its fault can be, which parameters it takes, and makes a
-//! [`Source`](crate::wire::Source): the changes it makes to the world, one after the other, from
+//! [`Source`]: the changes it makes to the world, one after the other, from
 //! its start to its end. What it holds when it ends (open contacts, supplies that are off, waiting
 //! hits) is let go. No kind knows anything of counters.
 

@@ -8,6 +8,7 @@ use linesman_proto::topology::{End, Tree};
 
 use super::Kind;
 use super::error::{FaultError, nearest};
+use crate::hardware::PortKind;
 use crate::segment_file::FaultEntry;
 use crate::truth::Place;
 use crate::wire::Line;
@@ -26,7 +27,8 @@ pub enum PlaceRule {
     Line,
     /// `device`: one device.
     Device,
-    /// `device` or `devices`: one device or several.
+    /// `device` or `devices`: what feeds one device or several, and with a coupler the terminals
+    /// that it feeds over the E-bus.
     Devices,
     /// `at`: a card of the MainDevice, `maindevice` unless said.
     Card,
@@ -67,6 +69,28 @@ pub(crate) struct Scene<'a> {
     pub(crate) nodes: &'a BTreeMap<DeviceId, usize>,
     pub(crate) tree: &'a Tree,
     pub(crate) world: &'a World,
+    /// Current that each node takes from the E-bus, in mA; negative where it feeds it.
+    pub(crate) ebus_ma: &'a [i16],
+}
+
+impl Scene<'_> {
+    /// A node and all that it feeds over the E-bus.
+    fn with_fed(&self, node: usize) -> Vec<usize> {
+        let mut fed = vec![node];
+        if self.ebus_ma.get(node).is_some_and(|current| *current < 0) {
+            let mut next = 0;
+            while let Some(from) = fed.get(next).copied() {
+                next += 1;
+                let ports = self.world.nodes[from].controller.hardware().ports;
+                let children = self.tree.children(from);
+                fed.extend(children.filter_map(|(port, child)| {
+                    let takes = self.ebus_ma.get(child).is_some_and(|current| *current > 0);
+                    (takes && ports[port] == PortKind::Ebus).then_some(child)
+                }));
+            }
+        }
+        fed
+    }
 }
 
 /// A place, found.
@@ -149,12 +173,20 @@ impl Finder<'_> {
             if ids.is_empty() {
                 return Err(self.error(self.no_device(name)));
             }
-            target.nodes.extend(ids.iter().filter_map(|id| self.scene.nodes.get(id)));
+            for node in ids.iter().filter_map(|id| self.scene.nodes.get(id)) {
+                if self.kind.place == PlaceRule::Devices {
+                    target.nodes.extend(self.scene.with_fed(*node));
+                } else {
+                    target.nodes.push(*node);
+                }
+            }
             target.places.extend(ids.into_iter().map(Place::Device));
         }
         if target.places.is_empty() {
             return Err(self.error("no device is given".to_owned()));
         }
+        target.nodes.sort_unstable();
+        target.nodes.dedup();
         Ok(target)
     }
 

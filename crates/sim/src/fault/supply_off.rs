@@ -1,5 +1,5 @@
 //! `supply-off`: a supply that several devices share fails. They go off together, but for the
-//! microseconds that their capacitors differ.
+//! microseconds that their capacitors differ. A coupler takes the terminals along that it feeds.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;

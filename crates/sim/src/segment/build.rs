@@ -126,7 +126,11 @@ fn assemble(
     let world = World::new(&tree, made, &cable_m, signals);
     let nodes: BTreeMap<DeviceId, usize> =
         placed.iter().enumerate().map(|(node, one)| (one.id, node)).collect();
+    let current = |one: &Placed| {
+        library::find(&one.planned.type_name).map_or(0, library::LibraryType::ebus_current_ma)
+    };
     let mut segment = Segment {
+        ebus_ma: placed.iter().map(current).collect(),
         name: file.name.clone(),
         tree,
         world,

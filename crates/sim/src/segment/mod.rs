@@ -52,6 +52,8 @@ pub struct Segment {
     seed: Seed,
     /// By node.
     devices: Vec<DeviceInfo>,
+    /// Current that each node takes from the E-bus, in mA.
+    ebus_ma: Vec<i16>,
     /// The node of each device that is there.
     nodes: BTreeMap<DeviceId, usize>,
     /// Names of all devices that were planned.
@@ -182,6 +184,7 @@ impl Segment {
             nodes: &self.nodes,
             tree: &self.tree,
             world: &self.world,
+            ebus_ma: &self.ebus_ma,
         };
         let number = self.world.truth.faults().len();
         let stream = self.seed.stream(&format!("fault {number} {}", entry.kind));

@@ -109,6 +109,7 @@ pub struct SegmentRing {
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FaultEntry {
     /// A fault name, such as `emc-noise`.
+    #[schemars(schema_with = "kinds_schema")]
     pub kind: String,
     /// A link `K1.C-B3.A`, one direction of it `K1.C>B3.A`, or a list of those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -128,6 +129,11 @@ pub struct FaultEntry {
     /// Parameters of the kind, such as `hits_per_s`.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, Value>,
+}
+
+fn kinds_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    let names: Vec<&str> = crate::fault::KINDS.iter().map(|kind| kind.name.name()).collect();
+    schemars::json_schema!({ "type": "string", "enum": names })
 }
 
 impl FaultEntry {

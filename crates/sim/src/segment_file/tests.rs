@@ -148,7 +148,9 @@ fn plants_keep_to_their_options() {
 fn the_schema_names_what_can_be_written() {
     let schema = schemars::schema_for!(SegmentFile);
     let text = schema.as_value().to_string();
-    for word in ["device", "closes_at", "cable_m", "from_ms", "additionalProperties"] {
+    for word in
+        ["device", "closes_at", "cable_m", "from_ms", "additionalProperties", "link-flapping"]
+    {
         assert!(text.contains(word), "{word}");
     }
 }

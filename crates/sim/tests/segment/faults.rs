@@ -23,6 +23,7 @@ fn cycles(bench: &mut Bench, count: usize) -> usize {
     whole
 }
 
+// proves: ESC-05 partial, JCT-05 partial
 #[test]
 fn an_open_link_cuts_off_what_is_behind_it() {
     let mut bench = Bench::plant();
@@ -43,6 +44,7 @@ fn an_open_link_cuts_off_what_is_behind_it() {
     assert!(!record.is_active());
 }
 
+// proves: JCT-05 partial, JCT-08 partial, RED-04 partial
 #[test]
 fn a_cut_costs_the_frames_before_the_loop_closes_and_no_more() {
     // A contact of the E-bus: loops close 2 µs later. Frames of 60 bytes follow one another every
@@ -112,6 +114,7 @@ fn hit(place: &str, hits: u32) -> Bench {
     bench
 }
 
+// proves: HW-18 partial, HW-28 partial
 #[test]
 fn a_hit_on_the_way_out_is_found_next_and_forwarded_by_all_others() {
     let bench = hit("K1.B>T2.A", 3);
@@ -148,6 +151,7 @@ fn a_hit_on_the_way_out_is_found_next_and_forwarded_by_all_others() {
     assert_eq!(counters, expected);
 }
 
+// proves: HW-18 partial, HW-28 partial
 #[test]
 fn a_hit_on_the_way_back_is_seen_by_no_unit_behind() {
     let bench = hit("K8.A>K6.C", 5);
@@ -158,13 +162,14 @@ fn a_hit_on_the_way_back_is_seen_by_no_unit_behind() {
     assert_eq!(counters, expected, "all units had executed it");
 }
 
+// proves: HW-30 partial
 #[test]
 fn the_last_hop_is_counted_by_the_card_alone() {
     let bench = hit("K1.A>maindevice", 4);
     assert_eq!(bench.counters(), [""; 0]);
 }
 
-// proves: HW-08 partial
+// proves: HW-13 partial
 #[test]
 fn one_ten_and_a_thousand_hits_are_as_many() {
     for hits in [1, 10, 1_000] {
@@ -295,6 +300,23 @@ fn a_brown_out_forgets_address_and_counters() {
 }
 
 #[test]
+fn what_feeds_a_coupler_feeds_its_terminals() {
+    let mut bench = Bench::plant();
+    bench.send(Command::Bwr, at(0, 0x0010), &[1, 0x10]);
+    bench.inject(&FaultEntry::new(FaultName::BrownOut).device("K6"));
+    bench.wait(Span::s(4));
+    assert_eq!(bench.count(), Some(8));
+    let forgot = ["K1", "T2", "T5", "K6", "T7", "K8"]
+        .map(|name| bench.segment.controller(bench.id(name)).unwrap().station_address().0 == 0);
+    assert_eq!(forgot, [false, false, false, true, true, false]);
+    // A terminal feeds nobody: its contacts pass the supply on.
+    bench.inject(&FaultEntry::new(FaultName::SupplyOff).device("T3"));
+    bench.wait(Span::ms(5));
+    assert_eq!(bench.segment.truth().faults()[1].supplies_lost, 1);
+    assert_eq!(bench.segment.truth().faults()[0].supplies_lost, 2);
+}
+
+#[test]
 fn a_flapping_contact_loses_links_again_and_again() {
     let mut bench = Bench::plant();
     let entry = FaultEntry::new(FaultName::LinkFlapping).at("T4.B-T5.A");
@@ -409,6 +431,7 @@ fn a_card_without_a_signal_loses_its_carrier() {
     assert_eq!(bench.count(), Some(8));
 }
 
+// proves: RED-01 partial
 #[test]
 fn a_ring_survives_a_cut() {
     let mut bench = Bench::new(&format!("{PLANT}\n[ring]\ncloses_at = \"K8.C\"\n"));

@@ -18,6 +18,7 @@ fn a_broadcast_counts_every_controller_once() {
     assert!(host.carrier && host.tx_frames == 1 && host.rx_frames == 1 && host.rx_crc_errors == 0);
 }
 
+// proves: ESC-09 partial, JCT-03 partial
 #[test]
 fn positions_are_in_the_order_of_the_ports() {
     // Terminals on port B of a coupler come before what hangs on its port C.
@@ -48,6 +49,7 @@ fn short_frames_are_padded_and_long_ones_not_sent() {
     assert_eq!(bench.segment.host(Path::A).tx_dropped, 1);
 }
 
+// proves: ESC-08 partial
 #[test]
 fn a_frame_takes_its_time() {
     // One coupler alone, 10 m away. On the way out and back: card and port of the coupler (half of
@@ -93,6 +95,7 @@ fn many_frames_in_flight_do_not_disturb_each_other() {
     assert!(arrived.iter().all(|(_, bytes)| super::rig::answer(bytes).1 == 8));
 }
 
+// proves: RED-03 partial, RED-05 partial, JCT-02 partial
 #[test]
 fn a_ring_gives_each_cards_frame_to_the_other() {
     let mut bench = Bench::new(&format!("{PLANT}\n[ring]\ncloses_at = \"K8.C\"\n"));
@@ -126,6 +129,7 @@ fn the_same_calls_give_the_same_bytes() {
     assert!(first.0.iter().flatten().any(|(arrival, _)| !arrival.intact));
 }
 
+// proves: ESC-11 partial, JCT-10 partial
 #[test]
 fn a_large_junction_is_three_controllers() {
     let text = r#"

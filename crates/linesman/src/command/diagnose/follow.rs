@@ -1,12 +1,12 @@
 //! Findings as they happen.
 
 use linesman_diagnosis::report::{Diagnosis, FindingReport, Number};
-use linesman_diagnosis::{Engine, Event, EventKind};
+use linesman_diagnosis::{Event, EventKind};
 use linesman_proto::time::Instant;
 use serde::Serialize;
 
 use crate::output::Output;
-use crate::text::finding::Writer;
+use crate::text::names::Names;
 use crate::text::quantity::time;
 
 /// Something that happened, one line of `--follow --json`.
@@ -73,27 +73,24 @@ impl Follower {
         Self { json }
     }
 
-    /// Tells what happened since the last call.
-    pub(crate) fn tell(&self, engine: &mut Engine, output: &mut Output) {
-        while let Some(Event { at, kind, finding }) = engine.poll_event() {
-            let event = EventName::of(kind);
-            if self.json {
-                self.write(at, event, Some(finding), None, output);
-                continue;
-            }
-            let names = super::names(engine);
-            let writer = Writer { names: &names, paint: output.paint(), width: output.width() };
-            let line = format!(
-                "{:>12}  {:<9}  {} {} at {}: {}",
-                time(at.as_nanos()),
-                event.word(),
-                finding.code,
-                finding.name,
-                writer.names.place(&finding.place),
-                finding.cause,
-            );
-            output.line(&line);
+    /// Tells what happened to a finding.
+    pub(crate) fn tell(&self, event: Event, names: &Names, output: &mut Output) {
+        let Event { at, kind, finding } = event;
+        let event = EventName::of(kind);
+        if self.json {
+            self.write(at, event, Some(finding), None, output);
+            return;
         }
+        let line = format!(
+            "{:>12}  {:<9}  {} {} at {}: {}",
+            time(at.as_nanos()),
+            event.word(),
+            finding.code,
+            finding.name,
+            names.place(&finding.place),
+            finding.cause,
+        );
+        output.line(&line);
     }
 
     /// Tells the whole answer at the end.

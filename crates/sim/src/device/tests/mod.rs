@@ -17,6 +17,7 @@ use super::Signals;
 use super::library::{Built, build};
 use crate::controller::tests::rig::{Bench, logical};
 
+mod hostile;
 mod mailbox;
 mod process_data;
 mod sdo;

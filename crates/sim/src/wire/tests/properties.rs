@@ -55,6 +55,7 @@ proptest! {
         }
     }
 
+    // proves: RED-10 partial, ESC-04 partial
     #[test]
     fn open_links_leave_what_the_route_says(
         shape in any_shape(16),
@@ -73,6 +74,7 @@ proptest! {
         }
     }
 
+    // proves: HW-18 partial, HW-22 partial, HW-28 partial
     #[test]
     fn a_hit_counts_where_the_route_is_checked(
         shape in any_shape(16),

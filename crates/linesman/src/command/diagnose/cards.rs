@@ -1,0 +1,130 @@
+//! A line that nobody drives: reads again and again, and sees what changes.
+
+use linesman_diagnosis::{Engine, FrameSeen, HostObservation, Setup};
+use linesman_link::clock::HostClock;
+use linesman_maindevice::{Event, MainDevice};
+use linesman_proto::time::{Instant, Span};
+use linesman_runtime::drive::{Audience, Driver};
+
+use super::Session;
+use crate::command::driven;
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::output::{Output, Progress};
+use crate::text::quantity::{count, time};
+
+/// How long the line is looked at when nobody says, in seconds.
+const SECONDS: f64 = 5.0;
+/// Between two looks. Each is a few frames long, so that damage has something to hit.
+const LOOK_EVERY: Span = Span::ms(10);
+
+/// Judges the line on these cards. With `active` station addresses are written and SIIs read, so
+/// that the SubDevices have names; else nothing is sent that writes.
+pub(super) fn run(
+    names: &[String],
+    active: bool,
+    session: Session,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    driven::refuse(names)?;
+    let stop = driven::stop()?;
+    let clock = HostClock::start();
+    let until = session.until(SECONDS)?;
+    let mut driver = Driver::open(names, clock)?;
+    let setup = Setup {
+        host_counters: true,
+        start: clock.started_at().rfc3339(),
+        clock: "host, monotonic".to_owned(),
+        ..session.setup.clone()
+    };
+    let mut looking = Looking {
+        engine: Engine::new(setup),
+        session: &session,
+        output,
+        progress: Progress::new(),
+        next: if active { Next::Scan } else { Next::LookAt(Instant::ZERO) },
+        frames: 0,
+    };
+    let result = driver.run(until, &stop, &mut looking);
+    let Looking { engine, frames, mut progress, output, .. } = looking;
+    progress.clear();
+    let complete = match result {
+        Ok(()) => true,
+        Err(error) if frames == 0 => return Err(error.into()),
+        Err(error) => {
+            let failure = Failure::from(error);
+            output.warn(&format!("{}; judged as far as it went", failure.reason));
+            false
+        }
+    };
+    Ok(session.conclude(engine, clock.now(), complete, output))
+}
+
+/// Looks again and again.
+struct Looking<'a> {
+    engine: Engine,
+    session: &'a Session,
+    output: &'a mut Output,
+    progress: Progress,
+    next: Next,
+    frames: u64,
+}
+
+/// What the MainDevice does next.
+#[derive(Clone, Copy)]
+enum Next {
+    /// Address and read all.
+    Scan,
+    /// Look, at this time.
+    LookAt(Instant),
+    /// It is at work.
+    Wait,
+}
+
+impl Audience for Looking<'_> {
+    fn frame(&mut self, frame: &FrameSeen<'_>) {
+        self.frames += 1;
+        self.engine.handle_frame(frame);
+    }
+
+    fn host(&mut self, observation: &HostObservation) {
+        self.engine.handle_host(observation);
+    }
+
+    fn event(&mut self, now: Instant, event: Event, _: &mut MainDevice) {
+        let is_done = matches!(
+            event,
+            Event::Looked(_) | Event::LookFailed(_) | Event::Scanned(_) | Event::ScanFailed(_)
+        );
+        if is_done {
+            self.next = Next::LookAt(now + LOOK_EVERY);
+        }
+    }
+
+    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
+        self.engine.handle_timeout(now);
+        self.session.follow(&mut self.engine, self.output);
+        match self.next {
+            Next::Scan => {
+                self.next = Next::Wait;
+                main.scan(now);
+            }
+            Next::LookAt(at) if at <= now => {
+                self.next = Next::Wait;
+                main.look(now);
+            }
+            Next::LookAt(_) | Next::Wait => {}
+        }
+        let frames = self.frames;
+        self.progress.show(|| format!("{}, {}", count(frames, "frame"), time(now.as_nanos())));
+        !self.output.is_closed()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let look = match self.next {
+            Next::LookAt(at) => Some(at),
+            Next::Scan | Next::Wait => None,
+        };
+        [look, self.engine.poll_timeout()].into_iter().flatten().min()
+    }
+}

@@ -1,0 +1,75 @@
+//! A virtual segment: brought up by our own MainDevice in virtual time, which costs little.
+
+use std::path::Path;
+
+use linesman_lab::lab::Lab;
+use linesman_lab::options::LabOptions;
+use linesman_proto::state::AlState;
+use linesman_proto::time::{Instant, Span};
+use linesman_sim::segment_file::SegmentFile;
+
+use super::Session;
+use crate::command::driven;
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::files;
+use crate::output::{Output, Progress};
+use crate::text::names::Names;
+use crate::text::quantity::{count, time};
+
+/// How long the line runs at least when nobody says, in seconds.
+const LEAST_SECONDS: f64 = 5.0;
+/// How long it runs behind the last beginning or end of a fault, in seconds.
+const BEHIND_FAULTS: f64 = 3.0;
+/// Between two looks for Ctrl-C and events.
+const STEP: Span = Span::ms(20);
+
+/// Judges the segment of a file.
+pub(super) fn run(
+    path: &Path,
+    target: AlState,
+    session: Session,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    let file = files::segment_file(path)?;
+    let until = session.until(seconds(&file))?;
+    let stop = driven::stop()?;
+    let source = session.setup.source.clone();
+    let options = LabOptions { target, source, ..LabOptions::default() };
+    let mut lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
+    let names = Names::new(lab.project().devices.iter().map(|device| device.name.clone()));
+    let mut progress = Progress::new();
+    while lab.now() < until && !stop.is_set() && !output.is_closed() {
+        let next = until.min(lab.now() + STEP);
+        lab.run_until(next).map_err(|error| files::in_file(path, &error))?;
+        follow(&mut lab, &names, &session, output);
+        let (now, frames) = (lab.now(), lab.frames());
+        progress.show(|| format!("{} of {}, {}", text(now), text(until), count(frames, "frame")));
+    }
+    progress.clear();
+    if let Some(failure) = lab.failure() {
+        output.warn(&format!("the line was not brought up: {failure}"));
+    }
+    let diagnosis = lab.finish();
+    follow(&mut lab, &names, &session, output);
+    Ok(session.answer(diagnosis, &names, lab.now(), output))
+}
+
+fn follow(lab: &mut Lab, names: &Names, session: &Session, output: &mut Output) {
+    while let Some(event) = lab.poll_finding_event() {
+        if let Some(follower) = &session.follower {
+            follower.tell(event, names, output);
+        }
+    }
+}
+
+/// Long enough to see every fault of the file.
+fn seconds(file: &SegmentFile) -> f64 {
+    let changes = file.faults.iter().flat_map(|fault| [fault.from_ms, fault.to_ms]).flatten();
+    let last_ms = changes.fold(0.0, f64::max);
+    (last_ms / 1e3 + BEHIND_FAULTS).max(LEAST_SECONDS)
+}
+
+fn text(at: Instant) -> String {
+    time(at.as_nanos())
+}

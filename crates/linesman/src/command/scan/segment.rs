@@ -1,0 +1,44 @@
+//! A scan of a virtual segment, in virtual time.
+
+use std::path::Path;
+
+use linesman_lab::lab::Lab;
+use linesman_lab::options::{Begin, LabOptions};
+use linesman_maindevice::Event;
+use linesman_proto::time::Span;
+
+use super::Scan;
+use crate::command::driven;
+use crate::failure::Failure;
+use crate::files;
+
+/// Virtual seconds cost little.
+const PATIENCE: Span = Span::s(60);
+/// Between two looks whether it is done.
+const STEP: Span = Span::ms(1);
+
+/// Scans the segment of a file.
+pub(super) fn scan(path: &Path) -> Result<Scan, Failure> {
+    let file = files::segment_file(path)?;
+    let options = LabOptions { begin: Begin::Scan, ..LabOptions::default() };
+    let mut lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
+    let ended = |lab: &Lab| lab.events().iter().any(|(_, event)| outcome(event).is_some());
+    lab.run_while(PATIENCE, STEP, ended).map_err(|error| files::in_file(path, &error))?;
+    let result = lab.events().iter().find_map(|(_, event)| outcome(event));
+    let inventory = result.unwrap_or_else(|| {
+        let reason = format!("{}: the scan was not done after 60 virtual seconds", path.display());
+        Err(Failure::new(reason, "this is a fault of the program, please report it with the file"))
+    })?;
+    Ok(Scan { inventory, start: None })
+}
+
+/// What came of the scan, once it ended.
+fn outcome(event: &Event) -> Option<Result<linesman_config::inventory::Inventory, Failure>> {
+    if let Event::Scanned(inventory) = event {
+        Some(Ok((**inventory).clone()))
+    } else if let Event::ScanFailed(error) = event {
+        Some(Err(driven::nobody(error)))
+    } else {
+        None
+    }
+}

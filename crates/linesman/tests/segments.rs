@@ -1,0 +1,112 @@
+//! Virtual segments through `scan` and `diagnose`, in virtual time.
+
+mod support;
+
+use std::fs;
+
+use serde_json::Value;
+use support::{Run, assert_valid, linesman};
+use tempfile::TempDir;
+
+/// A coupler, two terminals behind it, and a box on its second port.
+const PLANT: &str = r#"
+name = "branch"
+seed = 11
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "I1"
+type = "EL1008"
+on = "K1.B"
+[[device]]
+name = "O1"
+type = "EL2008"
+on = "I1.B"
+[[device]]
+name = "K2"
+type = "EK1100"
+on = "K1.C"
+cable_m = 20.0
+[[device]]
+name = "O2"
+type = "EL2008"
+on = "K2.B"
+"#;
+
+fn with_segment(command: &str, faults: &str, more: &[&str]) -> Run {
+    let directory = TempDir::new().expect("a temporary directory");
+    let path = directory.path().join("plant.toml");
+    fs::write(&path, format!("{PLANT}{faults}")).expect("a file can be written");
+    let place = format!("sim:{}", path.display());
+    linesman([command, &place].into_iter().chain(more.iter().copied()))
+}
+
+#[track_caller]
+fn diagnosis(run: &Run, status: i32) -> Value {
+    assert_eq!(run.status, status, "{}", run.all());
+    let diagnosis = run.json();
+    assert_valid(&diagnosis, "diagnosis");
+    diagnosis
+}
+
+#[test]
+fn a_scan_draws_the_branch() {
+    let run = with_segment("scan", "", &[]);
+    assert_eq!(run.status, 0, "{}", run.all());
+    assert!(run.stdout.starts_with("5 SubDevices\n"), "{}", run.stdout);
+    let scan = with_segment("scan", "", &["--json"]).json();
+    assert_valid(&scan, "scan");
+    let devices = scan["devices"].as_array().unwrap();
+    let branch = &devices[3]["ports"][0]["to"];
+    assert_eq!(branch, &serde_json::json!({ "no": 1, "port": "C" }));
+    assert_eq!(scan["start"], Value::Null, "virtual time has no date");
+}
+
+#[test]
+fn a_sound_plant_is_healthy_in_op() {
+    let found = diagnosis(&with_segment("diagnose", "", &["--json"]), 0);
+    assert_eq!(found["verdict"], "healthy");
+    assert_eq!(found["network"]["devices"], 5);
+    assert_eq!(found["network"]["al_state_highest"], "OP");
+    let lower = diagnosis(&with_segment("diagnose", "", &["--json", "--to", "SAFEOP"]), 0);
+    assert_eq!(lower["network"]["al_state_highest"], "SAFEOP");
+}
+
+#[test]
+fn a_cut_cable_is_one_finding_that_names_the_link() {
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"K1.C-K2.A\"\nfrom_ms = 2000\n";
+    let found = diagnosis(&with_segment("diagnose", cut, &["--json"]), 1);
+    assert_eq!(found["verdict"], "faulty");
+    let findings = found["findings"].as_array().unwrap();
+    let errors: Vec<_> = findings.iter().filter(|one| one["severity"] == "error").collect();
+    assert_eq!(errors.len(), 1, "{found:#}");
+    let place = &errors[0]["place"];
+    assert_eq!(place["kind"], "link", "{place}");
+    assert_eq!(place["a"], serde_json::json!({ "no": 1, "port": "C" }));
+    assert_eq!(place["b"], serde_json::json!({ "no": 4, "port": "A" }));
+    let text = with_segment("diagnose", cut, &[]);
+    assert!(text.stdout.contains("1 (K1) port C"), "names: {}", text.stdout);
+}
+
+#[test]
+fn the_same_file_gives_the_same_answer() {
+    let noise =
+        "[[fault]]\nkind = \"emc-noise\"\nat = \"K1.C>K2.A\"\nfrom_ms = 2000\nto_ms = 3000\n";
+    let runs = [(); 2].map(|()| with_segment("diagnose", noise, &["--json"]));
+    let [one, other] = runs.map(|run| {
+        let mut value = run.json();
+        // The directory of the file is another one.
+        value["source"] = Value::Null;
+        value
+    });
+    assert_eq!(one, other);
+}
+
+#[test]
+fn a_capture_selector_is_no_line_to_scan() {
+    let run = linesman(["scan", "trace.pcapng"]);
+    assert_eq!(run.status, 2);
+    assert!(run.stderr.contains("`linesman diagnose trace.pcapng`"), "{}", run.stderr);
+}
