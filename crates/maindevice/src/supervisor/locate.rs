@@ -82,7 +82,7 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
         .map(|device| device.id)
         .filter(|id| !matches!(lock(&context.line).found(*id), Found::There { .. }))
         .collect();
-    if seen.is_empty() || planned.is_empty() {
+    if seen.is_empty() {
         return;
     }
     let reading: Vec<_> = (seen.iter())
@@ -101,19 +101,28 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
         let anyone = device.identity == Identity::default();
         mismatch(&device.identity, found, device.revision_rule).filter(|_| !anyone)
     };
-    let pairs = if seen.len() == planned.len() {
+    let pairs: Vec<(usize, usize)> = if seen.len() == planned.len() {
         (0..seen.len()).map(|at| (at, at)).collect()
     } else {
         align(seen.len(), planned.len(), |at, of| differs(planned[of], &identities[at]).is_none())
     };
+    for (at, found) in identities.iter().enumerate() {
+        if pairs.iter().all(|(paired, _)| *paired != at)
+            && lock(&context.line).add_stranger(None, *found)
+        {
+            let (position, found) = (seen[at].position, *found);
+            context.wire.emit(Event::UnplannedDevice { position, found });
+        }
+    }
     for (at, of) in pairs {
         let (id, found) = (planned[of], identities[at]);
         match differs(id, &found) {
             None => give_address(context, seen[at].position, id).await,
-            Some(mismatch) => {
+            Some(mismatch) if lock(&context.line).add_stranger(Some(id), found) => {
                 let expected = context.plan.devices[id.index()].identity;
                 context.wire.emit(Event::WrongDevice { id, mismatch, expected, found });
             }
+            Some(_told) => {}
         }
     }
 }

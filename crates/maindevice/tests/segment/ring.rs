@@ -33,6 +33,7 @@ fn bench() -> Bench {
     Bench::with_options(RING, Options { ring: true, ..Options::default() })
 }
 
+// proves: RED-02, RED-03
 #[test]
 fn an_intact_ring_is_scanned_and_run() {
     let mut bench = bench();
@@ -47,6 +48,7 @@ fn an_intact_ring_is_scanned_and_run() {
     assert_eq!(after.working_counter_errors, before.working_counter_errors);
 }
 
+// proves: RED-01 partial: in the virtual segment, RED-05, RED-06
 #[test]
 fn a_cut_ring_keeps_all_subdevices() {
     let mut bench = bench();
