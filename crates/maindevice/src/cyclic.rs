@@ -2,7 +2,9 @@
 //!
 //! Each task of the plan sends its frames when its cycle begins. What comes back is judged datagram
 //! by datagram against the expected working counter, which follows from who is present; inputs are
-//! taken over only when it holds.
+//! taken over only when it holds. What a SubDevice adds while it changes its state is not known: its
+//! SyncManagers are on before it gives data. Until it has arrived the expectation is a range, so that
+//! one SubDevice that comes back, or is stuck, does not stop the inputs of all others.
 
 use std::sync::{Arc, Mutex};
 
@@ -24,11 +26,12 @@ use crate::supervisor::Line;
 /// One datagram with what is known of it.
 #[derive(Debug)]
 struct Judged {
-    expected: WorkingCounter,
+    /// What those that surely serve it add.
+    least: WorkingCounter,
+    /// What it is when those that are on their way between states add to it, too.
+    most: WorkingCounter,
     /// The last one that was told of; `None` when all is well.
     told: Option<WorkingCounter>,
-    /// Whether all its owners are where they shall be: only then is a deficit news.
-    settled: bool,
 }
 
 #[derive(Debug)]
@@ -45,7 +48,9 @@ pub(crate) struct Cyclic {
     plan: Arc<Plan>,
     line: Arc<Mutex<Line>>,
     tasks: Vec<TaskState>,
-    presence: Presence,
+    /// Who surely serves process data, and who may.
+    least: Presence,
+    most: Presence,
     /// Which version of the line's state the expectations are made of.
     version: u64,
     pub(crate) outputs: Vec<u8>,
@@ -59,9 +64,9 @@ impl Cyclic {
             frames: (task.frames.iter())
                 .map(|frame| {
                     let fresh = |_: &DatagramPlan| Judged {
-                        expected: WorkingCounter(0),
+                        least: WorkingCounter(0),
+                        most: WorkingCounter(0),
                         told: None,
-                        settled: false,
                     };
                     frame.datagrams.iter().map(fresh).collect()
                 })
@@ -70,7 +75,8 @@ impl Cyclic {
         };
         let mut cyclic = Self {
             tasks: plan.tasks.iter().map(task).collect(),
-            presence: Presence::none(plan.devices.len()),
+            least: Presence::none(plan.devices.len()),
+            most: Presence::none(plan.devices.len()),
             version: u64::MAX,
             outputs: vec![0; plan.outputs_len],
             inputs: vec![0; plan.inputs_len],
@@ -88,13 +94,12 @@ impl Cyclic {
             return;
         }
         self.version = line.version();
-        line.copy_presence(&mut self.presence);
+        line.copy_presence(&mut self.least, &mut self.most);
         for (task, state) in self.plan.tasks.iter().zip(&mut self.tasks) {
             for (frame, judged) in task.frames.iter().zip(&mut state.frames) {
                 for (datagram, judged) in frame.datagrams.iter().zip(judged) {
-                    judged.expected = expect(datagram, &self.presence, PathView::Merged);
-                    judged.settled =
-                        datagram.ownership.iter().all(|owned| line.is_settled(owned.device));
+                    judged.least = expect(datagram, &self.least, PathView::Merged);
+                    judged.most = expect(datagram, &self.most, PathView::Merged);
                 }
             }
         }
@@ -171,20 +176,17 @@ impl Cyclic {
                 watch_line(&self.line, wkc, datagram.data(), events);
                 continue;
             }
-            if wkc == judged.expected {
-                copy_inputs(plan, datagram.data(), &mut self.inputs);
+            if (judged.least..=judged.most).contains(&wkc) {
+                copy_inputs(plan, datagram.data(), &self.least, &mut self.inputs);
                 if judged.told.take().is_some() {
                     events(Event::WorkingCounterGood { task, frame, datagram: at });
                 }
                 continue;
             }
-            if !judged.settled {
-                continue;
-            }
             statistics.working_counter_errors += 1;
             if judged.told != Some(wkc) {
                 judged.told = Some(wkc);
-                let expected = judged.expected;
+                let expected = wkc.clamp(judged.least, judged.most);
                 events(Event::WorkingCounter {
                     task,
                     frame,
@@ -237,13 +239,15 @@ fn fill(datagram: &DatagramPlan, outputs: &[u8], data: &mut [u8]) {
     }
 }
 
-fn copy_inputs(datagram: &DatagramPlan, data: &[u8], inputs: &mut [u8]) {
+/// Inputs of those that surely gave theirs; what is of the others stays as it was.
+fn copy_inputs(datagram: &DatagramPlan, data: &[u8], serving: &Presence, inputs: &mut [u8]) {
     if !matches!(datagram.command, Command::Lrw | Command::Lrd) {
         return;
     }
     for owned in &datagram.ownership {
         let len = owned.range.len();
         if owned.direction == Direction::Inputs
+            && serving.of(owned.device).inputs
             && let Some(from) = data.get(owned.range.clone())
             && let Some(to) = inputs.get_mut(owned.image_at..owned.image_at + len)
         {
@@ -251,3 +255,6 @@ fn copy_inputs(datagram: &DatagramPlan, data: &[u8], inputs: &mut [u8]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

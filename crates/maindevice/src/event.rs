@@ -2,7 +2,7 @@
 
 use linesman_config::identity::Mismatch;
 use linesman_config::inventory::Inventory;
-use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::address::{DeviceId, Position, WorkingCounter};
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
 use linesman_proto::register::{AlStatus, DlStatus, ErrorCounters};
@@ -75,7 +75,7 @@ pub enum Event {
         /// It had lost its station address: it was without power.
         restarted: bool,
     },
-    /// Where a SubDevice of the plan should be there is another.
+    /// Where a SubDevice of the plan should be there is another. It is left alone; told once.
     WrongDevice {
         /// Which one is planned.
         id: DeviceId,
@@ -84,6 +84,13 @@ pub enum Event {
         /// Who is planned.
         expected: Identity,
         /// Who is there.
+        found: Identity,
+    },
+    /// A SubDevice that the plan does not have. It is left alone.
+    UnplannedDevice {
+        /// Where it was seen.
+        position: Position,
+        /// Who it is.
         found: Identity,
     },
     /// How many SubDevices answer a broadcast has changed.

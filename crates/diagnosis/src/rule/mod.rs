@@ -4,11 +4,14 @@
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
 pub mod frame_errors;
+pub mod host_trouble;
+pub mod identity;
 pub mod link_lost;
 pub mod nobody_answers;
 pub mod not_answering;
 pub mod one_direction;
 pub mod restarted;
+pub mod second_maindevice;
 pub mod state_error;
 pub mod working_counter;
 
@@ -74,6 +77,7 @@ pub const RULES: &[Rule] = &[
     link_lost::RULE,
     not_answering::RULE,
     frame_errors::RULE,
+    identity::RULE,
     //
     // The network as a whole, working counters and states.
     nobody_answers::RULE,
@@ -81,6 +85,8 @@ pub const RULES: &[Rule] = &[
     state_error::RULE,
     working_counter::RULE,
     one_direction::RULE,
+    host_trouble::RULE,
+    second_maindevice::RULE,
 ];
 
 /// The manual: every page of every rule, by code.

@@ -59,6 +59,7 @@ fn sleepers_wake_in_the_order_of_time() {
     assert_eq!(executor.poll_timeout(), Some(at(3)));
 }
 
+// proves: FRM-21
 #[test]
 fn a_bad_working_counter_is_asked_again_and_then_reported() {
     let mut executor = Executor::new();

@@ -143,10 +143,9 @@ fn run(scripted: &mut Scripted, job: Job) -> Event {
 
 fn upload(scripted: &mut Scripted, index: u16) -> Result<Vec<u8>, SdoError> {
     let object = ObjectAddress::new(index, 1);
-    match run(scripted, Job::Upload { object, complete: false }) {
-        Event::SdoUploaded { result, .. } => result,
-        other => panic!("{other:?}"),
-    }
+    let event = run(scripted, Job::Upload { object, complete: false });
+    let Event::SdoUploaded { result, .. } = event else { panic!("{event:?}") };
+    result
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub struct Step {
     pub to: AlState,
     /// How long it may take.
     pub limit: Span,
-    /// AL status mirrors AL control: there is no error bit and nothing to acknowledge.
+    /// AL status mirrors AL control: the acknowledge bit must not be sent.
     pub emulated: bool,
 }
 
@@ -53,6 +53,9 @@ const FIRST_POLL: Span = Span::us(500);
 const SLOWEST_POLL: Span = Span::ms(10);
 /// A request that was not taken is written again after so many looks at the status.
 const WRITE_AGAIN_AFTER: u32 = 20;
+
+/// How long an acknowledgement may take.
+const ACKNOWLEDGE_LIMIT: Span = Span::ms(500);
 
 /// State and status code.
 ///
@@ -83,12 +86,13 @@ pub async fn request(wire: &Wire, target: Target, step: Step) -> Result<(), Step
             looks += 1;
         }
         let (status, code) = read(wire, target).await?;
-        let there = status.state() == StateValue::Known(to);
-        if there && (emulated || !status.error()) {
-            return Ok(());
-        }
-        if status.error() && !emulated {
+        // We never write the error bit to a controller with device emulation, so it does not mirror
+        // it: there, too, it is the SubDevice that shows it.
+        if status.error() {
             return Err(StepError::Refused { to, status, code });
+        }
+        if status.state() == StateValue::Known(to) {
+            return Ok(());
         }
         if wire.now() >= until {
             return Err(StepError::TimedOut { to, status });
@@ -98,18 +102,28 @@ pub async fn request(wire: &Wire, target: Target, step: Step) -> Result<(), Step
     }
 }
 
-/// Acknowledges an error; the SubDevice stays in its state.
+/// Acknowledges an error; the SubDevice stays in its state. Where AL status mirrors AL control the
+/// bit is taken back afterwards.
 ///
 /// # Errors
 /// [`StepError`] when the error bit does not go.
-pub async fn acknowledge(wire: &Wire, target: Target, status: AlStatus) -> Result<(), StepError> {
+pub async fn acknowledge(
+    wire: &Wire,
+    target: Target,
+    status: AlStatus,
+    emulated: bool,
+) -> Result<(), StepError> {
     // A value that names no state cannot be asked for: INIT clears all.
     let to = status.state().state().unwrap_or(AlState::Init);
-    let control = AlControl::request(to).with_error_acknowledge(true).to_bytes();
-    let until = wire.now() + Span::ms(500);
+    let control = AlControl::request(to);
+    let acknowledge = control.with_error_acknowledge(true).to_bytes();
+    let until = wire.now() + ACKNOWLEDGE_LIMIT;
     loop {
-        wire.write(target, register::AL_CONTROL.address, &control).await?;
+        wire.write(target, register::AL_CONTROL.address, &acknowledge).await?;
         wire.sleep(FIRST_POLL).await;
+        if emulated {
+            wire.write(target, register::AL_CONTROL.address, &control.to_bytes()).await?;
+        }
         let (status, code) = read(wire, target).await?;
         if !status.error() {
             return Ok(());

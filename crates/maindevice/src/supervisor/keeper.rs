@@ -119,8 +119,7 @@ impl Keeper<'_> {
         let [first, longest] = self.context.options.retry_after;
         let wait = self.backoff.max(first);
         self.backoff = (wait * 2).min(longest);
-        // It stays where it is: what it does not serve meanwhile is no news.
-        lock(&self.context.line).set_stuck(self.device.id, status.state().state());
+        lock(&self.context.line).set_moving(self.device.id, status.state().state());
         let until = self.context.wire.now() + wait;
         while self.context.wire.now() < until {
             self.context.wire.sleep(self.context.options.watch_interval.min(wait)).await;
@@ -151,8 +150,8 @@ impl Keeper<'_> {
         let (wire, target) = (&context.wire, self.target());
         let (status, code) = state::read(wire, target).await?;
         self.learn_state(status, code);
-        if status.error() && !device.device_emulation {
-            state::acknowledge(wire, target, status).await?;
+        if status.error() {
+            state::acknowledge(wire, target, status, device.device_emulation).await?;
         }
         let mut current = match status.state() {
             StateValue::Known(AlState::Boot) | StateValue::Unknown(_) => None,
@@ -205,8 +204,7 @@ impl Keeper<'_> {
                 return Trouble::Lost;
             }
             let at_target = self.known.al.is_some_and(|(status, _)| {
-                status.state() == StateValue::Known(self.device.target)
-                    && (!status.error() || self.device.device_emulation)
+                status.state() == StateValue::Known(self.device.target) && !status.error()
             });
             if !at_target {
                 return Trouble::Fell;

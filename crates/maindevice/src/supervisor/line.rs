@@ -1,6 +1,7 @@
 //! What is known of each SubDevice right now: shared by the cyclic exchange, which judges by it, and
 //! by the keepers, which find it out.
 
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex};
@@ -9,6 +10,7 @@ use std::task::{Context, Poll, Waker};
 use linesman_config::plan::Plan;
 use linesman_config::plan::expect::{Presence, Served};
 use linesman_proto::address::{DeviceId, Path, WorkingCounter};
+use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, OredStates};
 
 use crate::executor::lock;
@@ -33,7 +35,8 @@ pub(crate) enum Found {
 struct Live {
     found: Found,
     served: bool,
-    /// What it serves is known; else it is on its way.
+    /// What it serves is known. It is not while it is on its way, or stuck with an error: its
+    /// SyncManagers may take data or deny them.
     settled: bool,
     /// It is at its target.
     reached: bool,
@@ -50,6 +53,8 @@ pub(crate) struct Line {
     responding: Option<WorkingCounter>,
     states: Option<OredStates>,
     all_reached: bool,
+    /// Who was found that the plan does not have, or not there: told once.
+    strangers: BTreeSet<(Option<DeviceId>, Identity)>,
 }
 
 impl Line {
@@ -62,21 +67,23 @@ impl Line {
         self.version
     }
 
-    pub(crate) fn copy_presence(&self, presence: &mut Presence) {
+    /// Who serves process data: `least` those that surely do, `most` also those that may, being on
+    /// their way between states or stuck short of their target.
+    pub(crate) fn copy_presence(&self, least: &mut Presence, most: &mut Presence) {
         for (live, id) in self.devices.iter().zip(0..) {
             let there = matches!(live.found, Found::There { .. });
-            let reached_by = there.then_some(Path::A);
-            let serves = there && live.served;
-            presence.set(DeviceId(id), Served { reached_by, inputs: serves, outputs: serves });
+            let serves = |serves| Served {
+                reached_by: there.then_some(Path::A),
+                inputs: there && serves,
+                outputs: there && serves,
+            };
+            least.set(DeviceId(id), serves(live.served && live.settled));
+            most.set(DeviceId(id), serves(live.served || !live.settled));
         }
     }
 
     fn live(&mut self, id: DeviceId) -> Option<&mut Live> {
         self.devices.get_mut(id.index())
-    }
-
-    pub(crate) fn is_settled(&self, id: DeviceId) -> bool {
-        self.devices.get(id.index()).is_some_and(|live| live.settled)
     }
 
     pub(crate) fn found(&self, id: DeviceId) -> Found {
@@ -100,11 +107,6 @@ impl Line {
     /// Notes that a SubDevice is on its way between states, and what it serves meanwhile.
     pub(crate) fn set_moving(&mut self, id: DeviceId, state: Option<AlState>) {
         self.set(id, state, false, false);
-    }
-
-    /// Notes that a SubDevice stays where it is, short of its target.
-    pub(crate) fn set_stuck(&mut self, id: DeviceId, state: Option<AlState>) {
-        self.set(id, state, true, false);
     }
 
     /// Notes that a SubDevice is where it shall be.
@@ -133,6 +135,11 @@ impl Line {
     /// Notes that all have reached their targets; true the first time.
     pub(crate) fn set_all_reached(&mut self) -> bool {
         !std::mem::replace(&mut self.all_reached, true)
+    }
+
+    /// Notes a stranger, in the place of a planned SubDevice or elsewhere; true the first time.
+    pub(crate) fn add_stranger(&mut self, instead_of: Option<DeviceId>, who: Identity) -> bool {
+        self.strangers.insert((instead_of, who))
     }
 
     /// What the cyclic broadcast read brought. Returns the number that answered before if it has

@@ -3,7 +3,9 @@
 use crate::bench::{Bench, Fate};
 use linesman_config::fault::FaultName;
 use linesman_config::plan::{self, Plan};
-use linesman_maindevice::{Event, Options};
+use linesman_maindevice::{Event, Options, ProbeRequest, Target};
+use linesman_proto::port::Port;
+use linesman_proto::register::{DL_STATUS, PortState};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_sim::seed::Seed;
@@ -68,6 +70,7 @@ fn count(bench: &Bench, which: impl Fn(&Event) -> bool) -> usize {
     bench.events.iter().filter(|(_, event)| which(event)).count()
 }
 
+// proves: FRM-16 partial: against full controllers
 #[test]
 fn a_plant_of_ten_comes_to_op_and_stays_there() {
     let mut bench = Bench::new(PLANT);
@@ -88,6 +91,7 @@ fn a_plant_of_ten_comes_to_op_and_stays_there() {
     assert_eq!(trouble, 0, "{:#?}", bench.events);
 }
 
+// proves: FRM-15 partial: on LRW
 #[test]
 fn process_data_go_both_ways() {
     let mut bench = Bench::new(PLANT);
@@ -111,6 +115,7 @@ fn process_data_go_both_ways() {
     assert_eq!(bench.device.inputs()[inputs.start], 0b1000);
 }
 
+// proves: FRM-29
 #[test]
 fn a_cut_loses_what_is_behind_it_and_healing_brings_it_back() {
     let mut bench = Bench::new(PLANT);
@@ -127,6 +132,12 @@ fn a_cut_loses_what_is_behind_it_and_healing_brings_it_back() {
     }
     assert_eq!(count(&bench, |event| matches!(event, Event::DeviceLost { .. })), 5);
     assert_eq!(bench.state("T2"), "OP");
+    // The port towards the cut is closed.
+    let closed = |event: &Event| {
+        matches!(event, Event::Links { id, status }
+            if id.no() == 1 && status.port_state(Port::C) == PortState::UNUSED)
+    };
+    assert_eq!(count(&bench, closed), 1);
     // The working counter was short until it was clear who is missing.
     let short = |event: &Event| matches!(event, Event::WorkingCounter { expected, received, .. } if received < expected);
     assert!(count(&bench, short) > 0);
@@ -232,6 +243,34 @@ fn a_refusal_is_reported_and_tried_again_more_and_more_seldom() {
     assert_eq!(count(&bench, |event| matches!(event, Event::AllReached)), 1);
 }
 
+/// A controller with device emulation shows its refusal, too; and what the others give goes on.
+#[test]
+fn a_stuck_device_does_not_stop_the_inputs_of_the_others() {
+    let mut bench = Bench::new(PLANT);
+    let inventory = bench.scan();
+    let tree = inventory.tree().clone();
+    let plan = Plan::build(&inventory.planned(AlState::Op), tree, &plan::PlanOptions::default());
+    let plan = plan.unwrap();
+    for (name, to) in [("T2", "SAFEOP"), ("T4", "OP")] {
+        let entry = fault("init-refused").device(name).with("to", to);
+        bench.segment.inject(bench.now, &entry).unwrap();
+    }
+    bench.device.start(bench.now, plan.clone());
+    bench.run_for(Span::s(3));
+    for name in ["T2", "T4"] {
+        let id = bench.id(name);
+        let refused = |event: &Event| matches!(event, Event::Refused { id: it, .. } if *it == id);
+        assert!(count(&bench, refused) > 0, "{name}");
+    }
+    assert_eq!(bench.state("T1"), "OP");
+    let inputs = plan.device(bench.id("T1")).unwrap().inputs.clone();
+    let signals = bench.segment.inputs(bench.id("T1")).to_vec();
+    bench.segment.signals_mut().set(signals[0], 1);
+    bench.run_for(Span::ms(5));
+    assert_eq!(bench.device.inputs()[inputs.start], 1);
+    assert_eq!(count(&bench, |event| matches!(event, Event::WorkingCounter { .. })), 0);
+}
+
 #[test]
 fn one_of_thirty_frames_lost_does_not_stop_a_start() {
     let mut bench = Bench::new(PLANT);
@@ -283,6 +322,19 @@ fn a_missing_device_is_named_and_the_others_run() {
 }
 
 #[test]
+fn an_extra_device_is_told_once_and_left_alone() {
+    let bench = started_on(
+        "[[fault]]\nkind = \"device-missing\"\ndevice = \"T5\"\n\
+         [[device]]\nname = \"X\"\ntype = \"EL3004\"\non = \"T8.B\"\n\
+         [[device]]\nname = \"Y\"\ntype = \"EL1018\"\non = \"X.B\"\n",
+    );
+    let extra = count(&bench, |event| matches!(event, Event::UnplannedDevice { .. }));
+    assert_eq!(extra, 2, "{:#?}", bench.events);
+    assert_eq!((bench.state("X"), bench.state("T8")), ("INIT".to_owned(), "OP".to_owned()));
+}
+
+// proves: HC-03 partial: by position, without serial
+#[test]
 fn a_wrong_device_is_told_from_the_planned_one_and_not_driven() {
     let bench =
         started_on("[[fault]]\nkind = \"device-wrong\"\ndevice = \"T3\"\ntype = \"EL3104\"\n");
@@ -314,4 +366,19 @@ fn random_plants_are_scanned_right_and_run() {
         }
         bench.start(AlState::Op);
     }
+}
+
+#[test]
+fn a_probe_reads_beside_the_cycle() {
+    let mut bench = Bench::new(PLANT);
+    let plan = bench.start(AlState::Op);
+    let station = plan.device(bench.id("T2")).unwrap().station;
+    let target = Target::Station(station);
+    let request = ProbeRequest { target, register: DL_STATUS.address, len: 2, write: None };
+    bench.device.probe(bench.now, request.clone());
+    assert!(bench.run_until(Span::ms(10), |event| matches!(event, Event::Probed { .. })));
+    let Some((_, Event::Probed { request: asked, result })) = bench.events.pop() else { panic!() };
+    assert_eq!(asked, request);
+    let status = bench.segment.controller(bench.id("T2")).unwrap().dl_status();
+    assert_eq!(result.unwrap().word(0), status.value());
 }

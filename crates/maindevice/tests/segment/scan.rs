@@ -77,6 +77,7 @@ fn a_look_writes_nothing_and_reads_the_counters() {
     }
 }
 
+// proves: FRM-21 partial: lost frames; bad working counters are in executor::tests
 #[test]
 fn three_of_a_hundred_frames_lost_are_repeated() {
     let mut bench = Bench::new(PLANT);

@@ -15,7 +15,8 @@ use crate::controller::Pdi;
 /// What is behind a controller: a processor with its software, or plain inputs and outputs.
 pub trait Firmware: Debug + Send {
     /// The supply is there and the controller has tried to load the SII
-    /// ([`Pdi::sii_load_ok`] says how that went). Whatever was before is forgotten.
+    /// ([`Pdi::sii_load_ok`] says how that went). Whatever was before is forgotten, but for settings
+    /// that the device stores.
     fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>);
 
     /// Something happened on the EtherCAT side, or the wake-up time came. `now` is when that was:

@@ -9,7 +9,7 @@ mod frames;
 mod memory;
 mod ports;
 mod properties;
-mod recorded;
+pub(crate) mod recorded;
 pub(crate) mod rig;
 mod sii;
 mod sync_manager;

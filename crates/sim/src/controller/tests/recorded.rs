@@ -15,7 +15,7 @@ use crate::frame::WireFrame;
 use crate::hardware::PortKind;
 
 /// Packets of a pcapng file: time in ns since its first packet, bytes.
-fn packets(file: &[u8]) -> Vec<(u64, Vec<u8>)> {
+pub(crate) fn packets(file: &[u8]) -> Vec<(u64, Vec<u8>)> {
     let u32_at = |at: usize| -> u32 {
         file.get(at..at + 4).map_or(0, |bytes| u32::from_le_bytes(bytes.try_into().unwrap()))
     };

@@ -151,7 +151,7 @@ impl Dictionary {
     /// The object that complete access is to, if it can be had whole.
     fn whole(&self, address: ObjectAddress) -> Result<&Object, SdoAbortCode> {
         let object = self.object(address.index).ok_or(SdoAbortCode::NO_OBJECT)?;
-        if object.code == ObjectCode::Variable {
+        if object.code == ObjectCode::Variable || !self.complete_access {
             return Err(SdoAbortCode::COMPLETE_ACCESS);
         }
         if address.subindex > 1 {

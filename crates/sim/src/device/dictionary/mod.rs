@@ -166,16 +166,19 @@ pub struct EntryRef {
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Dictionary {
     objects: Vec<Object>,
+    /// Whole objects can be had at once.
+    complete_access: bool,
 }
 
 /// Largest object that is taken by download, in bytes: more no device of the library has.
 pub const LARGEST: usize = 4_096;
 
 impl Dictionary {
-    /// These objects. Of two with the same index the later one counts.
+    /// These objects, with or without complete access. Of two with the same index the later one
+    /// counts.
     #[must_use]
-    pub fn new(objects: Vec<Object>) -> Self {
-        let mut dictionary = Self::default();
+    pub fn new(objects: Vec<Object>, complete_access: bool) -> Self {
+        let mut dictionary = Self { objects: Vec::new(), complete_access };
         for object in objects {
             match dictionary.place(object.index) {
                 Ok(at) => dictionary.objects[at] = object,
@@ -231,6 +234,17 @@ impl Dictionary {
         let object = self.objects.get_mut(at.object);
         if let Some(entry) = object.and_then(|object| object.entries.get_mut(at.entry)) {
             entry.set_number(value);
+        }
+    }
+
+    /// The device starts anew: every value is again as in `fresh`, a dictionary of the same objects,
+    /// but for settings that are kept for a replacement. Those were stored when they were written.
+    pub fn restart(&mut self, fresh: &Self) {
+        let entries = self.objects.iter_mut().flat_map(|object| &mut object.entries);
+        for (entry, fresh) in entries.zip(fresh.objects.iter().flat_map(|object| &object.entries)) {
+            if !entry.access.has(Access::BACKUP) {
+                entry.value.clone_from(&fresh.value);
+            }
         }
     }
 

@@ -15,19 +15,22 @@ fn dictionary() -> Dictionary {
         Object::list(ObjectIndex(index), "record", ObjectCode::Record, DataType(0x2A), entries)
     };
     let write_in_op = Access(Access::WRITE_OP);
-    Dictionary::new(vec![
-        record(
-            0x2001,
-            vec![
-                number(1, 1, READ_WRITE, 1),
-                number(2, 3, READ_WRITE, 5),
-                number(4, 16, READ_WRITE, 0x1234),
-                number(5, 7, READ_ONLY, 0x55),
-            ],
-        ),
-        Object::variable(ObjectIndex(0x2000), number(0, 32, READ_WRITE, 7)),
-        Object::variable(ObjectIndex(0x2002), number(0, 8, write_in_op, 0)),
-    ])
+    Dictionary::new(
+        vec![
+            record(
+                0x2001,
+                vec![
+                    number(1, 1, READ_WRITE, 1),
+                    number(2, 3, READ_WRITE, 5),
+                    number(4, 16, READ_WRITE, 0x1234),
+                    number(5, 7, READ_ONLY, 0x55),
+                ],
+            ),
+            Object::variable(ObjectIndex(0x2000), number(0, 32, READ_WRITE, 7)),
+            Object::variable(ObjectIndex(0x2002), number(0, 8, write_in_op, 0)),
+        ],
+        true,
+    )
 }
 
 fn at(index: u16, subindex: u8) -> ObjectAddress {

@@ -8,7 +8,7 @@ use super::smart::{
     MAILBOX_IN, MAILBOX_OUT, NO_INPUTS, NO_OUTPUTS, SYNCHRONISED, TERMINAL, inputs, outputs,
 };
 use super::spec::{
-    Behind, EntrySpec, Function, PdoSpec, ProcessorSpec, SettingSpec, SettingsSpec, Spec,
+    Behind, COE, EntrySpec, Function, PdoSpec, ProcessorSpec, SettingSpec, SettingsSpec, Spec,
 };
 use crate::device::application::analog::Range;
 use crate::device::processor::ResponseTimes;
@@ -231,6 +231,8 @@ pub(super) const TYPES: &[LibraryType] = &[
         name: "EL3004",
         title: "EL3004 4Ch. Ana. Input +/-10V, 12bit",
         product: 0x0BBC_3052,
+        revision: 0x0015_0000,
+        coe: COE,
         behind: Behind::Processor(&FOUR_BIPOLAR_12),
         ..FOUR_IN
     }]),
@@ -239,6 +241,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         title: "EL3102 2Ch. Ana. Input +/-10V, DIFF",
         product: 0x0C1E_3052,
         chip: &ESC20,
+        coe: COE,
         behind: Behind::Processor(&TWO_BIPOLAR),
         ..TWO_IN
     }]),
@@ -262,6 +265,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         title: "EL3162 2Ch. Ana. Input 0-10V",
         product: 0x0C5A_3052,
         chip: &ESC20,
+        coe: COE,
         behind: Behind::Processor(&TWO_UNIPOLAR),
         ..TWO_IN
     }]),

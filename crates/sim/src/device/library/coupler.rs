@@ -9,7 +9,7 @@ use linesman_proto::port::Port;
 use linesman_proto::register::SmControl;
 
 use super::chip::{ET1100, ET1200};
-use super::spec::{Behind, EntrySpec, PdoSpec, Spec, SyncManagerSpec, Use};
+use super::spec::{Behind, EntrySpec, NO_COE, PdoSpec, Spec, SyncManagerSpec, Use};
 use super::{InnerLink, LibraryType};
 use crate::hardware::PortKind::{Absent, Ebus, Mii};
 
@@ -32,6 +32,7 @@ const COUPLER: Spec = Spec {
     pdi_configuration_2: 0,
     sync_managers: &[],
     pdos: &[],
+    coe: NO_COE,
     behind: Behind::Plain,
     op_modes: &[],
 };

@@ -5,7 +5,7 @@ use linesman_proto::register::SmControl;
 
 use super::LibraryType;
 use super::chip::ET1200;
-use super::spec::{Behind, EntrySpec, PdoSpec, Spec, SyncManagerSpec, Use};
+use super::spec::{Behind, EntrySpec, NO_COE, PdoSpec, Spec, SyncManagerSpec, Use};
 use crate::hardware::PortKind::{Absent, Ebus};
 
 /// SII byte 0: digital I/O.
@@ -64,6 +64,7 @@ pub(super) const TERMINAL: Spec = Spec {
     pdi_configuration_2: 0,
     sync_managers: &[],
     pdos: &[],
+    coe: NO_COE,
     behind: Behind::Plain,
     op_modes: &[],
 };

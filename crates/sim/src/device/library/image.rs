@@ -3,9 +3,9 @@
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
 use linesman_proto::sii::{
-    Category, CoeDetails, Configuration, FmmuUsage, General, GeneralFlags, Identity, Image,
-    MailboxArea, MailboxPair, OpMode, Pdo, PdoEntry, PdoFlags, PortKind as SiiPort, Protocols,
-    Size, StringIndex, Strings, SyncManager, SyncManagerEnable, SyncManagerKind,
+    Category, Configuration, FmmuUsage, General, GeneralFlags, Identity, Image, MailboxArea,
+    MailboxPair, OpMode, Pdo, PdoEntry, PdoFlags, PortKind as SiiPort, Protocols, Size,
+    StringIndex, Strings, SyncManager, SyncManagerEnable, SyncManagerKind,
 };
 
 use super::object::{Individual, channel_name};
@@ -18,8 +18,6 @@ pub(super) const VENDOR: u32 = 2;
 const ALWAYS_THERE: PdoFlags = PdoFlags(0x0011);
 /// PDO flags of what can be assigned: fixed.
 const FIXED: PdoFlags = PdoFlags(0x0010);
-/// CoE details: SDO, SDO information, PDO assignment, complete access.
-const COE: u8 = 0x27;
 /// General flag: the mailbox repeats lost messages.
 const MAILBOX_REPEATS: u8 = 0x04;
 /// EEPROM of devices with a processor: 32 Kbit.
@@ -96,7 +94,7 @@ fn general(spec: &Spec, strings: &mut Strings) -> General {
         order,
         name,
         group_again: group,
-        coe: CoeDetails(if has_mailbox { COE } else { 0 }),
+        coe: spec.coe,
         flags: GeneralFlags(in_memory | repeats),
         physical_memory_address: memory.unwrap_or(RegisterAddress(0)),
         ebus_current_ma: spec.ebus_current_ma,
@@ -130,15 +128,16 @@ pub(super) fn bootstrap(spec: &Spec) -> MailboxPair {
 }
 
 fn fmmus(spec: &Spec) -> Vec<FmmuUsage> {
-    if spec.mailbox().is_present() {
-        return vec![FmmuUsage::Outputs, FmmuUsage::Inputs, FmmuUsage::MailboxState];
-    }
     let mut usages = Vec::new();
-    if spec.sync_manager(Use::Outputs).is_some() {
+    let exchanges = |kind| spec.sync_manager(kind).is_some_and(|manager| manager.length > 0);
+    if exchanges(Use::Outputs) {
         usages.push(FmmuUsage::Outputs);
     }
-    if spec.sync_manager(Use::Inputs).is_some() {
+    if exchanges(Use::Inputs) {
         usages.push(FmmuUsage::Inputs);
+    }
+    if spec.mailbox().is_present() {
+        usages.push(FmmuUsage::MailboxState);
     }
     usages
 }

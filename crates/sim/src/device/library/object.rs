@@ -57,7 +57,9 @@ pub(super) fn dictionary(
         Entry::number(2, "Maximum number of modules", DataType::UINT, 16, READ_ONLY, 1),
     ];
     objects.push(record(0xF000, "Modular device profile", RECORD, profile));
-    Dictionary::new(objects)
+    let code_word = Entry::number(0, "Code word", DataType::UDINT, 32, READ_WRITE, 0);
+    objects.push(Object::variable(ObjectIndex(0xF008), code_word));
+    Dictionary::new(objects, spec.coe.complete_access())
 }
 
 fn record(index: u16, name: &str, data_type: DataType, entries: Vec<Entry>) -> Object {

@@ -7,8 +7,8 @@ use linesman_proto::register::SmControl;
 use super::LibraryType;
 use super::chip::ET1100;
 use super::spec::{
-    Behind, EntrySpec, Function, OpModeSpec, PdoSpec, ProcessorSpec, SettingSpec, SettingsSpec,
-    Spec, SyncManagerSpec, Use,
+    Behind, COE_WITH_COMPLETE_ACCESS, EntrySpec, Function, OpModeSpec, PdoSpec, ProcessorSpec,
+    SettingSpec, SettingsSpec, Spec, SyncManagerSpec, Use,
 };
 use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Ebus};
@@ -91,6 +91,7 @@ pub(super) const TERMINAL: Spec = Spec {
     pdi_configuration_2: 0,
     sync_managers: &[],
     pdos: &[],
+    coe: COE_WITH_COMPLETE_ACCESS,
     behind: Behind::Plain,
     op_modes: &[],
 };

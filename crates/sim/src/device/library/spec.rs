@@ -4,7 +4,7 @@ use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::coe::DataType;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::SmControl;
-use linesman_proto::sii::{MailboxArea, MailboxPair};
+use linesman_proto::sii::{CoeDetails, MailboxArea, MailboxPair};
 
 use super::chip::Chip;
 use crate::device::application::analog::Range;
@@ -40,11 +40,20 @@ pub(super) struct Spec {
     pub(super) sync_managers: &'static [SyncManagerSpec],
     /// Process data.
     pub(super) pdos: &'static [PdoSpec],
+    /// SII, category General: what its CoE can do; 0 for a device without.
+    pub(super) coe: CoeDetails,
     /// What is behind the controller.
     pub(super) behind: Behind,
     /// Operation modes with distributed clocks, for those that have them.
     pub(super) op_modes: &'static [OpModeSpec],
 }
+
+/// CoE with SDO, SDO information and PDO assignment.
+pub(super) const COE: CoeDetails = CoeDetails(0x07);
+/// The same with complete access.
+pub(super) const COE_WITH_COMPLETE_ACCESS: CoeDetails = CoeDetails(0x27);
+/// No CoE.
+pub(super) const NO_COE: CoeDetails = CoeDetails(0x00);
 
 /// What is behind a controller.
 #[derive(Clone, Copy, Debug)]

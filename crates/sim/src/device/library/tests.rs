@@ -90,7 +90,9 @@ fn profiles_of_devices_with_a_processor() {
         let size = if name == "EL6601" { 1_024 } else { 128 };
         assert_eq!(mailbox.areas.receive.offset.0, 0x1000, "{name}");
         assert_eq!((mailbox.areas.receive.size, mailbox.areas.send.size), (size, size), "{name}");
-        assert!(mailbox.complete_access && mailbox.protocols.0 == 0x0004, "{name}");
+        let old = ["EL3004", "EL3102", "EL3162"].contains(&name);
+        assert_eq!(mailbox.complete_access, !old, "{name}");
+        assert!(mailbox.protocols.0 == 0x0004, "{name}");
         assert!(!profile.device_emulation, "{name}");
         for manager in &profile.process {
             let record = image.sync_managers()[usize::from(manager.index)];

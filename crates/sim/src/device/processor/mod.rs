@@ -204,6 +204,9 @@ impl Processor {
     }
 
     fn start_mailbox(&mut self, from: AlState, pdi: &Pdi<'_>, code: AlStatusCode) -> Outcome {
+        if !pdi.sii_load_ok() {
+            return Outcome::Failed(AlState::Init, AlStatusCode::EEPROM_ERROR);
+        }
         if !self.has_mailbox(pdi, code == AlStatusCode::INVALID_MAILBOX_BOOT) {
             return Outcome::Failed(AlState::Init, code);
         }
@@ -344,7 +347,7 @@ fn watchdog_ran_out(pdi: &mut Pdi<'_>) -> bool {
 
 impl Firmware for Processor {
     fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        self.dictionary = self.description.dictionary.clone();
+        self.dictionary.restart(&self.description.dictionary);
         self.mailbox.restart();
         (self.inputs, self.outputs) = (ProcessImage::default(), ProcessImage::default());
         self.step = None;

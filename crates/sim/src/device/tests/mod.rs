@@ -20,6 +20,7 @@ use crate::controller::tests::rig::{Bench, logical};
 mod hostile;
 mod mailbox;
 mod process_data;
+mod recorded;
 mod sdo;
 mod state;
 

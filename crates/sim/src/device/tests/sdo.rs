@@ -7,6 +7,7 @@ use linesman_proto::mailbox::coe::information::{
 };
 use linesman_proto::mailbox::coe::sdo::{Initial, Request, Response, Segment};
 use linesman_proto::mailbox::coe::{Message as CoeMessage, ObjectAddress, ObjectIndex};
+use linesman_proto::time::Span;
 
 use super::Device;
 
@@ -97,6 +98,22 @@ fn what_cannot_be_done_is_aborted_with_its_code() {
     device.enter_safeop();
     assert_eq!(device.download(0x1C13, 0, &[0]), Err(0x0800_0022), "in PREOP only");
     assert_eq!(device.download(0x8000, 0x13, &[1, 0]), Ok(()));
+}
+
+#[test]
+fn settings_outlive_the_supply_and_assignments_do_not() {
+    let mut device = preop("EL4102");
+    assert_eq!(device.download(0x8000, 0x13, &[0x34, 0x12]), Ok(()));
+    assert_eq!(device.download(0x1C12, 0, &[0]), Ok(()));
+    let now = device.bench.now;
+    device.bench.controller.power_off(now);
+    device.bench.wait(Span::ms(1));
+    let now = device.bench.now;
+    device.bench.controller.power_on(now);
+    device.bench.wait(Span::ms(200));
+    device.enter_preop();
+    assert_eq!(device.upload(0x8000, 0x13), Ok(vec![0x34, 0x12]));
+    assert_eq!(device.upload(0x1C12, 0), Ok(vec![2]));
 }
 
 #[test]
