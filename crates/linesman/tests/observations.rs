@@ -21,7 +21,7 @@ fn finding(name: &str) -> Value {
     let diagnosis = run.json();
     assert_valid(&diagnosis, "diagnosis");
     assert_eq!(diagnosis["verdict"], "faulty");
-    let findings = diagnosis["findings"].as_array().unwrap();
+    let findings = diagnosis["findings"].as_array().expect("findings");
     assert_eq!(findings.len(), 1, "one cause is one finding: {diagnosis:#}");
     findings[0].clone()
 }
