@@ -274,6 +274,16 @@ impl Exchange {
         Some(at)
     }
 
+    /// Gives up all frames of a plan that runs no longer: they must not be taken for those of the next.
+    pub(crate) fn abandon_cyclic(&mut self) {
+        while let Some(at) = (self.waiting.iter().copied())
+            .find(|at| matches!(self.slots[*at].purpose, Purpose::Cyclic { .. }))
+        {
+            self.outgoing.retain(|(outgoing, _)| *outgoing != at);
+            self.retire(at, SlotState::GivenUp);
+        }
+    }
+
     /// The requests of an answered or given-up slot, to be completed by the caller.
     pub(crate) fn take_requests(&mut self, at: usize) -> Vec<Queued> {
         std::mem::take(&mut self.slots[at].requests)

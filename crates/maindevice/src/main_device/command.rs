@@ -118,6 +118,7 @@ impl MainDevice {
             self.executor.cancel(control.group());
         }
         self.running = None;
+        self.exchange.abandon_cyclic();
         let wire = self.executor.group(self.options.repeats);
         self.control = Some(wire.clone());
         wire
