@@ -78,7 +78,7 @@ impl Fixture {
         assert!(self.cyclic.send_due(self.now, &mut self.exchange, &mut self.statistics));
         self.now += Span::ms(1);
         let mut buffer = vec![0; 1514];
-        let transmit = self.exchange.poll_transmit(self.now, &mut buffer).unwrap();
+        let (transmit, _) = self.exchange.poll_transmit(self.now, &mut buffer).unwrap();
         let sent = buffer[..transmit.len].to_vec();
         let mut back = sent.clone();
         back[6] |= SOURCE_MARK;

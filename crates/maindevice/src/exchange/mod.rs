@@ -70,7 +70,7 @@ pub(crate) struct Exchange {
     acyclic_out: usize,
     number: u32,
     patience: Span,
-    /// Whether what card A sends arrives at card B: `None` before the first frame, or with one card.
+    /// Whether what one card sends arrives at the other: `None` before the first frame, or with one card.
     ring_intact: Option<bool>,
 }
 
@@ -156,6 +156,8 @@ impl Exchange {
         if empty {
             return None;
         }
+        slot.cards.clear();
+        slot.cards.extend(slot.requests.iter().map(|queued| queued.request.card));
         slot.state = SlotState::Waiting;
         slot.purpose = purpose;
         slot.sent_at = now;
@@ -184,7 +186,11 @@ impl Exchange {
     }
 
     /// The next copy of a frame to be sent, as bytes in `buffer`, which must hold the longest frame.
-    pub(crate) fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
+    pub(crate) fn poll_transmit(
+        &mut self,
+        now: Instant,
+        buffer: &mut [u8],
+    ) -> Option<(Transmit, Purpose)> {
         while let Some((at, path)) = self.outgoing.pop_front() {
             let slot = &self.slots[at];
             let len = slot.sent.len();
@@ -192,9 +198,9 @@ impl Exchange {
             out.copy_from_slice(&slot.sent);
             if path == Path::B {
                 out[6..12].copy_from_slice(&self.sources[1].0);
-                slot::mask_positions(out);
             }
-            return Some(Transmit { at: now, path, len });
+            slot::mask(out, &slot.cards, path);
+            return Some((Transmit { at: now, path, len }, slot.purpose));
         }
         None
     }
@@ -224,8 +230,8 @@ impl Exchange {
             return Received::Duplicate;
         }
         slot.arrived[copy] = true;
-        if self.paths[Path::B.index()] && sender == Path::A {
-            self.ring_intact = Some(path == Path::B);
+        if self.paths[Path::B.index()] {
+            self.ring_intact = Some(path != sender);
         }
         if slot.reply.is_empty() {
             slot.reply.extend_from_slice(frame);

@@ -59,6 +59,9 @@ impl MainDevice {
 
     /// Drives every SubDevice of the plan to its target and keeps it there, and exchanges process
     /// data. Another command that is going on is ended.
+    ///
+    /// It begins with clearing the station addresses of all SubDevices, then gives those of the plan.
+    /// A SubDevice that is not who the plan says, or that the plan does not have, is left alone.
     pub fn start(&mut self, now: Instant, plan: Plan) {
         let wire = self.command();
         let plan = Arc::new(plan);

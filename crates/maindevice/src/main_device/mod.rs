@@ -89,8 +89,9 @@ impl MainDevice {
         if !self.exchange.has_outgoing() {
             self.send_acyclic(now);
         }
-        let transmit = self.exchange.poll_transmit(now, buffer)?;
+        let (transmit, purpose) = self.exchange.poll_transmit(now, buffer)?;
         self.statistics.frames_sent += 1;
+        self.statistics.cyclic_sent += u64::from(matches!(purpose, Purpose::Cyclic { .. }));
         Some(transmit)
     }
 
