@@ -1,10 +1,10 @@
 //! Frames out, frames back: slots, packing, matching, time-outs.
 //!
-//! [`Exchange`] keeps a slot for each frame that is out. The index bytes of a frame's datagrams carry
+//! The engine keeps a slot for each frame that is out. The index bytes of a frame's datagrams carry
 //! its number: the first the low byte, the others the next one. A reply is matched by source
 //! address, number and shape; so a late reply (the slot was given up) and a duplicate (it was
 //! answered) are told from a lost frame and from frames of others. [`request`] is what procedures
-//! ask for; [`mod@merge`] is what becomes of two copies.
+//! ask for. Two copies of a ring are merged datagram by datagram.
 
 mod merge;
 mod queue;
