@@ -1,8 +1,8 @@
-//! `proves: ID[, ID] [partial[: reason]]`: which test shows which row.
+//! `proves: ID [partial[: reason]], …`: which test shows which row.
 //!
 //! In Rust it is a `//` comment directly above `#[test]`, in a story a line of its head, in an
-//! interop program a `#` comment above the check. One `partial` in an annotation makes all of its
-//! rows partial: a full claim has a line of its own.
+//! interop program a `#` comment above the check. `partial` belongs to the row it stands behind; a
+//! reason may hold commas, and ends where the next row begins.
 
 use crate::files::TextFile;
 
@@ -118,9 +118,9 @@ fn read(file: &TextFile, language: Language, claims: &mut Vec<Claim>, errors: &m
         };
         match parse(&text) {
             Err(why) => errors.push(format!("{at}: {why}")),
-            Ok((ids, extent)) => claims.extend(ids.into_iter().map(|id| Claim {
+            Ok(rows) => claims.extend(rows.into_iter().map(|(id, extent)| Claim {
                 id,
-                extent: extent.clone(),
+                extent,
                 surface,
                 path: file.path.clone(),
                 line: index + 1,
@@ -162,29 +162,34 @@ fn python_check(lines: &[&str]) -> Option<String> {
 }
 
 /// Reads what stands behind the marker.
-fn parse(text: &str) -> Result<(Vec<String>, Extent), String> {
-    let (head, reason) = match text.split_once("partial:") {
-        Some((head, reason)) => (head, Some(reason.trim())),
-        None => (text, None),
-    };
-    let mut ids = Vec::new();
-    let mut partial = reason.is_some();
-    for word in head.split([',', ' ']).filter(|word| !word.is_empty()) {
-        if word == "partial" {
-            partial = true;
-        } else if is_id(word) {
-            ids.push(word.to_owned());
+fn parse(text: &str) -> Result<Vec<(String, Extent)>, String> {
+    let mut rows: Vec<(String, Extent)> = Vec::new();
+    for item in text.split(',') {
+        let item = item.trim();
+        let (id, rest) = item.split_once(' ').unwrap_or((item, ""));
+        if is_id(id) {
+            let extent = match rest.trim().strip_prefix("partial").map(str::trim) {
+                None if rest.is_empty() => Extent::Full,
+                Some("" | ":") => Extent::Partial(None),
+                Some(reason) if reason.starts_with(':') => {
+                    Extent::Partial(Some(reason[1..].trim().to_owned()))
+                }
+                Some(_) | None => return Err(unreadable(item)),
+            };
+            rows.push((id.to_owned(), extent));
+        } else if let Some((_, Extent::Partial(Some(reason)))) = rows.last_mut() {
+            // A comma within a reason.
+            reason.push_str(", ");
+            reason.push_str(item);
         } else {
-            return Err(format!(
-                "{word:?} is neither a row nor `partial`; expected `ID[, ID] [partial[: reason]]`"
-            ));
+            return Err(unreadable(item));
         }
     }
-    if ids.is_empty() {
-        return Err("no row is named".to_owned());
-    }
-    let reason = reason.filter(|reason| !reason.is_empty()).map(str::to_owned);
-    Ok((ids, if partial { Extent::Partial(reason) } else { Extent::Full }))
+    Ok(rows)
+}
+
+fn unreadable(item: &str) -> String {
+    format!("{item:?} cannot be read; expected `ID [partial[: reason]], …`")
 }
 
 fn is_id(word: &str) -> bool {
@@ -225,11 +230,16 @@ mod tests {
     }
 
     #[test]
-    fn one_partial_makes_all_rows_of_the_annotation_partial() {
-        let (found, _) =
-            of("crates/a/src/b.rs", "// proves: FRM-02 partial, FRM-03\n#[test]\nfn all() {}\n");
-        assert!(found.iter().all(|(_, extent, _)| *extent == Extent::Partial(None)));
-        assert_eq!(found.len(), 2);
+    fn partial_belongs_to_the_row_before_it() {
+        let text = "// proves: FRM-02 partial, FRM-03, HW-03 partial: a, b, HW-04\n\
+                    #[test]\nfn all() {}\n";
+        let (found, errors) = of("crates/a/src/b.rs", text);
+        let extents: Vec<Extent> = found.into_iter().map(|(_, extent, _)| extent).collect();
+        let reason = Extent::Partial(Some("a, b".into()));
+        assert_eq!(
+            (extents, errors),
+            (vec![Extent::Partial(None), Extent::Full, reason, Extent::Full], 0)
+        );
     }
 
     #[test]

@@ -315,7 +315,12 @@ impl Engine {
             if !watched.is_due(now) {
                 continue;
             }
-            watched.line.derive_tree();
+            if self.book.findings().is_empty() {
+                watched.learner.settle(&mut watched.line);
+            }
+            if watched.learner.is_settled() {
+                watched.line.derive_tree();
+            }
             watched.judged = watched.line.revision();
             watched.conditions.clear();
             let view = View { line: &watched.line, now, has_ended };
@@ -441,7 +446,7 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     match outcome {
         Outcome::Request | Outcome::RequestCopy => {
             traffic.sent += 1;
-            if traffic.senders.len() < pairing.senders().len() {
+            if pairing.senders_changed() {
                 traffic.senders = pairing.senders().to_vec();
                 line.touch();
             }

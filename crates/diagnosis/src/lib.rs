@@ -1,6 +1,6 @@
 //! Frames in, findings out: where, why and what to do.
 //!
-//! [`observe`] pairs what went out with what came back, [`line`] is what is known of the network,
+//! [`observe`] pairs what went out with what came back, [`mod@line`] is what is known of the network,
 //! each [`rule`] looks at the line for one kind of trouble, [`finding`] gives conditions a life, and
 //! [`report`] is the answer as people and programs read it. [`Engine`] drives them all.
 

@@ -5,10 +5,11 @@
 mod support;
 
 use linesman_config::fault::FaultName;
-use linesman_diagnosis::EventKind;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, PlaceReport, Verdict};
-use linesman_proto::address::{LogicalAddress, RegisterAddress};
+use linesman_diagnosis::{EventKind, HostEvent, HostObservation};
+use linesman_proto::address::{LogicalAddress, Network, Path, RegisterAddress};
 use linesman_proto::register::FmmuConfig;
+use linesman_proto::time::{Instant, Span};
 use support::script::{Script, brd, fprd, fpwr, lrw};
 use support::text;
 
@@ -91,16 +92,20 @@ fn a_refused_state_names_device_transition_and_code() {
 }
 
 #[test]
-fn an_acknowledged_refusal_is_closed_but_not_forgotten() {
+fn a_refusal_is_over_when_the_state_is_reached_and_not_when_it_is_acknowledged() {
     let mut script = Script::scanned(1);
     script.exchange(&[fpwr(0x1001, 0x0120, &[4, 0])]);
     script.exchange(&[fprd(0x1001, 0x0130, &[0x12, 0, 0, 0, 0x1E, 0])]);
     script.exchange(&[fpwr(0x1001, 0x0120, &[0x12, 0])]);
     script.exchange(&[fprd(0x1001, 0x0130, &[0x02, 0, 0, 0, 0, 0])]);
-    let report = report(&mut script);
-    let finding = only(&report);
-    assert_eq!((finding.name.as_str(), finding.state), ("state-refused", FindingState::Closed));
-    assert_eq!(report.verdict, Verdict::Faulty);
+    let acknowledged = report(&mut script);
+    let finding = only(&acknowledged);
+    assert_eq!((finding.name.as_str(), finding.state), ("state-refused", FindingState::Confirmed));
+    script.exchange(&[fpwr(0x1001, 0x0120, &[4, 0])]);
+    script.exchange(&[fprd(0x1001, 0x0130, &[0x04, 0, 0, 0, 0, 0])]);
+    let reached = report(&mut script);
+    assert_eq!(only(&reached).state, FindingState::Closed);
+    assert_eq!(reached.verdict, Verdict::Faulty, "it was there");
 }
 
 #[test]
@@ -208,6 +213,79 @@ fn probes_are_asked_for_once_something_is_wrong() {
     assert!(probes.iter().any(|probe| probe.register == RegisterAddress(0x0300)));
 }
 
+fn host(script: &mut Script, what: HostEvent) {
+    script.now += 1_000_000;
+    let observation = HostObservation {
+        network: Network(0),
+        path: Path::A,
+        time: Instant::from_nanos(script.now),
+        what,
+    };
+    script.engine.handle_host(&observation);
+}
+
+#[test]
+fn a_host_that_drops_frames_is_blamed_itself() {
+    let mut script = running();
+    host(&mut script, HostEvent::SocketDrops(0));
+    host(&mut script, HostEvent::SocketDrops(12));
+    let report = report(&mut script);
+    let finding = only(&report);
+    assert_eq!((finding.name.as_str(), finding.cause), ("host-drops-frames", FaultName::HostDrops));
+    assert_eq!(finding.place, PlaceReport::Host);
+}
+
+#[test]
+fn late_cycles_are_a_warning_once_they_are_many() {
+    let mut script = running();
+    host(&mut script, HostEvent::Late(Span::us(300)));
+    host(&mut script, HostEvent::Late(Span::us(1500)));
+    script.engine.finish(Instant::from_nanos(script.now), true);
+    assert_eq!(script.engine.diagnosis().verdict, Verdict::Healthy, "two are none");
+    host(&mut script, HostEvent::Late(Span::us(900)));
+    let report = report(&mut script);
+    assert_eq!(only(&report).cause, FaultName::HostJitter);
+}
+
+#[test]
+fn two_senders_are_two_maindevices_but_two_cards_are_not() {
+    let other = |script: &mut Script, datagram: &support::script::Datagram| {
+        for is_back in [false, true] {
+            let index = script.index;
+            let mut bytes = support::script::frame(std::slice::from_ref(datagram), index, is_back);
+            bytes[11] = 0x77;
+            script.feed(&bytes, linesman_diagnosis::Direction::Unknown, 10_000);
+        }
+        script.index = script.index.wrapping_add(1);
+    };
+    let mut script = running();
+    for _ in 0..30 {
+        cycles(&mut script, 1, 3);
+        other(&mut script, &brd(0x0130, &[8, 0], 3));
+    }
+    let report_of_two = report(&mut script);
+    let finding = only(&report_of_two);
+    assert_eq!(finding.cause, FaultName::SecondMainDevice);
+    assert!(finding.evidence[0].text.contains("10:10:10:10:10:77"), "{}", finding.evidence[0].text);
+    // The second card of a ring repeats each request while the first one is out.
+    let mut script = running();
+    for _ in 0..30 {
+        let datagrams = [brd(0x0130, &[8, 0], 3)];
+        script.send(&datagrams);
+        let index = script.index;
+        let mut copy = support::script::frame(&datagrams, index, false);
+        copy[11] = 0x77;
+        script.feed(&copy, linesman_diagnosis::Direction::Unknown, 1_000);
+        script.give_back(&datagrams);
+        let mut back = support::script::frame(&datagrams, index, true);
+        back[11] = 0x77;
+        script.feed(&back, linesman_diagnosis::Direction::Unknown, 1_000);
+        script.index = script.index.wrapping_add(1);
+    }
+    let report_of_ring = report(&mut script);
+    assert_eq!(report_of_ring.verdict, Verdict::Healthy, "{}", text(&report_of_ring));
+}
+
 #[test]
 fn a_broadcast_of_states_is_not_a_state() {
     let mut script = Script::scanned(2);
@@ -251,4 +329,22 @@ fn the_report_is_read_back_as_it_was_written() {
     assert_eq!(finding["evidence"][0]["kind"], "frame");
     let back: Diagnosis = serde_json::from_value(json).unwrap();
     assert_eq!(back, report);
+}
+
+#[test]
+fn a_run_joined_in_the_middle_is_put_in_the_order_of_stations() {
+    let mut script = Script::new();
+    // Polled from the middle on, as a MainDevice that goes round does.
+    for station in [0x1003, 0x1001, 0x1002] {
+        let dl: u16 = if station == 0x1003 { 0x5617 } else { 0x5A37 };
+        script.exchange(&[fprd(station, 0x0110, &dl.to_le_bytes())]);
+        script.exchange(&[fprd(station, 0x0130, &[8, 0, 0, 0, 0, 0])]);
+    }
+    script.exchange(&[brd(0x0130, &[8, 0], 3)]);
+    script.finish();
+    let line = script.engine.line(Network(0)).unwrap();
+    let stations: Vec<_> = line.devices.iter().map(|device| device.station.unwrap().0).collect();
+    assert_eq!(stations, [0x1001, 0x1002, 0x1003]);
+    let tree = line.tree.as_ref().unwrap();
+    assert_eq!([tree.parent(0), tree.parent(1), tree.parent(2)], [None, Some(0), Some(1)]);
 }

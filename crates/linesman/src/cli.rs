@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{completion, diagnose, explain, interfaces, scan, schema, sim};
+use crate::command::{completion, demo, diagnose, explain, interfaces, lab, scan, schema, sim};
 use crate::version::VERSION;
 
 /// The whole command line.
@@ -42,6 +42,8 @@ pub(crate) enum ColorChoice {
 /// The commands.
 #[derive(Subcommand, Debug)]
 pub(crate) enum Command {
+    /// See it work: a virtual plant, broken and healed, the truth beside the verdict
+    Demo(demo::Arguments),
     /// Which SubDevices there are and how they are wired
     Scan(scan::Arguments),
     /// What is wrong with a line: where, why, and what to do
@@ -52,6 +54,8 @@ pub(crate) enum Command {
     Explain(explain::Arguments),
     /// A virtual segment on real interfaces, for any MainDevice
     Sim(sim::Arguments),
+    /// Stories and swarms in virtual time
+    Lab(lab::Arguments),
     /// JSON schema of a file or output
     Schema(schema::Arguments),
     /// Shell completion: write it to where your shell looks for it
@@ -65,7 +69,12 @@ impl Command {
             Self::Scan(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
-            Self::Explain(_) | Self::Sim(_) | Self::Schema(_) | Self::Completion(_) => false,
+            Self::Demo(_)
+            | Self::Explain(_)
+            | Self::Sim(_)
+            | Self::Lab(_)
+            | Self::Schema(_)
+            | Self::Completion(_) => false,
         }
     }
 }

@@ -255,3 +255,6 @@ fn copy_inputs(datagram: &DatagramPlan, data: &[u8], serving: &Presence, inputs:
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

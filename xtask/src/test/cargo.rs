@@ -62,10 +62,17 @@ pub(super) fn tests(context: &Context<'_>) -> Result<Outcome> {
         println!("    {line}");
     }
     if !ran.success() {
-        for line in ran.output.lines().filter(|line| is_failure(line)) {
-            println!("    {line}");
+        let mut lines = ran.output.lines();
+        while let Some(line) = lines.next() {
+            if line.contains("panicked at ") {
+                println!("    {line}");
+                // What it panicked with.
+                println!("    {}", lines.next().unwrap_or_default());
+            } else if is_failure(line) {
+                println!("    {line}");
+            }
         }
-        let why = format!("{} failed; {}", counts.failed, ran.explain());
+        let why = format!("{} failed; {}", counts.failed, ran.status_line());
         return Ok(Outcome::Failed { count: counts.passed, why });
     }
     let mut note = format!("tests in {} programs", counts.programs);
@@ -79,7 +86,9 @@ pub(super) fn tests(context: &Context<'_>) -> Result<Outcome> {
 }
 
 fn is_failure(line: &str) -> bool {
-    (line.starts_with("test ") && line.ends_with("FAILED")) || line.starts_with("error")
+    let program = ["error: test failed", "error: could not compile", "error: doctest failed"];
+    let test = line.starts_with("test ") && line.ends_with("FAILED");
+    test || program.iter().any(|start| line.starts_with(start))
 }
 
 /// The documentation builds without a warning: no dead link.

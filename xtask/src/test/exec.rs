@@ -88,6 +88,11 @@ impl Ran {
         for line in &lines[lines.len().saturating_sub(TAIL)..] {
             println!("    {line}");
         }
+        self.status_line()
+    }
+
+    /// In one line how the command ended.
+    pub(super) fn status_line(&self) -> String {
         let how = match self.status {
             None => "ran out of time".to_owned(),
             Some(status) => status.to_string(),

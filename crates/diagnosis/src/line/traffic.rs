@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-use linesman_proto::ethernet::MacAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
 
 use super::Seen;
 use super::host::Tally;
+use crate::observe::Sender;
 
 /// Silences kept.
 pub const SILENCES_KEPT: usize = 16;
@@ -63,8 +63,8 @@ pub struct Traffic {
     /// When nothing at all came back, oldest first, at most [`SILENCES_KEPT`].
     pub silences: VecDeque<Silence>,
     recent_returns: RecentReturns,
-    /// The source addresses that requests came from, at most four.
-    pub senders: Vec<MacAddress>,
+    /// Who sent requests, at most four.
+    pub senders: Vec<Sender>,
     /// Returns whose request was not seen.
     pub returned_alone: u64,
     /// Frames recorded twice.

@@ -8,5 +8,5 @@ pub mod seen;
 
 pub use exchange::{Exchange, FrameCopy};
 pub use fingerprint::Fingerprint;
-pub use pairing::{Outcome, Pairing};
+pub use pairing::{Outcome, Pairing, Sender};
 pub use seen::{Direction, FrameSeen, HostEvent, HostObservation};

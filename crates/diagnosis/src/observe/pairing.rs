@@ -18,6 +18,7 @@ use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
 use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen};
+use crate::line::Seen;
 
 /// Most requests waiting for their return; beyond, the oldest is lost.
 const MOST_PENDING: usize = 256;
@@ -36,6 +37,8 @@ const IN_FLIGHT: Span = Span::ms(5);
 const REMEMBERED: usize = 8;
 /// Senders kept.
 const MOST_SENDERS: usize = 4;
+/// So many requests of its own make a sender one for sure.
+pub const OWN: u64 = 16;
 
 /// What a frame turned out to be, besides the exchange it may complete.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -52,6 +55,17 @@ pub enum Outcome {
     Duplicate,
 }
 
+/// Somebody who sends requests.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Sender {
+    /// Its address.
+    pub mac: MacAddress,
+    /// Its first request.
+    pub first: Seen<()>,
+    /// Requests of its own: the second card of a ring only repeats those of the first.
+    pub own: u64,
+}
+
 /// Requests that wait for their return.
 #[derive(Clone, Default, Debug)]
 pub struct Pairing {
@@ -60,7 +74,8 @@ pub struct Pairing {
     spare_sums: Vec<Vec<u16>>,
     returned: [Option<(Fingerprint, Instant)>; REMEMBERED],
     returned_next: usize,
-    senders: Vec<MacAddress>,
+    senders: Vec<Sender>,
+    senders_changed: bool,
     returns: u64,
 }
 
@@ -71,7 +86,7 @@ struct Pending {
     time: Instant,
     number: u64,
     path: Option<Path>,
-    is_marked: bool,
+    source: MacAddress,
     is_live: bool,
     sent: [bool; 2],
     /// Copies that are still out.
@@ -105,7 +120,9 @@ impl Pairing {
             Direction::Unknown => self.is_return(found, source, print),
         };
         if !is_return {
-            return self.request(frame, source, print, settle);
+            let other = |found: usize| self.pending[found].source != source;
+            let is_repeated = found.is_some_and(other);
+            return self.request(frame, source, is_repeated, print, settle);
         }
         let Some(found) = found else {
             if self.was_returned(print, frame.time) {
@@ -164,22 +181,27 @@ impl Pairing {
         self.pending.len()
     }
 
-    /// The source addresses that requests came from, at most four.
+    /// Who sent requests, at most four.
     #[must_use]
-    pub fn senders(&self) -> &[MacAddress] {
+    pub fn senders(&self) -> &[Sender] {
         &self.senders
+    }
+
+    /// Whether there is a new sender, or one proved to be none's second card, since this was asked.
+    pub fn senders_changed(&mut self) -> bool {
+        std::mem::take(&mut self.senders_changed)
     }
 
     /// Whether a frame of unknown direction is on its way back.
     fn is_return(&self, found: Option<usize>, source: MacAddress, print: Fingerprint) -> bool {
         let Some(pending) = found.map(|index| &self.pending[index]) else {
-            let is_own = |sender: &MacAddress| !sender.is_marked() && sender.marked() == source;
+            let is_own = |sender: &Sender| !sender.mac.is_marked() && sender.mac.marked() == source;
             return print.is_answered || self.senders.iter().any(is_own);
         };
         if print.changing != pending.print.changing {
             return true;
         }
-        match (pending.is_marked, source.is_marked()) {
+        match (pending.source.is_marked(), source.is_marked()) {
             (false, marked) => marked,
             // An address that is marked from the start shows nothing. Where answers are known to
             // come, a second frame is the return; else it is the request again.
@@ -191,6 +213,7 @@ impl Pairing {
         &mut self,
         frame: &FrameSeen<'_>,
         source: MacAddress,
+        is_repeated: bool,
         print: Fingerprint,
         settle: &mut impl FnMut(&Exchange<'_>),
     ) -> Outcome {
@@ -209,9 +232,7 @@ impl Pairing {
                 return Outcome::Duplicate;
             }
         }
-        if !self.senders.contains(&source) && self.senders.len() < MOST_SENDERS {
-            self.senders.push(source);
-        }
+        self.note_sender(frame, source, is_repeated);
         if self.pending.len() >= MOST_PENDING {
             self.lose(0, false, settle);
         }
@@ -228,7 +249,7 @@ impl Pairing {
             time: frame.time,
             number: frame.number,
             path: frame.path,
-            is_marked: source.is_marked(),
+            source,
             is_live: frame.direction != Direction::Unknown,
             sent,
             out: 1,
@@ -237,6 +258,23 @@ impl Pairing {
             sums,
         });
         Outcome::Request
+    }
+
+    fn note_sender(&mut self, frame: &FrameSeen<'_>, mac: MacAddress, is_repeated: bool) {
+        let own = u64::from(!is_repeated);
+        let count = self.senders.len();
+        match self.senders.iter_mut().find(|sender| sender.mac == mac) {
+            Some(sender) => {
+                sender.own += own;
+                self.senders_changed |= own > 0 && sender.own == OWN;
+            }
+            None if count < MOST_SENDERS => {
+                let first = Seen::new((), frame.time, Some(frame.number));
+                self.senders.push(Sender { mac, first, own });
+                self.senders_changed = true;
+            }
+            None => {}
+        }
     }
 
     /// Pairs a return with pending request `found`.

@@ -4,12 +4,14 @@
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
 pub mod frame_errors;
+pub mod host_trouble;
 pub mod identity;
 pub mod link_lost;
 pub mod nobody_answers;
 pub mod not_answering;
 pub mod one_direction;
 pub mod restarted;
+pub mod second_maindevice;
 pub mod state_error;
 pub mod working_counter;
 
@@ -83,6 +85,8 @@ pub const RULES: &[Rule] = &[
     state_error::RULE,
     working_counter::RULE,
     one_direction::RULE,
+    host_trouble::RULE,
+    second_maindevice::RULE,
 ];
 
 /// The manual: every page of every rule, by code.

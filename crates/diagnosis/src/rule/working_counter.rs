@@ -5,7 +5,7 @@
 //!
 //! **How it is found.** Each logical datagram has a working counter that it comes back with while all is
 //! well; it is known from the time after the process data were set up. Who owns which part is known from
-//! the FMMUs (0x0600 and up) that were seen being written. An SubDevice that gives inputs adds 1; one
+//! the FMMUs (0x0600 and up) that were seen being written. A SubDevice that gives inputs adds 1; one
 //! that takes outputs adds 1 to an LWR and 2 to an LRW. The missing amount and what else is known of the
 //! owners (no answer, error, fallen state) tell who it is. When the MainDevice itself took a SubDevice
 //! out of SAFEOP or OP, a lower working counter is what it wanted.
@@ -160,7 +160,10 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     for (cyclic, deficit) in deficits.iter().rev().take(3) {
         condition = condition.shown_by(evidence(line, cyclic, deficit));
     }
-    if suspects.is_certain {
+    // Where the set-up was not seen, the suspects are all that are in trouble: what explains them,
+    // explains this.
+    let is_unknown = deficits.iter().all(|(cyclic, _)| line.owners(cyclic).next().is_none());
+    if suspects.is_certain || is_unknown {
         condition =
             condition.about(suspects.devices.iter().map(|device| Symptom::WorkingCounter(*device)));
     }

@@ -4,6 +4,7 @@ mod capture;
 mod cards;
 pub(crate) mod follow;
 mod listen;
+mod observations;
 mod segment;
 
 use std::path::PathBuf;
@@ -28,11 +29,15 @@ use crate::version;
 
 use super::sim;
 
+/// The clock of an observation file.
+const NO_CLOCK: &str = "none";
+
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
-    /// Where the frames are: see below
-    #[arg(value_name = "WHERE")]
+    /// Where the frames are, or a file with what was read: eth0, eth0+eth1, listen:eth0,
+    /// sim:plant.toml, trace.pcapng, observations.toml
+    #[arg(value_name = "WHERE|OBSERVATIONS.toml")]
     place: String,
     /// What was planned (TOML): names, wiring and identities to hold the line against
     #[arg(long, value_name = "FILE")]
@@ -104,10 +109,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let session = Session::new(arguments, &selector, None);
             segment::run(path, arguments.to.into(), session, output)
         }
-        Selector::Observations(_) => Err(Failure::new(
-            format!("`{}`: observation files cannot be judged so far", arguments.place),
-            "for a virtual segment say `sim:` in front of the file's name",
-        )),
+        Selector::Observations(path) => {
+            observations::run(path, Session::new(arguments, &selector, project), output)
+        }
     }
 }
 
@@ -172,7 +176,9 @@ impl Session {
 
 /// The diagnosis as text.
 fn print(diagnosis: &Diagnosis, names: &Names, output: &mut Output) {
-    let writer = Writer { names, paint: output.paint(), width: output.width() };
+    // An observation file says what was read, not when.
+    let timed = diagnosis.clock != NO_CLOCK;
+    let writer = Writer { names, paint: output.paint(), width: output.width(), timed };
     output.text(&text::diagnosis::write(diagnosis, &writer));
 }
 

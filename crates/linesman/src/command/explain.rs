@@ -172,6 +172,7 @@ mod tests {
         assert_eq!(titles("0x0303"), ["Register 0x0302: RX error counter, port B"]);
         assert_eq!(titles("safeop"), ["State SAFEOP"]);
         assert_eq!(titles("link-open"), ["Fault link-open"]);
+        assert!(titles("h100")[0].starts_with("Finding H100"));
         assert_eq!(titles("0x06010002").len(), 1);
         assert_eq!(titles("0x0011").len(), 1, "a status code, no register");
         assert_eq!(titles("al:0x0130").len(), 1);
@@ -189,7 +190,7 @@ mod tests {
             assert!(titles(&word)[0].starts_with("AL status code"), "{word}");
         }
         for fault in FaultName::ALL {
-            assert_eq!(titles(fault.name()), [format!("Fault {fault}")]);
+            assert!(titles(fault.name()).contains(&format!("Fault {fault}")));
         }
     }
 

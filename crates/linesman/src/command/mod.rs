@@ -1,10 +1,12 @@
 //! The commands, one file each.
 
 pub(crate) mod completion;
+pub(crate) mod demo;
 pub(crate) mod diagnose;
 pub(crate) mod driven;
 pub(crate) mod explain;
 pub(crate) mod interfaces;
+pub(crate) mod lab;
 pub(crate) mod scan;
 pub(crate) mod schema;
 pub(crate) mod sim;
@@ -17,6 +19,8 @@ use crate::output::Output;
 /// Does what was asked.
 pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failure> {
     match command {
+        Command::Demo(arguments) => demo::run(&arguments, output),
+        Command::Lab(arguments) => lab::run(&arguments, output),
         Command::Scan(arguments) => scan::run(&arguments, output),
         Command::Diagnose(arguments) => diagnose::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),

@@ -1,6 +1,7 @@
 //! `linesman schema`: the JSON schema of each file and output.
 
 use linesman_config::project::Project;
+use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
 use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
@@ -27,6 +28,8 @@ pub(crate) enum Name {
     Segment,
     /// What was planned (TOML)
     Project,
+    /// What was read with another tool (TOML), for `diagnose`
+    Observations,
     /// `scan --json`
     Scan,
     /// `diagnose --json`
@@ -49,6 +52,7 @@ fn schema(name: Name) -> Schema {
     match name {
         Name::Segment => schema_for!(SegmentFile),
         Name::Project => schema_for!(Project),
+        Name::Observations => schema_for!(ObservationFile),
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),

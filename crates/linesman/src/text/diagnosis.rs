@@ -53,12 +53,14 @@ fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     let network = &diagnosis.network;
     let mut parts = vec![count(network.devices.0, "SubDevice")];
     parts.extend(network.al_state_highest.as_ref().map(|state| format!("highest state {state}")));
-    parts.push(count(network.frames.0, "frame"));
-    parts.push(format!(
-        "{} judged, {} unanswered",
-        count(network.datagrams.0, "datagram"),
-        network.unanswered.0
-    ));
+    if writer.timed {
+        parts.push(count(network.frames.0, "frame"));
+        parts.push(format!(
+            "{} judged, {} unanswered",
+            count(network.datagrams.0, "datagram"),
+            network.unanswered.0
+        ));
+    }
     if network.lost.0 > 0 {
         parts.push(format!("{} lost", count(network.lost.0, "frame")));
     }
@@ -125,7 +127,7 @@ mod tests {
     #[test]
     fn a_diagnosis_reads_from_verdict_to_consequence() {
         let names = Names::new(["K1".to_owned(), "B3".to_owned()]);
-        let writer = Writer { names: &names, paint: Paint::PLAIN, width: 100 };
+        let writer = Writer { names: &names, paint: Paint::PLAIN, width: 100, timed: true };
         let expected = "\
 FAULTY  trace.pcapng: 1 error
   2 SubDevices, highest state OP, 40,000 frames, 20,000 datagrams judged, 3 unanswered, 1 frame lost
@@ -155,7 +157,7 @@ ERROR   H104 port-errors (over)
         diagnosis.findings.clear();
         diagnosis.complete = true;
         let names = Names::default();
-        let writer = Writer { names: &names, paint: Paint::PLAIN, width: 100 };
+        let writer = Writer { names: &names, paint: Paint::PLAIN, width: 100, timed: true };
         let text = write(&diagnosis, &writer);
         assert!(
             text.starts_with("HEALTHY  trace.pcapng: nothing is wrong with the line\n"),

@@ -22,6 +22,8 @@ pub(crate) struct Writer<'a> {
     pub(crate) paint: Paint,
     /// Columns.
     pub(crate) width: usize,
+    /// Whether times mean something; an observation file has none.
+    pub(crate) timed: bool,
 }
 
 impl Writer<'_> {
@@ -33,7 +35,9 @@ impl Writer<'_> {
         for other in &finding.alternatives {
             self.add(&mut text, "or", &self.alternative(other));
         }
-        self.add(&mut text, "when", &when(finding));
+        if self.timed {
+            self.add(&mut text, "when", &when(finding));
+        }
         self.evidence(&mut text, &finding.evidence);
         for (index, action) in finding.actions.iter().enumerate() {
             let heading = if index == 0 { "do" } else { "" };
@@ -91,13 +95,16 @@ impl Writer<'_> {
         }
     }
 
-    /// `at 1.234 ms, frame 12: text (14 (B3) port A, register 0x0300, 3 → 18)`.
+    /// `at 1.234 ms, frame 12: text (register 0x0300, 3 → 18)`.
     fn piece(&self, evidence: &EvidenceReport) -> String {
         let mut head = Vec::new();
-        head.extend(evidence.time_ns.map(|Number(at)| format!("at {}", time(at))));
+        let at = evidence.time_ns.filter(|_| self.timed);
+        head.extend(at.map(|Number(at)| format!("at {}", time(at))));
         head.extend(evidence.frame.map(|Number(frame)| format!("frame {frame}")));
         let mut tail = Vec::new();
-        if let Some(no) = evidence.no {
+        // Most texts name the device themselves.
+        let named = |no: u32| evidence.text.contains(&format!("SubDevice {no}"));
+        if let Some(no) = evidence.no.filter(|no| !named(*no)) {
             let port = evidence.port.map(|port| format!(" port {port}")).unwrap_or_default();
             tail.push(format!("{}{port}", self.names.device(no)));
         }

@@ -18,6 +18,8 @@ impl Names {
         match index.map(|index| self.0.get(index).map_or("", String::as_str)) {
             None => "MainDevice".to_owned(),
             Some("") => no.to_string(),
+            // What files without names call them.
+            Some(name) if name == format!("SubDevice {no}") => no.to_string(),
             Some(name) => format!("{no} ({name})"),
         }
     }

@@ -1,10 +1,10 @@
 //! Frames out, frames back: slots, packing, matching, time-outs.
 //!
-//! [`Exchange`] keeps a slot for each frame that is out. The index bytes of a frame's datagrams carry
+//! The engine keeps a slot for each frame that is out. The index bytes of a frame's datagrams carry
 //! its number: the first the low byte, the others the next one. A reply is matched by source
 //! address, number and shape; so a late reply (the slot was given up) and a duplicate (it was
 //! answered) are told from a lost frame and from frames of others. [`request`] is what procedures
-//! ask for; [`mod@merge`] is what becomes of two copies.
+//! ask for. Two copies of a ring are merged datagram by datagram.
 
 mod merge;
 mod queue;
@@ -70,7 +70,7 @@ pub(crate) struct Exchange {
     acyclic_out: usize,
     number: u32,
     patience: Span,
-    /// Whether what card A sends arrives at card B: `None` before the first frame, or with one card.
+    /// Whether what one card sends arrives at the other: `None` before the first frame, or with one card.
     ring_intact: Option<bool>,
 }
 
@@ -156,6 +156,8 @@ impl Exchange {
         if empty {
             return None;
         }
+        slot.cards.clear();
+        slot.cards.extend(slot.requests.iter().map(|queued| queued.request.card));
         slot.state = SlotState::Waiting;
         slot.purpose = purpose;
         slot.sent_at = now;
@@ -184,7 +186,11 @@ impl Exchange {
     }
 
     /// The next copy of a frame to be sent, as bytes in `buffer`, which must hold the longest frame.
-    pub(crate) fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
+    pub(crate) fn poll_transmit(
+        &mut self,
+        now: Instant,
+        buffer: &mut [u8],
+    ) -> Option<(Transmit, Purpose)> {
         while let Some((at, path)) = self.outgoing.pop_front() {
             let slot = &self.slots[at];
             let len = slot.sent.len();
@@ -192,9 +198,9 @@ impl Exchange {
             out.copy_from_slice(&slot.sent);
             if path == Path::B {
                 out[6..12].copy_from_slice(&self.sources[1].0);
-                slot::mask_positions(out);
             }
-            return Some(Transmit { at: now, path, len });
+            slot::mask(out, &slot.cards, path);
+            return Some((Transmit { at: now, path, len }, slot.purpose));
         }
         None
     }
@@ -224,8 +230,8 @@ impl Exchange {
             return Received::Duplicate;
         }
         slot.arrived[copy] = true;
-        if self.paths[Path::B.index()] && sender == Path::A {
-            self.ring_intact = Some(path == Path::B);
+        if self.paths[Path::B.index()] {
+            self.ring_intact = Some(path != sender);
         }
         if slot.reply.is_empty() {
             slot.reply.extend_from_slice(frame);
@@ -266,6 +272,16 @@ impl Exchange {
         self.outgoing.retain(|(outgoing, _)| *outgoing != at);
         self.retire(at, if answered { SlotState::Answered } else { SlotState::GivenUp });
         Some(at)
+    }
+
+    /// Gives up all frames of a plan that runs no longer: they must not be taken for those of the next.
+    pub(crate) fn abandon_cyclic(&mut self) {
+        while let Some(at) = (self.waiting.iter().copied())
+            .find(|at| matches!(self.slots[*at].purpose, Purpose::Cyclic { .. }))
+        {
+            self.outgoing.retain(|(outgoing, _)| *outgoing != at);
+            self.retire(at, SlotState::GivenUp);
+        }
     }
 
     /// The requests of an answered or given-up slot, to be completed by the caller.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use linesman_proto::address::{Position, RegisterAddress, StationAddress, WorkingCounter};
+use linesman_proto::address::{Path, Position, RegisterAddress, StationAddress, WorkingCounter};
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::time::Span;
@@ -10,8 +10,11 @@ use linesman_proto::time::Span;
 /// Whom a register access means.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Target {
-    /// The controller at a place in the order of processing. For scanning only: places move.
+    /// The controller at a place in the order in which frames of card A are processed. For scanning
+    /// only: places move.
     Position(Position),
+    /// The same for frames of card B: in a broken ring, where each card has a half of its own.
+    PositionOnB(Position),
     /// The controller with this station address.
     Station(StationAddress),
     /// All controllers.
@@ -23,7 +26,7 @@ impl Target {
     #[must_use]
     pub const fn read_command(self) -> Command {
         match self {
-            Self::Position(_) => Command::Aprd,
+            Self::Position(_) | Self::PositionOnB(_) => Command::Aprd,
             Self::Station(_) => Command::Fprd,
             Self::All => Command::Brd,
         }
@@ -33,9 +36,19 @@ impl Target {
     #[must_use]
     pub const fn write_command(self) -> Command {
         match self {
-            Self::Position(_) => Command::Apwr,
+            Self::Position(_) | Self::PositionOnB(_) => Command::Apwr,
             Self::Station(_) => Command::Fpwr,
             Self::All => Command::Bwr,
+        }
+    }
+
+    /// The card whose frames reach it; `None`: either.
+    #[must_use]
+    pub const fn card(self) -> Option<Path> {
+        match self {
+            Self::Position(_) => Some(Path::A),
+            Self::PositionOnB(_) => Some(Path::B),
+            Self::Station(_) | Self::All => None,
         }
     }
 
@@ -43,7 +56,7 @@ impl Target {
     #[must_use]
     pub const fn register(self, address: RegisterAddress) -> DatagramAddress {
         let adp = match self {
-            Self::Position(position) => position.auto_increment(),
+            Self::Position(position) | Self::PositionOnB(position) => position.auto_increment(),
             Self::Station(station) => station.0,
             Self::All => 0,
         };
@@ -55,6 +68,7 @@ impl fmt::Display for Target {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Position(position) => write!(f, "position {position}"),
+            Self::PositionOnB(position) => write!(f, "position {position} from card B"),
             Self::Station(station) => write!(f, "station {station}"),
             Self::All => f.write_str("all SubDevices"),
         }
@@ -71,6 +85,8 @@ pub struct Request {
     /// What is sent; zeros for a read. At most
     /// [`MAX_DATAGRAM_DATA`](linesman_proto::frame::MAX_DATAGRAM_DATA) bytes.
     pub data: Vec<u8>,
+    /// The card whose copy of the frame carries it; `None`: both.
+    pub card: Option<Path>,
     /// How often it is sent again when its frame does not come back.
     pub repeats: u8,
 }
@@ -83,6 +99,7 @@ impl Request {
             command: target.read_command(),
             address: target.register(address),
             data: vec![0; usize::from(len)],
+            card: target.card(),
             repeats: 0,
         }
     }
@@ -94,6 +111,7 @@ impl Request {
             command: target.write_command(),
             address: target.register(address),
             data: data.to_vec(),
+            card: target.card(),
             repeats: 0,
         }
     }
@@ -102,6 +120,12 @@ impl Request {
     #[must_use]
     pub fn repeated(self, repeats: u8) -> Self {
         Self { repeats, ..self }
+    }
+
+    /// The same, carried by the frames of one card only.
+    #[must_use]
+    pub fn by_card(self, card: Path) -> Self {
+        Self { card: Some(card), ..self }
     }
 
     /// What it asks, without the data: for messages.

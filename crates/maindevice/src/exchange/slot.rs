@@ -1,11 +1,12 @@
 //! A slot: one frame on its way, with up to two copies.
 
 use linesman_proto::address::Path;
-use linesman_proto::command::{Addressing, Command};
-use linesman_proto::ethernet::MAX_LEN;
-use linesman_proto::frame::{DATAGRAM_HEADER_LEN, FrameView, WKC_LEN};
+use linesman_proto::command::Command;
+use linesman_proto::ethernet::{HEADER_LEN, MAX_LEN};
+use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, FrameView, WKC_LEN};
 use linesman_proto::time::Instant;
 
+use super::MAX_ACYCLIC_DATAGRAMS;
 use super::queue::Queued;
 
 /// Whose frame it is.
@@ -41,8 +42,10 @@ pub(crate) enum SlotState {
 pub(crate) struct Slot {
     pub(crate) state: SlotState,
     pub(crate) purpose: Purpose,
-    /// The frame as card A sends it.
+    /// The frame before datagrams of the other card are masked.
     pub(crate) sent: Vec<u8>,
+    /// The card that carries each datagram, where it is one only; empty when all go by both.
+    pub(crate) cards: Vec<Option<Path>>,
     /// What came back: the first copy, later with the second merged in.
     pub(crate) reply: Vec<u8>,
     pub(crate) sent_at: Instant,
@@ -61,6 +64,7 @@ impl Slot {
             state: SlotState::Free,
             purpose: Purpose::Acyclic,
             sent: Vec::with_capacity(MAX_LEN),
+            cards: Vec::with_capacity(MAX_ACYCLIC_DATAGRAMS),
             reply: Vec::with_capacity(MAX_LEN),
             sent_at: Instant::ZERO,
             deadline: Instant::MAX,
@@ -77,10 +81,10 @@ impl Slot {
             return false;
         };
         let mut came = came.datagrams();
-        for sent in sent.datagrams() {
+        for (at, sent) in sent.datagrams().enumerate() {
             let (Ok(sent), Some(Ok(came))) = (sent, came.next()) else { return false };
             let Some(command) = sent.command() else { return false };
-            let same = came.code() == as_sent_by(command, sender).code()
+            let same = came.code() == as_sent_by(command, self.card(at), sender).code()
                 && came.index() == sent.index()
                 && came.offset() == sent.offset()
                 && came.data_len() == sent.data_len()
@@ -94,36 +98,35 @@ impl Slot {
         came.next().is_none()
     }
 
+    /// The card that alone carries a datagram.
+    fn card(&self, datagram: usize) -> Option<Path> {
+        self.cards.get(datagram).copied().flatten()
+    }
+
     /// Whether all copies that were sent have come back.
     pub(crate) fn is_complete(&self) -> bool {
         !self.outstanding.into_iter().zip(self.arrived).any(|(out, back)| out && !back)
     }
 }
 
-/// Positions are counted from the other end by card B: there it would mean another controller.
-pub(crate) fn as_sent_by(command: Command, sender: Path) -> Command {
-    match (sender, command.addressing()) {
-        (Path::B, Addressing::Position) => Command::Nop,
-        (Path::A, Addressing::Position)
-        | (
-            Path::A | Path::B,
-            Addressing::None | Addressing::Station | Addressing::Broadcast | Addressing::Logical,
-        ) => command,
+/// What a datagram is in the copy that `sender` sends: nothing, if it is for the other card. A position
+/// would mean another controller there.
+pub(crate) fn as_sent_by(command: Command, card: Option<Path>, sender: Path) -> Command {
+    match card {
+        Some(card) if card != sender => Command::Nop,
+        Some(_) | None => command,
     }
 }
 
-/// Turns a frame of card A into the copy that card B sends.
-pub(crate) fn mask_positions(frame: &mut [u8]) {
-    let mut at = linesman_proto::ethernet::HEADER_LEN + linesman_proto::frame::ETHERCAT_HEADER_LEN;
-    // The frame is our own: its lengths are right, and it ends where the last datagram ends.
-    while let Some(header) = frame.get_mut(at..at + DATAGRAM_HEADER_LEN) {
+/// Turns a frame of ours into the copy that `sender` sends: `cards` tells who carries each datagram.
+pub(crate) fn mask(frame: &mut [u8], cards: &[Option<Path>], sender: Path) {
+    let mut at = HEADER_LEN + ETHERCAT_HEADER_LEN;
+    for card in cards {
+        let Some(header) = frame.get_mut(at..at + DATAGRAM_HEADER_LEN) else { return };
         if let Some(command) = Command::from_code(header[0]) {
-            header[0] = as_sent_by(command, Path::B).code();
+            header[0] = as_sent_by(command, *card, sender).code();
         }
-        let len = u16::from_le_bytes([header[6], header[7]]);
-        if len & 0x8000 == 0 {
-            return;
-        }
-        at += DATAGRAM_HEADER_LEN + usize::from(len & 0x07FF) + WKC_LEN;
+        let len = u16::from_le_bytes([header[6], header[7]]) & 0x07FF;
+        at += DATAGRAM_HEADER_LEN + usize::from(len) + WKC_LEN;
     }
 }

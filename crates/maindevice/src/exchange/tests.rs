@@ -27,7 +27,7 @@ fn transmit(exchange: &mut Exchange) -> Vec<(Path, Vec<u8>)> {
     exchange.send_acyclic(NOW);
     let mut buffer = vec![0; MAX_LEN];
     let mut frames = Vec::new();
-    while let Some(Transmit { path, len, .. }) = exchange.poll_transmit(NOW, &mut buffer) {
+    while let Some((Transmit { path, len, .. }, _)) = exchange.poll_transmit(NOW, &mut buffer) {
         frames.push((path, buffer[..len].to_vec()));
     }
     frames
@@ -178,4 +178,25 @@ fn card_b_asks_nobody_by_position() {
     let back = answered(&frames[0].1, [2, 0], 1);
     assert_eq!(exchange.receive(Path::A, &back), Received::Complete(0));
     assert_eq!(reply_of(&exchange, 0), ([2, 0], 1));
+}
+
+#[test]
+fn in_a_broken_ring_each_card_has_positions_of_its_own() {
+    let mut exchange = exchange(true);
+    let first = linesman_proto::address::Position(0);
+    for (ticket, target) in [(1, Target::Position(first)), (2, Target::PositionOnB(first))] {
+        let request = Request::read(target, RegisterAddress(0x0130), 2);
+        exchange.submit(queued(ticket, request)).unwrap();
+    }
+    let frames = transmit(&mut exchange);
+    assert_eq!((frames[0].1[16], frames[0].1[30]), (1, 0));
+    assert_eq!((frames[1].1[16], frames[1].1[30]), (0, 1));
+    exchange.receive(Path::A, &answered(&frames[0].1, [2, 0], 1));
+    let mut back = frames[1].1.clone();
+    back[6] |= SOURCE_MARK;
+    back[40..43].copy_from_slice(&[4, 0, 1]);
+    assert_eq!(exchange.receive(Path::B, &back), Received::Complete(0));
+    let reply = &exchange.slot(0).reply;
+    assert_eq!((reply[26], reply[28], reply[40], reply[42]), (2, 1, 4, 1));
+    assert_eq!(exchange.ring_intact(), Some(false));
 }

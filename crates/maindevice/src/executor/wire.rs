@@ -52,14 +52,19 @@ impl Wire {
         Exchanging { shared: Arc::clone(&self.shared), ticket }
     }
 
+    /// Queues a datagram that is repeated when its frame is lost.
+    pub fn ask(&self, request: Request) -> Exchanging {
+        self.submit(request.repeated(self.repeats))
+    }
+
     /// Reads registers; lost frames are repeated. The working counter is the caller's to judge.
     pub fn read(&self, target: Target, address: RegisterAddress, len: u16) -> Exchanging {
-        self.submit(Request::read(target, address, len).repeated(self.repeats))
+        self.ask(Request::read(target, address, len))
     }
 
     /// Writes registers; lost frames are repeated. The working counter is the caller's to judge.
     pub fn write(&self, target: Target, address: RegisterAddress, data: &[u8]) -> Exchanging {
-        self.submit(Request::write(target, address, data).repeated(self.repeats))
+        self.ask(Request::write(target, address, data))
     }
 
     /// Reads registers of one SubDevice; asks again when it did not answer.

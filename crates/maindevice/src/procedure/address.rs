@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use linesman_proto::address::{Position, StationAddress};
+use linesman_proto::address::StationAddress;
 use linesman_proto::register::STATION_ADDRESS;
 
 use crate::exchange::{ExchangeError, Target};
@@ -39,17 +39,17 @@ pub fn choose(present: &[StationAddress]) -> Vec<StationAddress> {
     chosen
 }
 
-/// Gives the SubDevice at a position its station address.
+/// Gives the SubDevice at a place its station address.
 ///
 /// # Errors
 /// [`ExchangeError`] when it does not take it.
 pub async fn assign(
     wire: &Wire,
-    position: Position,
+    place: Target,
     station: StationAddress,
 ) -> Result<(), ExchangeError> {
     let bytes = station.0.to_le_bytes();
-    wire.write_one(Target::Position(position), STATION_ADDRESS.address, &bytes).await?;
+    wire.write_one(place, STATION_ADDRESS.address, &bytes).await?;
     // Read back by that address: it answers, and no other does.
     wire.read_one(Target::Station(station), STATION_ADDRESS.address, STATION_ADDRESS.len).await?;
     Ok(())

@@ -4,12 +4,14 @@
 //! addresses may be missing or doubled. Reading AL status and DL status clears their event request
 //! bits in a controller (0x0210): do not look at a line that another MainDevice drives.
 
-use linesman_proto::address::{Network, Position, RegisterAddress, StationAddress, StationAlias};
+use linesman_proto::address::{
+    Network, Path, Position, RegisterAddress, StationAddress, StationAlias,
+};
 use linesman_proto::register::{self, AlStatus, DlStatus, ErrorCounters, EscInformation};
 use linesman_proto::state::{AlStatusCode, OredStates};
 use linesman_proto::time::Instant;
 
-use crate::exchange::{ExchangeError, Reply, Target};
+use crate::exchange::{ExchangeError, Reply, Request, Target};
 use crate::executor::Wire;
 
 /// What a look at a line has shown.
@@ -28,8 +30,10 @@ pub struct Look {
 /// One SubDevice as it was read. What it did not answer is `None`.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct LookedDevice {
-    /// Its place in the order of processing.
+    /// Its place in the order of processing; in a broken ring those of card B follow those of card A.
     pub position: Position,
+    /// How it was addressed.
+    pub target: Target,
     /// Its controller, 0x0000.
     pub information: Option<EscInformation>,
     /// Its station address, 0x0010; 0 if it has none.
@@ -85,14 +89,39 @@ pub async fn count(wire: &Wire, network: Network) -> Result<(u16, OredStates), L
     }
 }
 
+/// How each SubDevice is reached by position, in the order of processing.
+///
+/// # Errors
+/// [`LookError`] when there are none.
+pub async fn places(wire: &Wire, network: Network) -> Result<(Vec<Target>, OredStates), LookError> {
+    let (count, states) = self::count(wire, network).await?;
+    if wire.ring_intact() != Some(false) {
+        let places = (0..count).map(|position| Target::Position(Position(position)));
+        return Ok((places.collect(), states));
+    }
+    // A half for each card; that of card B is processed from the break outwards, so it follows.
+    let mut places = Vec::with_capacity(usize::from(count));
+    for card in Path::ALL {
+        let status = register::AL_STATUS;
+        let half = Request::read(Target::All, status.address, status.len).by_card(card);
+        let reply = wire.ask(half).await.map_err(LookError::Silent)?;
+        places.extend((0..reply.wkc.0).map(|position| match card {
+            Path::A => Target::Position(Position(position)),
+            Path::B => Target::PositionOnB(Position(position)),
+        }));
+    }
+    Ok((places, states))
+}
+
 /// Looks at a line.
 ///
 /// # Errors
 /// [`LookError`] when nobody is there. A single SubDevice that does not answer is no error.
 pub async fn look(wire: Wire, network: Network) -> Result<Look, LookError> {
-    let (count, states) = count(&wire, network).await?;
-    let reading: Vec<_> =
-        (0..count).map(|position| wire.spawn(look_at(wire.clone(), Position(position)))).collect();
+    let (places, states) = places(&wire, network).await?;
+    let reading: Vec<_> = (places.into_iter().zip(0..))
+        .map(|(target, position)| wire.spawn(look_at(wire.clone(), target, Position(position))))
+        .collect();
     let mut devices = Vec::with_capacity(reading.len());
     for device in reading {
         devices.push(device.await);
@@ -100,8 +129,7 @@ pub async fn look(wire: Wire, network: Network) -> Result<Look, LookError> {
     Ok(Look { network, at: wire.now(), states, devices })
 }
 
-async fn look_at(wire: Wire, position: Position) -> LookedDevice {
-    let target = Target::Position(position);
+async fn look_at(wire: Wire, target: Target, position: Position) -> LookedDevice {
     // All at once, so that they share frames; what was not answered is asked for again.
     let asked = [
         (register::ESC_TYPE.address, EscInformation::LEN as u16),
@@ -124,6 +152,7 @@ async fn look_at(wire: Wire, position: Position) -> LookedDevice {
     let counters = next().map(|reply| ErrorCounters::from_bytes(&reply.data, ErrorCounters::START));
     LookedDevice {
         position,
+        target,
         information,
         station: addresses.as_ref().map(|reply| StationAddress(reply.word(0))),
         alias: addresses.as_ref().map(|reply| StationAlias(reply.word(2))),

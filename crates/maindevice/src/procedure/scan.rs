@@ -11,7 +11,8 @@ use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{self, AlStatus, DlStatus};
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::DcTime32;
-use linesman_proto::topology::{Reconstruction, SeenController};
+use linesman_proto::topology::derive::Doubt;
+use linesman_proto::topology::{Reconstruction, SeenController, Tree, Wired};
 
 use super::look::{self, Look, LookError, LookedDevice};
 use super::{address, sii};
@@ -69,6 +70,8 @@ pub async fn scan(wire: Wire, network: Network) -> Result<Inventory, ScanError> 
 async fn scan_once(wire: &Wire, network: Network) -> Result<Inventory, ScanError> {
     let look = look::look(wire.clone(), network).await?;
     let stations = give_addresses(wire, &look).await?;
+    let on_b = |device: &LookedDevice| device.target.card() == Some(Path::B);
+    let half = look.devices.iter().position(on_b).unwrap_or(look.devices.len());
     let seen = latch(wire, &look, &stations).await;
     let reading: Vec<_> = (look.devices.into_iter().zip(0..))
         .zip(&stations)
@@ -85,7 +88,43 @@ async fn scan_once(wire: &Wire, network: Network) -> Result<Inventory, ScanError
     if after != before {
         return Err(ScanError::Changing { before, after });
     }
-    Ok(Inventory { devices, wiring: Reconstruction::of(Path::A, &seen) })
+    Ok(Inventory { devices, wiring: wiring(&seen, half) })
+}
+
+/// The line as card A sees it; in a broken ring also the half behind card B, from `half` on.
+fn wiring(seen: &[SeenController], half: usize) -> Reconstruction {
+    let (on_a, on_b) = seen.split_at(half.min(seen.len()));
+    let mut first = Reconstruction::of(Path::A, on_a);
+    if on_b.is_empty() {
+        return first;
+    }
+    let second = Reconstruction::of(Path::B, on_b);
+    let shifted = |wired: Wired| Wired { on: wired.on.map(|node| node + half), ..wired };
+    let both = match (first.tree.wiring(), second.tree.wiring()) {
+        (Ok(a), Ok(b)) => a.into_iter().chain(b.into_iter().map(shifted)).collect::<Vec<_>>(),
+        (Err(_), _) | (_, Err(_)) => Vec::new(),
+    };
+    match Tree::from_wiring(&both, None) {
+        Ok(tree) if tree.len() == seen.len() => {
+            first.tree = tree;
+            first.entry_basis.extend(second.entry_basis);
+            first.doubts.extend(second.doubts.into_iter().map(|doubt| shift_doubt(doubt, half)));
+            first.errors.extend(second.errors);
+            first
+        }
+        // Halves that do not fit together are told as one line, with what is wrong with that.
+        Ok(_) | Err(_) => Reconstruction::of(Path::A, seen),
+    }
+}
+
+fn shift_doubt(doubt: Doubt, by: usize) -> Doubt {
+    match doubt {
+        Doubt::Entry { node, taken } => Doubt::Entry { node: node + by, taken },
+        Doubt::Place { node, port, child, candidates } => {
+            Doubt::Place { node: node + by, port, child: child + by, candidates }
+        }
+        Doubt::ReceiveTimes { node } => Doubt::ReceiveTimes { node: node + by },
+    }
 }
 
 async fn give_addresses(wire: &Wire, look: &Look) -> Result<Vec<StationAddress>, ScanError> {
@@ -96,7 +135,8 @@ async fn give_addresses(wire: &Wire, look: &Look) -> Result<Vec<StationAddress>,
         .filter(|((_, present), chosen)| present != chosen)
         .map(|((device, _), chosen)| {
             let (wire, position, station) = (wire.clone(), device.position, *chosen);
-            async move { (position, address::assign(&wire, position, station).await) }
+            let place = device.target;
+            async move { (position, address::assign(&wire, place, station).await) }
         })
         .map(|task| wire.spawn(task))
         .collect();

@@ -20,6 +20,8 @@ use crate::procedure::{address, sii};
 /// One controller on the line.
 struct Seen {
     position: Position,
+    /// How it is addressed as long as it has no station address.
+    place: Target,
     /// Which of the plan, if its address tells.
     known: Option<DeviceId>,
 }
@@ -30,16 +32,13 @@ struct Seen {
 /// [`LookError`] when the line is silent.
 pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), LookError> {
     let wire = &context.wire;
-    let (count, _) = look::count(wire, context.network).await?;
+    let (places, _) = look::places(wire, context.network).await?;
     if from_scratch {
         // Addresses of an earlier run must not meet those of the plan.
         let _ = wire.write(Target::All, STATION_ADDRESS.address, &[0; 2]).await;
     }
-    let reads: Vec<_> = (0..count)
-        .map(|position| {
-            let target = Target::Position(Position(position));
-            wire.read(target, STATION_ADDRESS.address, STATION_ADDRESS.len)
-        })
+    let reads: Vec<_> = (places.iter())
+        .map(|place| wire.read(*place, STATION_ADDRESS.address, STATION_ADDRESS.len))
         .collect();
     let mut stations = Vec::with_capacity(reads.len());
     for read in reads {
@@ -50,8 +49,12 @@ pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), 
         let planned = context.plan.devices.iter().find(|device| device.station == station);
         planned.filter(|_| unique && station.0 != 0 && !from_scratch).map(|device| device.id)
     };
-    let seen: Vec<Seen> = (stations.iter().zip(0..))
-        .map(|(station, position)| Seen { position: Position(position), known: known(*station) })
+    let seen: Vec<Seen> = (stations.iter().zip(places).zip(0..))
+        .map(|((station, place), at)| Seen {
+            position: Position(at),
+            place,
+            known: known(*station),
+        })
         .collect();
     // Stretches between landmarks.
     let (mut first_seen, mut first_planned) = (0, 0);
@@ -87,7 +90,7 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
     }
     let reading: Vec<_> = (seen.iter())
         .map(|seen| {
-            let (wire, target) = (context.wire.clone(), Target::Position(seen.position));
+            let (wire, target) = (context.wire.clone(), seen.place);
             context.wire.spawn(async move { sii::read_identity(&wire, target).await })
         })
         .collect();
@@ -117,7 +120,7 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
     for (at, of) in pairs {
         let (id, found) = (planned[of], identities[at]);
         match differs(id, &found) {
-            None => give_address(context, seen[at].position, id).await,
+            None => give_address(context, seen[at].place, id).await,
             Some(mismatch) if lock(&context.line).add_stranger(Some(id), found) => {
                 let expected = context.plan.devices[id.index()].identity;
                 context.wire.emit(Event::WrongDevice { id, mismatch, expected, found });
@@ -127,9 +130,9 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
     }
 }
 
-async fn give_address(context: &Context, position: Position, id: DeviceId) {
+async fn give_address(context: &Context, place: Target, id: DeviceId) {
     let station = context.plan.devices[id.index()].station;
-    match address::assign(&context.wire, position, station).await {
+    match address::assign(&context.wire, place, station).await {
         Ok(()) => find(context, id, true),
         Err(_) => lose(context, id),
     }

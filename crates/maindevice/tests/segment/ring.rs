@@ -2,9 +2,11 @@
 
 use crate::bench::Bench;
 use linesman_maindevice::{Event, Options};
+use linesman_proto::address::Path;
 use linesman_proto::port::Port;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
+use linesman_proto::topology::End;
 use linesman_sim::segment_file::FaultEntry;
 
 const RING: &str = r#"
@@ -48,7 +50,7 @@ fn an_intact_ring_is_scanned_and_run() {
     assert_eq!(after.working_counter_errors, before.working_counter_errors);
 }
 
-// proves: RED-01 partial: in the virtual segment, RED-05, RED-06
+// proves: RED-05, RED-06, RED-01 partial: in the virtual segment only
 #[test]
 fn a_cut_ring_keeps_all_subdevices() {
     let mut bench = bench();
@@ -80,4 +82,41 @@ fn a_cut_ring_keeps_all_subdevices() {
     bench.run_for(Span::ms(200));
     assert_eq!(bench.device.statistics().working_counter_errors, before);
     assert_eq!(bench.state("B4"), "OP");
+}
+
+/// The line is switched on with a break: it is scanned and started all the same.
+// proves: RED-11 partial: the break is told by one event and by the wiring
+#[test]
+fn a_ring_that_is_broken_from_the_start_is_scanned_and_run() {
+    for cut in ["B2.B-B3.A", "B1.B-B2.A", "maindevice-B1.A"] {
+        let mut bench = bench();
+        let entry = FaultEntry::new("link-open".parse().unwrap()).at(cut);
+        bench.segment.inject(bench.now, &entry).unwrap();
+        bench.run_for(Span::ms(100));
+        let inventory = bench.scan();
+        let types: Vec<&str> =
+            inventory.devices.iter().map(|device| device.profile.type_name.as_str()).collect();
+        assert_eq!(types, ["EP1008-0001", "EP2308-0001", "EP4174-0002", "EP2308-0001"], "{cut}");
+        assert!(inventory.wiring.errors.is_empty(), "{cut}: {:?}", inventory.wiring.errors);
+        let last = inventory.tree().upstream(3);
+        assert_eq!(last, Some(End::MainDevice(Path::B)), "{cut}");
+        bench.start(AlState::Op);
+        assert_eq!((bench.state("B1"), bench.state("B4")), ("OP".to_owned(), "OP".to_owned()));
+    }
+}
+
+#[test]
+fn behind_a_break_a_device_without_power_comes_back() {
+    let mut bench = bench();
+    bench.start(AlState::Op);
+    let entry = FaultEntry::new("link-open".parse().unwrap()).at("B1.B-B2.A");
+    bench.segment.inject(bench.now, &entry).unwrap();
+    bench.run_for(Span::ms(500));
+    let off = FaultEntry::new("device-off".parse().unwrap()).device("B2");
+    let off = bench.segment.inject(bench.now, &off).unwrap();
+    bench.run_for(Span::ms(500));
+    bench.segment.heal(bench.now, off);
+    bench.run_for(Span::s(10));
+    assert!(bench.device.is_settled(), "{:#?}", bench.events);
+    assert_eq!(bench.state("B2"), "OP");
 }

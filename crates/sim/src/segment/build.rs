@@ -108,7 +108,9 @@ fn assemble(
             set_revision(&mut built.sii, revision);
         }
         let clock = clock(file, &one.planned, seed);
-        let Built { hardware, sii, firmware, outputs, inputs } = built;
+        let Built { mut hardware, sii, firmware, outputs, inputs } = built;
+        let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
+        hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
         made.push(Controller::new(one.id, hardware, clock, firmware, sii));
         devices.push(DeviceInfo { outputs, inputs });
     }

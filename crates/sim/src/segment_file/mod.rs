@@ -49,6 +49,10 @@ pub struct SegmentFile {
     /// Its error counters show old errors and noise at power-on, instead of 0.
     #[serde(default)]
     pub old_counters: bool,
+    /// `false`: no controller has counters of forwarded errors, as those of the first generation;
+    /// each follows its type unless said.
+    #[serde(default)]
+    pub counts_forwarded: Option<bool>,
     /// Its devices, in the order of their numbers.
     #[serde(default, rename = "device")]
     pub devices: Vec<SegmentDevice>,
@@ -87,6 +91,10 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]
     pub clock_ppm: Option<f64>,
+    /// Whether its controllers have counters of forwarded errors; as the segment, or else its type,
+    /// has it unless said.
+    #[serde(default)]
+    pub counts_forwarded: Option<bool>,
     /// Error counters that are not 0 at the start: `A.frame`, `A.physical`, `A.forwarded`,
     /// `A.lost_link` (and B, C, D), `processing_unit`, `pdi`.
     #[serde(default)]

@@ -49,6 +49,7 @@ pub fn plant(seed: Seed, options: &PlantOptions) -> SegmentFile {
         name: format!("plant {}", seed.0),
         seed: Some(seed.0),
         old_counters,
+        counts_forwarded: None,
         devices: builder.devices,
         ring,
         faults: Vec::new(),
@@ -243,6 +244,7 @@ impl Builder {
             cable_m,
             serial,
             clock_ppm: None,
+            counts_forwarded: None,
             counters: std::collections::BTreeMap::new(),
         });
         name

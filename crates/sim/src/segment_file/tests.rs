@@ -11,6 +11,7 @@ const PLANT: &str = r#"
 name = "plant \"7\""
 seed = 7
 old_counters = true
+counts_forwarded = false
 
 [[device]]
 name = "K1"
@@ -31,6 +32,7 @@ on = "K1.C"
 entry = "A"
 cable_m = 12
 clock_ppm = -3.5
+counts_forwarded = true
 
 [ring]
 closes_at = "K3.C"

@@ -12,6 +12,9 @@ pub(super) fn to_toml(file: &SegmentFile) -> String {
     if file.old_counters {
         text.push_str("old_counters = true\n");
     }
+    if let Some(counts) = file.counts_forwarded {
+        let _ = writeln!(text, "counts_forwarded = {counts}");
+    }
     for device in &file.devices {
         write_device(device, &mut text);
     }
@@ -45,6 +48,9 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     }
     if let Some(ppm) = device.clock_ppm {
         line("clock_ppm", number(ppm));
+    }
+    if let Some(counts) = device.counts_forwarded {
+        line("counts_forwarded", counts.to_string());
     }
     if !device.counters.is_empty() {
         let counters = device.counters.iter();

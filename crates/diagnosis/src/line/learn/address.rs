@@ -24,6 +24,8 @@ pub struct Addresses {
     order: Vec<DeviceId>,
     /// How many controllers a frame passes now.
     present: Option<u16>,
+    /// Whether a station was taken for a controller's without any sign of its position.
+    has_guessed: bool,
 }
 
 impl Addresses {
@@ -38,7 +40,7 @@ impl Addresses {
             Some(tree) => tree.order().iter().map(|node| DeviceId(*node as u32)).collect(),
             None => line.devices.iter().map(|device| device.id).collect(),
         };
-        Self { stations: planned.collect(), order, present: None }
+        Self { stations: planned.collect(), order, ..Self::default() }
     }
 
     /// How many controllers a frame passes now.
@@ -125,8 +127,40 @@ impl Addresses {
             None if line.devices.len() < MOST_DEVICES => line.add_device(),
             None => return None,
         };
+        self.has_guessed = true;
         self.give(line, id, station);
         Some(id)
+    }
+
+    /// Whether the order of controllers is known: from their positions, or by [`Self::settle`].
+    pub(super) const fn is_settled(&self) -> bool {
+        !self.has_guessed
+    }
+
+    /// Puts controllers that were met by their station addresses in the middle of a run into order:
+    /// every known MainDevice gives these addresses in the order of positions. Identities change, so
+    /// this is only for a line of which nothing was said yet. Says whether it was done.
+    pub(super) fn settle(&mut self, line: &mut Line) -> bool {
+        let count = line.devices.len();
+        let is_whole = self.present.map(usize::from) == Some(count)
+            && line.devices.iter().all(|device| device.station.is_some());
+        if !self.has_guessed || !is_whole || line.devices.iter().any(|one| one.planned.is_some()) {
+            return false;
+        }
+        line.devices.sort_by_key(|device| device.station);
+        self.stations.clear();
+        self.order.clear();
+        for (index, device) in line.devices.iter_mut().enumerate() {
+            device.id = DeviceId(index as u32);
+            device.position = Some(Position(index as u16));
+            self.order.push(device.id);
+            if let Some(station) = device.station {
+                self.stations.insert(station, device.id);
+            }
+        }
+        self.has_guessed = false;
+        line.touch();
+        true
     }
 
     /// A controller's registers were read.

@@ -81,6 +81,21 @@ impl Learner {
         Self { addresses: Addresses::new(line), ..Self::default() }
     }
 
+    /// Puts controllers that were met in the middle of a run into order, as far as it can be told.
+    /// Identities may change: only for a line of which nothing was said yet.
+    pub fn settle(&mut self, line: &mut Line) {
+        if self.addresses.settle(line) {
+            // What was under way was noted by the identities of before.
+            self.transfers = sii::Transfers::default();
+        }
+    }
+
+    /// Whether the order of controllers is known, so that a tree can be made of them.
+    #[must_use]
+    pub const fn is_settled(&self) -> bool {
+        self.addresses.is_settled()
+    }
+
     /// Learns all that an exchange shows.
     pub fn learn(&mut self, line: &mut Line, exchange: &Exchange<'_>) {
         match (&exchange.request, &exchange.reply) {

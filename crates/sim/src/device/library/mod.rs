@@ -1,6 +1,6 @@
 //! The device library: what can be put into a segment, as tables.
 //!
-//! Read first: ETG.2010 (SII). Every type is a [`Spec`] in one of the family files; everything a
+//! Read first: ETG.2010 (SII). Every type is a `Spec` in one of the family files; everything a
 //! device needs is made from it: hardware, SII image and firmware. Identities, ports, currents and
 //! default process data are those of the products that the types are named after.
 

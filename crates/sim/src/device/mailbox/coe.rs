@@ -160,7 +160,6 @@ impl CoeServer {
         if segment.toggle != toggle {
             return abort(object, SdoAbortCode::TOGGLE_BIT);
         }
-        // The last segment of a message that was filled up may bring more than was announced.
         data.extend_from_slice(segment.data);
         if data.len() > size {
             return abort(object, SdoAbortCode::TOO_LONG);

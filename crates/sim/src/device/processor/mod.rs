@@ -204,6 +204,9 @@ impl Processor {
     }
 
     fn start_mailbox(&mut self, from: AlState, pdi: &Pdi<'_>, code: AlStatusCode) -> Outcome {
+        if !pdi.sii_load_ok() {
+            return Outcome::Failed(AlState::Init, AlStatusCode::EEPROM_ERROR);
+        }
         if !self.has_mailbox(pdi, code == AlStatusCode::INVALID_MAILBOX_BOOT) {
             return Outcome::Failed(AlState::Init, code);
         }

@@ -5,7 +5,8 @@ use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::Span;
 
 use super::Device;
-use crate::device::Refusal;
+use crate::device::library::build;
+use crate::device::{Refusal, Signals};
 
 #[test]
 fn it_takes_its_time() {
@@ -72,6 +73,17 @@ fn a_mailbox_that_does_not_fit_is_refused() {
         device.guard(1, second.0, second.1, second.2);
         assert_eq!(device.request(2), (0x11, 0x0016), "{what}");
     }
+}
+
+#[test]
+fn without_its_sii_it_stays_in_init() {
+    let mut signals = Signals::default();
+    let mut built = build("EL3104", 1, &mut signals).unwrap().remove(0);
+    // The checksum does not fit any more.
+    built.sii[0] ^= 0x01;
+    let mut device = Device::new(built, signals);
+    device.set_up_mailbox();
+    assert_eq!(device.request(2), (0x11, 0x0051));
 }
 
 #[test]

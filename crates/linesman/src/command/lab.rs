@@ -1,0 +1,119 @@
+//! `linesman lab`: stories and swarms in virtual time.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use linesman_lab::story::Story;
+use linesman_lab::story::run::play;
+use linesman_lab::swarm::run::{SwarmOptions, SwarmReport, swarm};
+
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::files;
+use crate::output::{Output, Progress};
+use crate::text::quantity::count;
+
+/// What can be asked.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand, Debug)]
+enum Command {
+    /// Play stories: a fault, and what must be said about it
+    Run {
+        /// Markdown files
+        #[arg(required = true, value_name = "STORY.md")]
+        stories: Vec<PathBuf>,
+    },
+    /// Run plants and faults drawn by chance, and check what must always hold
+    Swarm {
+        /// From the first seed up to, not including, the second
+        #[arg(long, value_name = "A..B", value_parser = seeds)]
+        seeds: Range<u64>,
+        /// Only what did not hold, and the sum
+        #[arg(long, short)]
+        quiet: bool,
+    },
+}
+
+/// Does it.
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    match &arguments.command {
+        Command::Run { stories } => run_stories(stories, output),
+        Command::Swarm { seeds, quiet } => Ok(run_swarm(seeds.clone(), *quiet, output)),
+    }
+}
+
+/// `3..7`.
+fn seeds(text: &str) -> Result<Range<u64>, String> {
+    let wrong = || format!("`{text}`: expected two numbers, such as 0..200");
+    let (from, to) = text.split_once("..").ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse().map_err(|_| wrong());
+    let (from, to) = (number(from)?, number(to)?);
+    if from >= to {
+        return Err(format!("`{text}`: expected a second number greater than the first"));
+    }
+    Ok(from..to)
+}
+
+fn run_stories(stories: &[PathBuf], output: &mut Output) -> Result<Status, Failure> {
+    let mut held = 0;
+    for path in stories {
+        let text = files::text(path, "a story")?;
+        let story = Story::parse(&text).map_err(|error| files::in_file(path, &error))?;
+        let report = play(&story, |name| load(path, name));
+        held += usize::from(report.held());
+        output.text(&format!("{report}"));
+    }
+    output.line(&format!(
+        "{held} of {} held.",
+        if stories.len() == 1 {
+            "1 story".to_owned()
+        } else {
+            format!("{} stories", stories.len())
+        }
+    ));
+    Ok(if held == stories.len() { Status::Good } else { Status::Findings })
+}
+
+/// A segment file that a story names, from the directory of the story.
+fn load(story: &Path, name: &str) -> Result<String, String> {
+    let path = story.parent().unwrap_or(Path::new("")).join(name);
+    files::text(&path, "a segment file").map_err(|failure| failure.reason)
+}
+
+fn run_swarm(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {
+    let total = seeds.end - seeds.start;
+    let mut progress = Progress::new();
+    let mut done = 0;
+    let mut shown = String::new();
+    let report = swarm(seeds, &SwarmOptions::default(), |seed| {
+        done += 1;
+        if !quiet || !seed.is_green() {
+            progress.clear();
+            output.line(&seed.to_string());
+        }
+        shown = format!("{done} of {}", count(total, "seed"));
+        progress.show(|| shown.clone());
+    });
+    progress.clear();
+    output.line(&sum(&report));
+    if report.is_green() { Status::Good } else { Status::Findings }
+}
+
+fn sum(report: &SwarmReport) -> String {
+    let all = report.seeds.len() as u64;
+    let failed = report.failed().count();
+    let checked = report.seeds.iter().map(|seed| seed.counters_checked).sum();
+    let frames = report.seeds.iter().map(|seed| seed.frames).sum();
+    format!(
+        "{} run, {failed} failed; in {} a fault had an effect. {} passed, {} checked.",
+        count(all, "seed"),
+        report.with_effect(),
+        count(frames, "frame"),
+        count(checked, "working counter")
+    )
+}

@@ -1,0 +1,179 @@
+//! The commands of the user: look, scan, start, stop, probe, SDO.
+
+use std::sync::{Arc, Mutex};
+
+use linesman_config::plan::Plan;
+use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::state::AlState;
+use linesman_proto::time::Instant;
+
+use super::{MainDevice, Running};
+use crate::cyclic::Cyclic;
+use crate::event::Event;
+use crate::exchange::Target;
+use crate::executor::Wire;
+use crate::mailbox::{Job, Queues, SdoError};
+use crate::procedure::{look, scan, state};
+use crate::supervisor::{self, Context, Line};
+
+/// One register access beside the cycle, for those who want to know more.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ProbeRequest {
+    /// Whom.
+    pub target: Target,
+    /// From where.
+    pub register: RegisterAddress,
+    /// Bytes to be read; with `write`, its length counts.
+    pub len: u16,
+    /// What is written, if it is a write. Whoever asks for it answers for what it does.
+    pub write: Option<Vec<u8>>,
+}
+
+impl MainDevice {
+    /// Looks at the line: nothing but reads. Ends in [`Event::Looked`] or [`Event::LookFailed`]. Runs
+    /// beside whatever else is going on.
+    pub fn look(&mut self, now: Instant) {
+        let (wire, network) = (self.aside.clone(), self.network);
+        self.aside.spawn(async move {
+            wire.emit(match look::look(wire.clone(), network).await {
+                Ok(look) => Event::Looked(Box::new(look)),
+                Err(error) => Event::LookFailed(error),
+            });
+        });
+        self.handle_timeout(now);
+    }
+
+    /// Finds out what is there; see [`scan`](crate::procedure::scan) for what that writes. Ends in
+    /// [`Event::Scanned`] or [`Event::ScanFailed`]. Another command that is going on is ended.
+    pub fn scan(&mut self, now: Instant) {
+        let (wire, network) = (self.command(), self.network);
+        wire.clone().spawn(async move {
+            wire.emit(match scan::scan(wire.clone(), network).await {
+                Ok(inventory) => Event::Scanned(Box::new(inventory)),
+                Err(error) => Event::ScanFailed(error),
+            });
+        });
+        self.handle_timeout(now);
+    }
+
+    /// Drives every SubDevice of the plan to its target and keeps it there, and exchanges process
+    /// data. Another command that is going on is ended.
+    ///
+    /// It begins with clearing the station addresses of all SubDevices, then gives those of the plan.
+    /// A SubDevice that is not who the plan says, or that the plan does not have, is left alone.
+    pub fn start(&mut self, now: Instant, plan: Plan) {
+        let wire = self.command();
+        let plan = Arc::new(plan);
+        let line = Arc::new(Mutex::new(Line::new(&plan)));
+        let with_mailbox = plan.devices.iter().filter(|device| device.mailbox.is_some());
+        let mailboxes = Queues::of(with_mailbox.map(|device| device.id));
+        let context = Context {
+            wire: wire.clone(),
+            network: self.network,
+            plan: Arc::clone(&plan),
+            line: Arc::clone(&line),
+            options: Arc::clone(&self.options),
+            mailboxes: mailboxes.clone(),
+        };
+        wire.spawn(supervisor::supervise(context));
+        let cyclic = Cyclic::new(Arc::clone(&plan), Arc::clone(&line), now);
+        self.running = Some(Running { cyclic, plan, line, mailboxes });
+        self.acyclic_left = self.options.frames_at_once;
+        self.handle_timeout(now);
+    }
+
+    /// Ends the exchange of process data and drives every SubDevice that is there down to `to`. Ends
+    /// in [`Event::Stopped`].
+    pub fn stop(&mut self, now: Instant, to: AlState) {
+        let plan = self.running.as_ref().map(|running| Arc::clone(&running.plan));
+        let wire = self.command();
+        let options = Arc::clone(&self.options);
+        wire.clone().spawn(async move {
+            let devices = plan.iter().flat_map(|plan| &plan.devices);
+            let steps: Vec<_> = devices
+                .map(|device| {
+                    let wire = wire.clone();
+                    let step = state::Step {
+                        to,
+                        limit: options.state_timeouts.of(AlState::Op, to),
+                        emulated: device.device_emulation,
+                    };
+                    let target = Target::Station(device.station);
+                    // Who does not follow was lost or refuses; the line is left all the same.
+                    wire.clone().spawn(async move { state::request(&wire, target, step).await })
+                })
+                .collect();
+            for step in steps {
+                let _ = step.await;
+            }
+            wire.emit(Event::Stopped);
+        });
+        self.handle_timeout(now);
+    }
+
+    /// Ends what is going on and gives a wire for the next command.
+    fn command(&mut self) -> Wire {
+        if let Some(control) = self.control.take() {
+            self.executor.cancel(control.group());
+        }
+        self.running = None;
+        self.exchange.abandon_cyclic();
+        let wire = self.executor.group(self.options.repeats);
+        self.control = Some(wire.clone());
+        wire
+    }
+
+    /// One register access beside all else. Ends in [`Event::Probed`]; whoever sees the frames sees
+    /// the answer there, too.
+    pub fn probe(&mut self, now: Instant, request: ProbeRequest) {
+        let wire = self.aside.clone();
+        self.aside.spawn(async move {
+            let ProbeRequest { target, register, len, .. } = request;
+            let result = match &request.write {
+                Some(data) => wire.write(target, register, data).await,
+                None => wire.read(target, register, len).await,
+            };
+            wire.emit(Event::Probed { request, result });
+        });
+        self.handle_timeout(now);
+    }
+
+    /// Fetches an object of a running SubDevice. Ends in [`Event::SdoUploaded`].
+    pub fn sdo_upload(
+        &mut self,
+        now: Instant,
+        id: DeviceId,
+        object: ObjectAddress,
+        complete: bool,
+    ) {
+        if !self.queue_job(id, Job::Upload { object, complete }) {
+            let result = Err(SdoError::NotOpen { id });
+            self.aside.emit(Event::SdoUploaded { id, object, result });
+        }
+        self.handle_timeout(now);
+    }
+
+    /// Brings an object to a running SubDevice. Ends in [`Event::SdoDownloaded`].
+    pub fn sdo_download(
+        &mut self,
+        now: Instant,
+        id: DeviceId,
+        object: ObjectAddress,
+        complete: bool,
+        data: &[u8],
+    ) {
+        if !self.queue_job(id, Job::Download { object, complete, data: data.to_vec() }) {
+            let result = Err(SdoError::NotOpen { id });
+            self.aside.emit(Event::SdoDownloaded { id, object, result });
+        }
+        self.handle_timeout(now);
+    }
+
+    fn queue_job(&mut self, id: DeviceId, job: Job) -> bool {
+        match &self.running {
+            Some(running) => running.mailboxes.push(id, job).is_ok(),
+            None => false,
+        }
+    }
+}
