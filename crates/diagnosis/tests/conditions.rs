@@ -92,16 +92,20 @@ fn a_refused_state_names_device_transition_and_code() {
 }
 
 #[test]
-fn an_acknowledged_refusal_is_closed_but_not_forgotten() {
+fn a_refusal_is_over_when_the_state_is_reached_and_not_when_it_is_acknowledged() {
     let mut script = Script::scanned(1);
     script.exchange(&[fpwr(0x1001, 0x0120, &[4, 0])]);
     script.exchange(&[fprd(0x1001, 0x0130, &[0x12, 0, 0, 0, 0x1E, 0])]);
     script.exchange(&[fpwr(0x1001, 0x0120, &[0x12, 0])]);
     script.exchange(&[fprd(0x1001, 0x0130, &[0x02, 0, 0, 0, 0, 0])]);
-    let report = report(&mut script);
-    let finding = only(&report);
-    assert_eq!((finding.name.as_str(), finding.state), ("state-refused", FindingState::Closed));
-    assert_eq!(report.verdict, Verdict::Faulty);
+    let acknowledged = report(&mut script);
+    let finding = only(&acknowledged);
+    assert_eq!((finding.name.as_str(), finding.state), ("state-refused", FindingState::Confirmed));
+    script.exchange(&[fpwr(0x1001, 0x0120, &[4, 0])]);
+    script.exchange(&[fprd(0x1001, 0x0130, &[0x04, 0, 0, 0, 0, 0])]);
+    let reached = report(&mut script);
+    assert_eq!(only(&reached).state, FindingState::Closed);
+    assert_eq!(reached.verdict, Verdict::Faulty, "it was there");
 }
 
 #[test]
