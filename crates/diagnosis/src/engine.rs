@@ -196,8 +196,8 @@ impl Engine {
         self.now = self.now.max(observation.time);
         let now = self.now;
         let line = &mut self.watched(observation.network).line;
-        if let HostEvent::CardErrors { crc, .. } = observation.what {
-            line.note_card_errors(observation.path, crc, observation.time);
+        if let HostEvent::CardErrors { crc: 1.., .. } = observation.what {
+            line.note_errors(observation.time, observation.time);
         }
         line.host.record(observation);
         line.now = now;

@@ -2,17 +2,22 @@
 //!
 //! A rule says each time anew what holds or held. What it says for the first time opens a finding;
 //! what it says no longer it took back, and the finding goes without a trace, since it never was
-//! true. A condition that is over stays as a closed finding.
+//! true. A condition that is over stays as a closed finding; when the same trouble comes again after
+//! that, it is another finding.
 
 use linesman_proto::time::{Instant, Span};
 
-use super::{Condition, Severity, Symptom};
+use super::{Condition, Severity};
 
 /// What follows from a condition may show so long after its end: SubDevices are asked one by one, and
 /// links need seconds to come back.
 const AFTER: Span = Span::s(3);
-/// The same for what is only counted: errors follow at once, and are read soon after.
-const AFTER_COUNTED: Span = Span::s(1);
+
+/// A finding that has been over for so long stays, though the rule does not speak of it any more.
+const SETTLED: Span = Span::s(2);
+
+/// Most findings that are kept; the oldest ones that are over give way.
+const MOST_KEPT: usize = 1_000;
 
 /// A condition with a life.
 #[derive(Clone, PartialEq, Debug)]
@@ -61,7 +66,10 @@ impl Book {
     ) {
         let mut before = std::mem::take(&mut self.findings);
         for condition in conditions {
-            let known = before.iter().position(|finding| is_same(&finding.condition, &condition));
+            let known = before.iter().position(|finding| {
+                is_same(&finding.condition, &condition)
+                    && finding.closed.is_none_or(|closed| condition.since <= closed)
+            });
             let (mut finding, is_new) = match known {
                 Some(index) => (before.remove(index), false),
                 None => (self.open(condition.clone()), true),
@@ -86,10 +94,20 @@ impl Book {
             }
             self.findings.push(finding);
         }
-        for finding in &before {
-            tell(Change::Withdrawn, finding);
+        for finding in before {
+            if finding.closed.is_some_and(|closed| closed + SETTLED <= now) {
+                self.findings.push(finding);
+            } else {
+                tell(Change::Withdrawn, &finding);
+            }
         }
         self.findings.sort_by_key(|finding| finding.id);
+        while self.findings.len() > MOST_KEPT {
+            let Some(over) = self.findings.iter().position(|old| old.closed.is_some()) else {
+                break;
+            };
+            self.findings.remove(over);
+        }
         self.hang();
     }
 
@@ -178,11 +196,7 @@ fn is_same(one: &Condition, other: &Condition) -> bool {
 
 fn explains(cause: &Finding, effect: &Finding) -> bool {
     let symptoms = &effect.condition.symptoms;
-    let counted = |symptom: &Symptom| {
-        matches!(symptom, Symptom::PortErrors(..) | Symptom::FramesLost | Symptom::CardErrors)
-    };
-    let after = if symptoms.iter().all(counted) { AFTER_COUNTED } else { AFTER };
-    let was_over = cause.closed.is_some_and(|closed| closed + after < effect.opened);
+    let was_over = cause.closed.is_some_and(|closed| closed + AFTER < effect.opened);
     !symptoms.is_empty()
         && !was_over
         && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))

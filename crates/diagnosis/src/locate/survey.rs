@@ -1,14 +1,12 @@
 //! What the search looks at: the wiring, the ways of the frames, the counters, and when links changed.
 
-use std::collections::BTreeMap;
-
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Route, Tree};
 
-use crate::line::{CounterTrack, Line, Rise, Tally};
+use crate::line::{CounterTrack, Line, Rise};
 
 /// How far apart the readings that show a link's change and those that show the noise of that change
 /// may lie: link status and counters are read one after the other.
@@ -29,38 +27,6 @@ pub struct Survey<'a> {
     has_ended: bool,
     /// By link: from when to when it may have changed.
     changes: Vec<Vec<(Instant, Instant)>>,
-    /// What one era has counted; `None` when all is surveyed as it stands.
-    era: Option<InEra>,
-}
-
-/// Counters as one era moved them.
-#[derive(Clone, Debug)]
-struct InEra {
-    tracks: BTreeMap<(usize, ErrorCounter), CounterTrack>,
-    crc: [Tally; 2],
-    lost: Tally,
-}
-
-impl InEra {
-    /// The counters of the era with this index; those of the latest end with what was read last.
-    fn of(line: &Line, index: usize) -> Option<Self> {
-        let eras = line.eras.all();
-        let era = eras.get(index)?;
-        let next = eras.get(index + 1);
-        let (from, to) = (
-            if index == 0 { Instant::ZERO } else { era.began },
-            next.map_or(Instant::MAX, |next| next.began),
-        );
-        let mut tracks = BTreeMap::new();
-        for (node, device) in line.devices.iter().enumerate() {
-            for (counter, track) in device.counters.tracks() {
-                let base = era.total(device.id, counter);
-                let end = next.map_or(track.total, |next| next.total(device.id, counter));
-                tracks.insert((node, counter), track.between(&base, &end, from, to));
-            }
-        }
-        Some(Self { tracks, crc: era.crc, lost: era.lost })
-    }
 }
 
 impl<'a> Survey<'a> {
@@ -82,38 +48,7 @@ impl<'a> Survey<'a> {
             routes.extend(paths.map(|path| Route::of(tree, path, &[])));
         }
         let changes = (0..tree.links().len()).map(|link| changes(line, tree, link)).collect();
-        Some(Self { line, tree, routes, has_ended, changes, era: None })
-    }
-
-    /// One survey for each era of trouble, the latest last; one of everything for a line that has
-    /// none.
-    #[must_use]
-    pub fn of_eras(line: &'a Line, has_ended: bool) -> Vec<Self> {
-        let count = line.eras.all().len();
-        if count < 2 {
-            return Self::of(line, has_ended).into_iter().collect();
-        }
-        // Of an era that is over no further reading will come.
-        let surveys = (0..count).filter_map(|index| {
-            let survey = Self::of(line, has_ended || index + 1 < count)?;
-            Some(Self { era: InEra::of(line, index), ..survey })
-        });
-        surveys.collect()
-    }
-
-    /// What a card dropped for a wrong check sequence.
-    #[must_use]
-    pub fn card_errors(&self, card: Path) -> Tally {
-        match &self.era {
-            Some(era) => era.crc[card.index()],
-            None => self.line.host.card(card).crc,
-        }
-    }
-
-    /// Requests that were lost.
-    #[must_use]
-    pub fn lost(&self) -> Tally {
-        self.era.as_ref().map_or(self.line.traffic.lost, |era| era.lost)
+        Some(Self { line, tree, routes, has_ended, changes })
     }
 
     /// The network.
@@ -142,11 +77,14 @@ impl<'a> Survey<'a> {
 
     /// A counter of the controller at `node` of the tree; `None` when it was never read.
     #[must_use]
-    pub fn track(&self, node: usize, counter: ErrorCounter) -> Option<&CounterTrack> {
-        match &self.era {
-            Some(era) => era.tracks.get(&(node, counter)),
-            None => self.line.devices.get(node)?.counters.track(counter),
-        }
+    pub fn track(&self, node: usize, counter: ErrorCounter) -> Option<&'a CounterTrack> {
+        self.line.devices.get(node)?.counters.track(counter)
+    }
+
+    /// The rises of a counter in the present spell of errors, as far as they are kept.
+    pub fn rises(&self, track: &'a CounterTrack) -> impl Iterator<Item = &'a Rise> + use<'a> {
+        let began = self.line.spell_began;
+        track.rises.iter().filter(move |rise| rise.at >= began)
     }
 
     /// Whether a rise falls together with a change of the link, as noise and cut-off frames do.

@@ -74,28 +74,11 @@ const QUIET: Span = Span::s(2);
 pub const RULE: Rule = Rule { pages: &[ON_LINK, INSIDE, LAST_HOP], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let mut found: Vec<Condition> = Vec::new();
-    for survey in Survey::of_eras(view.line, view.has_ended) {
-        let mut of_era = Vec::new();
-        let located = Located::on(&survey);
-        for suspicion in Suspicion::all(&survey, &located) {
-            add(view, &survey, &suspicion, None, &mut of_era);
-        }
-        for mut condition in of_era {
-            let same = found.iter().position(|known| {
-                known.page.code == condition.page.code && known.place.is_same_spot(&condition.place)
-            });
-            // The same trouble has come again: it began when it first did.
-            if let Some(known) = same.map(|index| found.remove(index)) {
-                condition.since = condition.since.min(known.since);
-                condition.severity = condition.severity.max(known.severity);
-                condition.is_confirmed |= known.is_confirmed;
-                condition.confirmed_at = known.confirmed_at.or(condition.confirmed_at);
-            }
-            found.push(condition);
-        }
+    let Some(survey) = Survey::of(view.line, view.has_ended) else { return };
+    let located = Located::on(&survey);
+    for suspicion in Suspicion::all(&survey, &located) {
+        add(view, &survey, &suspicion, None, conditions);
     }
-    conditions.append(&mut found);
 }
 
 fn add(
@@ -155,7 +138,6 @@ fn add(
     for other in &suspicion.beneath {
         condition.explains.extend(symptoms(survey, other));
     }
-    condition.explains.extend(later_checks(survey, suspicion));
     if suspicion.frames() > 0 {
         condition.explains.push(Symptom::FramesLost);
         condition.explains.push(Symptom::CardErrors);
@@ -181,22 +163,6 @@ fn symptoms(survey: &Survey<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
         LastHop::Unknown { .. } => Symptom::FramesLost,
     });
     ports.chain(card).collect()
-}
-
-/// The ports that meet the bad frames later.
-fn later_checks(survey: &Survey<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
-    let mut later = Vec::new();
-    for damage in suspicion.damages.iter().filter(|damage| damage.frames > 0) {
-        for route in survey.routes().iter().filter(|route| route.path() == damage.path) {
-            let hop = route.hops().iter().position(|hop| *hop == damage.hop);
-            for check in hop.into_iter().flat_map(|hop| route.checks_from(hop + 1)) {
-                later.push(Symptom::PortErrors(DeviceId(check.node as u32), check.port));
-            }
-        }
-    }
-    later.sort_unstable();
-    later.dedup();
-    later
 }
 
 fn place(survey: &Survey<'_>, spot: Spot) -> Place {
@@ -245,7 +211,7 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
     for (counter, is_shown, text) in shown {
         let track = survey.track(node, counter);
         if let Some(rise) = track.filter(|_| is_shown).and_then(|track| track.last_rise()) {
-            let first = track.and_then(|track| track.first_rise()).unwrap_or(rise);
+            let first = track.and_then(|track| survey.rises(track).next()).unwrap_or(rise);
             let evidence = Evidence::rise(id, counter.address(), Some(port), rise, text)
                 .values(Some(u64::from(first.before)), Some(u64::from(rise.after)));
             condition.evidence.push(evidence);

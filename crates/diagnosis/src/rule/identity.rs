@@ -20,12 +20,13 @@
 use linesman_config::fault::{Class, FaultName};
 use linesman_config::identity::{self, Mismatch, mismatch};
 use linesman_proto::address::DeviceId;
+use linesman_proto::port::Port;
 use linesman_proto::register::table;
 use linesman_proto::sii::Identity;
 use linesman_proto::time::Instant;
 
 use super::{Rule, RulePage, View};
-use crate::finding::{Condition, Evidence, Place, Severity};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::line::{Device, Line, Planned, Seen};
 
 /// Another device.
@@ -170,8 +171,22 @@ fn moved(line: &Line, slots: &[Slot]) -> Option<Condition> {
         .or(FaultName::DeviceWrong, 0.1)
         .confirmed(seen.at)
         .shown_by(evidence(slot.id, &seen, text))
+        .explaining(shifted(slots, first))
         .advise(format!("Compare the line around {label} with the project, label by label."));
     Some(condition)
+}
+
+/// All behind answer from another place than planned: ports that should lead on end the line, and the
+/// last planned ones never answer.
+fn shifted(slots: &[Slot], first: usize) -> Vec<Symptom> {
+    let first = first.saturating_sub(1);
+    let behind = slots[first..].iter().map(|slot| slot.id);
+    behind
+        .flat_map(|id| {
+            let down = Port::ALL.map(|port| Symptom::LinkDown(id, port));
+            down.into_iter().chain([Symptom::Silent(id), Symptom::WorkingCounter(id)])
+        })
+        .collect()
 }
 
 fn wrong(

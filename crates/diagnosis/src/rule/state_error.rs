@@ -20,6 +20,8 @@ use linesman_proto::address::RegisterAddress;
 use linesman_proto::state::status_code::Class as CodeClass;
 use linesman_proto::state::{AlState, AlStatusCode, StatusCode};
 
+use linesman_proto::time::{Instant, Span};
+
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::line::{AlError, Device};
@@ -63,6 +65,8 @@ pub const SYNC: RulePage = RulePage {
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[REFUSED, LEFT, WATCHDOG, SYNC], judge };
 
+/// A MainDevice that does not try again for so long does not want the state any more.
+const GIVEN_UP: Span = Span::s(10);
 const AL_CONTROL: RegisterAddress = RegisterAddress(0x0120);
 const AL_STATUS: RegisterAddress = RegisterAddress(0x0130);
 const AL_STATUS_CODE: RegisterAddress = RegisterAddress(0x0134);
@@ -120,7 +124,7 @@ fn condition(
         .confidence(if meaning.is_some() { 0.8 } else { 0.6 })
         .confirmed(error.status.at)
         .about([Symptom::StateLost(device.id)])
-        .explaining([Symptom::WorkingCounter(device.id)]);
+        .explaining([Symptom::WorkingCounter(device.id), Symptom::Emergency(device.id)]);
     condition = match (cause, meaning.map(|meaning| meaning.class)) {
         (FaultName::InitRefused, Some(CodeClass::Configuration)) => {
             condition.or(FaultName::ConfigMismatch, 0.15)
@@ -137,7 +141,7 @@ fn condition(
         }
         _ => condition.or(FaultName::ConfigMismatch, 0.1),
     };
-    if let Some(ended) = error.ended {
+    if let Some(ended) = over(view, device, error) {
         condition = condition.ended(ended);
     }
     for evidence in evidence(device, error, meaning, times) {
@@ -156,6 +160,22 @@ fn condition(
         }
     }
     condition
+}
+
+/// When it was over. An acknowledged error is not: the MainDevice acknowledges and tries again, so only
+/// a SubDevice that gets where it should be, or that nobody asks any more, is well.
+fn over(view: &View<'_>, device: &Device, error: &AlError) -> Option<Instant> {
+    let ended = error.ended?;
+    let wanted = match error.requested.and_then(|requested| requested.value.state()) {
+        Some(state) if !error.had_arrived => Some(state),
+        Some(_) | None => error.from,
+    };
+    let is_there = !device.al.has_error() && device.al.state() >= wanted;
+    let reached = device.al.status.filter(|status| is_there && status.at >= error.status.at);
+    match reached {
+        Some(status) => Some(status.at),
+        None => (view.now.since(ended.min(view.now)) >= GIVEN_UP).then_some(ended),
+    }
 }
 
 fn evidence(

@@ -1,10 +1,10 @@
 //! Frames out, frames back: slots, packing, matching, time-outs.
 //!
-//! [`Exchange`] keeps a slot for each frame that is out. The index bytes of a frame's datagrams carry
+//! The engine keeps a slot for each frame that is out. The index bytes of a frame's datagrams carry
 //! its number: the first the low byte, the others the next one. A reply is matched by source
 //! address, number and shape; so a late reply (the slot was given up) and a duplicate (it was
 //! answered) are told from a lost frame and from frames of others. [`request`] is what procedures
-//! ask for; [`mod@merge`] is what becomes of two copies.
+//! ask for. Two copies of a ring are merged datagram by datagram.
 
 mod merge;
 mod queue;
@@ -272,6 +272,16 @@ impl Exchange {
         self.outgoing.retain(|(outgoing, _)| *outgoing != at);
         self.retire(at, if answered { SlotState::Answered } else { SlotState::GivenUp });
         Some(at)
+    }
+
+    /// Gives up all frames of a plan that runs no longer: they must not be taken for those of the next.
+    pub(crate) fn abandon_cyclic(&mut self) {
+        while let Some(at) = (self.waiting.iter().copied())
+            .find(|at| matches!(self.slots[*at].purpose, Purpose::Cyclic { .. }))
+        {
+            self.outgoing.retain(|(outgoing, _)| *outgoing != at);
+            self.retire(at, SlotState::GivenUp);
+        }
     }
 
     /// The requests of an answered or given-up slot, to be completed by the caller.

@@ -1,8 +1,8 @@
 //! Talking to the software of SubDevices.
 //!
-//! One [`multiplexer`] per SubDevice owns its mailbox: it counts messages, looks whether there is
+//! One multiplexer per SubDevice owns its mailbox: it counts messages, looks whether there is
 //! one to be fetched, fetches lost ones again, and hands them on by type. [`coe`] is one of its
-//! clients; jobs wait in a [`queue`] and are done one after another. Emergencies and messages that
+//! clients; jobs wait in a queue and are done one after another. Emergencies and messages that
 //! nobody asked for become events.
 
 pub mod coe;

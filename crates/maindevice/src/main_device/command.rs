@@ -44,7 +44,7 @@ impl MainDevice {
         self.handle_timeout(now);
     }
 
-    /// Finds out what is there; see [`scan`](crate::procedure::scan) for what that writes. Ends in
+    /// Finds out what is there; see [its page](crate::procedure::scan) for what it writes. Ends in
     /// [`Event::Scanned`] or [`Event::ScanFailed`]. Another command that is going on is ended.
     pub fn scan(&mut self, now: Instant) {
         let (wire, network) = (self.command(), self.network);
@@ -59,6 +59,9 @@ impl MainDevice {
 
     /// Drives every SubDevice of the plan to its target and keeps it there, and exchanges process
     /// data. Another command that is going on is ended.
+    ///
+    /// It begins with clearing the station addresses of all SubDevices, then gives those of the plan.
+    /// A SubDevice that is not who the plan says, or that the plan does not have, is left alone.
     pub fn start(&mut self, now: Instant, plan: Plan) {
         let wire = self.command();
         let plan = Arc::new(plan);
@@ -115,6 +118,7 @@ impl MainDevice {
             self.executor.cancel(control.group());
         }
         self.running = None;
+        self.exchange.abandon_cyclic();
         let wire = self.executor.group(self.options.repeats);
         self.control = Some(wire.clone());
         wire

@@ -1,4 +1,4 @@
-//! The engine: what comes in, what goes out. What its user can ask of it is in [`command`].
+//! The engine: what comes in, what goes out. What its user can ask of it is in `command`.
 
 mod command;
 
@@ -123,7 +123,8 @@ impl MainDevice {
         }
     }
 
-    /// A frame has arrived at a card, with a good check sequence.
+    /// A frame has arrived at a card, with a good check sequence. Nothing is given up here, so that a
+    /// frame which was fetched together with this one, late, still counts.
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.executor.advance(now);
         match self.exchange.receive(path, frame) {
@@ -138,7 +139,7 @@ impl MainDevice {
             Received::Echo => {}
         }
         self.watch_ring();
-        self.work(now);
+        self.work();
     }
 
     fn watch_ring(&mut self) {
@@ -156,11 +157,6 @@ impl MainDevice {
     /// given up.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.executor.advance(now);
-        self.work(now);
-    }
-
-    /// Gives up what is overdue, then runs whoever is ready.
-    fn work(&mut self, now: Instant) {
         while let Some(slot) = self.exchange.expire(now) {
             if self.exchange.slot(slot).state == SlotState::Answered {
                 self.complete(slot);
@@ -168,6 +164,11 @@ impl MainDevice {
                 self.give_up(slot);
             }
         }
+        self.work();
+    }
+
+    /// Runs whoever is ready.
+    fn work(&mut self) {
         self.executor.run();
         self.submit();
         if let Some(running) = &mut self.running {

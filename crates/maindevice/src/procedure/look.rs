@@ -101,13 +101,14 @@ pub async fn places(wire: &Wire, network: Network) -> Result<(Vec<Target>, OredS
     }
     // A half for each card; that of card B is processed from the break outwards, so it follows.
     let mut places = Vec::with_capacity(usize::from(count));
-    let cards: [(Path, fn(Position) -> Target); 2] =
-        [(Path::A, Target::Position), (Path::B, Target::PositionOnB)];
-    for (card, place) in cards {
+    for card in Path::ALL {
         let status = register::AL_STATUS;
         let half = Request::read(Target::All, status.address, status.len).by_card(card);
         let reply = wire.ask(half).await.map_err(LookError::Silent)?;
-        places.extend((0..reply.wkc.0).map(|position| place(Position(position))));
+        places.extend((0..reply.wkc.0).map(|position| match card {
+            Path::A => Target::Position(Position(position)),
+            Path::B => Target::PositionOnB(Position(position)),
+        }));
     }
     Ok((places, states))
 }

@@ -71,14 +71,19 @@ impl Line {
     /// their way between states or stuck short of their target.
     pub(crate) fn copy_presence(&self, least: &mut Presence, most: &mut Presence) {
         for (live, id) in self.devices.iter().zip(0..) {
-            let there = matches!(live.found, Found::There { .. });
-            let serves = |serves| Served {
-                reached_by: there.then_some(Path::A),
-                inputs: there && serves,
-                outputs: there && serves,
+            let serves = |serves: bool| Served {
+                reached_by: serves.then_some(Path::A),
+                inputs: serves,
+                outputs: serves,
             };
-            least.set(DeviceId(id), serves(live.served && live.settled));
-            most.set(DeviceId(id), serves(live.served || !live.settled));
+            let (surely, perhaps) = match live.found {
+                // It may still be running as an earlier plan left it.
+                Found::Unknown => (false, true),
+                Found::Lost => (false, false),
+                Found::There { .. } => (live.served && live.settled, live.served || !live.settled),
+            };
+            least.set(DeviceId(id), serves(surely));
+            most.set(DeviceId(id), serves(perhaps));
         }
     }
 

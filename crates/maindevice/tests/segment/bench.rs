@@ -19,6 +19,11 @@ pub(crate) enum Fate {
     Lost,
     Doubled,
     Late(Span),
+    /// A byte of it is replaced: an answer that lies.
+    Garbled {
+        at: usize,
+        byte: u8,
+    },
 }
 
 pub(crate) struct Bench {
@@ -105,6 +110,12 @@ impl Bench {
             Fate::Doubled => {
                 self.device.handle_frame(self.now, path, frame);
                 self.device.handle_frame(self.now, path, frame);
+            }
+            Fate::Garbled { at, byte } => {
+                let mut frame = frame.to_vec();
+                let at = at % frame.len();
+                frame[at] = byte;
+                self.device.handle_frame(self.now, path, &frame);
             }
             Fate::Late(span) => self.delayed.push((self.now + span, path, frame.to_vec())),
         }

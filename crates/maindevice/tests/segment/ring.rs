@@ -50,7 +50,7 @@ fn an_intact_ring_is_scanned_and_run() {
     assert_eq!(after.working_counter_errors, before.working_counter_errors);
 }
 
-// proves: RED-01 partial: in the virtual segment, RED-05, RED-06
+// proves: RED-05, RED-06, RED-01 partial: in the virtual segment only
 #[test]
 fn a_cut_ring_keeps_all_subdevices() {
     let mut bench = bench();

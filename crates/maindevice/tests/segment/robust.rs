@@ -1,10 +1,12 @@
 //! Hostile frames, two networks, the same run twice, and no allocation in the cycle.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Fate};
 use linesman_maindevice::{MainDevice, Options};
 use linesman_proto::address::{Network, Path};
+use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
+use linesman_sim::seed::Seed;
 use proptest::prelude::*;
 
 const SMALL: &str = r#"
@@ -21,6 +23,22 @@ on = "K1.B"
 name = "T2"
 type = "EL2008"
 on = "T1.B"
+"#;
+
+const SMART: &str = r#"
+name = "smart"
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "A1"
+type = "EL3102"
+on = "K1.B"
+[[device]]
+name = "M1"
+type = "EL7041"
+on = "A1.B"
 "#;
 
 /// A MainDevice in the middle of a scan, and the frames it has sent.
@@ -78,6 +96,43 @@ proptest! {
             frame.truncate((*cut).max(20));
             device.handle_frame(now, Path::A, &frame);
             while device.poll_event().is_some() {}
+        }
+    }
+}
+
+/// A running plant whose answers lie every now and then, in whatever place: nothing panics, and when
+/// they tell the truth again all is well.
+#[test]
+fn a_running_plant_survives_lying_answers() {
+    for seed in 0..4 {
+        let mut bench = Bench::new(SMART);
+        bench.start(AlState::Op);
+        let mut stream = Seed(seed).stream("lies");
+        bench.tamper = Some(Box::new(move |_| {
+            if !stream.chance(0.1) {
+                return Fate::Arrives;
+            }
+            // Most lies are in the first datagrams, where they hit something.
+            let at = stream.between(14, 120) as usize;
+            Fate::Garbled { at, byte: stream.between(0, 255) as u8 }
+        }));
+        for _ in 0..20 {
+            let id = bench.id("M1");
+            bench.device.sdo_upload(bench.now, id, ObjectAddress::new(0x1008, 0), false);
+            bench.run_for(Span::ms(100));
+        }
+        bench.tamper = None;
+        let until = bench.now + Span::s(60);
+        while !bench.device.is_settled() && bench.now < until {
+            bench.run_for(Span::ms(100));
+        }
+        assert!(
+            bench.device.is_settled(),
+            "seed {seed}: {:#?}",
+            bench.events.split_off(bench.events.len().saturating_sub(30))
+        );
+        for name in ["K1", "A1", "M1"] {
+            assert_eq!(bench.state(name), "OP", "seed {seed}, {name}");
         }
     }
 }

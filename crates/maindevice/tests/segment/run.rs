@@ -382,3 +382,18 @@ fn a_probe_reads_beside_the_cycle() {
     let status = bench.segment.controller(bench.id("T2")).unwrap().dl_status();
     assert_eq!(result.unwrap().word(0), status.value());
 }
+
+#[test]
+fn a_plan_can_be_started_over_and_over() {
+    let mut bench = Bench::new(PLANT);
+    let plan = bench.start(AlState::Op);
+    for _ in 0..3 {
+        // In the middle of a cycle, with a frame out.
+        bench.run_for(Span::us(10_020));
+        bench.events.clear();
+        bench.device.start(bench.now, plan.clone());
+        assert!(bench.run_until(Span::s(10), |event| matches!(event, Event::AllReached)));
+        assert_eq!(count(&bench, |event| matches!(event, Event::WorkingCounter { .. })), 0);
+    }
+    assert_eq!(bench.state("T8"), "OP");
+}

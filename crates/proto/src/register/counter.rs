@@ -93,15 +93,6 @@ impl Total {
         self.lost
     }
 
-    /// What was added since the total stood as `earlier`, a former state of this one.
-    #[must_use]
-    pub fn since(&self, earlier: &Self) -> Self {
-        let clears = self.clears.saturating_sub(earlier.clears);
-        // A counter that stands at its end may have missed any number.
-        let lost = clears > 0 || self.last == Some(u8::MAX);
-        Self { last: self.last, rise: self.rise.saturating_sub(earlier.rise), clears, lost }
-    }
-
     /// The last reading.
     #[must_use]
     pub const fn last(&self) -> Option<u8> {
@@ -119,23 +110,6 @@ impl Total {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-
-    #[test]
-    fn what_came_since_is_counted_apart() {
-        let mut total = Total::default();
-        for reading in [3, 10, 10] {
-            total.record(reading);
-        }
-        let earlier = total;
-        assert_eq!(total.since(&earlier).rise(), 0);
-        total.record(14);
-        let since = total.since(&earlier);
-        assert_eq!((since.rise(), since.is_lower_bound()), (4, false));
-        total.record(255);
-        assert!(total.since(&earlier).is_lower_bound());
-        total.record(2);
-        assert_eq!(total.since(&earlier).clears(), 1);
-    }
 
     #[test]
     fn two_readings() {

@@ -312,7 +312,6 @@ impl Learner {
 fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
     let Ok(view) = FrameView::parse(request.bytes) else { return };
     if exchange.earlier.is_empty() && !exchange.is_cut_off {
-        line.note_lost(request.time);
         line.traffic.record_lost(request.time, request.number, exchange.returns_before);
         line.touch();
     }

@@ -24,12 +24,6 @@ const RECEIVE_TIMES: u16 = 0x0900;
 pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     let (data, start) = (answer.reply.data(), answer.ado);
     let (at, frame) = (answer.at, Some(answer.frame));
-    let is_counters = start.0 > AL_STATUS_CODE && touches(start, data, COUNTERS);
-    if is_counters
-        && line.devices.get(id.index()).is_some_and(|device| device.counters.rise_in(start, data))
-    {
-        line.note_trouble(at);
-    }
     let Some(device) = line.devices.get_mut(id.index()) else { return };
     let mut news = false;
     if start.0 <= AL_STATUS_CODE {
@@ -45,7 +39,11 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         if let Some(code) = word_at(data, start, AL_STATUS_CODE) {
             news |= device.al.record_code(AlStatusCode(code), at, frame);
         }
-    } else if is_counters {
+    } else if touches(start, data, COUNTERS) {
+        if let Some(since) = device.counters.errors_since(start, data) {
+            line.note_errors(since, at);
+        }
+        let Some(device) = line.device_mut(id) else { return };
         news |= device.counters.record(start, data, at, frame);
     } else if start.0 == RECEIVE_TIMES
         && let Some(times) = part(data, start, RECEIVE_TIMES, 16)
