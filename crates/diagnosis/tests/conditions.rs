@@ -286,6 +286,36 @@ fn two_senders_are_two_maindevices_but_two_cards_are_not() {
     assert_eq!(report_of_ring.verdict, Verdict::Healthy, "{}", text(&report_of_ring));
 }
 
+/// A mailbox read that brings a CoE emergency.
+fn emergency(station: u16, code: u16) -> support::script::Datagram {
+    let [low, high] = code.to_le_bytes();
+    // Mailbox header: 10 bytes, from nobody, CoE, counter 1; CoE header: service 1.
+    let message = [10, 0, 0, 0, 0, 0x13, 0, 0x10, low, high, 0x09, 1, 2, 3, 4, 5];
+    fprd(station, 0x1080, &message)
+}
+
+#[test]
+fn an_emergency_is_read_and_withdrawn_by_its_device() {
+    let mut script = running();
+    script.exchange(&[emergency(0x1002, 0x4210)]);
+    let sent = report(&mut script);
+    let finding = only(&sent);
+    assert_eq!((finding.cause, no(finding)), (FaultName::Emergency, Some(2)));
+    assert_eq!(finding.state, FindingState::Confirmed);
+    let shown = &finding.evidence[0].text;
+    assert!(shown.contains("0x4210") && shown.contains("temperature"), "{shown}");
+    script.exchange(&[emergency(0x1002, 0x0000)]);
+    assert_eq!(only(&report(&mut script)).state, FindingState::Closed);
+}
+
+#[test]
+fn a_device_that_says_all_is_well_has_no_emergency() {
+    let mut script = running();
+    script.exchange(&[emergency(0x1002, 0x0000)]);
+    let report = report(&mut script);
+    assert_eq!(report.verdict, Verdict::Healthy, "{}", text(&report));
+}
+
 #[test]
 fn a_broadcast_of_states_is_not_a_state() {
     let mut script = Script::scanned(2);

@@ -44,7 +44,7 @@ impl MainDevice {
         self.handle_timeout(now);
     }
 
-    /// Finds out what is there; see [`scan`](crate::procedure::scan) for what that writes. Ends in
+    /// Finds out what is there; see [its page](crate::procedure::scan) for what it writes. Ends in
     /// [`Event::Scanned`] or [`Event::ScanFailed`]. Another command that is going on is ended.
     pub fn scan(&mut self, now: Instant) {
         let (wire, network) = (self.command(), self.network);

@@ -1,4 +1,4 @@
-//! The engine: what comes in, what goes out. What its user can ask of it is in [`command`].
+//! The engine: what comes in, what goes out. What its user can ask of it is in `command`.
 
 mod command;
 
