@@ -10,7 +10,7 @@ use linesman_proto::time::{Instant, Span};
 use crate::finding::{Book, Change, Condition, Finding, Severity};
 use crate::line::{Learner, Line, Seen};
 use crate::observe::{
-    Direction, Exchange, Fingerprint, FrameSeen, HostObservation, Outcome, Pairing,
+    Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, Pairing,
 };
 use crate::report::{self, Diagnosis, FindingReport, NetworkReport, Number, Verdict};
 use crate::rule::{RULES, View};
@@ -196,6 +196,9 @@ impl Engine {
         self.now = self.now.max(observation.time);
         let now = self.now;
         let line = &mut self.watched(observation.network).line;
+        if let HostEvent::CardErrors { crc: 1.., .. } = observation.what {
+            line.note_errors(observation.time, observation.time);
+        }
         line.host.record(observation);
         line.now = now;
         line.touch();

@@ -287,6 +287,52 @@ fn two_senders_are_two_maindevices_but_two_cards_are_not() {
 }
 
 #[test]
+fn a_live_card_that_receives_what_nobody_here_sent_sees_another_maindevice() {
+    let mut script = Script::new();
+    script.is_live = true;
+    script.scan(2);
+    for _ in 0..30 {
+        cycles(&mut script, 1, 3);
+        let index = script.index.wrapping_add(100);
+        let mut bytes = support::script::frame(&[brd(0x0130, &[2, 0], 2)], index, true);
+        bytes[11] = 0x77;
+        script.feed(&bytes, linesman_diagnosis::Direction::Received, 10_000);
+    }
+    let report = report(&mut script);
+    assert_eq!(only(&report).cause, FaultName::SecondMainDevice);
+}
+
+/// A mailbox read that brings a CoE emergency.
+fn emergency(station: u16, code: u16) -> support::script::Datagram {
+    let [low, high] = code.to_le_bytes();
+    // Mailbox header: 10 bytes, from nobody, CoE, counter 1; CoE header: service 1.
+    let message = [10, 0, 0, 0, 0, 0x13, 0, 0x10, low, high, 0x09, 1, 2, 3, 4, 5];
+    fprd(station, 0x1080, &message)
+}
+
+#[test]
+fn an_emergency_is_read_and_withdrawn_by_its_device() {
+    let mut script = running();
+    script.exchange(&[emergency(0x1002, 0x4210)]);
+    let sent = report(&mut script);
+    let finding = only(&sent);
+    assert_eq!((finding.cause, no(finding)), (FaultName::Emergency, Some(2)));
+    assert_eq!(finding.state, FindingState::Confirmed);
+    let shown = &finding.evidence[0].text;
+    assert!(shown.contains("0x4210") && shown.contains("temperature"), "{shown}");
+    script.exchange(&[emergency(0x1002, 0x0000)]);
+    assert_eq!(only(&report(&mut script)).state, FindingState::Closed);
+}
+
+#[test]
+fn a_device_that_says_all_is_well_has_no_emergency() {
+    let mut script = running();
+    script.exchange(&[emergency(0x1002, 0x0000)]);
+    let report = report(&mut script);
+    assert_eq!(report.verdict, Verdict::Healthy, "{}", text(&report));
+}
+
+#[test]
 fn a_broadcast_of_states_is_not_a_state() {
     let mut script = Script::scanned(2);
     // One in INIT with error, one in OP: 0x19 names neither.

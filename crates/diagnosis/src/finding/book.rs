@@ -2,7 +2,8 @@
 //!
 //! A rule says each time anew what holds or held. What it says for the first time opens a finding;
 //! what it says no longer it took back, and the finding goes without a trace, since it never was
-//! true. A condition that is over stays as a closed finding.
+//! true. A condition that is over stays as a closed finding; when the same trouble comes again after
+//! that, it is another finding.
 
 use linesman_proto::time::{Instant, Span};
 
@@ -11,6 +12,12 @@ use super::{Condition, Severity};
 /// What follows from a condition may show so long after its end: SubDevices are asked one by one, and
 /// links need seconds to come back.
 const AFTER: Span = Span::s(3);
+
+/// A finding that has been over for so long stays, though the rule does not speak of it any more.
+const SETTLED: Span = Span::s(2);
+
+/// Most findings that are kept; the oldest ones that are over give way.
+const MOST_KEPT: usize = 1_000;
 
 /// A condition with a life.
 #[derive(Clone, PartialEq, Debug)]
@@ -59,7 +66,10 @@ impl Book {
     ) {
         let mut before = std::mem::take(&mut self.findings);
         for condition in conditions {
-            let known = before.iter().position(|finding| is_same(&finding.condition, &condition));
+            let known = before.iter().position(|finding| {
+                is_same(&finding.condition, &condition)
+                    && finding.closed.is_none_or(|closed| condition.since <= closed)
+            });
             let (mut finding, is_new) = match known {
                 Some(index) => (before.remove(index), false),
                 None => (self.open(condition.clone()), true),
@@ -84,10 +94,20 @@ impl Book {
             }
             self.findings.push(finding);
         }
-        for finding in &before {
-            tell(Change::Withdrawn, finding);
+        for finding in before {
+            if finding.closed.is_some_and(|closed| closed + SETTLED <= now) {
+                self.findings.push(finding);
+            } else {
+                tell(Change::Withdrawn, &finding);
+            }
         }
         self.findings.sort_by_key(|finding| finding.id);
+        while self.findings.len() > MOST_KEPT {
+            let Some(over) = self.findings.iter().position(|old| old.closed.is_some()) else {
+                break;
+            };
+            self.findings.remove(over);
+        }
         self.hang();
     }
 

@@ -84,6 +84,8 @@ pub enum Symptom {
     WorkingCounter(DeviceId),
     /// A controller left the state it was in by itself, or reports an error.
     StateLost(DeviceId),
+    /// A controller's firmware sent an emergency.
+    Emergency(DeviceId),
     /// Frames do not come back.
     FramesLost,
     /// Damaged frames or symbols are counted at a port of a controller.

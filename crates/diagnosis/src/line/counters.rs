@@ -33,6 +33,8 @@ pub struct CounterTrack {
     pub last: Seen<u8>,
     /// Rises together, through clears.
     pub total: Total,
+    /// What `total` was when the present spell of errors began.
+    pub before_spell: u64,
     /// The latest rises, oldest first, at most [`RISES_KEPT`].
     pub rises: VecDeque<Rise>,
 }
@@ -93,6 +95,7 @@ impl CounterHistory {
                     first: Seen::new(value, at, frame),
                     last: Seen::new(value, at, frame),
                     total: Total::default(),
+                    before_spell: 0,
                     rises: VecDeque::new(),
                 }
             });
@@ -158,6 +161,23 @@ impl CounterHistory {
         !self.tracks.is_empty()
     }
 
+    /// When the errors happened that a reading shows, at the earliest; `None` when it shows none.
+    #[must_use]
+    pub fn errors_since(&self, start: RegisterAddress, data: &[u8]) -> Option<Instant> {
+        let reading = ErrorCounters::from_bytes(data, start);
+        let risen = reading.iter().filter(|(counter, value)| {
+            *value > 0 && self.last.value(*counter).is_some_and(|last| last != *value)
+        });
+        risen.filter_map(|(counter, _)| Some(self.tracks.get(&counter)?.last.at)).min()
+    }
+
+    /// A new spell of errors begins: what was counted so far belongs to earlier ones.
+    pub fn begin_spell(&mut self) {
+        for track in self.tracks.values_mut() {
+            track.before_spell = track.total.rise();
+        }
+    }
+
     /// When a rise of any of them was last read.
     #[must_use]
     pub const fn last_rise(&self) -> Option<Instant> {
@@ -200,6 +220,12 @@ impl CounterTrack {
             });
         }
         difference.rise > 0 || difference.cleared
+    }
+
+    /// Rises of the present spell of errors.
+    #[must_use]
+    pub const fn spell_rise(&self) -> u64 {
+        self.total.rise() - self.before_spell
     }
 
     /// The first rise that is still kept.

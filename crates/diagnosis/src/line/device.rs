@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use linesman_config::identity::RevisionRule;
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias};
+use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{AlControl, AlStatus, DlStatus, FmmuConfig};
 use linesman_proto::sii::Identity;
@@ -47,6 +48,8 @@ pub struct Device {
     pub dl: DlHistory,
     /// Its error counters.
     pub counters: CounterHistory,
+    /// Emergencies it sent, oldest first, at most [`CHANGES_KEPT`].
+    pub emergencies: VecDeque<Seen<Emergency>>,
     /// When a frame was received at each port, by its own clock: registers 0x0900 to 0x090F as last
     /// read. Those of closed ports mean nothing.
     pub received: Option<PortMap<DcTime32>>,
@@ -187,6 +190,7 @@ impl Device {
             al: AlHistory::default(),
             dl: DlHistory::default(),
             counters: CounterHistory::default(),
+            emergencies: VecDeque::new(),
             received: None,
             fmmus: BTreeMap::new(),
             sii: SiiImage::default(),
@@ -226,6 +230,11 @@ impl Device {
             self.silent = Some(since);
             push(&mut self.absences, Absence { since, ended: None });
         }
+    }
+
+    /// Notes an emergency.
+    pub fn record_emergency(&mut self, emergency: Seen<Emergency>) {
+        push(&mut self.emergencies, emergency);
     }
 
     /// When it first was in trouble of its own, or did not answer, within a stretch of time.

@@ -50,9 +50,25 @@ pub struct Tally {
     pub first: Option<Instant>,
     /// When it was last observed.
     pub last: Option<Instant>,
+    /// What `sum` was when the present spell of errors began.
+    pub before_spell: u64,
+    /// When it was first observed in this spell.
+    pub first_of_spell: Option<Instant>,
 }
 
 impl Tally {
+    /// How much of it belongs to the present spell of errors.
+    #[must_use]
+    pub const fn of_spell(&self) -> u64 {
+        self.sum.saturating_sub(self.before_spell)
+    }
+
+    /// A new spell of errors begins.
+    pub const fn begin_spell(&mut self) {
+        self.before_spell = self.sum;
+        self.first_of_spell = None;
+    }
+
     /// Counts `by` more at `at`; nothing when it is 0.
     pub fn add(&mut self, by: u64, at: Instant) {
         if by == 0 {
@@ -62,6 +78,7 @@ impl Tally {
         self.largest = self.largest.max(by);
         self.times += 1;
         self.first.get_or_insert(at);
+        self.first_of_spell.get_or_insert(at);
         self.last = Some(at);
     }
 }
@@ -71,6 +88,13 @@ impl HostHistory {
     #[must_use]
     pub const fn card(&self, path: Path) -> &CardHistory {
         &self.cards[path.index()]
+    }
+
+    /// A new spell of errors begins.
+    pub fn begin_spell(&mut self) {
+        for card in &mut self.cards {
+            card.crc.begin_spell();
+        }
     }
 
     /// Takes an observation.

@@ -15,7 +15,7 @@ use linesman_config::project::Project;
 use linesman_proto::address::{DeviceId, LogicalAddress, Network, Path, Position, StationAddress};
 use linesman_proto::port::Port;
 use linesman_proto::state::AlState;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 
 pub use counters::{CounterHistory, CounterTrack, Rise};
@@ -48,6 +48,9 @@ impl<T> Seen<T> {
     }
 }
 
+/// Errors that come after so long a time without any are a new spell.
+pub const SPELL_GAP: Span = Span::s(2);
+
 /// A network as far as it is known.
 #[derive(Clone, Debug, Default)]
 pub struct Line {
@@ -67,6 +70,9 @@ pub struct Line {
     pub traffic: Traffic,
     /// The time of the latest frame or observation.
     pub now: Instant,
+    /// When the present spell of errors began: at the earliest time that its first reading allows.
+    pub spell_began: Instant,
+    last_errors: Option<Instant>,
     revision: u64,
     /// From how many controllers and receive times the tree was derived.
     tree_basis: (usize, usize),
@@ -110,6 +116,21 @@ impl Line {
     /// Notes that something was learnt.
     pub const fn touch(&mut self) {
         self.revision += 1;
+    }
+
+    /// Errors are about to be recorded that happened after `since` and were read at `at`.
+    ///
+    /// After a time without any, they are a new spell: trouble of its own, whatever was counted before.
+    pub fn note_errors(&mut self, since: Instant, at: Instant) {
+        if self.last_errors.is_some_and(|last| since > last + SPELL_GAP) {
+            self.spell_began = since;
+            for device in &mut self.devices {
+                device.counters.begin_spell();
+            }
+            self.host.begin_spell();
+            self.traffic.lost.begin_spell();
+        }
+        self.last_errors = self.last_errors.max(Some(at));
     }
 
     /// A controller.

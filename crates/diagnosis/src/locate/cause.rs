@@ -444,7 +444,7 @@ fn rises<'a>(survey: &Survey<'a>, damage: &Damage) -> Vec<&'a Rise> {
     counters
         .into_iter()
         .filter_map(|counter| survey.track(node, counter))
-        .flat_map(|track| &track.rises)
+        .flat_map(|track| survey.rises(track))
         .collect()
 }
 
@@ -471,12 +471,11 @@ fn is_steady(survey: &Survey<'_>, group: &Group) -> bool {
         let Some(track) = survey.track(node, ErrorCounter::PhysicalLayer(port)) else {
             return false;
         };
-        let (Some(first), Some(last)) = (track.first_rise(), track.last_rise()) else {
-            return false;
-        };
+        let rises: Vec<&Rise> = survey.rises(track).collect();
+        let (Some(first), Some(last)) = (rises.first(), rises.last()) else { return false };
         let reading = last.at.since(last.after_time).as_nanos();
         let period = last.at.since(first.after_time).as_nanos();
-        let count = track.rises.len() as u64;
+        let count = rises.len() as u64;
         count >= 5 && period <= reading.saturating_mul(count * 5 / 4)
     })
 }

@@ -213,7 +213,7 @@ impl Walk<'_, '_> {
     }
 
     fn read(&self, hop: Hop, track: &CounterTrack) -> Reading {
-        let total = track.total.rise();
+        let total = track.spell_rise();
         let horizon = if self.survey.has_ended() { Instant::MAX } else { self.horizon };
         let mut reading = Reading {
             settled: total,
@@ -221,7 +221,7 @@ impl Walk<'_, '_> {
             excused: 0,
             is_lower_bound: track.total.is_lower_bound(),
         };
-        for rise in &track.rises {
+        for rise in self.survey.rises(track) {
             let by = u64::from(rise.difference.rise);
             if rise.at > horizon {
                 reading.settled = reading.settled.saturating_sub(by);
@@ -236,8 +236,8 @@ impl Walk<'_, '_> {
     fn period(&self, node: usize, port: Port) -> (Instant, Instant) {
         let counters = [ErrorCounter::InvalidFrame(port), ErrorCounter::PhysicalLayer(port)];
         let tracks = || counters.into_iter().filter_map(|c| self.survey.track(node, c));
-        let first = tracks().filter_map(|track| Some(track.first_rise()?.at)).min();
-        let last = tracks().filter_map(|track| Some(track.last_rise()?.at)).max();
+        let rises = || tracks().flat_map(|track| self.survey.rises(track)).map(|rise| rise.at);
+        let (first, last) = (rises().min(), rises().max());
         let now = self.survey.line().now;
         (first.unwrap_or(now), last.unwrap_or(now))
     }
@@ -247,9 +247,9 @@ impl Walk<'_, '_> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
         let errors = self.survey.line().host.card(card).crc;
-        let (first, last) = (errors.first?, errors.last?);
+        let (first, last) = (errors.first_of_spell?, errors.last?);
         let read_since = |at: Instant| self.survey.has_ended() || self.horizon > at;
-        let frames = errors.sum.saturating_sub(self.carried.frames);
+        let frames = errors.of_spell().saturating_sub(self.carried.frames);
         let is_new = if self.carried.frames == 0 {
             read_since(first)
         } else {
@@ -270,7 +270,7 @@ impl Walk<'_, '_> {
         let hop = *route.hops().last()?;
         let line = self.survey.line();
         let lost = line.traffic.lost;
-        let (first, last) = (lost.first?, lost.last?);
+        let (first, last) = (lost.first_of_spell?, lost.last?);
         let is_silent = self.carried.frames == 0 && !line.host.is_watched;
         // Counters that were read before the frame was missed say nothing of it.
         let is_read = self.is_read && self.horizon >= first;
@@ -278,7 +278,7 @@ impl Walk<'_, '_> {
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,
             card,
-            lost: lost.sum,
+            lost: lost.of_spell(),
             first,
             last,
         })

@@ -10,7 +10,13 @@ use crate::line::{CounterTrack, Line};
 /// Both ends of a link tell of the same loss, but are read one after the other.
 const SAME_LOSS: Span = Span::ms(500);
 
-/// What is known of one link's losses.
+/// A loss of at least this length is no flicker of a contact.
+const LONG_LOSS: Span = Span::ms(200);
+
+/// A link that stayed up for so long after a long loss was mended.
+const CALM: Span = Span::ms(500);
+
+/// What is known of one link's losses: those since it was last mended.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Drops {
     /// Index in [`Tree::links`].
@@ -64,10 +70,24 @@ impl Drops {
             }
         }
         seen.sort_by_key(|drop| drop.at);
+        let from = latest_spell(&mut seen);
         let tracks: Vec<&CounterTrack> =
             ends.into_iter().filter_map(|end| lost(line, end)).collect();
-        let losses = tracks.iter().map(|track| track.total.rise()).max().unwrap_or(0);
-        let rises = || tracks.iter().flat_map(|track| track.rises.iter().map(|rise| rise.at));
+        let kept = |track: &CounterTrack| -> u64 {
+            match from {
+                None => track.total.rise(),
+                Some(from) => {
+                    let later = track.rises.iter().filter(|rise| rise.after_time >= from);
+                    later.map(|rise| u64::from(rise.difference.rise)).sum()
+                }
+            }
+        };
+        let losses = tracks.iter().map(|track| kept(track)).max().unwrap_or(0);
+        let since = from.unwrap_or(Instant::ZERO);
+        let rises = || {
+            let all = tracks.iter().flat_map(|track| &track.rises);
+            all.filter(move |rise| rise.after_time >= since).map(|rise| rise.at)
+        };
         let first = seen.iter().map(|drop| drop.at).chain(rises()).min()?;
         let last = seen.iter().map(|drop| drop.at).chain(rises()).max()?;
         let count = losses.max(seen.len() as u64);
@@ -102,6 +122,19 @@ impl Drops {
         let near = |a: Instant, b: Instant| a <= b + SAME_LOSS && b <= a + SAME_LOSS;
         near(self.first, other.first) || near(self.last, other.last)
     }
+}
+
+/// Keeps only the losses after the last long one that was over for a while: those before are trouble
+/// of their own. Returns when that one was over.
+fn latest_spell(seen: &mut Vec<Drop>) -> Option<Instant> {
+    let ends = |pair: &[Drop]| {
+        let back = pair[0].back.filter(|back| back.since(pair[0].at) >= LONG_LOSS)?;
+        (pair[1].at.since(back) > CALM && pair[1].at > back).then_some(back)
+    };
+    let split = (1..seen.len()).rev().find_map(|at| Some((at, ends(&seen[at - 1..=at])?)));
+    let (at, back) = split?;
+    seen.drain(..at);
+    Some(back)
 }
 
 fn is_same(one: &Drop, other: &Drop) -> bool {

@@ -81,6 +81,12 @@ impl<'a> Survey<'a> {
         self.line.devices.get(node)?.counters.track(counter)
     }
 
+    /// The rises of a counter in the present spell of errors, as far as they are kept.
+    pub fn rises(&self, track: &'a CounterTrack) -> impl Iterator<Item = &'a Rise> + use<'a> {
+        let began = self.line.spell_began;
+        track.rises.iter().filter(move |rise| rise.at >= began)
+    }
+
     /// Whether a rise falls together with a change of the link, as noise and cut-off frames do.
     #[must_use]
     pub fn falls_with_link_change(&self, link: usize, rise: &Rise) -> bool {

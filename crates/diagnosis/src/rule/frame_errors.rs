@@ -138,7 +138,6 @@ fn add(
     for other in &suspicion.beneath {
         condition.explains.extend(symptoms(survey, other));
     }
-    condition.explains.extend(later_checks(survey, suspicion));
     if suspicion.frames() > 0 {
         condition.explains.push(Symptom::FramesLost);
         condition.explains.push(Symptom::CardErrors);
@@ -164,22 +163,6 @@ fn symptoms(survey: &Survey<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
         LastHop::Unknown { .. } => Symptom::FramesLost,
     });
     ports.chain(card).collect()
-}
-
-/// The ports that meet the bad frames later.
-fn later_checks(survey: &Survey<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
-    let mut later = Vec::new();
-    for damage in suspicion.damages.iter().filter(|damage| damage.frames > 0) {
-        for route in survey.routes().iter().filter(|route| route.path() == damage.path) {
-            let hop = route.hops().iter().position(|hop| *hop == damage.hop);
-            for check in hop.into_iter().flat_map(|hop| route.checks_from(hop + 1)) {
-                later.push(Symptom::PortErrors(DeviceId(check.node as u32), check.port));
-            }
-        }
-    }
-    later.sort_unstable();
-    later.dedup();
-    later
 }
 
 fn place(survey: &Survey<'_>, spot: Spot) -> Place {
@@ -228,7 +211,7 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
     for (counter, is_shown, text) in shown {
         let track = survey.track(node, counter);
         if let Some(rise) = track.filter(|_| is_shown).and_then(|track| track.last_rise()) {
-            let first = track.and_then(|track| track.first_rise()).unwrap_or(rise);
+            let first = track.and_then(|track| survey.rises(track).next()).unwrap_or(rise);
             let evidence = Evidence::rise(id, counter.address(), Some(port), rise, text)
                 .values(Some(u64::from(first.before)), Some(u64::from(rise.after)));
             condition.evidence.push(evidence);

@@ -143,5 +143,6 @@ fn both(one: &Tally, other: &Tally) -> Tally {
             (one, other) => one.or(other),
         },
         last: one.last.max(other.last),
+        ..Tally::default()
     }
 }

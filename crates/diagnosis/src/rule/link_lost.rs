@@ -167,6 +167,7 @@ pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
                 Symptom::Silent(id),
                 Symptom::WorkingCounter(id),
                 Symptom::StateLost(id),
+                Symptom::Emergency(id),
             ]);
         }
     }

@@ -3,6 +3,7 @@
 //! A rule is a pure function of the line. It is asked whenever something was learnt, and says all
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
+pub mod emergency;
 pub mod frame_errors;
 pub mod host_trouble;
 pub mod identity;
@@ -85,6 +86,7 @@ pub const RULES: &[Rule] = &[
     state_error::RULE,
     working_counter::RULE,
     one_direction::RULE,
+    emergency::RULE,
     host_trouble::RULE,
     second_maindevice::RULE,
 ];

@@ -108,8 +108,14 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     let symptom = if may_be_noise { Symptom::FramesLost } else { Symptom::NobodyAnswers };
     condition = condition.about([symptom]);
     let devices = line.devices.iter().map(|device| device.id);
-    let follows = devices
-        .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
+    let follows = devices.flat_map(|id| {
+        [
+            Symptom::Silent(id),
+            Symptom::WorkingCounter(id),
+            Symptom::StateLost(id),
+            Symptom::Emergency(id),
+        ]
+    });
     condition = condition.explaining(follows);
     condition = condition.explaining([Symptom::FramesLost, Symptom::NoCarrier]);
     advise(condition, carrier)

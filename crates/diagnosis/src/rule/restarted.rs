@@ -199,7 +199,8 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
 /// All that a device without power brings about.
 fn consequences(line: &Line, id: DeviceId) -> Vec<Symptom> {
     let mut follows = links_lost_with(line, id);
-    follows.extend([Symptom::Silent(id), Symptom::WorkingCounter(id)]);
+    let own = [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)];
+    follows.extend(own);
     if let Some(tree) = line.tree.as_ref().filter(|tree| id.index() < tree.len()) {
         for behind in tree.subtree(id.index()).iter().map(|node| DeviceId(*node as u32)) {
             if behind != id {
@@ -207,6 +208,7 @@ fn consequences(line: &Line, id: DeviceId) -> Vec<Symptom> {
                     Symptom::Silent(behind),
                     Symptom::WorkingCounter(behind),
                     Symptom::StateLost(behind),
+                    Symptom::Emergency(behind),
                 ]);
             }
         }

@@ -124,7 +124,7 @@ fn condition(
         .confidence(if meaning.is_some() { 0.8 } else { 0.6 })
         .confirmed(error.status.at)
         .about([Symptom::StateLost(device.id)])
-        .explaining([Symptom::WorkingCounter(device.id)]);
+        .explaining([Symptom::WorkingCounter(device.id), Symptom::Emergency(device.id)]);
     condition = match (cause, meaning.map(|meaning| meaning.class)) {
         (FaultName::InitRefused, Some(CodeClass::Configuration)) => {
             condition.or(FaultName::ConfigMismatch, 0.15)

@@ -1,8 +1,9 @@
-//! The identity as the object dictionary has it: SDO uploads of 0x1018.
+//! What mailboxes tell: the identity as the object dictionary has it (SDO uploads of 0x1018), and
+//! emergencies.
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::sdo::Response;
-use linesman_proto::mailbox::coe::{Message, ObjectIndex};
+use linesman_proto::mailbox::coe::{Emergency, Message, ObjectAddress, ObjectIndex};
 use linesman_proto::mailbox::{Header, MailboxType};
 
 use super::Answer;
@@ -18,12 +19,29 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     }
     let end = HEADER_LEN + usize::from(header.length);
     let Some(body) = data.get(HEADER_LEN..end) else { return };
-    let Ok(Message::SdoResponse(Response::Upload { object, complete: false, initial })) =
-        Message::parse(body)
-    else {
-        return;
-    };
-    let Some(bytes) = initial.data().first_chunk() else { return };
+    match Message::parse(body) {
+        Ok(Message::SdoResponse(Response::Upload { object, complete: false, initial })) => {
+            identity(line, id, answer, object, initial.data());
+        }
+        // Other process data may begin like a message by chance; an emergency has one length only.
+        Ok(Message::Emergency(emergency)) if body.len() == EMERGENCY_LEN => {
+            let Some(device) = line.devices.get_mut(id.index()) else { return };
+            device.record_emergency(Seen::new(emergency, answer.at, Some(answer.frame)));
+            line.touch();
+        }
+        Ok(_) | Err(_) => {}
+    }
+}
+
+/// An object was read: the identity, perhaps.
+fn identity(
+    line: &mut Line,
+    id: DeviceId,
+    answer: &Answer<'_>,
+    object: ObjectAddress,
+    data: &[u8],
+) {
+    let Some(bytes) = data.first_chunk() else { return };
     if object.index != ObjectIndex::IDENTITY {
         return;
     }
@@ -43,3 +61,5 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
 }
 
 const HEADER_LEN: usize = 6;
+/// CoE header and emergency.
+const EMERGENCY_LEN: usize = 2 + Emergency::LEN;

@@ -40,6 +40,10 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
             news |= device.al.record_code(AlStatusCode(code), at, frame);
         }
     } else if touches(start, data, COUNTERS) {
+        if let Some(since) = device.counters.errors_since(start, data) {
+            line.note_errors(since, at);
+        }
+        let Some(device) = line.device_mut(id) else { return };
         news |= device.counters.record(start, data, at, frame);
     } else if start.0 == RECEIVE_TIMES
         && let Some(times) = part(data, start, RECEIVE_TIMES, 16)
