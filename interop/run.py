@@ -75,10 +75,11 @@ def ran(result):
         assert inputs[ANALOG_IN], "the analogue terminal gave no inputs"
 
 
-# proves: ESC-05 partial: a foreign MainDevice starts the line
+# proves: ESC-05
 @check
 def soem_takes_the_line_to_op(line):
     with Segment(line, LINESMAN, FILE) as segment:
+        # All ports have opened by themselves: the first frame ever, without any address, meets all.
         assert segment.present == len(PRODUCTS), segment.present
         result = python_peer(line, "pysoem", "soem.py")
         is_the_line(result)

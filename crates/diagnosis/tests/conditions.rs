@@ -286,6 +286,22 @@ fn two_senders_are_two_maindevices_but_two_cards_are_not() {
     assert_eq!(report_of_ring.verdict, Verdict::Healthy, "{}", text(&report_of_ring));
 }
 
+#[test]
+fn a_live_card_that_receives_what_nobody_here_sent_sees_another_maindevice() {
+    let mut script = Script::new();
+    script.is_live = true;
+    script.scan(2);
+    for _ in 0..30 {
+        cycles(&mut script, 1, 3);
+        let index = script.index.wrapping_add(100);
+        let mut bytes = support::script::frame(&[brd(0x0130, &[2, 0], 2)], index, true);
+        bytes[11] = 0x77;
+        script.feed(&bytes, linesman_diagnosis::Direction::Received, 10_000);
+    }
+    let report = report(&mut script);
+    assert_eq!(only(&report).cause, FaultName::SecondMainDevice);
+}
+
 /// A mailbox read that brings a CoE emergency.
 fn emergency(station: u16, code: u16) -> support::script::Datagram {
     let [low, high] = code.to_le_bytes();

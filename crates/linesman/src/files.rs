@@ -68,6 +68,24 @@ pub(crate) fn project(path: &Path) -> Result<Project, Failure> {
     Project::parse(&text).map_err(|error| in_file(path, &error))
 }
 
+/// Refuses a path where something is already.
+pub(crate) fn refuse_to_overwrite(path: &Path) -> Result<(), Failure> {
+    if path.exists() {
+        let reason = format!("{}: the file is there already", path.display());
+        return Err(Failure::new(reason, "name another one, or move this one away"));
+    }
+    Ok(())
+}
+
+/// Writes a file that is not there yet.
+pub(crate) fn write_new(path: &Path, what: &str, text: &str) -> Result<(), Failure> {
+    refuse_to_overwrite(path)?;
+    fs::write(path, text).map_err(|error| {
+        let reason = format!("{}: writing {what}: {error}", path.display());
+        Failure::new(reason, "check the rights of the directory and its free space")
+    })
+}
+
 /// An error inside a file.
 pub(crate) fn in_file(path: &Path, error: &dyn std::error::Error) -> Failure {
     let mut failure = Failure::from_error(error);

@@ -110,3 +110,28 @@ fn a_capture_selector_is_no_line_to_scan() {
     assert_eq!(run.status, 2);
     assert!(run.stderr.contains("`linesman diagnose trace.pcapng`"), "{}", run.stderr);
 }
+
+#[test]
+fn the_same_file_gives_the_same_bytes_and_they_are_judged_alike() {
+    let directory = TempDir::new().expect("a temporary directory");
+    let noise =
+        "[[fault]]\nkind = \"emc-noise\"\nat = \"K1.C>K2.A\"\nfrom_ms = 1500\nto_ms = 2500\n";
+    let record = |name: &str| {
+        let path = directory.path().join(name);
+        let run = with_segment("diagnose", noise, &["--json", "--record", path.to_str().unwrap()]);
+        (path.clone(), fs::read(&path).expect("a recording"), run)
+    };
+    let (path, one, run) = record("one.pcapng");
+    let (_, other, _) = record("other.pcapng");
+    assert!(one == other, "{} and {} bytes differ", one.len(), other.len());
+    let live = run.json();
+    let again = linesman(["diagnose".as_ref(), path.as_os_str(), "--json".as_ref()]).json();
+    assert_valid(&again, "diagnosis");
+    for key in ["devices", "frames", "datagrams", "al_state_highest"] {
+        assert_eq!(live["network"][key], again["network"][key], "{key}");
+    }
+    let place = |diagnosis: &Value| diagnosis["findings"][0]["place"].clone();
+    assert_eq!(place(&live), place(&again), "{live:#}\n{again:#}");
+    let run = with_segment("diagnose", "", &["--record", path.to_str().unwrap()]);
+    assert_eq!(run.status, 2, "a file that is there stays");
+}

@@ -4,12 +4,14 @@
 //! files, [`drive`] runs a
 //! MainDevice on cards, [`listen`] hears what is on a card,
 //! [`host_watch`] asks about a card, [`serve`] puts a segment on real
-//! interfaces, [`stop`] is the wish to stop.
+//! interfaces, [`record`] writes
+//! what was seen to a file, [`stop`] is the wish to stop.
 
 pub mod capture;
 pub mod drive;
 pub mod host_watch;
 pub mod listen;
+pub mod record;
 pub mod selector;
 pub mod serve;
 pub mod stop;

@@ -7,11 +7,13 @@
 
 use linesman_proto::time::{Instant, Span};
 
-use super::{Condition, Severity};
+use super::{Condition, Severity, Symptom};
 
 /// What follows from a condition may show so long after its end: SubDevices are asked one by one, and
 /// links need seconds to come back.
 const AFTER: Span = Span::s(3);
+/// The same for what is only counted: errors follow at once, and are read soon after.
+const AFTER_COUNTED: Span = Span::s(1);
 
 /// A finding that has been over for so long stays, though the rule does not speak of it any more.
 const SETTLED: Span = Span::s(2);
@@ -196,7 +198,11 @@ fn is_same(one: &Condition, other: &Condition) -> bool {
 
 fn explains(cause: &Finding, effect: &Finding) -> bool {
     let symptoms = &effect.condition.symptoms;
-    let was_over = cause.closed.is_some_and(|closed| closed + AFTER < effect.opened);
+    let counted = |symptom: &Symptom| {
+        matches!(symptom, Symptom::PortErrors(..) | Symptom::FramesLost | Symptom::CardErrors)
+    };
+    let after = if symptoms.iter().all(counted) { AFTER_COUNTED } else { AFTER };
+    let was_over = cause.closed.is_some_and(|closed| closed + after < effect.opened);
     !symptoms.is_empty()
         && !was_over
         && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))

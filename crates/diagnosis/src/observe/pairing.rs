@@ -33,6 +33,8 @@ const RECORDED_TWICE: Span = Span::us(3);
 const MOST_IN_FLIGHT: usize = 32;
 /// And for so long.
 const IN_FLIGHT: Span = Span::ms(5);
+/// The copy for the other card of a ring follows within this time.
+const OTHER_CARD: Span = Span::ms(1);
 /// How many returns are remembered to know one that was recorded twice.
 const REMEMBERED: usize = 8;
 /// Senders kept.
@@ -64,6 +66,8 @@ pub struct Sender {
     pub first: Seen<()>,
     /// Requests of its own: the second card of a ring only repeats those of the first.
     pub own: u64,
+    /// Whether it is a card of this host, so that several of them are one MainDevice.
+    pub is_host: bool,
 }
 
 /// Requests that wait for their return.
@@ -129,6 +133,16 @@ impl Pairing {
                 return Outcome::Duplicate;
             }
             self.remember(print, frame.time);
+            let is_ours = |one: &Sender| one.mac == source || one.mac.marked() == source;
+            if frame.direction == Direction::Received && !self.senders.iter().any(is_ours) {
+                // Nobody here sent that.
+                self.note_sender(frame, source, false);
+            } else if let Some(other) =
+                self.senders.iter_mut().find(|one| one.mac == source && !one.is_host)
+            {
+                other.own += u64::from(frame.direction == Direction::Received);
+                self.senders_changed |= other.own == OWN;
+            }
             settle(&Exchange {
                 request: None,
                 reply: Some(copy(frame)),
@@ -217,20 +231,28 @@ impl Pairing {
         print: Fingerprint,
         settle: &mut impl FnMut(&Exchange<'_>),
     ) -> Outcome {
-        let same = |pending: &&mut Pending| {
-            pending.print == print && gap(pending.time, frame.time) <= RECORDED_TWICE
+        if let Some(path) = frame.path
+            && let Some(pending) = self.pending.iter_mut().rev().find(|pending| {
+                pending.print == print
+                    && !pending.sent[path.index()]
+                    && gap(pending.time, frame.time) <= OTHER_CARD
+            })
+        {
+            pending.sent[path.index()] = true;
+            pending.out += 1;
+            return Outcome::RequestCopy;
+        }
+        let was_recorded = |pending: &Pending| {
+            pending.print == print
+                && pending.path == frame.path
+                && gap(pending.time, frame.time) <= RECORDED_TWICE
+                && pending.bytes == frame.bytes
         };
-        // Copies for the other card follow at once, so only the latest ones can be meant.
-        if let Some(pending) = self.pending.iter_mut().rev().take(8).find(same) {
-            let card = frame.path.unwrap_or_default().index();
-            if !pending.sent[card] {
-                pending.sent[card] = true;
-                pending.out += 1;
-                return Outcome::RequestCopy;
-            }
-            if frame.direction == Direction::Unknown && pending.bytes == frame.bytes {
-                return Outcome::Duplicate;
-            }
+        // What is recorded twice follows at once, so only the latest ones can be meant.
+        if frame.direction == Direction::Unknown
+            && self.pending.iter().rev().take(8).any(was_recorded)
+        {
+            return Outcome::Duplicate;
         }
         self.note_sender(frame, source, is_repeated);
         if self.pending.len() >= MOST_PENDING {
@@ -270,7 +292,8 @@ impl Pairing {
             }
             None if count < MOST_SENDERS => {
                 let first = Seen::new((), frame.time, Some(frame.number));
-                self.senders.push(Sender { mac, first, own });
+                let is_host = frame.direction == Direction::Sent;
+                self.senders.push(Sender { mac, first, own, is_host });
                 self.senders_changed = true;
             }
             None => {}

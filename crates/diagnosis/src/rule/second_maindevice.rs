@@ -33,10 +33,14 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
     let senders = line.traffic.senders.iter();
     let own: Vec<_> = senders.filter(|sender| sender.own >= OWN).collect();
-    let [_, shown, ..] = &own[..] else { return };
-    let names: Vec<_> = own.iter().map(|sender| sender.mac.to_string()).collect();
+    // The cards of this host are one MainDevice.
+    let ours = own.iter().position(|sender| sender.is_host);
+    let others = own.iter().enumerate().filter(|(at, sender)| !sender.is_host || ours == Some(*at));
+    let apart: Vec<_> = others.map(|(_, sender)| *sender).collect();
+    let [_, shown, ..] = &apart[..] else { return };
+    let names: Vec<_> = apart.iter().map(|sender| sender.mac.to_string()).collect();
     let text =
-        format!("requests of their own come from {} addresses: {}", own.len(), names.join(", "));
+        format!("requests of their own come from {} addresses: {}", apart.len(), names.join(", "));
     let place = Place::Network { network: line.network };
     conditions.push(
         Condition::new(&PAGE, place, FaultName::SecondMainDevice, shown.first.at)

@@ -377,18 +377,29 @@ fn said(diagnosis: &Diagnosis) -> String {
     let mut text = format!("verdict: {:?}", diagnosis.verdict).to_lowercase();
     for finding in &diagnosis.findings {
         text += &format!(
-            "\n{} {} {} at {} ({:?}, {:.2}, {} consequences)",
+            "\n{} {} {} at {}, {:.2}, {}",
             finding.id,
             finding.code,
             finding.cause,
             Claim::of(finding).site,
-            finding.state,
             finding.confidence,
-            finding.consequences.len()
+            life(finding),
         );
         for evidence in finding.evidence.iter().take(3) {
             text += &format!("\n    {}", evidence.text);
         }
+        for follows in &finding.consequences {
+            let site = Claim::of(follows).site;
+            let (id, code, cause) = (&follows.id, &follows.code, follows.cause);
+            text += &format!("\n    so: {id} {code} {cause} at {site}, {}", life(follows));
+        }
     }
     text
+}
+
+/// When a finding was open, in ms of the run.
+fn life(finding: &FindingReport) -> String {
+    let ms = |ns: u64| format!("{:.1}", ns as f64 / 1e6);
+    let closed = finding.closed_ns.map_or_else(|| "now".to_owned(), |closed| ms(closed.0));
+    format!("{:?} from {} to {closed} ms", finding.state, ms(finding.opened_ns.0)).to_lowercase()
 }

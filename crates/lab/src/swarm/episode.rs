@@ -22,6 +22,8 @@ use crate::verdict::{Match, Scene, Site};
 
 /// Slices of time between two checks.
 const SLICE: Span = Span::ms(25);
+/// How long the line is left alone between two episodes.
+const QUIET: Span = Span::ms(2_500);
 /// How long a diagnosis may take to see what goes on.
 const VERDICT: Span = Span::s(2);
 
@@ -278,7 +280,7 @@ impl<'a> Episode<'a> {
             self.run(SLICE)?;
         }
         let recovered_in = self.lab.now().since(healed);
-        self.run(Span::ms(500))?;
+        self.run(QUIET)?;
         Ok(Some(recovered_in))
     }
 

@@ -1,6 +1,7 @@
 //! `linesman demo`: a plant drawn by chance, broken and healed, with the truth beside the verdict.
 
 use std::hash::{BuildHasher as _, RandomState};
+use std::path::PathBuf;
 
 use linesman_lab::demo::{Demo, DemoEpisode, DemoVerdict};
 use linesman_lab::lab::LabError;
@@ -9,6 +10,7 @@ use linesman_proto::time::Span;
 
 use crate::exit::Status;
 use crate::failure::Failure;
+use crate::files;
 use crate::output::{Output, Paint, wrapped};
 use crate::text::quantity::{count, grouped, time};
 
@@ -23,6 +25,9 @@ pub(crate) struct Arguments {
     /// Which plant and which faults; by chance unless said
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Write the plant as a segment file, for `sim` and `diagnose sim:`
+    #[arg(long, value_name = "plant.toml")]
+    save: Option<PathBuf>,
 }
 
 /// Shows it.
@@ -35,6 +40,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     };
     let mut demo = Demo::new(seed).map_err(failed)?;
     introduce(&demo, seed, output);
+    if let Some(path) = &arguments.save {
+        files::write_new(path, "the plant", &demo.file().to_toml())?;
+    }
     let took = demo.bring_up().map_err(failed)?;
     output.line(&format!("\nAll in OP after {} of its time.", span(took)));
     let (mut right, mut number) = (0, 0);

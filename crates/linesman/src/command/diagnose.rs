@@ -12,9 +12,11 @@ use std::path::PathBuf;
 use linesman_config::project::Project;
 use linesman_diagnosis::report::{Diagnosis, Verdict};
 use linesman_diagnosis::{Engine, Setup};
+use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Network;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
+use linesman_runtime::record::Recorder;
 use linesman_runtime::selector::Selector;
 
 use self::follow::Follower;
@@ -48,6 +50,9 @@ pub(crate) struct Arguments {
     /// How long to look; Ctrl-C ends it too
     #[arg(long, value_name = "N")]
     seconds: Option<f64>,
+    /// Write what is seen to a capture file, for Wireshark or to be judged again
+    #[arg(long, value_name = "FILE.pcapng")]
+    record: Option<PathBuf>,
     /// On a card: also what writes, that is station addresses and the reading of each SII. States
     /// and counters are left alone in any case
     #[arg(long)]
@@ -90,6 +95,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let selector = arguments.place.parse()?;
     let project = arguments.project.as_deref().map(files::project).transpose()?;
     match &selector {
+        Selector::Capture(_) | Selector::Observations(_) if arguments.record.is_some() => {
+            let reason = format!("`{selector}`: there is nothing to record");
+            Err(Failure::new(reason, "leave out `--record`"))
+        }
         Selector::Capture(path) => {
             let session = Session::new(arguments, &selector, project);
             capture::run(path, session, output)
@@ -120,6 +129,7 @@ pub(crate) struct Session {
     setup: Setup,
     follower: Option<Follower>,
     seconds: Option<f64>,
+    record: Option<PathBuf>,
     json: bool,
 }
 
@@ -127,7 +137,24 @@ impl Session {
     fn new(arguments: &Arguments, selector: &Selector, project: Option<Project>) -> Self {
         let setup = Setup { project, source: selector.to_string(), ..Setup::default() };
         let follower = arguments.follow.then(|| Follower::new(arguments.json));
-        Self { setup, follower, seconds: arguments.seconds, json: arguments.json }
+        let record = arguments.record.clone();
+        Self { setup, follower, seconds: arguments.seconds, record, json: arguments.json }
+    }
+
+    /// Begins the recording, where that was asked for. `start` is the date of the run's time 0.
+    fn recorder(&self, start: UnixTime, names: &[String]) -> Result<Option<Recorder>, Failure> {
+        let Some(path) = &self.record else { return Ok(None) };
+        files::refuse_to_overwrite(path)?;
+        let recorder = Recorder::create(path, &version::tool(), start, names);
+        recorder.map(Some).map_err(|error| files::in_file(path, &error))
+    }
+
+    /// Ends the recording.
+    fn end_recording(&self, recorder: Option<Recorder>, output: &Output) {
+        let (Some(recorder), Some(path)) = (recorder, &self.record) else { return };
+        if let Err(error) = recorder.finish() {
+            output.warn(&files::in_file(path, &error).reason);
+        }
     }
 
     /// When a look that began at 0 ends: when the user said, else after `seconds`.

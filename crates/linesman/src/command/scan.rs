@@ -5,7 +5,6 @@ pub(crate) mod report;
 mod segment;
 mod table;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use linesman_config::inventory::Inventory;
@@ -14,6 +13,7 @@ use linesman_runtime::selector::Selector;
 
 use crate::exit::Status;
 use crate::failure::Failure;
+use crate::files;
 use crate::output::Output;
 
 /// What can be asked.
@@ -43,7 +43,7 @@ struct Scan {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selector: Selector = arguments.place.parse()?;
     if let Some(path) = &arguments.save {
-        refuse_to_overwrite(path)?;
+        files::refuse_to_overwrite(path)?;
     }
     let scan = match &selector {
         Selector::Cards(names) => cards::scan(names)?,
@@ -69,19 +69,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     Ok(Status::Good)
 }
 
-fn refuse_to_overwrite(path: &Path) -> Result<(), Failure> {
-    if path.exists() {
-        let reason = format!("{}: the file is there already", path.display());
-        return Err(Failure::new(reason, "name another one, or move this one away"));
-    }
-    Ok(())
-}
-
 fn save(path: &Path, inventory: &Inventory) -> Result<(), Failure> {
     let name = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
-    let text = Project::from_inventory(&name, inventory).to_toml();
-    fs::write(path, text).map_err(|error| {
-        let reason = format!("{}: writing the project: {error}", path.display());
-        Failure::new(reason, "check the rights of the directory and its free space")
-    })
+    files::write_new(path, "the project", &Project::from_inventory(&name, inventory).to_toml())
 }

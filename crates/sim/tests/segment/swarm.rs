@@ -32,6 +32,7 @@ fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
     }
 }
 
+// proves: ESC-07
 #[test]
 fn no_counter_moves_without_a_cause_and_what_is_healed_is_whole_again() {
     let options = PlantOptions { max_devices: 30, ..PlantOptions::default() };

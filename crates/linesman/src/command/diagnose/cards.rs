@@ -5,6 +5,7 @@ use linesman_link::clock::HostClock;
 use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::drive::{Audience, Driver};
+use linesman_runtime::record::Recorder;
 
 use super::Session;
 use crate::command::driven;
@@ -37,17 +38,20 @@ pub(super) fn run(
         clock: "host, monotonic".to_owned(),
         ..session.setup.clone()
     };
+    let recorder = session.recorder(clock.started_at(), names)?;
     let mut looking = Looking {
         engine: Engine::new(setup),
         session: &session,
+        recorder,
         output,
         progress: Progress::new(),
         next: if active { Next::Scan } else { Next::LookAt(Instant::ZERO) },
         frames: 0,
     };
     let result = driver.run(until, &stop, &mut looking);
-    let Looking { engine, frames, mut progress, output, .. } = looking;
+    let Looking { engine, recorder, frames, mut progress, output, .. } = looking;
     progress.clear();
+    session.end_recording(recorder, output);
     let complete = match result {
         Ok(()) => true,
         Err(error) if frames == 0 => return Err(error.into()),
@@ -64,6 +68,7 @@ pub(super) fn run(
 struct Looking<'a> {
     engine: Engine,
     session: &'a Session,
+    recorder: Option<Recorder>,
     output: &'a mut Output,
     progress: Progress,
     next: Next,
@@ -84,6 +89,9 @@ enum Next {
 impl Audience for Looking<'_> {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.frames += 1;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.frame(frame);
+        }
         self.engine.handle_frame(frame);
     }
 

@@ -4,6 +4,7 @@ use linesman_diagnosis::{Engine, Setup};
 use linesman_link::clock::HostClock;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::listen::{Ears, Heard};
+use linesman_runtime::record::Recorder;
 
 use super::Session;
 use crate::command::driven;
@@ -27,7 +28,8 @@ pub(super) fn run(
     let clock = HostClock::start();
     let until = session.until(SECONDS)?;
     let mut ears = Ears::open(names, clock)?;
-    let mut listening = Listening { session, clock, engine: None, frames: 0 };
+    let recorder = session.recorder(clock.started_at(), names)?;
+    let mut listening = Listening { session, clock, recorder, engine: None, frames: 0 };
     let mut progress = Progress::new();
     let mut lost = None;
     while !stop.is_set() && clock.now() < until && !output.is_closed() {
@@ -41,7 +43,8 @@ pub(super) fn run(
     }
     progress.clear();
     let heard_for = clock.now();
-    let Listening { session, engine, .. } = listening;
+    let Listening { session, engine, recorder, .. } = listening;
+    session.end_recording(recorder, output);
     let Some(engine) = engine else {
         return Err(lost.map_or_else(|| silence(names, heard_for), Failure::from));
     };
@@ -57,6 +60,7 @@ pub(super) fn run(
 struct Listening {
     session: Session,
     clock: HostClock,
+    recorder: Option<Recorder>,
     engine: Option<Engine>,
     frames: u64,
 }
@@ -68,11 +72,14 @@ impl Listening {
         deadline: Instant,
         output: &mut Output,
     ) -> Result<(), linesman_link::error::LinkError> {
-        let Self { session, clock, engine, frames } = self;
+        let Self { session, clock, recorder, engine, frames } = self;
         ears.hear(deadline, |heard| {
             match heard {
                 Heard::Frame(frame) => {
                     *frames += 1;
+                    if let Some(recorder) = recorder {
+                        recorder.frame(&frame);
+                    }
                     // Only beside a MainDevice of this host are the card's counters about the line.
                     let is_local = frame.direction == linesman_diagnosis::Direction::Sent;
                     let engine = engine.get_or_insert_with(|| begin(session, *clock, is_local));

@@ -1,9 +1,11 @@
 //! A virtual segment: brought up by our own MainDevice in virtual time, which costs little.
 
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_lab::lab::Lab;
 use linesman_lab::options::LabOptions;
+use linesman_link::unix_time::UnixTime;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment_file::SegmentFile;
@@ -37,6 +39,17 @@ pub(super) fn run(
     let source = session.setup.source.clone();
     let options = LabOptions { target, source, ..LabOptions::default() };
     let mut lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
+    // A virtual run has no date: its recording begins in 1970.
+    let recorder = session.recorder(UnixTime::EPOCH, &[])?;
+    let recorder = Arc::new(Mutex::new(recorder));
+    let tap = Arc::clone(&recorder);
+    if session.record.is_some() {
+        lab.set_tap(Box::new(move |frame| {
+            if let Some(recorder) = &mut *tap.lock().unwrap_or_else(PoisonError::into_inner) {
+                recorder.frame(frame);
+            }
+        }));
+    }
     let names = Names::new(lab.project().devices.iter().map(|device| device.name.clone()));
     let mut progress = Progress::new();
     while lab.now() < until && !stop.is_set() && !output.is_closed() {
@@ -47,6 +60,8 @@ pub(super) fn run(
         progress.show(|| format!("{} of {}, {}", text(now), text(until), count(frames, "frame")));
     }
     progress.clear();
+    let recorder = recorder.lock().unwrap_or_else(PoisonError::into_inner).take();
+    session.end_recording(recorder, output);
     if let Some(failure) = lab.failure() {
         output.warn(&format!("the line was not brought up: {failure}"));
     }

@@ -1,0 +1,86 @@
+//! What was seen, as a capture file that other tools read too.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path as FilePath;
+
+use linesman_diagnosis::{Direction, FrameSeen};
+use linesman_link::capture::{
+    CaptureInterfaceId, CaptureWriteError, FrameDirection, FrameToWrite, InterfaceToWrite,
+    LinkType, PcapngWriter,
+};
+use linesman_link::unix_time::UnixTime;
+use linesman_proto::address::Path;
+use linesman_proto::time::Instant;
+
+/// A capture that is being written.
+pub struct Recorder {
+    writer: PcapngWriter<BufWriter<File>>,
+    start: UnixTime,
+    cards: [Option<CaptureInterfaceId>; 2],
+    names: Vec<String>,
+    /// The first thing that went wrong; nothing is written after it.
+    fault: Option<CaptureWriteError>,
+}
+
+impl Recorder {
+    /// Begins a file, which must not be there yet. `start` is the date of the run's time 0; `names`
+    /// are those of card A and card B, where they have any.
+    ///
+    /// # Errors
+    /// When the file is there already, or cannot be written.
+    pub fn create(
+        path: &FilePath,
+        application: &str,
+        start: UnixTime,
+        names: &[String],
+    ) -> Result<Self, CaptureWriteError> {
+        let file = BufWriter::new(File::create_new(path)?);
+        let writer = PcapngWriter::new(file, application)?;
+        Ok(Self { writer, start, cards: [None; 2], names: names.to_vec(), fault: None })
+    }
+
+    /// Writes a frame. What goes wrong is told by [`finish`](Self::finish): the line comes first.
+    pub fn frame(&mut self, frame: &FrameSeen<'_>) {
+        if self.fault.is_none() {
+            self.fault = self.write(frame).err();
+        }
+    }
+
+    fn write(&mut self, frame: &FrameSeen<'_>) -> Result<(), CaptureWriteError> {
+        let path = frame.path.unwrap_or(Path::A);
+        let interface = match self.cards[path.index()] {
+            Some(interface) => interface,
+            None => self.describe(path)?,
+        };
+        let direction = match frame.direction {
+            Direction::Sent => FrameDirection::Outgoing,
+            Direction::Received => FrameDirection::Incoming,
+            Direction::Unknown => FrameDirection::Unknown,
+        };
+        let time = self.start + frame.time.since(Instant::ZERO);
+        self.writer.write_frame(&FrameToWrite::new(interface, time, direction, frame.bytes))
+    }
+
+    fn describe(&mut self, path: Path) -> Result<CaptureInterfaceId, CaptureWriteError> {
+        let description = format!("card {path}");
+        let interface = self.writer.add_interface(&InterfaceToWrite {
+            name: self.names.get(path.index()).map_or("", String::as_str),
+            description: &description,
+            link_type: LinkType::Ethernet,
+        })?;
+        self.cards[path.index()] = Some(interface);
+        Ok(interface)
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// What went wrong first.
+    pub fn finish(self) -> Result<(), CaptureWriteError> {
+        match self.fault {
+            Some(fault) => Err(fault),
+            None => self.writer.finish().map(drop),
+        }
+    }
+}
