@@ -329,7 +329,7 @@ fn verdict(on: Option<FaultName>, lab: &Lab, diagnosis: &Diagnosis) -> Result<()
             // Once it is over and the line is back, memories tell more than silence did.
             let over = !fault.is_active();
             let scene = Scene { tree: lab.tree(), host_counters, answered_again };
-            (over || !answered_again) && best_finding(diagnosis, &truth, &scene).is_some()
+            (over || !answered_again) && best_finding(diagnosis, &truth, &scene, fault.began).is_some()
         });
         if !fits {
             return Err(format!(

@@ -222,7 +222,7 @@ impl<'a> Episode<'a> {
         };
         let diagnosis = self.lab.diagnosis();
         let truth = truth_of(log, fault);
-        if let Some((finding, graded)) = best_finding(&diagnosis, &truth, &scene) {
+        if let Some((finding, graded)) = best_finding(&diagnosis, &truth, &scene, fault.began) {
             let site = Site::from(&finding.place);
             let text = format!("{} {} at {site}", finding.code, finding.cause);
             outcome.found = Some((text, graded));

@@ -1,6 +1,7 @@
 //! Judging a diagnosis: which finding belongs to which fault, and what is left over.
 
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState};
+use linesman_proto::time::Instant;
 use linesman_proto::topology::Tree;
 use linesman_sim::truth::{Effect, Entry, FaultRecord, Place, TruthLog};
 
@@ -26,14 +27,20 @@ pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
     Truth { name: fault.name, places: fault.places.iter().map(place).collect(), al_code }
 }
 
-/// The finding that fits `fault` best, with how well; open ones are preferred to closed ones.
+/// The finding that fits a fault best, with how well; open ones are preferred to closed ones. What
+/// was over before the fault began, at `began`, is about something else.
 #[must_use]
 pub fn best_finding<'a>(
     diagnosis: &'a Diagnosis,
     truth: &Truth,
     scene: &Scene<'_>,
+    began: Option<Instant>,
 ) -> Option<(&'a FindingReport, Match)> {
-    let graded = diagnosis.findings.iter().map(|finding| {
+    let began = began.unwrap_or(Instant::ZERO).as_nanos();
+    let of_its_time = |finding: &&FindingReport| {
+        finding.closed_ns.is_none_or(|closed| closed.0 >= began)
+    };
+    let graded = diagnosis.findings.iter().filter(of_its_time).map(|finding| {
         let graded = matches(truth, scene, Claim::of(finding));
         (finding, graded)
     });
