@@ -9,8 +9,11 @@ use serde_json::{Value, json};
 use support::linesman;
 use tempfile::TempDir;
 
+/// A port in the answer: number and letter.
+type End = (u32, &'static str);
+
 /// Link by link: the end nearer the MainDevice and the far one, as in the file and as in the answer.
-const LINKS: [(&str, &str, (u32, &str), (u32, &str)); 5] = [
+const LINKS: [(&str, &str, End, End); 5] = [
     ("maindevice", "K1.A", (0, "A"), (1, "A")),
     ("K1.B", "T1.A", (1, "B"), (2, "A")),
     ("T1.B", "T2.A", (2, "B"), (3, "A")),
@@ -58,7 +61,7 @@ fn each_direction_of_each_link(terminals: [&str; 3]) {
                 let findings = diagnosis["findings"].as_array().expect("findings");
                 assert_eq!(findings.len(), 1, "{what}");
                 let finding = &findings[0];
-                let end = |(no, port): (u32, &str)| json!({ "no": no, "port": port });
+                let end = |(no, port): End| json!({ "no": no, "port": port });
                 let place = json!({
                     "kind": "link", "network": 0, "a": end(a), "b": end(b), "direction": direction
                 });

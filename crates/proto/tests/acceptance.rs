@@ -249,3 +249,17 @@ fn system_time_counts_from_2000_and_its_low_half_wraps_at_4_295_s() {
     assert_eq!(DcTime(wrap + 5).low().delta(DcTime(wrap - 5).low()), 10);
     assert!((Span::ns(wrap).as_secs_f64() - 4.295).abs() < 0.0005);
 }
+
+#[test]
+fn a_frame_without_room_for_a_header_takes_no_empty_datagram() {
+    for left in 0..12 {
+        let mut buffer = [0; 1514];
+        let mut builder = FrameBuilder::new(&mut buffer, MacAddress([2, 0, 0, 0, 0, 1]));
+        let address = DatagramAddress::Logical(LogicalAddress(0));
+        // 16 bytes of headers, 12 around the data of the first datagram.
+        let first = 1514 - 16 - 12 - left;
+        builder.push(Command::Lrd, 0, address, first).unwrap();
+        assert!(builder.push(Command::Nop, 1, address, 0).is_err(), "{left} bytes are left");
+        assert_eq!(builder.finish(), 1514 - left);
+    }
+}

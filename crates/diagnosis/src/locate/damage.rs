@@ -103,6 +103,11 @@ impl Located {
     }
 }
 
+/// Whether a counter stood at its end already when the present errors began.
+fn is_stuck(track: &CounterTrack) -> bool {
+    track.last.value == u8::MAX && track.spell_rise() == 0
+}
+
 /// Bad frames that earlier checks counted.
 #[derive(Clone, Copy, Default, Debug)]
 struct Carried {
@@ -137,10 +142,13 @@ impl Walk<'_, '_> {
         let mut unread = Vec::new();
         for hop in route.hops() {
             let End::Controller(node, port) = hop.to else { continue };
-            let Some(invalid) = self.survey.track(node, ErrorCounter::InvalidFrame(port)) else {
+            let invalid = self.survey.track(node, ErrorCounter::InvalidFrame(port));
+            // A counter that stood at 255 when the errors began is as good as none.
+            let Some(invalid) = invalid.filter(|track| !is_stuck(track)) else {
                 unread.push(*hop);
                 continue;
             };
+            found.extend(self.marked_before(route, &unread, *hop, node, port));
             let damage = self.check(*hop, node, port, invalid);
             if let Some((frames, symbols, is_lower_bound)) = damage {
                 let (first, last) = self.period(node, port);
@@ -166,6 +174,35 @@ impl Walk<'_, '_> {
         found
     }
 
+    /// Frames that come in marked as bad although no port counted them: they were found bad at a port
+    /// that nobody read.
+    fn marked_before(
+        &mut self,
+        route: &Route,
+        unread: &[Hop],
+        hop: Hop,
+        node: usize,
+        port: Port,
+    ) -> Option<Damage> {
+        let (nearest, earlier) = unread.split_last()?;
+        let track = self.survey.track(node, ErrorCounter::Forwarded(port))?;
+        let forwarded = self.read(hop, track);
+        let frames = forwarded.settled.saturating_sub(self.carried.frames);
+        let first = self.survey.rises(track).next().map(|rise| rise.at);
+        let last = track.last_rise().map(|rise| rise.at);
+        self.carried.frames = self.carried.frames.max(forwarded.total);
+        (frames > 0).then_some(Damage {
+            path: route.path(),
+            hop: *nearest,
+            frames,
+            symbols: None,
+            is_lower_bound: true,
+            or_earlier: earlier.to_vec(),
+            first: first?,
+            last: last?,
+        })
+    }
+
     /// What is new at a port: frames, symbols, and whether that is a lower bound.
     fn check(
         &mut self,
@@ -177,7 +214,9 @@ impl Walk<'_, '_> {
         let read = |counter| self.survey.track(node, counter).map(|track| self.read(hop, track));
         let invalid = self.read(hop, invalid);
         let forwarded = read(ErrorCounter::Forwarded(port)).unwrap_or_default();
-        let physical = read(ErrorCounter::PhysicalLayer(port));
+        let physical = self.survey.track(node, ErrorCounter::PhysicalLayer(port));
+        let physical = physical.filter(|track| !is_stuck(track));
+        let physical = physical.map(|track| self.read(hop, track));
         let is_physical_read = physical.is_some();
         let physical = physical.unwrap_or_default();
         let before = self.carried;

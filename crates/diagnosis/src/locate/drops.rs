@@ -14,7 +14,10 @@ const SAME_LOSS: Span = Span::ms(500);
 const LONG_LOSS: Span = Span::ms(200);
 
 /// A link that stayed up for so long after a long loss was mended.
-const CALM: Span = Span::ms(500);
+const CALM_AFTER_LONG: Span = Span::ms(500);
+
+/// A link that stayed up for so long after a short one did not lose it to the same flicker.
+const CALM: Span = Span::s(3);
 
 /// What is known of one link's losses: those since it was last mended.
 #[derive(Clone, PartialEq, Debug)]
@@ -70,26 +73,27 @@ impl Drops {
             }
         }
         seen.sort_by_key(|drop| drop.at);
-        let from = latest_spell(&mut seen);
         let tracks: Vec<&CounterTrack> =
             ends.into_iter().filter_map(|end| lost(line, end)).collect();
-        let kept = |track: &CounterTrack| -> u64 {
-            match from {
-                None => track.total.rise(),
-                Some(from) => {
-                    let later = track.rises.iter().filter(|rise| rise.after_time >= from);
-                    later.map(|rise| u64::from(rise.difference.rise)).sum()
-                }
+        let counted = tracks.iter().flat_map(|track| &track.rises);
+        let mut events: Vec<(Instant, Instant)> =
+            counted.map(|rise| (rise.after_time, rise.at)).collect();
+        events.extend(seen.iter().map(|drop| (drop.at, drop.back.unwrap_or(Instant::MAX))));
+        let since = latest_spell(&mut events, &seen);
+        seen.retain(|drop| drop.at >= since);
+        let rises = |track: &CounterTrack| -> u64 {
+            if since == Instant::ZERO {
+                return track.total.rise();
             }
+            let later = track.rises.iter().filter(|rise| rise.at >= since);
+            later.map(|rise| u64::from(rise.difference.rise)).sum()
         };
-        let losses = tracks.iter().map(|track| kept(track)).max().unwrap_or(0);
-        let since = from.unwrap_or(Instant::ZERO);
-        let rises = || {
-            let all = tracks.iter().flat_map(|track| &track.rises);
-            all.filter(move |rise| rise.after_time >= since).map(|rise| rise.at)
+        let losses = tracks.iter().map(|track| rises(track)).max().unwrap_or(0);
+        let noticed = || {
+            let rises = tracks.iter().flat_map(|track| &track.rises).map(|rise| rise.at);
+            rises.filter(|at| *at >= since).chain(seen.iter().map(|drop| drop.at))
         };
-        let first = seen.iter().map(|drop| drop.at).chain(rises()).min()?;
-        let last = seen.iter().map(|drop| drop.at).chain(rises()).max()?;
+        let (first, last) = (noticed().min()?, noticed().max()?);
         let count = losses.max(seen.len() as u64);
         let is_down = ends.into_iter().any(|end| is_down(line, end));
         Some(Self { link, seen, count, first, last, is_down })
@@ -124,17 +128,23 @@ impl Drops {
     }
 }
 
-/// Keeps only the losses after the last long one that was over for a while: those before are trouble
-/// of their own. Returns when that one was over.
-fn latest_spell(seen: &mut Vec<Drop>) -> Option<Instant> {
-    let ends = |pair: &[Drop]| {
-        let back = pair[0].back.filter(|back| back.since(pair[0].at) >= LONG_LOSS)?;
-        (pair[1].at.since(back) > CALM && pair[1].at > back).then_some(back)
+/// When the latest spell of losses began: those before are trouble of their own. A long loss that was
+/// over ends a spell, and so does a time without any.
+fn latest_spell(events: &mut [(Instant, Instant)], seen: &[Drop]) -> Instant {
+    events.sort_unstable();
+    let calm_after = |end: Instant| {
+        let mut long = seen.iter().filter(|drop| end.since(drop.at) >= LONG_LOSS);
+        if long.any(|drop| drop.back == Some(end)) { CALM_AFTER_LONG } else { CALM }
     };
-    let split = (1..seen.len()).rev().find_map(|at| Some((at, ends(&seen[at - 1..=at])?)));
-    let (at, back) = split?;
-    seen.drain(..at);
-    Some(back)
+    let mut began = Instant::ZERO;
+    let mut ended: Option<Instant> = None;
+    for &(from, to) in events.iter() {
+        if ended.is_some_and(|ended| from > ended + calm_after(ended)) {
+            began = from;
+        }
+        ended = ended.max(Some(to));
+    }
+    began
 }
 
 fn is_same(one: &Drop, other: &Drop) -> bool {

@@ -150,14 +150,10 @@ fn ends(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
 pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
     let mut follows: BTreeSet<Symptom> = ends(line, tree, link).into_iter().collect();
     follows.extend([Symptom::FramesLost, Symptom::CardErrors]);
+    // Errors at the moment of the change are not reported at all; others are trouble of their own.
     for end in [tree.links()[link].upstream, tree.links()[link].downstream] {
-        match end {
-            End::Controller(node, port) => {
-                follows.insert(Symptom::PortErrors(DeviceId(node as u32), port));
-            }
-            End::MainDevice(_) => {
-                follows.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
-            }
+        if let End::MainDevice(_) = end {
+            follows.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
         }
     }
     if let End::Controller(node, _) = tree.links()[link].downstream {

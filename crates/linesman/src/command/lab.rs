@@ -1,11 +1,16 @@
 //! `linesman lab`: stories and swarms in virtual time.
 
+use std::collections::BTreeMap;
+use std::num::NonZero;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc;
+use std::thread;
 
 use linesman_lab::story::Story;
 use linesman_lab::story::run::play;
-use linesman_lab::swarm::run::{SwarmOptions, SwarmReport, swarm};
+use linesman_lab::swarm::run::{SeedReport, SwarmOptions, SwarmReport, run_seed};
 
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -90,7 +95,7 @@ fn run_swarm(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {
     let mut progress = Progress::new();
     let mut done = 0;
     let mut shown = String::new();
-    let report = swarm(seeds, &SwarmOptions::default(), |seed| {
+    let report = swarm(seeds, |seed| {
         done += 1;
         if !quiet || !seed.is_green() {
             progress.clear();
@@ -102,6 +107,40 @@ fn run_swarm(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {
     progress.clear();
     output.line(&sum(&report));
     if report.is_green() { Status::Good } else { Status::Findings }
+}
+
+/// Runs the seeds on all processors, and shows each report in the order of the seeds.
+fn swarm(seeds: Range<u64>, mut show: impl FnMut(&SeedReport)) -> SwarmReport {
+    let options = SwarmOptions::default();
+    let threads = thread::available_parallelism().map_or(1, NonZero::get);
+    let next = AtomicU64::new(seeds.start);
+    let mut report = SwarmReport::default();
+    thread::scope(|scope| {
+        let (sender, receiver) = mpsc::channel();
+        for _ in 0..threads {
+            let (sender, next, options) = (sender.clone(), &next, &options);
+            scope.spawn(move || {
+                loop {
+                    let seed = next.fetch_add(1, Ordering::Relaxed);
+                    if seed >= seeds.end || sender.send(run_seed(seed, options)).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut early = BTreeMap::new();
+        let mut expected = seeds.start;
+        for of_seed in receiver {
+            early.insert(of_seed.seed, of_seed);
+            while let Some(of_seed) = early.remove(&expected) {
+                show(&of_seed);
+                report.seeds.push(of_seed);
+                expected += 1;
+            }
+        }
+    });
+    report
 }
 
 fn sum(report: &SwarmReport) -> String {

@@ -105,9 +105,10 @@ impl<'a> FrameBuilder<'a> {
         address: DatagramAddress,
         data_len: usize,
     ) -> Result<&mut [u8], FrameFull> {
-        let needed = data_len + DATAGRAM_OVERHEAD;
-        if data_len > self.room() {
-            let left = self.buffer.len().min(MAX_LEN) - self.len;
+        let needed = data_len.saturating_add(DATAGRAM_OVERHEAD);
+        let left = self.buffer.len().min(MAX_LEN) - self.len;
+        // Where not even header and counter fit, `room` is 0 and so may `data_len` be.
+        if needed > left || data_len > self.room() {
             return Err(FrameFull { data_len, needed, left });
         }
         if let Some(last) = self.last_at {
