@@ -58,6 +58,9 @@ const BEFORE: Span = Span::s(10);
 /// A link needs up to two seconds to come up again: only a longer outage was no mere dip.
 const LONG: Span = Span::ms(2500);
 
+/// Lost-link counters are read in turn: one may show the outage so long after it.
+const LINKS_COUNTED: Span = Span::s(3);
+
 /// A fall, with the time in which the device was gone.
 #[derive(Clone, Copy)]
 struct Fall<'a> {
@@ -171,7 +174,7 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
     if is_first {
         let mut follows = BTreeSet::new();
         for other in together {
-            follows.extend(consequences(line, other.device.id));
+            follows.extend(consequences(line, other));
             if other.device.id != device.id {
                 follows.insert(Symptom::StateLost(other.device.id));
             }
@@ -197,8 +200,9 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
 }
 
 /// All that a device without power brings about.
-fn consequences(line: &Line, id: DeviceId) -> Vec<Symptom> {
-    let mut follows = links_lost_with(line, id);
+fn consequences(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
+    let id = fall.device.id;
+    let mut follows = links_lost_with(line, fall);
     let own = [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)];
     follows.extend(own);
     if let Some(tree) = line.tree.as_ref().filter(|tree| id.index() < tree.len()) {
@@ -222,16 +226,21 @@ fn consequences(line: &Line, id: DeviceId) -> Vec<Symptom> {
 }
 
 /// What follows from a restart at the links of the device: without supply it has no link, so its
-/// neighbours lose theirs. Not so where a link was lost more often than the device restarted.
-fn links_lost_with(line: &Line, id: DeviceId) -> Vec<Symptom> {
-    let (Some(tree), Some(device)) = (&line.tree, line.device(id)) else { return Vec::new() };
+/// neighbours lose theirs. Not so where a link was lost more often than the device restarted, at
+/// another time, or is down though the device is back.
+fn links_lost_with(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
+    let Some(tree) = &line.tree else { return Vec::new() };
+    let device = fall.device;
     let falls = device.al.changes.iter().filter(|change| change.is_own_fall()).count() as u64;
     let mut follows = Vec::new();
     for drops in Drops::all(line) {
         let link = tree.links()[drops.link];
         let ends = [link.upstream, link.downstream];
-        let is_its = ends.iter().any(|end| end.node() == Some(id.index()));
-        if is_its && drops.count <= falls {
+        let is_its = ends.iter().any(|end| end.node() == Some(device.id.index()));
+        let is_then = drops.first + TOGETHER >= fall.began()
+            && drops.last <= fall.change.at + LINKS_COUNTED
+            && !drops.is_down;
+        if is_its && is_then && drops.count <= falls {
             follows.extend(link_lost::follows(line, tree, drops.link));
         }
     }
