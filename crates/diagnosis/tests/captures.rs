@@ -35,6 +35,7 @@ const ROWS: [(&str, u64, Option<&str>, u64); 17] = [
     ("echist-replay-segmented-upload-202401", 1, Some("PREOP"), 312),
 ];
 
+// proves: WS-04 partial, WS-13 partial
 #[test]
 fn every_real_capture_is_read_as_what_it_is() {
     let Some(folder) = real_captures() else { return };
