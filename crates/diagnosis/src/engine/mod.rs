@@ -388,7 +388,14 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     let print = Fingerprint::of(&view);
     traffic.cut_short += u64::from(print.is_cut && !frame.truncated);
     let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(line, exchange));
+    let mistaken = pairing.take_mistaken();
     let traffic = &mut line.traffic;
+    if mistaken > 0 {
+        traffic.sent = traffic.sent.saturating_sub(mistaken);
+        traffic.returned += mistaken;
+        traffic.returned_alone += mistaken;
+        traffic.senders = pairing.senders().to_vec();
+    }
     match outcome {
         Outcome::Request | Outcome::RequestCopy => {
             traffic.sent += 1;

@@ -1,6 +1,8 @@
 //! Judging a diagnosis: which finding belongs to which fault, and what is left over.
 
+use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState};
+use linesman_proto::time::Instant;
 use linesman_proto::topology::Tree;
 use linesman_sim::truth::{Effect, Entry, FaultRecord, Place, TruthLog};
 
@@ -23,17 +25,28 @@ pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
         }
         Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
     });
-    Truth { name: fault.name, places: fault.places.iter().map(place).collect(), al_code }
+    let places = fault.places.iter().map(place).collect();
+    Truth { name: fault.name, places, al_code, blind: Vec::new() }
 }
 
-/// The finding that fits `fault` best, with how well; open ones are preferred to closed ones.
+/// The finding that fits a fault best, with how well; open ones are preferred to closed ones. What
+/// was over before the fault began, at `began`, is about something else.
 #[must_use]
 pub fn best_finding<'a>(
     diagnosis: &'a Diagnosis,
     truth: &Truth,
     scene: &Scene<'_>,
+    began: Option<Instant>,
 ) -> Option<(&'a FindingReport, Match)> {
-    let graded = diagnosis.findings.iter().map(|finding| {
+    let began = began.unwrap_or(Instant::ZERO).as_nanos();
+    let of_its_time =
+        |finding: &&FindingReport| finding.closed_ns.is_none_or(|closed| closed.0 >= began);
+    // Errors on several links that rise in the same readings look like one source, and one of them
+    // hangs beneath the other: it has been found there.
+    let shared = diagnosis.findings.iter().filter(|finding| finding.cause == FaultName::EmcNoise);
+    let beneath = shared.flat_map(|finding| &finding.consequences);
+    let all = diagnosis.findings.iter().chain(beneath);
+    let graded = all.filter(of_its_time).map(|finding| {
         let graded = matches(truth, scene, Claim::of(finding));
         (finding, graded)
     });
@@ -45,19 +58,18 @@ pub fn best_finding<'a>(
 /// How well a finding fits any of the faults of the run, now or in the past.
 #[must_use]
 pub fn explains(
-    log: &TruthLog,
+    truths: &[Truth],
     tree: &Tree,
     host_counters: bool,
     finding: &FindingReport,
 ) -> Match {
     let claim = Claim::of(finding);
     let mut best = Match::NONE;
-    for fault in log.faults().iter().filter(|fault| fault.first_effect.is_some()) {
-        let truth = truth_of(log, fault);
+    for truth in truths {
         // A finding may have been made while the line was silent, or since.
         for answered_again in [false, true] {
             let scene = Scene { tree, host_counters, answered_again };
-            let graded = matches(&truth, &scene, claim);
+            let graded = matches(truth, &scene, claim);
             if graded.cause > best.cause {
                 best = graded;
             }
