@@ -28,6 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("segment", series(&frames)),
         ("diagnosis", series(&frames)),
         ("segment_file", segment_files()),
+        ("observation_file", observation_files()),
         ("frame", frames),
         ("sii", images()?),
         ("mailbox", messages()),
@@ -253,4 +254,16 @@ fn segment_files() -> Made {
         ("tree.toml", text(&["old_counters = true\n", coupler, tree])),
         ("unknown-key.toml", text(&[coupler, "colour = \"red\"\n"])),
     ]
+}
+
+fn observation_files() -> Made {
+    let counters = "[[device]]\nno = 1\nname = \"K1\"\non = \"maindevice\"\nstate = \"OP\"\n\
+        ports.A = { link = true, open = true, rx = \"0x0000\" }\n\
+        ports.B = { link = true, open = true, frame = 0, physical = 0 }\n\
+        [[device]]\nno = 2\nname = \"T2\"\non = \"K1.B\"\nstate = \"OP\"\n\
+        ports.A = { link = true, open = true, rx = \"0x0412\", forwarded = 3, lost_link = 1 }\n";
+    let refused = "[[device]]\nno = 1\nname = \"K1\"\non = \"maindevice\"\n\
+        state = \"ERR PREOP\"\nal_code = 0x001E\n";
+    let text = |text: &str| text.as_bytes().to_vec();
+    vec![("counters.toml", text(counters)), ("refused.toml", text(refused))]
 }

@@ -7,6 +7,7 @@ mod capture;
 mod diagnosis;
 mod frame;
 mod mailbox;
+mod observation_file;
 mod segment;
 mod segment_file;
 mod series;
@@ -16,6 +17,7 @@ pub use capture::capture;
 pub use diagnosis::diagnosis;
 pub use frame::frame;
 pub use mailbox::mailbox;
+pub use observation_file::observation_file;
 pub use segment::segment;
 pub use segment_file::segment_file;
 pub use sii::sii;
@@ -29,6 +31,7 @@ pub const TARGETS: &[Target] = &[
     ("diagnosis", diagnosis),
     ("frame", frame),
     ("mailbox", mailbox),
+    ("observation_file", observation_file),
     ("segment", segment),
     ("segment_file", segment_file),
     ("sii", sii),

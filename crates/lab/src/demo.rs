@@ -5,6 +5,7 @@
 //! [`Demo::bring_up`], then [`Demo::next_episode`] until there are no more.
 
 use linesman_config::fault::FaultName;
+use linesman_config::project::Project;
 use linesman_diagnosis::report::FindingReport;
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
@@ -18,7 +19,7 @@ use crate::drawing::{Label, Row, draw};
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 use crate::swarm::run::cabled;
-use crate::verdict::judge::{best_finding, truth_of};
+use crate::verdict::judge::{Company, best_finding};
 use crate::verdict::{Claim, Match, Scene, Site};
 
 /// SubDevices of a demo plant, at least.
@@ -189,6 +190,13 @@ impl Demo {
         self.mark(id, &mut episode);
         episode.verdict = self.judge(id)?;
         self.lab.run_until(self.lab.now() + QUIET)?;
+        // With more to go by it may have come to know the cause better; the first word stands.
+        if let (Some(verdict), Some((finding, fits))) =
+            (&mut episode.verdict, verdict_on(&self.lab, id))
+        {
+            verdict.place = describe(self.lab.project(), Claim::of(&finding).site);
+            (verdict.finding, verdict.fits) = (finding, fits);
+        }
         self.lab.heal(id);
         let healed = self.lab.now();
         let back = self
@@ -230,7 +238,7 @@ impl Demo {
                 Place::Device(id) => Site::Device(id),
                 Place::Host(_) => Site::Host,
             };
-            places.push(self.describe(site));
+            places.push(describe(self.lab.project(), site));
             episode.marked.extend(match site {
                 Site::Device(id) => vec![id],
                 Site::Link { a, b, .. } => {
@@ -242,13 +250,6 @@ impl Demo {
         episode.place = places.join(", ");
     }
 
-    fn describe(&self, site: Site) -> String {
-        let devices = &self.lab.project().devices;
-        site.describe(|id| {
-            devices.get(id.index()).map_or_else(|| id.no().to_string(), |d| d.name.clone())
-        })
-    }
-
     /// Lets the line run until the diagnosis has said what fits, or its time is up.
     fn judge(&mut self, id: FaultId) -> Result<Option<DemoVerdict>, LabError> {
         self.lab.run_while(VERDICT, CYCLE, |lab| verdict_on(lab, id).is_some())?;
@@ -258,7 +259,7 @@ impl Demo {
             Some(at) => self.lab.now().since(at).as_nanos().div_ceil(CYCLE.as_nanos()),
             None => 0,
         };
-        let place = self.describe(Claim::of(&finding).site);
+        let place = describe(self.lab.project(), Claim::of(&finding).site);
         let others = self.lab.open_findings().saturating_sub(1);
         Ok(Some(DemoVerdict { finding, place, fits, cycles, others }))
     }
@@ -266,10 +267,15 @@ impl Demo {
 
 fn verdict_on(lab: &Lab, id: FaultId) -> Option<(FindingReport, Match)> {
     let log = lab.truth();
-    let truth = truth_of(log, log.fault(id)?);
+    let truth = lab.truth_of(id)?;
     let scene = Scene { tree: lab.tree(), host_counters: true, answered_again: false };
-    let since = log.fault(id)?.began?.as_nanos();
+    let company = Company::of(log, log.fault(id)?);
     let diagnosis = lab.diagnosis();
-    let (finding, fits) = best_finding(&diagnosis, &truth, &scene)?;
-    (finding.opened_ns.0 >= since).then(|| (finding.clone(), fits))
+    let (finding, fits) = best_finding(&diagnosis, &truth, &scene, company)?;
+    Some((finding.clone(), fits))
+}
+
+fn describe(project: &Project, site: Site) -> String {
+    let device = |id: DeviceId| project.devices.get(id.index());
+    site.describe(|id| device(id).map_or_else(|| id.no().to_string(), |known| known.name.clone()))
 }

@@ -6,6 +6,8 @@
 
 use std::collections::VecDeque;
 
+use std::collections::BTreeMap;
+
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{Plan, PlanOptions};
 use linesman_config::project::{Project, ProjectError};
@@ -14,14 +16,18 @@ use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
 use linesman_diagnosis::{Engine, Event as FindingEvent, Setup};
 use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest, Target};
 use linesman_proto::address::{DeviceId, Network, Path};
+use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::Tree;
+use linesman_proto::topology::{End, Tree};
 use linesman_sim::fault::FaultError;
 use linesman_sim::segment::{BuildError, HostPort, Segment};
 use linesman_sim::segment_file::{FaultEntry, SegmentFile, SegmentFileError};
 use linesman_sim::truth::{FaultId, TruthLog, Unexplained};
 
 use crate::options::{Begin, LabOptions};
+use crate::verdict::Truth;
+use crate::verdict::judge::truth_of;
 
 /// How often the card's counters are looked at.
 const HOST_INTERVAL: Span = Span::ms(100);
@@ -87,6 +93,7 @@ pub struct Lab {
     events: Vec<(Instant, Event)>,
     finding_events: VecDeque<FindingEvent>,
     failure: Option<String>,
+    blind: BTreeMap<FaultId, Vec<End<DeviceId>>>,
     inventory: Option<Inventory>,
     plan: Option<Plan>,
     host_next: Instant,
@@ -135,6 +142,7 @@ impl Lab {
             events: Vec::new(),
             finding_events: VecDeque::new(),
             failure: None,
+            blind: BTreeMap::new(),
             inventory: None,
             plan: None,
             host_next: Instant::ZERO,
@@ -214,6 +222,21 @@ impl Lab {
         self.plan.as_ref()
     }
 
+    /// The project's identity of a SubDevice of the plan. A plan numbers what was found in the order
+    /// of processing, which for a device with several controllers is not that of the project.
+    #[must_use]
+    pub fn of_plan(&self, id: DeviceId) -> DeviceId {
+        let node = self.tree.order().get(id.index());
+        node.map_or(id, |node| DeviceId(*node as u32))
+    }
+
+    /// The plan's identity of a SubDevice of the project; the other way round than
+    /// [`Lab::of_plan`].
+    fn in_plan(&self, id: DeviceId) -> DeviceId {
+        let at = self.tree.order().iter().position(|node| *node == id.index());
+        at.map_or(id, |at| DeviceId(at as u32))
+    }
+
     /// Counters that moved without a logged cause since the last audit.
     pub fn audit(&mut self) -> Vec<Unexplained> {
         self.segment.audit()
@@ -269,7 +292,33 @@ impl Lab {
     /// # Errors
     /// The segment's, when the entry names no place or parameter.
     pub fn inject(&mut self, entry: &FaultEntry) -> Result<FaultId, LabError> {
-        Ok(self.segment.inject(self.now, entry)?)
+        let id = self.segment.inject(self.now, entry)?;
+        let blind = self.blind_ports();
+        self.blind.insert(id, blind);
+        Ok(id)
+    }
+
+    /// A fault of the run as a verdict is held against it; `None` if there is no such fault.
+    #[must_use]
+    pub fn truth_of(&self, id: FaultId) -> Option<Truth> {
+        let log = self.truth();
+        let blind = self.blind.get(&id).cloned().unwrap_or_default();
+        Some(Truth { blind, ..truth_of(log, log.fault(id)?) })
+    }
+
+    /// Ports whose symbol counter stands at its end.
+    fn blind_ports(&self) -> Vec<End<DeviceId>> {
+        let mut blind = Vec::new();
+        for id in self.segment.devices() {
+            let Some(controller) = self.segment.controller(id) else { continue };
+            let counters = controller.error_counters();
+            for port in Port::ALL {
+                if counters.value(ErrorCounter::PhysicalLayer(port)) == Some(u8::MAX) {
+                    blind.push(End::Controller(id, port));
+                }
+            }
+        }
+        blind
     }
 
     /// Ends a fault.
@@ -428,7 +477,8 @@ impl Lab {
             self.handle_event(event);
         }
         while let Some(probe) = self.engine.poll_probe() {
-            let device = self.plan.as_ref().and_then(|plan| plan.device(probe.device));
+            let device =
+                self.plan.as_ref().and_then(|plan| plan.device(self.in_plan(probe.device)));
             // Who is not of the plan has no address that could be asked.
             let Some(device) = device else { continue };
             let request = ProbeRequest {
@@ -497,7 +547,8 @@ impl Lab {
     fn make_plan(&self, inventory: &Inventory) -> Result<Plan, String> {
         let mut planned = inventory.planned(self.options.target);
         if planned.len() == self.project.devices.len() {
-            for (device, wanted) in planned.iter_mut().zip(&self.project.devices) {
+            for (device, id) in planned.iter_mut().zip(0..) {
+                let wanted = &self.project.devices[self.of_plan(DeviceId(id)).index()];
                 device.name.clone_from(&wanted.name);
             }
         }

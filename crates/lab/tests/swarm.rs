@@ -1,14 +1,14 @@
-//! The swarm's invariants. Two hundred seeds run in a release build: `linesman lab swarm`.
+//! The swarm's invariants, on two hundred seeds.
 
 use linesman_lab::swarm::{SwarmOptions, swarm};
 
-/// Seeds of this test, which also runs unoptimised; `SEEDS=A..B` chooses others.
+/// Seeds of this test: two hundred, unless `SEEDS=A..B` says others.
 fn seeds() -> std::ops::Range<u64> {
     #[expect(clippy::disallowed_methods, reason = "a choice for whoever works on one seed")]
     let chosen = std::env::var("SEEDS").ok();
     let chosen = chosen.as_deref().and_then(|text| text.split_once(".."));
     let chosen = chosen.and_then(|(from, to)| Some(from.parse().ok()?..to.parse().ok()?));
-    chosen.unwrap_or(1..13)
+    chosen.unwrap_or(1..201)
 }
 
 #[test]

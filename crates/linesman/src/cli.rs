@@ -2,7 +2,9 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{completion, demo, diagnose, explain, interfaces, lab, scan, schema, sim};
+use crate::command::{
+    completion, demo, diagnose, explain, fault, interfaces, lab, scan, schema, sim,
+};
 use crate::version::VERSION;
 
 /// The whole command line.
@@ -54,6 +56,8 @@ pub(crate) enum Command {
     Explain(explain::Arguments),
     /// A virtual segment on real interfaces, for any MainDevice
     Sim(sim::Arguments),
+    /// Break and heal a segment that runs on real interfaces
+    Fault(fault::Arguments),
     /// Stories and swarms in virtual time
     Lab(lab::Arguments),
     /// JSON schema of a file or output
@@ -68,6 +72,7 @@ impl Command {
         match self {
             Self::Scan(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
+            Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
             Self::Demo(_)
             | Self::Explain(_)

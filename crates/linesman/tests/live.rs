@@ -34,7 +34,7 @@ for card in near0 far0; do
     sysctl -q -w net.ipv6.conf.$card.disable_ipv6=1
     ip link set $card up
 done
-"$LINESMAN" sim "$PLANT" --on far0 > "$DIRECTORY/sim.out" &
+"$LINESMAN" sim "$PLANT" --on far0 --control "$DIRECTORY/control" > "$DIRECTORY/sim.out" &
 sim=$!
 trap 'kill -INT $sim 2> /dev/null; wait $sim || true' EXIT
 for try in $(seq 100); do
@@ -181,4 +181,47 @@ fn an_interface_that_vanishes_ends_the_look_with_what_was_seen() {
     assert_eq!(diagnosis["complete"], false, "{diagnosis}");
     assert_eq!(diagnosis["network"]["devices"], 3);
     assert!(run.stderr.contains("near0") && run.stderr.contains("judged as far"), "{}", run.stderr);
+}
+
+#[test]
+fn a_fault_put_on_a_running_line_is_found_and_heals() {
+    let script = r#"
+        "$LINESMAN" diagnose near0 --seconds 3 --json > "$DIRECTORY/found.json" &
+        look=$!
+        sleep 1
+        "$LINESMAN" fault "$DIRECTORY/control" inject link-open --at I1.B-O1.A > /dev/null || exit 8
+        sleep 0.5
+        "$LINESMAN" fault "$DIRECTORY/control" heal 1 --json || exit 9
+        wait $look
+        status=$?
+        cat "$DIRECTORY/found.json" >&2
+        exit $status
+    "#;
+    let Some(run) = beside_segment(script) else { return };
+    assert_eq!(run.status, 1, "{}", run.all());
+    let faults = run.json();
+    assert_valid(&faults, "faults");
+    assert_eq!(faults["faults"][0]["name"], "link-open");
+    assert_eq!(faults["faults"][0]["places"], serde_json::json!(["I1.B-O1.A"]));
+    let diagnosis: serde_json::Value = serde_json::from_str(&run.stderr).expect("a diagnosis");
+    let findings = diagnosis["findings"].as_array().unwrap();
+    let link = findings.iter().find(|one| one["place"]["kind"] == "link").expect("a link");
+    assert_eq!(link["place"]["a"], serde_json::json!({ "no": 2, "port": "B" }), "{diagnosis:#}");
+    assert_eq!(link["state"], "closed", "healed: {diagnosis:#}");
+}
+
+#[test]
+fn what_cannot_be_put_on_a_line_is_refused() {
+    let script = r#"
+        fault() { "$LINESMAN" fault "$DIRECTORY/control" "$@"; echo "$?"; }
+        fault list
+        fault inject link-open --at K1.C-K9.A
+        fault heal 5
+        "$LINESMAN" fault "$DIRECTORY/nobody" list --json; echo "$?"
+    "#;
+    let Some(run) = beside_segment(script) else { return };
+    assert!(run.stdout.starts_with("No faults so far.\n0\n2\n2\n{"), "{}", run.all());
+    assert!(run.stdout.ends_with("}\n2\n"), "{}", run.all());
+    assert!(run.stderr.contains("K9") && run.stderr.contains("no fault 5"), "{}", run.stderr);
+    assert!(run.stderr.contains("--control SOCKET"), "{}", run.stderr);
 }

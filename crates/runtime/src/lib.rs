@@ -5,9 +5,11 @@
 //! MainDevice on cards, [`listen`] hears what is on a card,
 //! [`host_watch`] asks about a card, [`serve`] puts a segment on real
 //! interfaces, [`record`] writes
-//! what was seen to a file, [`stop`] is the wish to stop.
+//! what was seen to a file, [`control`] breaks and heals it,
+//! [`stop`] is the wish to stop.
 
 pub mod capture;
+pub mod control;
 pub mod drive;
 pub mod host_watch;
 pub mod listen;

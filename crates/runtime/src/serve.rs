@@ -11,6 +11,7 @@ use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::Segment;
 
+use crate::control::Control;
 use crate::stop::Stop;
 use crate::wiring::Wiring;
 
@@ -70,17 +71,25 @@ impl Server {
         })
     }
 
-    /// Answers until `until` or `stop`.
+    /// Answers until `until` or `stop`, and suffers what `control` is asked for.
     ///
     /// # Errors
     /// When an interface vanished, or the kernel refuses something else. What was served so far
     /// stays to be asked for.
-    pub fn run(&mut self, until: Instant, stop: &Stop) -> Result<(), LinkError> {
+    pub fn run(
+        &mut self,
+        until: Instant,
+        stop: &Stop,
+        control: Option<&Control>,
+    ) -> Result<(), LinkError> {
         tighten_timers();
         loop {
             self.receive()?;
             let now = self.clock.now();
             self.segment.advance(now);
+            if let Some(control) = control {
+                control.serve(now, &mut self.segment);
+            }
             self.wiring.carry(self.segment.signals_mut());
             self.send(now)?;
             if stop.is_set() || now >= until {

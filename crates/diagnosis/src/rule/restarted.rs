@@ -50,11 +50,11 @@ pub const FELL: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[RESTARTED, FELL], judge };
 
 const AL_STATUS: RegisterAddress = RegisterAddress(0x0130);
-/// Outages that begin so close together have one cause; states are polled one after the other.
+/// Outages that follow so close on each other have one cause; states are polled one after the other.
 const TOGETHER: Span = Span::ms(500);
 /// An outage that ended so long before the state was seen may belong to it: addresses are given and
 /// states read only after a scan.
-const BEFORE: Span = Span::s(10);
+const BEFORE: Span = Span::s(3);
 /// A link needs up to two seconds to come up again: only a longer outage was no mere dip.
 const LONG: Span = Span::ms(2500);
 
@@ -73,6 +73,12 @@ struct Fall<'a> {
 impl Fall<'_> {
     fn began(&self) -> Instant {
         self.gone.map_or(self.change.at, |(since, _)| since)
+    }
+
+    /// Whether both were on their way down and up at the same time: a device without supply of its own
+    /// goes with the one that feeds it, and is seen to have fallen only after that one is back.
+    fn overlaps(&self, other: &Self) -> bool {
+        self.began() <= other.change.at + TOGETHER && other.began() <= self.change.at + TOGETHER
     }
 
     fn was_long(&self) -> bool {
@@ -94,7 +100,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for fall in &falls {
         let together: Vec<_> = falls
             .iter()
-            .filter(|other| other.is_restart && is_near(other.began(), fall.began()))
+            .filter(|other| other.is_restart && other.overlaps(fall))
             .copied()
             .collect();
         conditions.push(if fall.is_restart {
@@ -278,9 +284,4 @@ fn is_back(fall: &Fall<'_>) -> bool {
     let state = fall.device.al.state();
     let is_later = fall.device.al.status.is_some_and(|status| status.at > fall.change.at);
     is_later && state >= fall.change.from.state().state()
-}
-
-fn is_near(one: Instant, other: Instant) -> bool {
-    let (early, late) = if one < other { (one, other) } else { (other, one) };
-    late.since(early) <= TOGETHER
 }

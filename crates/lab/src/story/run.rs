@@ -15,7 +15,7 @@ use super::parse::{SegmentText, Story};
 use super::step::{Expectation, Heal, Step, StepAt, What};
 use crate::lab::Lab;
 use crate::options::LabOptions;
-use crate::verdict::judge::{best_finding, truth_of};
+use crate::verdict::judge::{Company, best_finding};
 use crate::verdict::{Claim, Scene, Site};
 
 /// How long a line may take to be brought up.
@@ -323,13 +323,14 @@ fn verdict(on: Option<FaultName>, lab: &Lab, diagnosis: &Diagnosis) -> Result<()
     let mut none = true;
     for fault in log.faults().iter().filter(meant) {
         none = false;
-        let truth = truth_of(log, fault);
+        let Some(truth) = lab.truth_of(fault.id) else { continue };
         let host_counters = lab.options().host_counters;
         let fits = [false, true].into_iter().any(|answered_again| {
             // Once it is over and the line is back, memories tell more than silence did.
             let over = !fault.is_active();
             let scene = Scene { tree: lab.tree(), host_counters, answered_again };
-            (over || !answered_again) && best_finding(diagnosis, &truth, &scene).is_some()
+            (over || !answered_again)
+                && best_finding(diagnosis, &truth, &scene, Company::of(log, fault)).is_some()
         });
         if !fits {
             return Err(format!(

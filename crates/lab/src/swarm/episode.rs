@@ -17,8 +17,8 @@ use super::reach::Reach;
 use super::run::{SwarmOptions, cabled};
 use crate::choice::{AT_RUN_TIME, Choice, Ground};
 use crate::lab::{Lab, LabError};
-use crate::verdict::judge::{best_finding, explains, truth_of};
-use crate::verdict::{Match, Scene, Site};
+use crate::verdict::judge::{Company, best_finding, explains};
+use crate::verdict::{Match, Scene, Site, Truth};
 
 /// Slices of time between two checks.
 const SLICE: Span = Span::ms(25);
@@ -162,7 +162,8 @@ impl<'a> Episode<'a> {
             if matches!(note.kind, Kind::Logical(_)) && !up {
                 continue;
             }
-            let Some(expected) = expected(note.kind, plan, &reached) else { continue };
+            let served = |id| reached.get(self.lab.of_plan(id).index()).copied().unwrap_or(false);
+            let Some(expected) = expected(note.kind, plan, &reached, served) else { continue };
             self.checked += 1;
             if expected != note.counter {
                 wrong = wrong.or(Some((*note, expected)));
@@ -221,8 +222,10 @@ impl<'a> Episode<'a> {
             answered_again: false,
         };
         let diagnosis = self.lab.diagnosis();
-        let truth = truth_of(log, fault);
-        if let Some((finding, graded)) = best_finding(&diagnosis, &truth, &scene) {
+        let Some(truth) = self.lab.truth_of(id) else { return outcome };
+        if let Some((finding, graded)) =
+            best_finding(&diagnosis, &truth, &scene, Company::of(log, fault))
+        {
             let site = Site::from(&finding.place);
             let text = format!("{} {} at {site}", finding.code, finding.cause);
             outcome.found = Some((text, graded));
@@ -287,8 +290,10 @@ impl<'a> Episode<'a> {
     /// Every finding has a cause in the log.
     fn explain_findings(&mut self) {
         let diagnosis = self.lab.diagnosis();
+        let acted = self.lab.truth().faults().iter().filter(|fault| fault.first_effect.is_some());
+        let truths: Vec<Truth> = acted.filter_map(|fault| self.lab.truth_of(fault.id)).collect();
         for finding in diagnosis.findings.iter().filter(|f| f.severity != Severity::Info) {
-            let graded = explains(self.lab.truth(), self.lab.tree(), self.host_counters, finding);
+            let graded = explains(&truths, self.lab.tree(), self.host_counters, finding);
             if !graded.is_right() {
                 let site = Site::from(&finding.place);
                 let faults: Vec<String> =

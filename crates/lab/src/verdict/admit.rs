@@ -19,6 +19,9 @@ pub struct Truth {
     pub places: Vec<TruthPlace>,
     /// The AL status code that a refusing device gives.
     pub al_code: Option<u16>,
+    /// Ports whose symbol counter stood at its end when the fault began: they could not tell
+    /// symbol errors from clean symbols any more.
+    pub blind: Vec<End<DeviceId>>,
 }
 
 /// Where a fault sits.
@@ -67,6 +70,8 @@ const UNCOUNTED: &str = "without the card's counters frames that the card drops 
                          back";
 const MII: &str = "between its PHY and its controller the receiver may spoil what came clean";
 const MAY_COME_AGAIN: &str = "an opening that is over may have been the first of many";
+const BLIND: &str = "the receiver's symbol counter stood at its end, so nobody knows whether the \
+                     symbols were clean";
 const ONCE: &str = "each opening of a flapping contact is an open link";
 const RESTART: &str = "a dip of a supply and a short time without power are the same to a device";
 const SHARED: &str = "one device of a supply looks the same from outside as a supply of one device";
@@ -122,7 +127,7 @@ impl Set<'_> {
                     self.end(name, to, None);
                 }
                 if name == DeviceInternal {
-                    self.clean(from, to);
+                    self.clean(truth, from, to);
                 }
                 if name == NicDamaged {
                     self.card(from, to);
@@ -184,8 +189,14 @@ impl Set<'_> {
     }
 
     /// Bad frames with clean symbols from `from` to `to`.
-    fn clean(&mut self, from: End<DeviceId>, to: End<DeviceId>) {
+    fn clean(&mut self, truth: &Truth, from: End<DeviceId>, to: End<DeviceId>) {
         self.end(DeviceInternal, to, Some(MII));
+        if truth.blind.contains(&to) {
+            let hop = Site::hop(self.scene.tree, from, to);
+            for cause in [CableDegraded, EmcNoise, TransmitterDamaged, ReceiverDamaged] {
+                self.add(cause, hop, Some(BLIND));
+            }
+        }
         self.card(from, to);
     }
 
@@ -218,7 +229,7 @@ impl Set<'_> {
         if name == DeviceInternal {
             for (here, far) in self.links_of(id) {
                 self.add(DeviceInternal, Site::hop(self.scene.tree, here, far), None);
-                self.clean(here, far);
+                self.clean(truth, here, far);
             }
         }
         if name == TransmitterDamaged {
@@ -300,7 +311,7 @@ mod tests {
     }
 
     fn truth(name: FaultName, place: TruthPlace) -> Truth {
-        Truth { name, places: vec![place], al_code: None }
+        Truth { name, places: vec![place], al_code: None, blind: Vec::new() }
     }
 
     fn grade(truth: &Truth, host_counters: bool, cause: FaultName, site: Site) -> Grade {
@@ -351,6 +362,17 @@ mod tests {
         assert!(grade(&inner, true, NicDamaged, Site::Host).is_right());
         assert!(!grade(&inner, true, HostDrops, Site::Host).is_right());
         assert!(grade(&inner, false, HostDrops, Site::Host).is_right());
+    }
+
+    #[test]
+    fn a_counter_at_its_end_cannot_tell_clean_symbols() {
+        let mut inner = truth(DeviceInternal, TruthPlace::Device(DeviceId(1)));
+        let hop = Site::Link { a: end(1, B), b: Some(end(2, A)), way: Some(Way::AToB) };
+        assert!(!grade(&inner, true, CableDegraded, hop).is_right());
+        inner.blind.push(end(2, A));
+        assert!(grade(&inner, true, CableDegraded, hop).is_right());
+        let back = Site::Link { a: end(0, B), b: Some(end(1, A)), way: Some(Way::BToA) };
+        assert!(!grade(&inner, true, CableDegraded, back).is_right());
     }
 
     #[test]

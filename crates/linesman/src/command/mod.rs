@@ -5,6 +5,7 @@ pub(crate) mod demo;
 pub(crate) mod diagnose;
 pub(crate) mod driven;
 pub(crate) mod explain;
+pub(crate) mod fault;
 pub(crate) mod interfaces;
 pub(crate) mod lab;
 pub(crate) mod scan;
@@ -26,6 +27,7 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
         Command::Explain(arguments) => explain::run(&arguments, output),
         Command::Sim(arguments) => sim::run(&arguments, output),
+        Command::Fault(arguments) => fault::run(&arguments, output),
         Command::Schema(arguments) => schema::run(&arguments, output),
         Command::Completion(arguments) => completion::run(&arguments, output),
     }

@@ -3,6 +3,7 @@
 use linesman_config::project::Project;
 use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
+use linesman_runtime::control::Answer;
 use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
 
@@ -36,6 +37,8 @@ pub(crate) enum Name {
     Diagnosis,
     /// A line of `diagnose --follow --json`
     Event,
+    /// `fault --json`
+    Faults,
     /// `interfaces --json`
     Interfaces,
     /// What every command with --json prints when nothing could be judged
@@ -56,6 +59,7 @@ fn schema(name: Name) -> Schema {
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),
+        Name::Faults => schema_for!(Answer),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Error => schema_for!(ErrorReport),
     }

@@ -1,9 +1,10 @@
 //! `linesman sim`: a virtual segment on real interfaces, for any MainDevice.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use linesman_lab::drawing;
 use linesman_proto::time::{Instant, Span};
+use linesman_runtime::control::Control;
 use linesman_runtime::selector::Selector;
 use linesman_runtime::serve::{Served, Server};
 use linesman_runtime::wiring::Wiring;
@@ -28,6 +29,9 @@ pub(crate) struct Arguments {
     /// End after so many seconds; else Ctrl-C ends it
     #[arg(long, value_name = "N")]
     seconds: Option<f64>,
+    /// Open a socket for `linesman fault`, to break and heal the segment while it runs
+    #[arg(long, value_name = "SOCKET")]
+    control: Option<PathBuf>,
 }
 
 /// Answers frames until asked to stop.
@@ -48,12 +52,20 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         0 => String::new(),
         wires => format!(" {} wired to inputs.", count(wires as u64, "output")),
     };
+    let control = arguments.control.as_deref().map(open_control).transpose()?;
     let mut server = Server::open(plant.segment, wiring, &names)?;
     output.line(&format!("\n{count_text} on {}.{wires} Ctrl-C ends it.", names.join("+")));
-    let result = server.run(until, &stop);
+    let result = server.run(until, &stop, control.as_ref());
     output.line(&summary(&server.served(), server.clock().now()));
     result?;
     Ok(Status::Good)
+}
+
+fn open_control(path: &Path) -> Result<Control, Failure> {
+    Control::open(path).map_err(|error| {
+        let reason = format!("{}: opening the control socket: {error}", path.display());
+        Failure::new(reason, "name another path, in a directory where you may write")
+    })
 }
 
 /// The end of a run that lasts so many seconds.
