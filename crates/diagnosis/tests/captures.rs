@@ -8,7 +8,7 @@ mod support;
 use linesman_config::fault::Class;
 use linesman_diagnosis::report::{FindingState, PlaceReport, Severity, Verdict};
 use linesman_proto::address::Network;
-use support::{read_capture, real_captures, text};
+use support::{read_capture, read_some_of_capture, real_captures, text};
 
 /// Name, SubDevices, highest AL state, datagrams of requests.
 ///
@@ -35,6 +35,7 @@ const ROWS: [(&str, u64, Option<&str>, u64); 17] = [
     ("echist-replay-segmented-upload-202401", 1, Some("PREOP"), 312),
 ];
 
+// proves: WS-04 partial, WS-13 partial
 #[test]
 fn every_real_capture_is_read_as_what_it_is() {
     let Some(folder) = real_captures() else { return };
@@ -50,6 +51,31 @@ fn every_real_capture_is_read_as_what_it_is() {
             assert_eq!(report.verdict, Verdict::Healthy, "{name}: {}", text(&report));
             assert!(report.findings.is_empty(), "{name}: {}", text(&report));
         }
+    }
+}
+
+/// Bit 0x02 of the first byte of the source address: set by the first controller.
+fn comes_back(frame: &[u8]) -> bool {
+    frame.get(6).is_some_and(|first| first & 0x02 != 0)
+}
+
+#[test]
+fn half_a_capture_is_no_fault_of_the_line() {
+    let Some(folder) = real_captures() else { return };
+    for (name, devices, state, _) in ROWS {
+        let path = folder.join(format!("{name}.pcapng"));
+        // Broadcasts alone that nobody answers are just that.
+        if !["ec-soem-sdinfo-no-slaves", "ec-twincat-scan-devices-2"].contains(&name) {
+            let report = read_some_of_capture(&path, |frame| !comes_back(frame)).diagnosis();
+            assert_ne!(report.verdict, Verdict::Faulty, "{name}, sent: {}", text(&report));
+        }
+        if name == "ec-soem-sdinfo-no-slaves" {
+            continue;
+        }
+        let report = read_some_of_capture(&path, comes_back).diagnosis();
+        assert_ne!(report.verdict, Verdict::Faulty, "{name}, returned: {}", text(&report));
+        assert_eq!(report.network.devices.0, devices, "{name}, returned");
+        assert_eq!(report.network.al_state_highest.as_deref(), state, "{name}, returned");
     }
 }
 

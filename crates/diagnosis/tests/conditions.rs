@@ -67,6 +67,7 @@ fn all_well() {
     assert!(script.engine.poll_event().is_none());
 }
 
+// proves: SW-01 partial, DIA-02 partial
 #[test]
 fn a_refused_state_names_device_transition_and_code() {
     let mut script = Script::scanned(3);
@@ -118,6 +119,7 @@ fn a_copied_acknowledge_bit_is_no_error() {
     assert_eq!(report.verdict, Verdict::Healthy, "{}", text(&report));
 }
 
+// proves: SW-03 partial
 #[test]
 fn a_watchdog_explains_the_missing_outputs() {
     let mut script = running();
@@ -198,6 +200,7 @@ fn events_tell_the_life_of_a_finding_in_order() {
     assert_eq!(kinds, [EventKind::Opened, EventKind::Confirmed, EventKind::Closed]);
 }
 
+// proves: FRM-19 partial
 #[test]
 fn probes_are_asked_for_once_something_is_wrong() {
     let mut script = Script::with(linesman_diagnosis::Setup {

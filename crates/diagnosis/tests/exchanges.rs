@@ -276,6 +276,7 @@ fn frames_cut_off_by_the_recorder_are_read_as_far_as_they_go() {
     assert_eq!((report.network.datagrams.0, report.network.unanswered.0), (1 + 2 + 6 + 20, 0));
 }
 
+// proves: RED-06 partial
 #[test]
 fn both_cards_of_a_ring_make_one_exchange() {
     let mut script = Script::new();

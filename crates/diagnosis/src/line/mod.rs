@@ -3,13 +3,17 @@
 //! Frames teach it, or an observation file fills it in directly; rules only look at it. Everything
 //! keeps when and by which frame it was learnt, so that a finding can point there.
 
+pub mod al_history;
 pub mod counters;
 pub mod cyclic;
 pub mod device;
+pub mod dl_history;
 pub mod host;
 pub mod learn;
 pub mod sii_image;
 pub mod traffic;
+
+use std::collections::VecDeque;
 
 use linesman_config::project::Project;
 use linesman_proto::address::{DeviceId, LogicalAddress, Network, Path, Position, StationAddress};
@@ -18,16 +22,18 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 
+pub use al_history::{AlChange, AlError, AlHistory};
 pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cyclic::{Cyclic, Deficit, Owner};
-pub use device::{
-    Absence, AlChange, AlError, AlHistory, Device, DlChange, DlHistory, Planned, SeenIdentity,
-    Trouble,
-};
+pub use device::{Absence, Device, Planned, SeenIdentity, Trouble};
+pub use dl_history::{DlChange, DlHistory};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
 pub use sii_image::SiiImage;
 pub use traffic::{Silence, Traffic};
+
+/// How many changes of one kind are kept of a controller; older ones are forgotten.
+pub const CHANGES_KEPT: usize = 64;
 
 /// Something that was learnt, with when and from which frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -250,4 +256,12 @@ pub(crate) fn owners(
         }
         (owner.reads || owner.writes).then_some(owner)
     })
+}
+
+/// Adds a change; the oldest one goes when there are too many.
+fn push_kept<T>(changes: &mut VecDeque<T>, change: T) {
+    if changes.len() == CHANGES_KEPT {
+        changes.pop_front();
+    }
+    changes.push_back(change);
 }

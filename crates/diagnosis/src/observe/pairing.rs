@@ -81,6 +81,21 @@ pub struct Pairing {
     senders: Vec<Sender>,
     senders_changed: bool,
     returns: u64,
+    one_way: OneWay,
+    /// Returns that were taken for requests, since this was asked.
+    mistaken: u64,
+}
+
+/// Whether the recording shows only what comes back.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+enum OneWay {
+    /// Nothing speaks for it yet.
+    #[default]
+    Open,
+    /// Answers came from this marked address, and no request was seen: whatever has it comes back.
+    From(MacAddress),
+    /// Requests and returns are both there.
+    No,
 }
 
 #[derive(Clone, Debug)]
@@ -132,6 +147,9 @@ impl Pairing {
             if self.was_returned(print, frame.time) {
                 return Outcome::Duplicate;
             }
+            if frame.direction == Direction::Unknown {
+                self.weigh_one_way(source, print, settle);
+            }
             self.remember(print, frame.time);
             let is_ours = |one: &Sender| one.mac == source || one.mac.marked() == source;
             if frame.direction == Direction::Received && !self.senders.iter().any(is_ours) {
@@ -154,6 +172,7 @@ impl Pairing {
             self.returns += 1;
             return Outcome::ReturnAlone;
         };
+        self.one_way = OneWay::No;
         self.remember(print, frame.time);
         self.returns += 1;
         self.give_back(found, frame, view, settle);
@@ -206,11 +225,18 @@ impl Pairing {
         std::mem::take(&mut self.senders_changed)
     }
 
+    /// How many requests turned out to be returns whose request was not seen, since this was asked.
+    pub fn take_mistaken(&mut self) -> u64 {
+        std::mem::take(&mut self.mistaken)
+    }
+
     /// Whether a frame of unknown direction is on its way back.
     fn is_return(&self, found: Option<usize>, source: MacAddress, print: Fingerprint) -> bool {
         let Some(pending) = found.map(|index| &self.pending[index]) else {
             let is_own = |sender: &Sender| !sender.mac.is_marked() && sender.mac.marked() == source;
-            return print.is_answered || self.senders.iter().any(is_own);
+            return print.is_answered
+                || self.one_way == OneWay::From(source)
+                || self.senders.iter().any(is_own);
         };
         if print.changing != pending.print.changing {
             return true;
@@ -220,6 +246,48 @@ impl Pairing {
             // An address that is marked from the start shows nothing. Where answers are known to
             // come, a second frame is the return; else it is the request again.
             (true, _) => self.returns > 0,
+        }
+    }
+
+    /// A return came whose request was not seen. An answer from a marked address, with no request
+    /// ever paired, means that requests are not recorded; what nobody answered and was taken for one
+    /// came back too. Where the MainDevice's own address has the mark, the next answer to such a
+    /// frame shows the mistake.
+    fn weigh_one_way(
+        &mut self,
+        source: MacAddress,
+        print: Fingerprint,
+        settle: &mut impl FnMut(&Exchange<'_>),
+    ) {
+        match self.one_way {
+            OneWay::Open if print.is_answered && source.is_marked() => {
+                self.one_way = OneWay::From(source);
+                self.senders.retain(|sender| sender.mac != source);
+                while let Some(at) = self.pending.iter().position(|one| one.source == source) {
+                    let reply = Some(self.pending[at].copy());
+                    let returns_before = self.returns;
+                    settle(&Exchange {
+                        request: None,
+                        reply,
+                        earlier: &[],
+                        is_last: true,
+                        returns_before,
+                        is_cut_off: false,
+                    });
+                    self.returns += 1;
+                    self.mistaken += 1;
+                    self.remove(at);
+                }
+            }
+            OneWay::From(_) => {
+                let was_its_request = |(returned, _): &(Fingerprint, Instant)| {
+                    returned.lasting == print.lasting && !returned.is_answered
+                };
+                if print.is_answered && self.returned.iter().flatten().any(was_its_request) {
+                    self.one_way = OneWay::No;
+                }
+            }
+            OneWay::Open | OneWay::No => {}
         }
     }
 

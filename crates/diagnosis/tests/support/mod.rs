@@ -34,11 +34,19 @@ pub fn real_captures() -> Option<PathBuf> {
 
 /// The engine after a whole capture file.
 pub fn read_capture(path: &Path) -> Engine {
+    read_some_of_capture(path, |_| true)
+}
+
+/// The engine after those frames of a capture file that `wanted` takes.
+pub fn read_some_of_capture(path: &Path, wanted: impl Fn(&[u8]) -> bool) -> Engine {
     let mut engine = Engine::new(Setup { source: path.display().to_string(), ..Setup::default() });
     let mut reader = CaptureReader::open(path).unwrap();
     let mut first = None;
     let mut now = Instant::default();
     while let Some(frame) = reader.next_frame() {
+        if !wanted(frame.bytes) {
+            continue;
+        }
         if let Some(time) = frame.time {
             let first = *first.get_or_insert(time);
             now = Instant::default() + time.since(first).unwrap_or(Span::ns(0));

@@ -1,19 +1,22 @@
 //! The whole of diagnosis: frames and host observations in, findings out.
 
+mod setup;
+
 use std::collections::VecDeque;
 
-use linesman_config::project::Project;
-use linesman_proto::address::{DeviceId, Network, RegisterAddress};
+use linesman_proto::address::{Network, RegisterAddress};
 use linesman_proto::frame::{FrameError, FrameView};
 use linesman_proto::time::{Instant, Span};
 
-use crate::finding::{Book, Change, Condition, Finding, Severity};
+use crate::finding::{Book, Condition, Finding, Severity};
 use crate::line::{Learner, Line, Seen};
 use crate::observe::{
     Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, Pairing,
 };
-use crate::report::{self, Diagnosis, FindingReport, NetworkReport, Number, Verdict};
+use crate::report::{self, Diagnosis, NetworkReport, Number, Verdict};
 use crate::rule::{RULES, View};
+
+pub use setup::{Event, EventKind, Probe, ProbeEffect, Setup};
 
 /// The rules are asked at most this often; what they find keeps the time of its evidence.
 const JUDGE_EVERY: Span = Span::ms(10);
@@ -24,63 +27,6 @@ const JUDGE_AGAIN: Span = Span::ms(100);
 
 /// For so long after its last rise a counter is watched in this way.
 const WATCHED_AFTER_RISE: Span = Span::s(15);
-
-/// What the engine is told before it begins.
-#[derive(Clone, Default, Debug)]
-pub struct Setup {
-    /// What was planned, for network 0.
-    pub project: Option<Project>,
-    /// Whether the counters of the host's cards will be reported, so that silence means zero.
-    pub host_counters: bool,
-    /// Whether probes can be sent.
-    pub probes: bool,
-    /// What is looked at: a selector, or a file.
-    pub source: String,
-    /// When the run began, RFC 3339.
-    pub start: Option<String>,
-    /// The clock behind the times.
-    pub clock: String,
-}
-
-/// Something happened to a finding.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Event {
-    /// When the engine noticed.
-    pub at: Instant,
-    /// What happened.
-    pub kind: EventKind,
-    /// The finding, without what follows from it.
-    pub finding: FindingReport,
-}
-
-/// What happened to a finding.
-pub type EventKind = Change;
-
-/// A wish to have a register read.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Probe {
-    /// The network.
-    pub network: Network,
-    /// The controller.
-    pub device: DeviceId,
-    /// Where to begin.
-    pub register: RegisterAddress,
-    /// How many bytes.
-    pub len: u16,
-    /// Later than this the answer is of no use.
-    pub deadline: Instant,
-    /// What the probe does to the line.
-    pub effect: ProbeEffect,
-}
-
-/// What a probe does to the line.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum ProbeEffect {
-    /// It reads, and changes nothing.
-    Reads,
-    /// It writes: only where the user allowed it.
-    Writes,
-}
 
 /// One network.
 #[derive(Clone, Debug)]
@@ -442,7 +388,14 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     let print = Fingerprint::of(&view);
     traffic.cut_short += u64::from(print.is_cut && !frame.truncated);
     let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(line, exchange));
+    let mistaken = pairing.take_mistaken();
     let traffic = &mut line.traffic;
+    if mistaken > 0 {
+        traffic.sent = traffic.sent.saturating_sub(mistaken);
+        traffic.returned += mistaken;
+        traffic.returned_alone += mistaken;
+        traffic.senders = pairing.senders().to_vec();
+    }
     match outcome {
         Outcome::Request | Outcome::RequestCopy => {
             traffic.sent += 1;

@@ -1,0 +1,184 @@
+//! States of one controller over time, and the errors it signalled.
+
+use std::collections::VecDeque;
+
+use linesman_proto::register::{AlControl, AlStatus};
+use linesman_proto::state::{AlState, AlStatusCode, StateValue};
+use linesman_proto::time::Instant;
+
+use super::{Seen, push_kept};
+
+/// States over time.
+#[derive(Clone, Default, Debug)]
+pub struct AlHistory {
+    /// AL status (0x0130) as last read.
+    pub status: Option<Seen<AlStatus>>,
+    /// AL status code (0x0134) as last read.
+    pub code: Option<Seen<AlStatusCode>>,
+    /// The state last asked for (0x0120).
+    pub requested: Option<Seen<StateValue>>,
+    /// The highest state it was ever seen in.
+    pub highest: Option<AlState>,
+    /// Changes of status, oldest first, at most [`CHANGES_KEPT`](super::CHANGES_KEPT).
+    pub changes: VecDeque<AlChange>,
+    /// All changes, also those forgotten.
+    pub change_count: u64,
+    /// Errors it signalled, oldest first, at most [`CHANGES_KEPT`](super::CHANGES_KEPT).
+    pub errors: VecDeque<AlError>,
+    /// Whether it was in the state last asked for, without error, since it was asked.
+    pub has_arrived: bool,
+}
+
+/// An error that a controller signalled in AL status.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct AlError {
+    /// AL status with the error bit, when it was first read.
+    pub status: Seen<AlStatus>,
+    /// The code, as far as it was read while the error stood.
+    pub code: Option<Seen<AlStatusCode>>,
+    /// The state before; `None` when none was read.
+    pub from: Option<AlState>,
+    /// The state asked for at that time.
+    pub requested: Option<Seen<StateValue>>,
+    /// Whether it had been in the state asked for: then it left it by itself, else it refused.
+    pub had_arrived: bool,
+    /// When the error was gone.
+    pub ended: Option<Instant>,
+}
+
+/// A change of AL status.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct AlChange {
+    /// As it was.
+    pub from: AlStatus,
+    /// As it is then.
+    pub to: AlStatus,
+    /// When, by which frame.
+    pub at: Instant,
+    /// The number of the frame that showed it.
+    pub frame: Option<u64>,
+    /// The state asked for at that time, where a request was seen.
+    pub requested: Option<AlState>,
+}
+
+impl AlChange {
+    /// Whether it went to a lower state though nobody asked for one, and without an error.
+    #[must_use]
+    pub fn is_own_fall(&self) -> bool {
+        let (from, to) = (self.from.state().state(), self.to.state().state());
+        let (Some(from), Some(to)) = (from, to) else { return false };
+        let was_asked = self.requested.is_none_or(|requested| requested < from);
+        to < from && !was_asked && !self.to.error()
+    }
+}
+
+impl AlHistory {
+    /// Takes a reading of AL status. Says whether it is news.
+    pub fn record_status(&mut self, status: AlStatus, at: Instant, frame: Option<u64>) -> bool {
+        self.record_error(status, at, frame);
+        let before = self.status.replace(Seen::new(status, at, frame));
+        self.highest = self.highest.max(status.state().state());
+        let Some(before) = before else { return true };
+        if before.value == status {
+            // The first sighting is the evidence, not the thousandth.
+            self.status = Some(before);
+            return false;
+        }
+        self.change_count += 1;
+        let requested = self.requested.and_then(|requested| requested.value.state());
+        push_kept(
+            &mut self.changes,
+            AlChange { from: before.value, to: status, at, frame, requested },
+        );
+        true
+    }
+
+    /// Whether the error bit is but an echo: a controller without a processor behind it copies AL
+    /// control to AL status, with the bit that acknowledges errors. An error of its own would keep
+    /// a SubDevice from the state asked for.
+    fn is_echo(&self, status: AlStatus) -> bool {
+        match self.requested {
+            Some(requested) => requested.value == status.state(),
+            // Nobody was seen asking: a MainDevice that starts does so with INIT and acknowledge.
+            None => status.state().state() == Some(AlState::Init),
+        }
+    }
+
+    fn record_error(&mut self, status: AlStatus, at: Instant, frame: Option<u64>) {
+        let is_error = status.error() && !self.is_echo(status);
+        let open = self.errors.back_mut().filter(|error| error.ended.is_none());
+        if !is_error {
+            if let Some(error) = open {
+                error.ended = Some(at);
+            }
+            let requested = self.requested.map(|requested| requested.value);
+            self.has_arrived |= requested == Some(status.state());
+            return;
+        }
+        if open.is_some() {
+            return;
+        }
+        push_kept(
+            &mut self.errors,
+            AlError {
+                status: Seen::new(status, at, frame),
+                code: None,
+                from: self.status.and_then(|status| status.value.state().state()),
+                requested: self.requested,
+                had_arrived: self.has_arrived,
+                ended: None,
+            },
+        );
+        // The code is read after the status; what was read earlier is about something else.
+        self.code = None;
+    }
+
+    /// Takes a write to AL control.
+    pub fn record_request(&mut self, control: AlControl, requested: Seen<StateValue>) {
+        if control.acknowledges_error()
+            && let Some(error) = self.errors.back_mut()
+        {
+            error.ended.get_or_insert(requested.at);
+        }
+        let is_new = self.requested.is_none_or(|known| known.value != requested.value);
+        if is_new {
+            self.has_arrived = false;
+        }
+        self.requested = Some(requested);
+    }
+
+    /// Whether the MainDevice asked for a state without process data.
+    #[must_use]
+    pub fn is_asked_down(&self) -> bool {
+        let requested = self.requested.and_then(|requested| requested.value.state());
+        requested.is_some_and(|state| !state.has_inputs())
+    }
+
+    /// Whether it signals an error now.
+    #[must_use]
+    pub fn has_error(&self) -> bool {
+        self.errors.back().is_some_and(|error| error.ended.is_none())
+    }
+
+    /// Takes a reading of AL status code. Says whether it is news.
+    pub fn record_code(&mut self, code: AlStatusCode, at: Instant, frame: Option<u64>) -> bool {
+        if self.code.is_some_and(|known| known.value == code) {
+            return false;
+        }
+        let seen = Seen::new(code, at, frame);
+        self.code = Some(seen);
+        if code.0 != 0
+            && let Some(error) = self.errors.back_mut()
+            && error.ended.is_none()
+        {
+            error.code.get_or_insert(seen);
+        }
+        true
+    }
+
+    /// The state, where one was read and it names one.
+    #[must_use]
+    pub fn state(&self) -> Option<AlState> {
+        self.status?.value.state().state()
+    }
+}
