@@ -276,13 +276,14 @@ fn clean_symbols_point_inside_a_device_and_several_links_to_interference() {
     assert_eq!(conditions[0].place, Place::device(Network(0), DeviceId(3)));
 
     let mut bench = Bench::new(tree, vec![(true, false); 15]);
-    for _ in 0..4 {
-        bench.noise(4, A, 9);
-        bench.noise(10, A, 7);
-        bench.noise(0, C, 5);
-        bench.read_all();
+    for burst in [3, 0, 9, 1, 0, 12, 4, 0, 7, 2, 11, 1] {
+        bench.noise(4, A, 2 * burst + 1);
+        bench.noise(10, A, burst);
+        bench.noise(0, C, burst + 1);
+        bench.now += Span::ms(100);
         bench.read_all();
     }
+    bench.read_all();
     let conditions = bench.conditions();
     let causes: Vec<_> = conditions.iter().map(|condition| condition.cause).collect();
     assert_eq!(causes, [FaultName::EmcNoise; 3]);

@@ -19,7 +19,7 @@ use crate::drawing::{Label, Row, draw};
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 use crate::swarm::run::cabled;
-use crate::verdict::judge::best_finding;
+use crate::verdict::judge::{Company, best_finding};
 use crate::verdict::{Claim, Match, Scene, Site};
 
 /// SubDevices of a demo plant, at least.
@@ -269,8 +269,9 @@ fn verdict_on(lab: &Lab, id: FaultId) -> Option<(FindingReport, Match)> {
     let log = lab.truth();
     let truth = lab.truth_of(id)?;
     let scene = Scene { tree: lab.tree(), host_counters: true, answered_again: false };
+    let company = Company::of(log, log.fault(id)?);
     let diagnosis = lab.diagnosis();
-    let (finding, fits) = best_finding(&diagnosis, &truth, &scene, log.fault(id)?.began)?;
+    let (finding, fits) = best_finding(&diagnosis, &truth, &scene, company)?;
     Some((finding.clone(), fits))
 }
 

@@ -222,6 +222,21 @@ impl Lab {
         self.plan.as_ref()
     }
 
+    /// The project's identity of a SubDevice of the plan. A plan numbers what was found in the order
+    /// of processing, which for a device with several controllers is not that of the project.
+    #[must_use]
+    pub fn of_plan(&self, id: DeviceId) -> DeviceId {
+        let node = self.tree.order().get(id.index());
+        node.map_or(id, |node| DeviceId(*node as u32))
+    }
+
+    /// The plan's identity of a SubDevice of the project; the other way round than
+    /// [`Lab::of_plan`].
+    fn in_plan(&self, id: DeviceId) -> DeviceId {
+        let at = self.tree.order().iter().position(|node| *node == id.index());
+        at.map_or(id, |at| DeviceId(at as u32))
+    }
+
     /// Counters that moved without a logged cause since the last audit.
     pub fn audit(&mut self) -> Vec<Unexplained> {
         self.segment.audit()
@@ -462,7 +477,8 @@ impl Lab {
             self.handle_event(event);
         }
         while let Some(probe) = self.engine.poll_probe() {
-            let device = self.plan.as_ref().and_then(|plan| plan.device(probe.device));
+            let device =
+                self.plan.as_ref().and_then(|plan| plan.device(self.in_plan(probe.device)));
             // Who is not of the plan has no address that could be asked.
             let Some(device) = device else { continue };
             let request = ProbeRequest {
@@ -531,7 +547,8 @@ impl Lab {
     fn make_plan(&self, inventory: &Inventory) -> Result<Plan, String> {
         let mut planned = inventory.planned(self.options.target);
         if planned.len() == self.project.devices.len() {
-            for (device, wanted) in planned.iter_mut().zip(&self.project.devices) {
+            for (device, id) in planned.iter_mut().zip(0..) {
+                let wanted = &self.project.devices[self.of_plan(DeviceId(id)).index()];
                 device.name.clone_from(&wanted.name);
             }
         }

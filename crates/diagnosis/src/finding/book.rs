@@ -72,6 +72,14 @@ impl Book {
                 is_same(&finding.condition, &condition)
                     && finding.closed.is_none_or(|closed| condition.since <= closed)
             });
+            if known.is_none() {
+                // The same trouble again: what was is history.
+                while let Some(index) =
+                    before.iter().position(|finding| is_same(&finding.condition, &condition))
+                {
+                    self.findings.push(before.remove(index));
+                }
+            }
             let (mut finding, is_new) = match known {
                 Some(index) => (before.remove(index), false),
                 None => (self.open(condition.clone()), true),
@@ -199,7 +207,13 @@ fn is_same(one: &Condition, other: &Condition) -> bool {
 fn explains(cause: &Finding, effect: &Finding) -> bool {
     let symptoms = &effect.condition.symptoms;
     let counted = |symptom: &Symptom| {
-        matches!(symptom, Symptom::PortErrors(..) | Symptom::FramesLost | Symptom::CardErrors)
+        matches!(
+            symptom,
+            Symptom::PortErrors(..)
+                | Symptom::LinkDown(..)
+                | Symptom::FramesLost
+                | Symptom::CardErrors
+        )
     };
     let after = if symptoms.iter().all(counted) { AFTER_COUNTED } else { AFTER };
     let was_over = cause.closed.is_some_and(|closed| closed + after < effect.opened);

@@ -23,6 +23,7 @@ use std::collections::BTreeSet;
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
+use linesman_proto::port::Port;
 use linesman_proto::register::{ErrorCounter, table};
 use linesman_proto::time::Span;
 use linesman_proto::topology::{End, Tree};
@@ -166,6 +167,8 @@ pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
                 Symptom::StateLost(id),
                 Symptom::Emergency(id),
             ]);
+            // If it is the device that failed, those behind it lost their links, too.
+            follows.extend(Port::ALL.map(|port| Symptom::LinkDown(id, port)));
         }
     }
     follows.into_iter().collect()

@@ -15,7 +15,7 @@ use super::parse::{SegmentText, Story};
 use super::step::{Expectation, Heal, Step, StepAt, What};
 use crate::lab::Lab;
 use crate::options::LabOptions;
-use crate::verdict::judge::best_finding;
+use crate::verdict::judge::{Company, best_finding};
 use crate::verdict::{Claim, Scene, Site};
 
 /// How long a line may take to be brought up.
@@ -330,7 +330,7 @@ fn verdict(on: Option<FaultName>, lab: &Lab, diagnosis: &Diagnosis) -> Result<()
             let over = !fault.is_active();
             let scene = Scene { tree: lab.tree(), host_counters, answered_again };
             (over || !answered_again)
-                && best_finding(diagnosis, &truth, &scene, fault.began).is_some()
+                && best_finding(diagnosis, &truth, &scene, Company::of(log, fault)).is_some()
         });
         if !fits {
             return Err(format!(

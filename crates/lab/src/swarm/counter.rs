@@ -1,6 +1,7 @@
 //! The check of working counters: what came back against who could be reached.
 
 use linesman_config::plan::Plan;
+use linesman_proto::address::DeviceId;
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::frame::view::Datagram;
@@ -46,30 +47,32 @@ impl Kind {
     }
 }
 
-/// The value that must come back when the nodes in `reached` are there and serve all they have;
-/// `None` for a datagram that is not of the plan.
+/// The value that must come back when the nodes in `reached` are there, and those of the plan that
+/// are `served` serve all they have; `None` for a datagram that is not of the plan.
 ///
 /// It counts by hand: a broadcast one for each, a logical read one, a write one, both three.
 #[must_use]
-pub fn expected(kind: Kind, plan: &Plan, reached: &[bool]) -> Option<u16> {
-    let there = |node: usize| reached.get(node).copied().unwrap_or(false);
+pub fn expected(
+    kind: Kind,
+    plan: &Plan,
+    reached: &[bool],
+    served: impl Fn(DeviceId) -> bool,
+) -> Option<u16> {
     match kind {
         Kind::Broadcast => Some(reached.iter().filter(|reached| **reached).count() as u16),
         Kind::Logical(address) => {
             let (.., datagram) = plan.datagrams().find(|(.., datagram)| {
                 matches!(datagram.address, DatagramAddress::Logical(at) if at.0 == address)
             })?;
+            let written = if datagram.command == Command::Lrw { 2 } else { 1 };
             let mut sum = 0;
-            for node in 0..reached.len() {
+            for device in plan.devices.iter().filter(|device| served(device.id)) {
                 let has = |direction| {
                     let mut owners = datagram.ownership.iter();
-                    owners.any(|owned| owned.device.index() == node && owned.direction == direction)
+                    owners.any(|own| own.device == device.id && own.direction == direction)
                 };
-                if there(node) {
-                    let written = if datagram.command == Command::Lrw { 2 } else { 1 };
-                    sum += u16::from(has(Direction::Inputs));
-                    sum += if has(Direction::Outputs) { written } else { 0 };
-                }
+                sum += u16::from(has(Direction::Inputs));
+                sum += if has(Direction::Outputs) { written } else { 0 };
             }
             Some(sum)
         }

@@ -17,7 +17,7 @@ use super::reach::Reach;
 use super::run::{SwarmOptions, cabled};
 use crate::choice::{AT_RUN_TIME, Choice, Ground};
 use crate::lab::{Lab, LabError};
-use crate::verdict::judge::{best_finding, explains};
+use crate::verdict::judge::{Company, best_finding, explains};
 use crate::verdict::{Match, Scene, Site, Truth};
 
 /// Slices of time between two checks.
@@ -162,7 +162,8 @@ impl<'a> Episode<'a> {
             if matches!(note.kind, Kind::Logical(_)) && !up {
                 continue;
             }
-            let Some(expected) = expected(note.kind, plan, &reached) else { continue };
+            let served = |id| reached.get(self.lab.of_plan(id).index()).copied().unwrap_or(false);
+            let Some(expected) = expected(note.kind, plan, &reached, served) else { continue };
             self.checked += 1;
             if expected != note.counter {
                 wrong = wrong.or(Some((*note, expected)));
@@ -222,7 +223,9 @@ impl<'a> Episode<'a> {
         };
         let diagnosis = self.lab.diagnosis();
         let Some(truth) = self.lab.truth_of(id) else { return outcome };
-        if let Some((finding, graded)) = best_finding(&diagnosis, &truth, &scene, fault.began) {
+        if let Some((finding, graded)) =
+            best_finding(&diagnosis, &truth, &scene, Company::of(log, fault))
+        {
             let site = Site::from(&finding.place);
             let text = format!("{} {} at {site}", finding.code, finding.cause);
             outcome.found = Some((text, graded));

@@ -2,7 +2,7 @@
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 use linesman_sim::truth::{Effect, Entry, FaultRecord, Place, TruthLog};
 
@@ -29,22 +29,51 @@ pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
     Truth { name: fault.name, places, al_code, blind: Vec::new() }
 }
 
+/// When and in what company a fault acted.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Company {
+    /// When it began.
+    pub began: Option<Instant>,
+    /// Whether another began with it.
+    pub is_shared: bool,
+}
+
+impl Company {
+    /// Of a fault of the log.
+    #[must_use]
+    pub fn of(log: &TruthLog, fault: &FaultRecord) -> Self {
+        let together = |other: &&FaultRecord| match (other.began, fault.began) {
+            (Some(one), Some(other)) => one.since(other).max(other.since(one)) < TOGETHER,
+            (Some(_) | None, _) => false,
+        };
+        let is_shared = log.faults().iter().filter(together).count() > 1;
+        Self { began: fault.began, is_shared }
+    }
+}
+
+/// Faults that began so close together are one event to whoever reads counters and states in turn.
+const TOGETHER: Span = Span::ms(500);
+
 /// The finding that fits a fault best, with how well; open ones are preferred to closed ones. What
-/// was over before the fault began, at `began`, is about something else.
+/// was over before the fault began is about something else.
+///
+/// Two faults that begin together may look like one source: interference on several links, a supply
+/// that several devices share. Then one of them hangs beneath the other, and has been found there.
 #[must_use]
 pub fn best_finding<'a>(
     diagnosis: &'a Diagnosis,
     truth: &Truth,
     scene: &Scene<'_>,
-    began: Option<Instant>,
+    company: Company,
 ) -> Option<(&'a FindingReport, Match)> {
-    let began = began.unwrap_or(Instant::ZERO).as_nanos();
+    let began = company.began.unwrap_or(Instant::ZERO).as_nanos();
     let of_its_time =
         |finding: &&FindingReport| finding.closed_ns.is_none_or(|closed| closed.0 >= began);
-    // Errors on several links that rise in the same readings look like one source, and one of them
-    // hangs beneath the other: it has been found there.
-    let shared = diagnosis.findings.iter().filter(|finding| finding.cause == FaultName::EmcNoise);
-    let beneath = shared.flat_map(|finding| &finding.consequences);
+    let is_common = |finding: &&FindingReport| {
+        use FaultName::{BrownOut, DeviceOff, EmcNoise, SupplyOff};
+        company.is_shared && matches!(finding.cause, EmcNoise | BrownOut | SupplyOff | DeviceOff)
+    };
+    let beneath = diagnosis.findings.iter().filter(is_common).flat_map(|f| &f.consequences);
     let all = diagnosis.findings.iter().chain(beneath);
     let graded = all.filter(of_its_time).map(|finding| {
         let graded = matches(truth, scene, Claim::of(finding));
