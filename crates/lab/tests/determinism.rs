@@ -1,4 +1,5 @@
 //! Same seed, same bytes: the captures of two runs are equal to the last bit.
+#![expect(clippy::unwrap_used, reason = "helpers of the test")]
 
 use std::sync::{Arc, Mutex};
 
