@@ -517,15 +517,13 @@ impl Lab {
     }
 
     fn handle_event(&mut self, event: Event) {
-        match &event {
-            Event::Scanned(inventory) => {
-                self.inventory = Some((**inventory).clone());
-                if self.options.begin == Begin::Run {
-                    self.start(inventory);
-                }
+        if let Event::Scanned(inventory) = &event {
+            self.inventory = Some((**inventory).clone());
+            if self.options.begin == Begin::Run {
+                self.start(inventory);
             }
-            Event::ScanFailed(error) => self.failure = Some(error.to_string()),
-            _ => {}
+        } else if let Event::ScanFailed(error) = &event {
+            self.failure = Some(error.to_string());
         }
         if self.events.len() >= KEPT_EVENTS {
             self.events.drain(..KEPT_EVENTS / 2);

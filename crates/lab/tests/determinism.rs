@@ -1,5 +1,7 @@
 //! Same seed, same bytes: the captures of two runs are equal to the last bit.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
+
 use std::sync::{Arc, Mutex};
 
 use linesman_config::fault::FaultName;

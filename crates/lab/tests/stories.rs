@@ -1,5 +1,7 @@
 //! All stories of `scenarios/` come out as they are told.
 
+#![allow(clippy::disallowed_methods, reason = "stories are files of the project")]
+
 use std::fs;
 use std::path::PathBuf;
 
