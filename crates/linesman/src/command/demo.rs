@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     }
     let (frames, ran) = (demo.lab().frames(), demo.lab().now());
     output.line(&format!(
-        "\n{right} of {number} verdicts were right, and the line came back. {} in {} of virtual time.",
+        "\n{right} of {number} faults were told rightly and healed. {} in {} of virtual time.",
         count(frames, "frame"),
         time(ran.as_nanos())
     ));
@@ -87,8 +87,7 @@ fn text(heading: &str, episode: &DemoEpisode, paint: Paint, width: usize) -> Str
         text.push_str(&wrapped(&format!("  {}", paint.faint(&format!("{name:<9}"))), words, width));
     };
     let mut text = format!("\n{}\n", paint.bold(&format!("Fault {heading}")));
-    add(&mut text, "injected", &format!("{} at {}", episode.fault, episode.place));
-    add(&mut text, "", &paint.faint(&episode.entry));
+    add(&mut text, "injected", &episode.entry);
     match &episode.verdict {
         Some(verdict) => {
             for (name, words) in verdict_lines(verdict, paint) {
@@ -109,7 +108,7 @@ fn verdict_lines(verdict: &DemoVerdict, paint: Paint) -> Vec<(&'static str, Stri
     let DemoVerdict { finding, place, fits, cycles, others } = verdict;
     let grade = match fits.cause {
         Grade::Exact => paint.good("RIGHT"),
-        Grade::Admitted(why) => format!("{} ({why})", paint.good("RIGHT")),
+        Grade::Admitted(_) => paint.good("RIGHT"),
         Grade::Wrong => paint.bad("WRONG"),
     };
     let mut lines = vec![
@@ -122,6 +121,9 @@ fn verdict_lines(verdict: &DemoVerdict, paint: Paint) -> Vec<(&'static str, Stri
             format!("{} {}", grouped(*cycles), if *cycles == 1 { "cycle" } else { "cycles" }),
         ),
     ];
+    if let Grade::Admitted(why) = fits.cause {
+        lines.push(("since", why.to_owned()));
+    }
     if *others > 0 {
         lines.push((
             "beside",
