@@ -72,3 +72,22 @@ impl JsonSchema for Number {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_double_cannot_hold_is_written_as_text() {
+        let json = |value| serde_json::to_string(&Number(value)).unwrap();
+        assert_eq!(json(0), "0");
+        assert_eq!(json(1 << 53), "9007199254740992");
+        assert_eq!(json((1 << 53) + 1), "\"9007199254740993\"");
+        for text in ["9007199254740993", "\"9007199254740993\""] {
+            assert_eq!(serde_json::from_str::<Number>(text).unwrap(), Number((1 << 53) + 1));
+        }
+        for text in ["-1", "\"x\"", "1.5"] {
+            assert!(serde_json::from_str::<Number>(text).is_err(), "{text}");
+        }
+    }
+}

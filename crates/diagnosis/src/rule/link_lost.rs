@@ -158,6 +158,7 @@ pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
         }
     }
     if let End::Controller(node, _) = tree.links()[link].downstream {
+        follows.extend(lost_beyond(line, tree, link, node));
         for &node in tree.subtree(node) {
             let id = DeviceId(node as u32);
             follows.extend([
@@ -171,6 +172,26 @@ pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
         }
     }
     follows.into_iter().collect()
+}
+
+/// The links beyond the device behind a lost one, as far as they were lost with it: then it was without
+/// supply. Those that were lost more often, or before, have trouble of their own.
+fn lost_beyond(line: &Line, tree: &Tree, link: usize, behind: usize) -> Vec<Symptom> {
+    let all = Drops::all(line);
+    let of = |link: usize| all.iter().find(|drops| drops.link == link);
+    let Some(own) = of(link) else { return Vec::new() };
+    let mut lost = Vec::new();
+    for (port, child) in tree.children(behind) {
+        let beyond = tree.link_above(child).and_then(of);
+        let is_with = |beyond: &&Drops| {
+            beyond.count <= own.count && beyond.first >= own.first && !beyond.is_down
+        };
+        if beyond.filter(is_with).is_some() {
+            lost.push(Symptom::LinkDown(DeviceId(behind as u32), port));
+            lost.push(Symptom::LinkDown(DeviceId(child as u32), tree.entry(child)));
+        }
+    }
+    lost
 }
 
 fn status_evidence(line: &Line, drop: &Drop) -> Evidence {

@@ -98,3 +98,29 @@ pub fn catalogue() -> Vec<&'static RulePage> {
     pages.sort_by_key(|page| page.code);
     pages
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_is_unique_and_has_a_manual_page() {
+        let pages = catalogue();
+        assert!(pages.is_sorted_by(|a, b| a.code < b.code), "a code twice");
+        for page in pages {
+            let letter = match page.class {
+                Class::Hardware => 'H',
+                Class::Software => 'S',
+                Class::Configuration => 'C',
+                Class::Timing => 'T',
+                Class::Host => 'X',
+            };
+            assert!(page.code.starts_with(letter), "{}", page.code);
+            let manual = page.manual();
+            assert!(manual.starts_with("# "), "{}", page.code);
+            for part in ["How it is found.", "What it means.", "What to do."] {
+                assert!(manual.contains(part), "{}: {part}", page.code);
+            }
+        }
+    }
+}

@@ -3,6 +3,7 @@
 //! ```text
 //! [at TIME] inject FAULT at PLACE [for TIME] [with KEY = VALUE, …]
 //! [at TIME] inject FAULT at device NAME [for TIME] [with …]
+//! [at TIME] inject FAULT at devices NAME, NAME [for TIME] [with …]
 //! [at TIME] heal [FAULT]
 //! at TIME
 //! [at TIME] expect verdict [on FAULT] [within TIME]
@@ -143,9 +144,14 @@ fn inject(words: &mut Words<'_>) -> Result<Step, String> {
         Some((place, time)) => (place, Some(Words { rest: time.trim() }.time()?)),
         None => (place, None),
     };
-    match place.trim().strip_prefix("device ") {
-        Some(device) => entry += &format!("device = {:?}\n", device.trim()),
-        None => entry += &format!("at = {:?}\n", place.trim()),
+    let place = place.trim();
+    if let Some(device) = place.strip_prefix("device ") {
+        entry += &format!("device = {:?}\n", device.trim());
+    } else if let Some(devices) = place.strip_prefix("devices ") {
+        let devices: Vec<&str> = devices.split(',').map(str::trim).collect();
+        entry += &format!("devices = {devices:?}\n");
+    } else {
+        entry += &format!("at = {place:?}\n");
     }
     for parameter in parameters.into_iter().flat_map(split_outside_brackets) {
         entry += parameter.trim();
@@ -298,6 +304,9 @@ mod tests {
             entry,
             "kind = \"emc-noise\"\nat = \"K1.C>B3.A\"\nhits = 10\nalso = [\"a\", \"b\"]\n"
         );
+        let (_, step) = read("inject supply-off at devices K1, K2");
+        let entry = "kind = \"supply-off\"\ndevices = [\"K1\", \"K2\"]\n".to_owned();
+        assert_eq!(step, Step::Inject { entry, lasts: None });
         let (at, step) = read("inject device-off at device K1 for 20 ms");
         assert_eq!(at, None);
         let entry = "kind = \"device-off\"\ndevice = \"K1\"\n".to_owned();
