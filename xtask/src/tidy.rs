@@ -14,8 +14,13 @@ use crate::requirements::Requirements;
 const CODE_LINES_MAX: usize = 480;
 /// Lines of a Rust file with its unit tests.
 const FILE_LINES_MAX: usize = 700;
-/// Files that may be longer: each is one table.
-const LONG_TABLES: &[&str] = &["crates/proto/src/state/status_code/table.rs"];
+/// Files that may be longer, and how long. A table may be; the others are to be split, and until
+/// then must not grow beyond this.
+const LONG_FILES: &[(&str, usize)] = &[
+    ("crates/diagnosis/src/locate/cause.rs", 560),
+    ("crates/lab/src/lab.rs", 620),
+    ("crates/proto/src/state/status_code/table.rs", 700),
+];
 
 /// Words that speak of how the project came to be, or of one machine, instead of the project.
 /// In halves, so that this list does not find itself.
@@ -110,15 +115,16 @@ fn shape(file: &TextFile, broken: &mut Vec<String>) {
 fn length(file: &TextFile, broken: &mut Vec<String>) {
     let code = file.text.lines().take_while(|line| line.trim() != "#[cfg(test)]").count();
     let all = file.text.lines().count();
-    let table = LONG_TABLES.contains(&file.path.as_str());
+    let listed = LONG_FILES.iter().find(|(path, _)| *path == file.path);
+    let code_max = listed.map_or(CODE_LINES_MAX, |(_, lines)| *lines);
     // A file of tests is one list of cases.
     let tests = file.path.contains("/tests/") || file.path.ends_with("/tests.rs");
-    if !table && !tests && code > CODE_LINES_MAX {
+    if !tests && code > code_max {
         broken.push(format!(
-            "{}: {code} lines of code, at most {CODE_LINES_MAX}: one concept is one file",
+            "{}: {code} lines of code, at most {code_max}: one concept is one file",
             file.path
         ));
-    } else if !table && all > FILE_LINES_MAX {
+    } else if all > FILE_LINES_MAX {
         broken.push(format!("{}: {all} lines, at most {FILE_LINES_MAX}", file.path));
     }
     if !tests && !file.text.starts_with("//!") && !file.text.starts_with("#!") {

@@ -396,3 +396,27 @@ proptest! {
         prop_assert_eq!(located.hops[0].frames, frames.min(255));
     }
 }
+
+#[test]
+fn counters_at_their_end_are_as_good_as_none() {
+    let tree = fifteen();
+    let mut bench = Bench::new(tree.clone(), vec![(true, false); 15]);
+    // Somebody's old errors: port A of SubDevice 14 counts no more.
+    *bench.real[13].slot(ErrorCounter::InvalidFrame(A)) = Some(255);
+    *bench.real[13].slot(ErrorCounter::PhysicalLayer(A)) = Some(255);
+    bench.line = Line::new(Network(0));
+    for _ in 0..15 {
+        bench.line.add_device();
+    }
+    bench.line.tree = Some(tree.clone());
+    bench.read_all();
+    let route = Route::intact(&tree);
+    bench.hit(route.hop_to(13, A).unwrap(), 4, true);
+    bench.read_all();
+    bench.read_all();
+    let located = bench.located(false);
+    assert_eq!(located.hops.len(), 1, "{located:?}");
+    // The next port got them marked as bad already: they were found bad at the port that is worn out.
+    let damage = &located.hops[0];
+    assert_eq!((damage.hop.to, damage.frames, damage.symbols), (End::Controller(13, A), 4, None));
+}

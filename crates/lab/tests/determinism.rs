@@ -1,5 +1,6 @@
 //! Same seed, same bytes: the captures of two runs are equal to the last bit.
-#![expect(clippy::unwrap_used, reason = "helpers of the test")]
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
 use std::sync::{Arc, Mutex};
 

@@ -166,3 +166,31 @@ fn a_project_that_is_none() {
     assert_eq!(run.status, 2, "{}", run.all());
     assert!(run.stderr.contains("plan.toml") && run.stderr.contains("nam"), "{}", run.stderr);
 }
+
+#[test]
+fn an_option_that_says_nothing_there_is_refused() {
+    let rows = [
+        ("trace.pcap", vec!["--seconds", "3"], "--seconds"),
+        ("trace.pcap", vec!["--active"], "--active"),
+        ("read.toml", vec!["--record", "x.pcapng"], "--record"),
+        ("listen:nope0", vec!["--to", "op"], "--to"),
+        ("sim:plant.toml", vec!["--project", "plan.toml"], "--project"),
+    ];
+    for (place, more, option) in rows {
+        let run = diagnose(Path::new(place), &more);
+        refused(&run, &[place, &format!("leave out `{option}`")]);
+    }
+}
+
+#[test]
+fn a_long_capture_is_judged_frame_by_frame() {
+    let files = Files::new();
+    let mut capture = Pcap::new();
+    capture.exchanges(150_000);
+    let run = diagnose(&files.write("long.pcap", &capture.0), &["--json"]);
+    assert_eq!((run.status, run.stderr.as_str()), (0, ""), "{}", run.all());
+    let network = &run.json()["network"];
+    assert_eq!(network["frames"], 300_000);
+    assert_eq!(network["datagrams"], 150_000);
+    assert_eq!(network["unanswered"], 0);
+}

@@ -1,6 +1,8 @@
 //! The generated pages of `docs/` say what the program says. `LINESMAN_WRITE_PAGES=1 cargo test -p
 //! linesman --test pages` writes them anew.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;

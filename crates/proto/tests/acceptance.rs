@@ -19,7 +19,7 @@ fn frame(lens: &[usize]) -> Vec<u8> {
     let mut builder = FrameBuilder::new(&mut buffer, MacAddress([2, 0, 0, 0, 0, 1]));
     for len in lens {
         let address = DatagramAddress::Logical(LogicalAddress(0x0900_0000));
-        builder.push(Command::Lrd, 0, address, *len).unwrap();
+        builder.push(Command::Lrd, 0, address, *len).expect("it fits");
     }
     let len = builder.finish();
     buffer[..len].to_vec()

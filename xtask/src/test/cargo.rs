@@ -42,8 +42,16 @@ pub(super) fn tidy(context: &Context<'_>) -> Result<Outcome> {
 }
 
 pub(super) fn lints(context: &Context<'_>) -> Result<Outcome> {
-    let arguments =
-        ["clippy", "--workspace", "--all-targets", "--color=never", "--", "-D", "warnings"];
+    let arguments = [
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--keep-going",
+        "--color=never",
+        "--",
+        "-D",
+        "warnings",
+    ];
     let ran = context.command("lints", cargo(), &arguments).run()?;
     if !ran.success() {
         return Ok(Outcome::Failed { count: 0, why: ran.explain() });
@@ -93,7 +101,7 @@ fn is_failure(line: &str) -> bool {
 
 /// The documentation builds without a warning: no dead link.
 pub(super) fn docs(context: &Context<'_>) -> Result<Outcome> {
-    let arguments = ["doc", "--workspace", "--no-deps", "--document-private-items"];
+    let arguments = ["doc", "--workspace", "--no-deps", "--document-private-items", "--keep-going"];
     let ran =
         context.command("docs", cargo(), &arguments).env("RUSTDOCFLAGS", RUSTDOC_FLAGS).run()?;
     if !ran.success() {

@@ -211,6 +211,7 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
             symptom,
             Symptom::PortErrors(..)
                 | Symptom::LinkDown(..)
+                | Symptom::LinkCounted(..)
                 | Symptom::FramesLost
                 | Symptom::CardErrors
         )

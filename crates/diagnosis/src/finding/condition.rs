@@ -94,6 +94,8 @@ pub enum Symptom {
     CardErrors,
     /// A port of a controller has no link any more.
     LinkDown(DeviceId, Port),
+    /// A port of a controller lost its link for a while that nobody saw: only its counter tells.
+    LinkCounted(DeviceId, Port),
     /// The card has no link any more.
     NoCarrier,
     /// Nothing comes back at all.

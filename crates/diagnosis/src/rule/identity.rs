@@ -183,8 +183,10 @@ fn shifted(slots: &[Slot], first: usize) -> Vec<Symptom> {
     let behind = slots[first..].iter().map(|slot| slot.id);
     behind
         .flat_map(|id| {
-            let down = Port::ALL.map(|port| Symptom::LinkDown(id, port));
-            down.into_iter().chain([Symptom::Silent(id), Symptom::WorkingCounter(id)])
+            let down = Port::ALL.into_iter().flat_map(move |port| {
+                [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
+            });
+            down.chain([Symptom::Silent(id), Symptom::WorkingCounter(id)])
         })
         .collect()
 }

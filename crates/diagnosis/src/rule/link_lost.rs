@@ -66,7 +66,14 @@ fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
     let mut condition = Condition::new(&PAGE, place, cause, drops.first)
         .confidence(confidence)
         .confirmed(drops.first)
-        .about(ends(line, tree, drops.link))
+        .about(ends(line, tree, drops.link).into_iter().map(|symptom| {
+            if let Symptom::LinkDown(id, port) = symptom
+                && drops.seen.is_empty()
+            {
+                return Symptom::LinkCounted(id, port);
+            }
+            symptom
+        }))
         .explaining(follows(line, tree, drops.link));
     for (cause, at, confidence) in others {
         condition = match at {
@@ -150,6 +157,11 @@ fn ends(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
 /// What can follow from the loss.
 pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
     let mut follows: BTreeSet<Symptom> = ends(line, tree, link).into_iter().collect();
+    for end in [tree.links()[link].upstream, tree.links()[link].downstream] {
+        if let End::Controller(node, port) = end {
+            follows.insert(Symptom::LinkCounted(DeviceId(node as u32), port));
+        }
+    }
     follows.extend([Symptom::FramesLost, Symptom::CardErrors]);
     // Errors at the moment of the change are not reported at all; others are trouble of their own.
     for end in [tree.links()[link].upstream, tree.links()[link].downstream] {
@@ -168,7 +180,7 @@ pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
                 Symptom::Emergency(id),
             ]);
             // If it is the device that failed, those behind it lost their links, too.
-            follows.extend(Port::ALL.map(|port| Symptom::LinkDown(id, port)));
+            follows.extend(Port::ALL.map(|port| Symptom::LinkCounted(id, port)));
         }
     }
     follows.into_iter().collect()

@@ -58,8 +58,8 @@ pub(crate) struct Arguments {
     #[arg(long)]
     active: bool,
     /// On a virtual segment: the state that its SubDevices are driven to
-    #[arg(long, value_enum, value_name = "STATE", default_value_t, ignore_case = true)]
-    to: Target,
+    #[arg(long, value_enum, value_name = "STATE", ignore_case = true)]
+    to: Option<Target>,
     /// JSON, schema linesman.diagnosis/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -93,12 +93,9 @@ impl From<Target> for AlState {
 /// Judges what the selector names.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selector = arguments.place.parse()?;
+    refuse_misplaced(arguments, &selector)?;
     let project = arguments.project.as_deref().map(files::project).transpose()?;
     match &selector {
-        Selector::Capture(_) | Selector::Observations(_) if arguments.record.is_some() => {
-            let reason = format!("`{selector}`: there is nothing to record");
-            Err(Failure::new(reason, "leave out `--record`"))
-        }
         Selector::Capture(path) => {
             let session = Session::new(arguments, &selector, project);
             capture::run(path, session, output)
@@ -111,15 +108,33 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             cards::run(names, arguments.active, session, output)
         }
         Selector::Segment(path) => {
-            if arguments.project.is_some() {
-                let reason = format!("`{selector}`: a segment file says itself what was planned");
-                return Err(Failure::new(reason, "leave out `--project`"));
-            }
             let session = Session::new(arguments, &selector, None);
-            segment::run(path, arguments.to.into(), session, output)
+            segment::run(path, arguments.to.unwrap_or_default().into(), session, output)
         }
         Selector::Observations(path) => {
             observations::run(path, Session::new(arguments, &selector, project), output)
+        }
+    }
+}
+
+/// Refuses options that say nothing about such a selector: whoever wrote them expects something.
+fn refuse_misplaced(arguments: &Arguments, selector: &Selector) -> Result<(), Failure> {
+    let is_file = matches!(selector, Selector::Capture(_) | Selector::Observations(_));
+    let is_segment = matches!(selector, Selector::Segment(_));
+    let is_driven = matches!(selector, Selector::Cards(_));
+    let Arguments { project, seconds, record, active, to, .. } = arguments;
+    let rows = [
+        ("--record", record.is_some() && is_file, "there is nothing to record"),
+        ("--seconds", seconds.is_some() && is_file, "the file is judged to its end"),
+        ("--project", project.is_some() && is_segment, "the file says itself what was planned"),
+        ("--active", *active && !is_driven, "only a line on a card can be written to"),
+        ("--to", to.is_some() && !is_segment, "only a virtual segment is driven to a state"),
+    ];
+    match rows.into_iter().find(|(_, is_misplaced, _)| *is_misplaced) {
+        None => Ok(()),
+        Some((option, _, why)) => {
+            let reason = format!("`{selector}`: {why}");
+            Err(Failure::new(reason, format!("leave out `{option}`")))
         }
     }
 }

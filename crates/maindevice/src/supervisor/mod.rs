@@ -2,7 +2,7 @@
 //!
 //! [`locate`] finds the SubDevices of the plan on the line and gives them their addresses; one
 //! [`keeper`] per SubDevice drives it to its target, watches it, and drives it again when it fell
-//! out; [`supervise`] starts them and looks for those that are lost. [`line`] is what they know.
+//! out; [`supervise`] starts them and looks for those that are lost. [`mod@line`] is what they know.
 
 mod align;
 pub(crate) mod keeper;
