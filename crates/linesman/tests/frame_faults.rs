@@ -50,9 +50,11 @@ fn each_direction_of_each_link(terminals: [&str; 3]) {
     for (near, far, a, b) in LINKS {
         for (from, to, direction) in [(near, far, "a-to-b"), (far, near, "b-to-a")] {
             for hits in [1, 10, 1000] {
+                // Time enough that not each frame of a while is hit: that would be silence.
+                let to_ms = 1500 + 5 * hits.max(200);
                 let fault = format!(
                     "[[fault]]\nkind = \"emc-noise\"\nat = \"{from}>{to}\"\nfrom_ms = 1500\n\
-                     to_ms = 4500\nhits = {hits}\n"
+                     to_ms = {to_ms}\nhits = {hits}\n"
                 );
                 let (status, diagnosis) = diagnose(&(plant(terminals, "seed = 5\n") + &fault));
                 let what = format!("{from}>{to}, {hits} hits: {:#}", diagnosis["findings"]);
