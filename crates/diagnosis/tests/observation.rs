@@ -70,7 +70,7 @@ fn a_permanent_break_is_one_finding_with_its_consequences() {
     assert!(finding.alternatives.iter().any(|other| other.cause == FaultName::DeviceOff));
     let below: Vec<u32> = finding.consequences.iter().map(no).collect();
     assert_eq!(below, [15, 16, 17, 18, 19, 20, 21]);
-    assert_eq!(diagnosis.network.devices.0, 21);
+    assert_eq!(diagnosis.network.devices.0, 28);
     assert_eq!(diagnosis.network.al_state_highest.as_deref(), Some("OP"));
 }
 

@@ -31,7 +31,7 @@ const CYCLE: Span = Span::ms(2);
 /// How long the bring-up may take.
 const BRING_UP: Span = Span::s(20);
 /// How long the line runs between two faults.
-const QUIET: Span = Span::ms(2_500);
+const QUIET: Span = Span::ms(3_500);
 /// How long the diagnosis may take.
 const VERDICT: Span = Span::s(3);
 /// How long the line may take to recover, and all findings to close.

@@ -10,6 +10,7 @@
 pub mod cause;
 pub mod damage;
 pub mod drops;
+mod rhythm;
 pub mod survey;
 
 pub use cause::{Suspect, Suspicion};

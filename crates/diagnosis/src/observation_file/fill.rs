@@ -38,6 +38,8 @@ impl ObservationFile {
             }
         }
         self.teach_host(&mut line, at);
+        // Whoever wrote the file saw a place for each of them, also for those that are silent.
+        line.traffic.positions_seen = u16::try_from(line.devices.len()).unwrap_or(u16::MAX);
         line.touch();
         line
     }

@@ -23,7 +23,7 @@ use crate::verdict::{Match, Scene, Site, Truth};
 /// Slices of time between two checks.
 const SLICE: Span = Span::ms(25);
 /// How long the line is left alone between two episodes.
-const QUIET: Span = Span::ms(2_500);
+const QUIET: Span = Span::ms(3_500);
 /// How long a diagnosis may take to see what goes on.
 const VERDICT: Span = Span::s(2);
 

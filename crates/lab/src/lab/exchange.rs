@@ -1,0 +1,155 @@
+//! What goes from engine to engine: frames, events, probes, what the cards count.
+
+use linesman_config::inventory::Inventory;
+use linesman_config::plan::{Plan, PlanOptions};
+use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
+use linesman_maindevice::{Event, ProbeRequest, Target};
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::time::Instant;
+
+use super::{AT_ONE_INSTANT, Lab, LabError};
+use crate::options::Begin;
+
+/// How many events are kept; the oldest go first.
+const KEPT_EVENTS: usize = 10_000;
+
+impl Lab {
+    /// The project's identity of a SubDevice of the plan. A plan numbers what was found in the order
+    /// of processing, which for a device with several controllers is not that of the project.
+    #[must_use]
+    pub fn of_plan(&self, id: DeviceId) -> DeviceId {
+        let node = self.tree.order().get(id.index());
+        node.map_or(id, |node| DeviceId(*node as u32))
+    }
+
+    /// The plan's identity of a SubDevice of the project; the other way round than
+    /// [`Lab::of_plan`].
+    fn in_plan(&self, id: DeviceId) -> DeviceId {
+        let at = self.tree.order().iter().position(|node| *node == id.index());
+        at.map_or(id, |at| DeviceId(at as u32))
+    }
+
+    /// Takes out all that the engines have to give: frames, events, probes.
+    pub(super) fn drain(&mut self) -> Result<(), LabError> {
+        let mut transmit = std::mem::take(&mut self.transmit);
+        let mut count = 0_u32;
+        while let Some(sent) = self.main.poll_transmit(self.now, &mut transmit) {
+            let at = sent.at.max(self.now);
+            let frame = &transmit[..sent.len];
+            self.show(Direction::Sent, sent.path, at, frame);
+            self.segment.handle_frame(at, sent.path, frame);
+            count += 1;
+            if count > AT_ONE_INSTANT {
+                return Err(LabError::Stuck { at: self.now, what: "sending" });
+            }
+        }
+        self.transmit = transmit;
+        while let Some(event) = self.main.poll_event() {
+            self.handle_event(event);
+        }
+        while let Some(probe) = self.engine.poll_probe() {
+            let device =
+                self.plan.as_ref().and_then(|plan| plan.device(self.in_plan(probe.device)));
+            // Who is not of the plan has no address that could be asked.
+            let Some(device) = device else { continue };
+            let request = ProbeRequest {
+                target: Target::Station(device.station),
+                register: probe.register,
+                len: probe.len,
+                write: None,
+            };
+            self.main.probe(self.now, request);
+        }
+        while let Some(event) = self.engine.poll_event() {
+            if self.finding_events.len() >= KEPT_EVENTS {
+                self.finding_events.pop_front();
+            }
+            self.finding_events.push_back(event);
+        }
+        Ok(())
+    }
+
+    pub(super) fn show(&mut self, direction: Direction, path: Path, time: Instant, bytes: &[u8]) {
+        self.frames += 1;
+        let seen = FrameSeen {
+            network: self.network,
+            path: Some(path),
+            direction,
+            time,
+            number: self.frames,
+            fcs: None,
+            truncated: false,
+            bytes,
+        };
+        self.engine.handle_frame(&seen);
+        if let Some(tap) = &mut self.tap {
+            tap(&seen);
+        }
+    }
+
+    fn handle_event(&mut self, event: Event) {
+        if let Event::Scanned(inventory) = &event {
+            self.inventory = Some((**inventory).clone());
+            if self.options.begin == Begin::Run {
+                self.start(inventory);
+            }
+        }
+        if let Event::ScanFailed(error) = &event {
+            self.failure = Some(error.to_string());
+        }
+        if self.events.len() >= KEPT_EVENTS {
+            self.events.drain(..KEPT_EVENTS / 2);
+        }
+        self.events.push((self.now, event));
+    }
+
+    fn start(&mut self, inventory: &Inventory) {
+        match self.make_plan(inventory) {
+            Ok(plan) => {
+                self.main.start(self.now, plan.clone());
+                self.plan = Some(plan);
+            }
+            Err(error) => self.failure = Some(error),
+        }
+    }
+
+    /// The plan for what was found, with the names of the project where they fit.
+    fn make_plan(&self, inventory: &Inventory) -> Result<Plan, String> {
+        let mut planned = inventory.planned(self.options.target);
+        if planned.len() == self.project.devices.len() {
+            for (device, id) in planned.iter_mut().zip(0..) {
+                let wanted = &self.project.devices[self.of_plan(DeviceId(id)).index()];
+                device.name.clone_from(&wanted.name);
+            }
+        }
+        let options = PlanOptions { cycle: self.options.cycle, ..PlanOptions::default() };
+        Plan::build(&planned, inventory.tree().clone(), &options).map_err(|error| error.to_string())
+    }
+
+    /// Turns what the cards counted since the last look into host observations.
+    pub(super) fn look_at_cards(&mut self) {
+        for path in Path::ALL.into_iter().take(self.paths) {
+            let port = self.segment.host(path);
+            let last = std::mem::replace(&mut self.host_last[path.index()], port);
+            let mut note = |what| {
+                let observation =
+                    HostObservation { network: self.network, path, time: self.now, what };
+                self.engine.handle_host(&observation);
+            };
+            if port.carrier != last.carrier {
+                note(HostEvent::Carrier(port.carrier));
+            }
+            let failures = port.tx_dropped - last.tx_dropped;
+            if failures > 0 {
+                note(HostEvent::SendFailures(failures));
+            }
+            if self.options.host_counters {
+                let crc = port.rx_crc_errors - last.rx_crc_errors;
+                let other = port.rx_length_errors - last.rx_length_errors;
+                if crc + other > 0 {
+                    note(HostEvent::CardErrors { crc, other });
+                }
+            }
+        }
+    }
+}

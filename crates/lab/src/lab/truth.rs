@@ -1,0 +1,58 @@
+//! Faults of the run, and what is true of them.
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::topology::End;
+use linesman_sim::segment_file::FaultEntry;
+use linesman_sim::truth::{FaultId, Unexplained};
+
+use super::{Lab, LabError};
+use crate::verdict::Truth;
+use crate::verdict::judge::truth_of;
+
+impl Lab {
+    /// Puts a fault on the line.
+    ///
+    /// # Errors
+    /// The segment's, when the entry names no place or parameter.
+    pub fn inject(&mut self, entry: &FaultEntry) -> Result<FaultId, LabError> {
+        let id = self.segment.inject(self.now, entry)?;
+        let blind = self.blind_ports();
+        self.blind.insert(id, blind);
+        Ok(id)
+    }
+
+    /// A fault of the run as a verdict is held against it; `None` if there is no such fault.
+    #[must_use]
+    pub fn truth_of(&self, id: FaultId) -> Option<Truth> {
+        let log = self.truth();
+        let blind = self.blind.get(&id).cloned().unwrap_or_default();
+        Some(Truth { blind, ..truth_of(log, log.fault(id)?) })
+    }
+
+    /// Ports whose symbol counter stands at its end.
+    fn blind_ports(&self) -> Vec<End<DeviceId>> {
+        let mut blind = Vec::new();
+        for id in self.segment.devices() {
+            let Some(controller) = self.segment.controller(id) else { continue };
+            let counters = controller.error_counters();
+            for port in Port::ALL {
+                if counters.value(ErrorCounter::PhysicalLayer(port)) == Some(u8::MAX) {
+                    blind.push(End::Controller(id, port));
+                }
+            }
+        }
+        blind
+    }
+
+    /// Ends a fault.
+    pub fn heal(&mut self, fault: FaultId) {
+        self.segment.heal(self.now, fault);
+    }
+
+    /// Counters that moved without a logged cause since the last audit.
+    pub fn audit(&mut self) -> Vec<Unexplained> {
+        self.segment.audit()
+    }
+}
