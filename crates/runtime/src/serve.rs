@@ -6,6 +6,7 @@
 
 use linesman_link::clock::{HostClock, tighten_timers};
 use linesman_link::error::LinkError;
+use linesman_link::real_time::sched_fifo;
 use linesman_link::socket::{Batch, RawSocket, Ready, SocketOptions, Waitable, wait_any};
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
@@ -19,6 +20,8 @@ use crate::wiring::Wiring;
 const BATCH: usize = 64;
 /// Below this the thread looks again and again instead of sleeping: waking may take 50 µs.
 const SPIN: Span = Span::us(80);
+/// Below the priority of interrupt threads, above programs without a cycle.
+const PRIORITY: u8 = 10;
 /// Longest sleep, so that a wish to stop is noticed.
 const NAP: Span = Span::ms(50);
 
@@ -83,6 +86,9 @@ impl Server {
         control: Option<&Control>,
     ) -> Result<(), LinkError> {
         tighten_timers();
+        // A line never waits for other programs. Without the right it is late at times, as
+        // `Served::latest` tells.
+        let _ = sched_fifo(PRIORITY);
         loop {
             self.receive()?;
             let now = self.clock.now();
