@@ -120,6 +120,10 @@ fn add(
     if !is_unknown {
         condition = condition.confirmed(first);
     }
+    // A full counter does not show whether it goes on; frames that are still missing do.
+    let is_full = suspicion.damages.iter().any(|damage| damage.is_lower_bound);
+    let latest_lost = view.line.traffic.latest_lost.filter(|_| is_full && suspicion.frames() > 0);
+    let last = latest_lost.map_or(last, |lost| last.max(lost.at));
     if last + QUIET < view.line.now {
         condition = condition.ended(last);
     }
