@@ -28,7 +28,12 @@ impl Lab {
     pub fn truth_of(&self, id: FaultId) -> Option<Truth> {
         let log = self.truth();
         let blind = self.blind.get(&id).cloned().unwrap_or_default();
-        Some(Truth { blind, ..truth_of(log, log.fault(id)?) })
+        let remakes = |id: &DeviceId| {
+            let controller = self.segment.controller(*id);
+            controller.is_some_and(|known| known.hardware().counting.remakes_symbol_errors)
+        };
+        let remaking = self.segment.devices().filter(remakes).collect();
+        Some(Truth { blind, remaking, ..truth_of(log, log.fault(id)?) })
     }
 
     /// Ports whose symbol counter stands at its end.

@@ -22,6 +22,8 @@ pub struct Truth {
     /// Ports whose symbol counter stood at its end when the fault began: they could not tell
     /// symbol errors from clean symbols any more.
     pub blind: Vec<End<DeviceId>>,
+    /// Devices that make a symbol error anew when they send a bad frame on.
+    pub remaking: Vec<DeviceId>,
 }
 
 /// Where a fault sits.
@@ -72,6 +74,8 @@ const MII: &str = "between its PHY and its controller the receiver may spoil wha
 const MAY_COME_AGAIN: &str = "an opening that is over may have been the first of many";
 const BLIND: &str = "the receiver's symbol counter stood at its end, so nobody knows whether the \
                      symbols were clean";
+const REMADE: &str = "the sender makes a symbol error anew for each bad frame, as if the frame had \
+                      been hit on the wire";
 const ONCE: &str = "each opening of a flapping contact is an open link";
 const RESTART: &str = "a dip of a supply and a short time without power are the same to a device";
 const SHARED: &str = "one device of a supply looks the same from outside as a supply of one device";
@@ -191,10 +195,12 @@ impl Set<'_> {
     /// Bad frames with clean symbols from `from` to `to`.
     fn clean(&mut self, truth: &Truth, from: End<DeviceId>, to: End<DeviceId>) {
         self.end(DeviceInternal, to, Some(MII));
-        if truth.blind.contains(&to) {
+        let remade = from.node().is_some_and(|sender| truth.remaking.contains(&sender));
+        let why = if truth.blind.contains(&to) { Some(BLIND) } else { remade.then_some(REMADE) };
+        if why.is_some() {
             let hop = Site::hop(self.scene.tree, from, to);
             for cause in [CableDegraded, EmcNoise, TransmitterDamaged, ReceiverDamaged] {
-                self.add(cause, hop, Some(BLIND));
+                self.add(cause, hop, why);
             }
         }
         self.card(from, to);
@@ -311,7 +317,7 @@ mod tests {
     }
 
     fn truth(name: FaultName, place: TruthPlace) -> Truth {
-        Truth { name, places: vec![place], al_code: None, blind: Vec::new() }
+        Truth { name, places: vec![place], al_code: None, blind: Vec::new(), remaking: Vec::new() }
     }
 
     fn grade(truth: &Truth, host_counters: bool, cause: FaultName, site: Site) -> Grade {
@@ -371,6 +377,11 @@ mod tests {
         assert!(!grade(&inner, true, CableDegraded, hop).is_right());
         inner.blind.push(end(2, A));
         assert!(grade(&inner, true, CableDegraded, hop).is_right());
+        inner.blind.clear();
+        inner.remaking.push(DeviceId(1));
+        assert!(grade(&inner, true, CableDegraded, hop).is_right());
+        inner.remaking.clear();
+        inner.blind.push(end(2, A));
         let back = Site::Link { a: end(0, B), b: Some(end(1, A)), way: Some(Way::BToA) };
         assert!(!grade(&inner, true, CableDegraded, back).is_right());
     }

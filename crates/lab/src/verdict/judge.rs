@@ -26,7 +26,7 @@ pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
         Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
     });
     let places = fault.places.iter().map(place).collect();
-    Truth { name: fault.name, places, al_code, blind: Vec::new() }
+    Truth { name: fault.name, places, al_code, blind: Vec::new(), remaking: Vec::new() }
 }
 
 /// When and in what company a fault acted.
