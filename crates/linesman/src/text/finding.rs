@@ -1,5 +1,7 @@
 //! One finding: what, where, why, how we know, what to do, what follows from it.
 
+use std::ops::Range;
+
 use linesman_diagnosis::report::{
     AlternativeReport, EvidenceReport, FindingReport, FindingState, Number, Severity,
 };
@@ -12,6 +14,9 @@ use crate::output::{Paint, wrapped};
 const MOST_EVIDENCE: usize = 6;
 /// Most consequences that are shown one by one.
 const MOST_CONSEQUENCES: usize = 5;
+
+/// Registers that count.
+const COUNTERS: Range<u16> = 0x0300..0x0314;
 
 /// How a finding is written.
 #[derive(Clone, Copy)]
@@ -109,10 +114,19 @@ impl Writer<'_> {
             tail.push(format!("{}{port}", self.names.device(no)));
         }
         tail.extend(evidence.register.map(|register| format!("register 0x{register:04X}")));
+        // Counters are read as numbers, all else as bits and codes.
+        let largest = evidence.before.max(evidence.after).map_or(0, |Number(value)| value);
+        let is_code = evidence.register.is_some_and(|register| !COUNTERS.contains(&register));
+        let number = |value: u64| match is_code && largest > 9 {
+            true => format!("0x{value:04X}"),
+            false => grouped(value),
+        };
         match (evidence.before, evidence.after) {
-            (Some(Number(before)), Some(Number(after))) => tail.push(format!("{before} → {after}")),
+            (Some(Number(before)), Some(Number(after))) => {
+                tail.push(format!("{} → {}", number(before), number(after)));
+            }
             (None, Some(Number(value))) | (Some(Number(value)), None) => {
-                tail.push(format!("read {value}"));
+                tail.push(format!("read {}", number(value)));
             }
             (None, None) => {}
         }
