@@ -230,14 +230,17 @@ impl Lab {
         self.plan.is_some() && self.not_up().next().is_none()
     }
 
-    /// SubDevices that are not in the target state, by what their controllers say.
+    /// SubDevices that are not in the target state, by what their controllers say, or that no frame
+    /// can reach.
     pub fn not_up(&self) -> impl Iterator<Item = DeviceId> {
-        self.segment.devices().filter(|id| {
-            self.segment.controller(*id).is_none_or(|controller| {
-                let status = controller.al_status();
-                let there = status.state().state() == Some(self.options.target);
-                !controller.is_powered() || status.error() || !there
-            })
+        let reached = self.reached();
+        self.segment.devices().filter(move |id| {
+            let is_reached = reached.contains(id);
+            !is_reached
+                || self.segment.controller(*id).is_none_or(|controller| {
+                    let status = controller.al_status();
+                    status.error() || status.state().state() != Some(self.options.target)
+                })
         })
     }
 

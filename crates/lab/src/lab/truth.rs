@@ -1,6 +1,8 @@
 //! Faults of the run, and what is true of them.
 
-use linesman_proto::address::DeviceId;
+use std::collections::BTreeSet;
+
+use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::topology::End;
@@ -59,5 +61,31 @@ impl Lab {
     /// Counters that moved without a logged cause since the last audit.
     pub fn audit(&mut self) -> Vec<Unexplained> {
         self.segment.audit()
+    }
+
+    /// Controllers that a frame of either card can get to: powered, with open ports all the way.
+    pub(super) fn reached(&self) -> BTreeSet<DeviceId> {
+        let tree = self.segment.tree();
+        let ids: Vec<DeviceId> = self.segment.devices().collect();
+        let is_open = |end: End| match end {
+            End::MainDevice(path) => self.segment.host(path).carrier,
+            End::Controller(node, port) => {
+                let controller = ids.get(node).and_then(|id| self.segment.controller(*id));
+                controller.is_some_and(|known| known.is_powered() && known.is_open(port))
+            }
+        };
+        let mut reached = BTreeSet::new();
+        let mut front: Vec<End> = Path::ALL.into_iter().map(End::MainDevice).collect();
+        while let Some(end) = front.pop() {
+            let Some(far) = tree.opposite(end).filter(|far| is_open(end) && is_open(*far)) else {
+                continue;
+            };
+            if let (Some(node), End::Controller(..)) = (far.node(), far)
+                && reached.insert(ids[node])
+            {
+                front.extend(tree.open_ports(node).map(|port| End::Controller(node, port)));
+            }
+        }
+        reached
     }
 }

@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::End;
+use linesman_proto::topology::{End, Route};
 use linesman_sim::hardware::PortKind;
 use linesman_sim::seed::Seed;
 use linesman_sim::segment::Segment;
-use linesman_sim::segment_file::{PlantOptions, plant};
+use linesman_sim::segment_file::{PlantOptions, SegmentFile, plant};
 
 use super::episode::{Episode, EpisodeReport};
 use crate::lab::{Lab, LabError};
@@ -164,12 +164,7 @@ pub fn run_seed(seed: u64, options: &SwarmOptions) -> SeedReport {
 fn play(seed: u64, options: &SwarmOptions, report: &mut SeedReport) -> Result<(), LabError> {
     let seed = Seed(seed);
     let mut stream = seed.stream("swarm");
-    let plant_options = PlantOptions {
-        min_devices: options.min_devices,
-        max_devices: options.max_devices,
-        ..PlantOptions::default()
-    };
-    let file = plant(seed, &plant_options);
+    let file = draw_plant(seed, options);
     let host_counters = stream.chance(0.5);
     let lab_options = LabOptions { cycle: options.cycle, host_counters, ..LabOptions::default() };
     let mut lab = Lab::new(&file, lab_options)?;
@@ -191,6 +186,23 @@ fn play(seed: u64, options: &SwarmOptions, report: &mut SeedReport) -> Result<()
     report.time = lab.now();
     report.frames = lab.frames();
     result
+}
+
+/// A plant, now and then a ring.
+///
+/// A ring that leaves a junction by another port than its last is not drawn: what hangs behind the
+/// later ports is processed by frames of the second card only, also while the ring is whole.
+fn draw_plant(seed: Seed, options: &SwarmOptions) -> SegmentFile {
+    let plant_options = PlantOptions {
+        min_devices: options.min_devices,
+        max_devices: options.max_devices,
+        ring: seed.stream("ring").chance(0.15),
+        ..PlantOptions::default()
+    };
+    let file = plant(seed, &plant_options);
+    let tree = file.project().ok().and_then(|project| project.tree().ok());
+    let is_whole = tree.is_none_or(|tree| Route::intact(&tree).order().count() == tree.len());
+    if is_whole { file } else { plant(seed, &PlantOptions { ring: false, ..plant_options }) }
 }
 
 /// By link of the tree: whether it is a cable rather than a contact between two terminals.
