@@ -48,8 +48,10 @@ fn usage(error: &clap::Error) -> ExitCode {
     let wants_json = std::env::args_os().any(|argument| argument == "--json");
     if error.use_stderr() && wants_json {
         let text = error.to_string();
-        let reason = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
-        let failure = Failure::new(reason, "see `linesman --help`");
+        // What is wrong stands before the first empty line, often over several lines.
+        let wrong = text.lines().take_while(|line| !line.trim().is_empty());
+        let reason = wrong.map(str::trim).collect::<Vec<_>>().join(" ");
+        let failure = Failure::new(reason.trim_start_matches("error: "), "see `linesman --help`");
         return refuse(&failure, true, &mut Output::new(cli::ColorChoice::Never));
     }
     // A closed pipe is the only thing that can go wrong here.

@@ -128,7 +128,7 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
             (LinkFlapping, 0.75, vec![(BrownOut, behind, 0.1), (CableDegraded, None, 0.05)])
         }
         Some(longest) if longest < SHORT => {
-            (LinkFlapping, 0.5, vec![(LinkOpen, None, 0.25), (BrownOut, behind, 0.1)])
+            (LinkOpen, 0.45, vec![(LinkFlapping, None, 0.35), (BrownOut, behind, 0.1)])
         }
         Some(_) => (LinkOpen, 0.6, vec![(LinkFlapping, None, 0.15), (DeviceOff, behind, 0.15)]),
     }

@@ -64,7 +64,7 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     // Without a carrier it is the first hop for sure; with one, something forwards nothing.
     let (open, off, dead_link, card) = match carrier {
         Some(false) => (0.6, 0.3, 0.0, 0.1),
-        Some(true) => (0.25, 0.3, 0.25, 0.1),
+        Some(true) => (0.35, 0.25, 0.2, 0.1),
         None => (0.45, 0.3, 0.1, 0.1),
     };
     let since = silence.since;

@@ -48,12 +48,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         let Some(silent) = device.silent else { continue };
         let place = Place::device(line.network, device.id);
         let label = line.label(device.id);
-        let condition = Condition::new(&PAGE, place, FaultName::DeviceOff, silent.at);
+        let new = |cause| Condition::new(&PAGE, place, cause, silent.at);
         let mut condition = if is_cut_off(device.id.index()) {
             // Why is for the finding above.
-            condition.confidence(0.3).or(FaultName::LinkOpen, 0.6)
+            new(FaultName::LinkOpen).confidence(0.6).or(FaultName::DeviceOff, 0.3)
         } else {
-            condition
+            new(FaultName::DeviceOff)
                 .confidence(0.5)
                 .or(FaultName::LinkOpen, 0.25)
                 .or(FaultName::BrownOut, 0.1)

@@ -130,13 +130,14 @@ impl Lab {
     pub(super) fn look_at_cards(&mut self) {
         for path in Path::ALL.into_iter().take(self.paths) {
             let port = self.segment.host(path);
-            let last = std::mem::replace(&mut self.host_last[path.index()], port);
+            let before = self.host_last[path.index()].replace(port);
+            let last = before.unwrap_or_default();
             let mut note = |what| {
                 let observation =
                     HostObservation { network: self.network, path, time: self.now, what };
                 self.engine.handle_host(&observation);
             };
-            if port.carrier != last.carrier {
+            if before.is_none_or(|before| before.carrier != port.carrier) {
                 note(HostEvent::Carrier(port.carrier));
             }
             let failures = port.tx_dropped - last.tx_dropped;

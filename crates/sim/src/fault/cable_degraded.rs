@@ -22,7 +22,7 @@ pub(super) const KIND: Kind = Kind {
         },
         Parameter {
             key: "hits",
-            meaning: "Exactly so many frames are hit, evenly over time, instead of `hits_per_s`.",
+            meaning: "Exactly so many frames are hit, evenly over time and even if that takes longer than `to_ms`, instead of `hits_per_s`.",
             shape: Shape::Whole { low: 1, high: 1_000_000, default: None },
         },
     ],

@@ -186,6 +186,9 @@ pub enum SegmentFileError {
     /// Not TOML, or not of this form: with line and column.
     #[error("{0}")]
     Form(String),
+    /// There is nothing in it.
+    #[error("there is no `[[device]]` in it: a segment has at least one SubDevice")]
+    Empty,
     /// A type that the library does not have.
     #[error("device `{device}`: {source}")]
     Type {
@@ -254,6 +257,9 @@ impl SegmentFile {
     pub fn parse(text: &str) -> Result<Self, SegmentFileError> {
         let file: Self =
             toml::from_str(text).map_err(|error| SegmentFileError::Form(error.to_string()))?;
+        if file.devices.is_empty() {
+            return Err(SegmentFileError::Empty);
+        }
         file.check()?;
         Ok(file)
     }
