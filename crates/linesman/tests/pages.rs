@@ -8,8 +8,10 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use linesman_diagnosis::rule;
+use linesman_proto::port::Port;
 use linesman_sim::device::library;
 use linesman_sim::fault::{KINDS, PlaceRule, Shape};
+use linesman_sim::hardware::PortKind;
 
 fn docs() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs")
@@ -111,10 +113,25 @@ fn shape(shape: Shape) -> (String, String) {
 fn devices() -> String {
     let mut text = String::from(
         "# Devices of the library\n\nGenerated from the library: what `type` of a `[[device]]` may \
-         say.\n\n| type | what it is |\n|---|---|\n",
+         say, and what its ports are: Ethernet takes a cable, E-bus a neighbour on the terminal bus. \
+         A device of several controllers has a line for each, and those behind the first are called \
+         `NAME/2`, `NAME/3` where a place is named.\n\n| type | what it is | port A | B | C | D |\n\
+         |---|---|---|---|---|---|\n",
     );
     for kind in library::types() {
-        writeln!(text, "| {} | {} |", kind.name(), kind.title()).unwrap();
+        for (part, ports) in kind.ports().enumerate() {
+            let (name, title) = if part == 0 { (kind.name(), kind.title()) } else { ("", "") };
+            write!(text, "| {name} | {title} |").unwrap();
+            for port in Port::ALL {
+                let what = match ports[port] {
+                    PortKind::Absent => "",
+                    PortKind::Ebus => "E-bus",
+                    PortKind::Mii => "Ethernet",
+                };
+                write!(text, " {what} |").unwrap();
+            }
+            text.push('\n');
+        }
     }
     text
 }

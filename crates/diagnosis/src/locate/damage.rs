@@ -287,7 +287,12 @@ impl Walk<'_, '_> {
         let hop = *route.hops().last()?;
         let errors = self.survey.line().host.card(card).crc;
         let (first, last) = (errors.first_of_spell?, errors.last?);
-        let read_since = |at: Instant| self.survey.has_ended() || self.horizon > at;
+        // At the end of the input no reading comes any more. If nothing came back at last, the
+        // counters could not even be asked, and their silence says nothing.
+        let silences = &self.survey.line().traffic.silences;
+        let is_silent = silences.back().is_some_and(|silence| silence.ended.is_none());
+        let may_judge = self.survey.has_ended() && !is_silent;
+        let read_since = |at: Instant| may_judge || self.horizon > at;
         let frames = errors.of_spell().saturating_sub(self.carried.frames);
         let is_new = if self.carried.frames == 0 {
             read_since(first)

@@ -9,6 +9,8 @@
 //! **What it means.** Usually the first cable is not plugged, is broken, or the first SubDevice has
 //! no supply. If the card has a link and frames still vanish, something shows a link that does not
 //! forward: a media converter, a switch, a device that is not EtherCAT, or a damaged controller.
+//! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
+//! every frame; which link it is, no counter can be asked.
 //!
 //! **What to do.** Look at the LED of the card and of the IN port of the first SubDevice, then at
 //! supply, cable and the choice of the card, in this order.
@@ -73,10 +75,28 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     } else {
         format!("first of {} requests; none came back", silence.frames)
     };
-    let place = first_link(line);
-    let mut condition = Condition::new(&PAGE, place, FaultName::LinkOpen, since.at)
-        .confidence(open)
-        .shown_by(Evidence::frame(since.at, since.frame.unwrap_or(0), text));
+    let spoiled = line.host.card(Path::A).crc;
+    let is_spoiled = spoiled.of_spell() > 0 && spoiled.last.is_some_and(|last| last >= since.at);
+    let mut condition = if is_spoiled {
+        // They do come back, but damaged, and no counter can be asked where.
+        let place = Place::Network { network: line.network };
+        Condition::new(&PAGE, place, FaultName::CableDegraded, since.at)
+            .confidence(0.4)
+            .or(FaultName::TransmitterDamaged, 0.15)
+            .or(FaultName::DeviceInternal, 0.15)
+            .or(FaultName::EmcNoise, 0.1)
+    } else {
+        Condition::new(&PAGE, first_link(line), FaultName::LinkOpen, since.at).confidence(open)
+    };
+    condition = condition.shown_by(Evidence::frame(since.at, since.frame.unwrap_or(0), text));
+    if is_spoiled {
+        let text = format!(
+            "the card received {} damaged frames meanwhile: the way round is whole, but something on \
+             it spoils every frame",
+            spoiled.of_spell()
+        );
+        condition = condition.shown_by(Evidence::host(spoiled.last, text));
+    }
     if was_answered && let Some(returned) = line.traffic.latest_returned {
         let frame = returned.frame.unwrap_or(0);
         let text = "the last frame that came back".to_owned();
@@ -89,12 +109,14 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
         let at = line.host.card(Path::A).carrier.map(|carrier| carrier.at);
         condition = condition.shown_by(Evidence::host(at, text));
     }
-    condition = match first_device(line) {
-        Some(id) => condition.or_at(FaultName::DeviceOff, Place::device(line.network, id), off),
-        None => condition.or(FaultName::DeviceOff, off),
-    };
-    if dead_link > 0.0 {
-        condition = condition.or(FaultName::FalseLink, dead_link);
+    if !is_spoiled {
+        condition = match first_device(line) {
+            Some(id) => condition.or_at(FaultName::DeviceOff, Place::device(line.network, id), off),
+            None => condition.or(FaultName::DeviceOff, off),
+        };
+        if dead_link > 0.0 {
+            condition = condition.or(FaultName::FalseLink, dead_link);
+        }
     }
     condition = condition.or_at(FaultName::NicDamaged, Place::Host, card);
     if silence.frames >= CERTAIN || view.has_ended {
@@ -118,6 +140,17 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     });
     condition = condition.explaining(follows);
     condition = condition.explaining([Symptom::FramesLost, Symptom::NoCarrier]);
+    if is_spoiled && !may_be_noise {
+        condition = condition.explaining([Symptom::CardErrors]);
+    }
+    if is_spoiled {
+        return condition
+            .advise(
+                "Take SubDevices away from the far end, or plug the cable behind the first half \
+                 out: when frames come back, what spoils them lies behind.",
+            )
+            .advise("Then read the error counters: they name the link.");
+    }
     advise(condition, carrier)
 }
 
