@@ -398,6 +398,9 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
     if is_unread {
         let sender = hop.from.node().map_or(Spot::Host, Spot::Device);
         list.push(suspect(DeviceInternal, sender, 0.1));
+    } else if !is_both && let Some(node) = hop.from.node() {
+        // Controllers in programmable logic make a symbol error of a frame that was bad before.
+        list.push(suspect(DeviceInternal, Spot::Device(node), 0.04));
     }
     if let Some(damage) = group.damages.first() {
         add_earlier(&mut list, damage);
