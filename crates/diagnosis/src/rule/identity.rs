@@ -155,14 +155,16 @@ fn moved(line: &Line, slots: &[Slot]) -> Option<Condition> {
     let seen = slot.found?;
     let place = Place::device(line.network, slot.id);
     let label = line.label(slot.id);
+    let how_many = if by == 1 { "one SubDevice".to_owned() } else { format!("{by} SubDevices") };
     let (page, cause, text) = if is_missing {
+        let is = if by == 1 { "is" } else { "are" };
         let text = format!(
-            "{by} SubDevices are missing from {label} on: the one found there is planned {by} further on"
+            "{how_many} {is} missing from {label} on: the one found there is planned {by} further on"
         );
         (&MISSING, FaultName::DeviceMissing, text)
     } else {
         let text = format!(
-            "{by} SubDevices too many before {label}: from here on all are {by} further on than planned"
+            "{how_many} too many before {label}: from here on all are {by} further on than planned"
         );
         (&EXTRA, FaultName::DeviceExtra, text)
     };

@@ -235,6 +235,7 @@ fn counter_evidence(line: &Line, end: End) -> Option<Evidence> {
     let rise = track.last_rise()?;
     let id = DeviceId(node as u32);
     let count = track.total.rise();
-    let text = format!("SubDevice {} lost the link of port {port} {count} times", line.label(id));
+    let often = if count == 1 { "once".to_owned() } else { format!("{count} times") };
+    let text = format!("SubDevice {} lost the link of port {port} {often}", line.label(id));
     Some(Evidence::rise(id, counter.address(), Some(port), rise, text))
 }
