@@ -54,6 +54,19 @@ kind = "init-refused"
 device = "Term 2 (EL2008)"
 to = "OP"
 code = 27
+
+[[fault]]
+kind = "link-open"
+at = "K1.C-K3.A"
+at_ms = [10.0, 200.5]
+for_ms = 3.0
+times = 7
+burst = { count = 3, every_ms = 20.0 }
+
+[[fault]]
+kind = "device-off"
+device = "K3"
+random = { mean_ms = 500.0, for_ms = 20.0 }
 "#;
 
 #[test]
