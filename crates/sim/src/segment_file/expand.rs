@@ -178,8 +178,9 @@ fn wiring_error(planned: &[Planned], error: ProjectError) -> SegmentFileError {
     })
 }
 
-/// The counter behind a key of the file.
-pub(crate) fn parse_counter(key: &str) -> Option<linesman_proto::register::ErrorCounter> {
+/// The counter behind a key of the file, such as `A.lost_link`; `None` for what is none.
+#[must_use]
+pub fn parse_counter(key: &str) -> Option<linesman_proto::register::ErrorCounter> {
     use linesman_proto::register::ErrorCounter as Counter;
     match key {
         "processing_unit" => return Some(Counter::ProcessingUnit),

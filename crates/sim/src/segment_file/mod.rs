@@ -31,7 +31,8 @@ use linesman_config::attachment::Attachment;
 use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, parse_counter, wiring};
+pub use expand::parse_counter;
+pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
 pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
