@@ -2,8 +2,8 @@
 
 use linesman_proto::time::Instant;
 
-use super::schedule::{Window, Windows};
 use super::Plot;
+use super::schedule::{Window, Windows};
 use crate::truth::FaultId;
 use crate::wire::{Change, Source};
 
@@ -49,17 +49,7 @@ impl Running {
         let first = windows.first();
         let present = windows.next().unwrap_or(first);
         let next = source.next_change();
-        Self {
-            id,
-            plot,
-            windows,
-            present,
-            nth: 0,
-            source,
-            begun: false,
-            healed_at: None,
-            next,
-        }
+        Self { id, plot, windows, present, nth: 0, source, begun: false, healed_at: None, next }
     }
 
     /// Heals it at an instant, unless it ends before.

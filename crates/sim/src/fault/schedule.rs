@@ -262,11 +262,8 @@ mod tests {
     use crate::segment_file::{BurstTimes, RandomTimes, Times};
 
     fn of(from_to: (f64, Option<f64>), schedule: &Schedule) -> Result<Windows, FaultError> {
-        let entry = FaultEntry {
-            from_ms: Some(from_to.0),
-            to_ms: from_to.1,
-            ..FaultEntry::default()
-        };
+        let entry =
+            FaultEntry { from_ms: Some(from_to.0), to_ms: from_to.1, ..FaultEntry::default() };
         windows("fault 1", &entry, schedule, Instant::ZERO, Seed(1).stream("windows"))
     }
 

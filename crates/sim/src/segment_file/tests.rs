@@ -73,7 +73,7 @@ random = { mean_ms = 500.0, for_ms = 20.0 }
 fn a_file_reads_and_writes_itself() {
     let file = SegmentFile::parse(PLANT).unwrap();
     assert_eq!(SegmentFile::parse(&file.to_toml()), Ok(file.clone()));
-    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 3));
+    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 5));
     assert_eq!(file.devices[2].cable_m, Some(12.0));
     assert_eq!(file.devices[0].counters["A.physical"], 3);
     let noise = &file.faults[0];
