@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use linesman_diagnosis::rule;
 use linesman_proto::port::Port;
 use linesman_sim::device::library;
-use linesman_sim::fault::{KINDS, PlaceRule, Shape};
+use linesman_sim::fault::{KINDS, Shape};
 use linesman_sim::hardware::PortKind;
 
 fn docs() -> PathBuf {
@@ -71,17 +71,7 @@ fn faults() -> String {
          parameters of its kind.\n",
     );
     for kind in KINDS {
-        let place = match kind.place {
-            PlaceRule::Link => "`at`: a link, `K1.C-B3.A`",
-            PlaceRule::Lines => "`at`: a link `K1.C-B3.A`, or one direction of it `K1.C>B3.A`",
-            PlaceRule::ManyLines => {
-                "`at`: a link `K1.C-B3.A`, one direction of it `K1.C>B3.A`, or a list of those"
-            }
-            PlaceRule::Line => "`at`: one direction of a link, `K1.C>B3.A`",
-            PlaceRule::Device => "`device`",
-            PlaceRule::Devices => "`device`, or `devices` with a list",
-            PlaceRule::Card => "`at`: a card, `maindevice` (unless said) or `maindevice.B`",
-        };
+        let place = kind.place.allowed();
         write!(text, "\n## {}\n\n{}\n\nPlace: {place}.\n", kind.name, kind.name.meaning()).unwrap();
         if !kind.parameters.is_empty() {
             text.push_str("\n| parameter | range | unless said | meaning |\n|---|---|---|---|\n");

@@ -52,6 +52,16 @@ pub enum Effect {
         /// Number of the frame in the segment.
         frame: u64,
     },
+    /// Somebody else than the MainDevice sent a frame.
+    StrangerSent {
+        /// Number of the frame in the segment.
+        frame: u64,
+    },
+    /// The host kept a frame back before it sent it.
+    FrameDelayed {
+        /// Number of the frame in the segment.
+        frame: u64,
+    },
     /// A processing unit counted an undamaged frame for what is in it: foreign, too short,
     /// circulating.
     ContentRefused {
@@ -77,6 +87,8 @@ pub enum Effect {
     WrongDevice,
     /// A device that was planned is not here.
     MissingDevice,
+    /// A cable is plugged into another port than planned.
+    WrongPort,
 }
 
 /// An entry of the log.
@@ -132,6 +144,10 @@ pub struct FaultRecord {
     pub frames_spoiled: u64,
     /// Frames, or rests of frames, that vanished.
     pub frames_lost: u64,
+    /// Frames that it sent itself.
+    pub frames_sent: u64,
+    /// Frames that it kept back.
+    pub frames_delayed: u64,
     /// Ends of links that lost their link.
     pub links_lost: u64,
     /// Controllers that lost their supply.
@@ -153,13 +169,16 @@ impl FaultRecord {
             Effect::FrameLost { .. } => self.frames_lost += 1,
             Effect::SignalLost => self.links_lost += 1,
             Effect::PowerLost => self.supplies_lost += 1,
+            Effect::StrangerSent { .. } => self.frames_sent += 1,
+            Effect::FrameDelayed { .. } => self.frames_delayed += 1,
             Effect::ContentRefused { .. }
             | Effect::SignalBack
             | Effect::PowerBack
             | Effect::StateRefused { .. }
             | Effect::OldCounters
             | Effect::WrongDevice
-            | Effect::MissingDevice => {}
+            | Effect::MissingDevice
+            | Effect::WrongPort => {}
         }
     }
 }
@@ -220,6 +239,8 @@ impl TruthLog {
             symbol_errors: 0,
             frames_spoiled: 0,
             frames_lost: 0,
+            frames_sent: 0,
+            frames_delayed: 0,
             links_lost: 0,
             supplies_lost: 0,
         });

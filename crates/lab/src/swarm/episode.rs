@@ -264,7 +264,10 @@ impl<'a> Episode<'a> {
                 | Effect::StateRefused { .. }
                 | Effect::OldCounters
                 | Effect::WrongDevice
-                | Effect::MissingDevice => false,
+                | Effect::MissingDevice
+                | Effect::StrangerSent { .. }
+                | Effect::FrameDelayed { .. }
+                | Effect::WrongPort => false,
             },
             Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => false,
         })

@@ -18,12 +18,21 @@ mod device_internal;
 mod device_missing;
 mod device_off;
 mod device_wrong;
+mod early_link;
 mod emc_noise;
+mod false_link;
+mod foreign_frames;
+mod host_drops;
+mod host_jitter;
 mod init_refused;
 mod link_flapping;
 mod link_open;
+mod maindevice_wrong_port;
 mod nic_damaged;
+mod ports_swapped;
 mod receiver_damaged;
+mod ring_open;
+mod second_maindevice;
 mod supply_off;
 mod transmitter_damaged;
 
@@ -38,6 +47,7 @@ pub(crate) use running::{Running, Step};
 
 pub(crate) use device_missing::missing_device;
 pub(crate) use device_wrong::{Replacement, replacement};
+pub(crate) use ports_swapped::{Turned, turned};
 
 use crate::seed::{Seed, Stream};
 use crate::segment_file::FaultEntry;
@@ -60,6 +70,23 @@ pub struct Kind {
     start: fn(Start<'_>) -> Result<Box<dyn Source>, FaultError>,
 }
 
+impl Kind {
+    /// Whether it is in the line from its making on: it cannot come and go while the line runs.
+    #[must_use]
+    pub fn is_built_in(&self) -> bool {
+        let built_in = [
+            FaultName::DeviceMissing,
+            FaultName::DeviceExtra,
+            FaultName::DeviceWrong,
+            FaultName::DevicesSwapped,
+            FaultName::TwinsSwapped,
+            FaultName::PortsSwapped,
+            FaultName::MainDeviceWrongPort,
+        ];
+        built_in.contains(&self.name)
+    }
+}
+
 /// All kinds that a segment can have.
 pub const KINDS: &[Kind] = &[
     link_open::KIND,
@@ -76,6 +103,15 @@ pub const KINDS: &[Kind] = &[
     device_missing::KIND,
     init_refused::KIND,
     nic_damaged::KIND,
+    false_link::KIND,
+    early_link::KIND,
+    ports_swapped::KIND,
+    maindevice_wrong_port::KIND,
+    ring_open::KIND,
+    second_maindevice::KIND,
+    foreign_frames::KIND,
+    host_jitter::KIND,
+    host_drops::KIND,
 ];
 
 /// The kind with a name, if a segment can have it.

@@ -49,11 +49,9 @@ pub fn plant(seed: Seed, options: &PlantOptions) -> SegmentFile {
         name: format!("plant {}", seed.0),
         seed: Some(seed.0),
         old_counters,
-        counts_forwarded: None,
         devices: builder.devices,
         ring,
-        faults: Vec::new(),
-        types: super::DescribedTypes::default(),
+        ..SegmentFile::default()
     };
     in_order(file)
 }
@@ -245,6 +243,8 @@ impl Builder {
             cable_m,
             serial,
             clock_ppm: None,
+            medium: None,
+            remakes_symbol_errors: None,
             counts_forwarded: None,
             counters: std::collections::BTreeMap::new(),
         });
@@ -257,7 +257,11 @@ impl Builder {
         let cable_m = (self.stream.log_uniform(5.0, 80.0) * 10.0).round() / 10.0;
         match farthest.on {
             Attachment::Device { .. } => {
-                Some(SegmentRing { closes_at: farthest.on.clone(), cable_m: Some(cable_m) })
+                Some(SegmentRing {
+                    closes_at: farthest.on.clone(),
+                    cable_m: Some(cable_m),
+                    medium: None,
+                })
             }
             Attachment::MainDevice(_) => None,
         }

@@ -13,12 +13,15 @@ mod due;
 pub mod history;
 pub mod link;
 mod node;
+pub(crate) mod plug_noise;
+pub mod stranger;
 pub(crate) mod walk;
 pub(crate) mod world;
 
 pub use change::{Change, Line, Source};
 pub use history::History;
-pub use link::{CABLE_NS_PER_M, Link};
+pub use link::{CABLE_NS_PER_M, Link, Medium};
+pub use stranger::Stranger;
 
 #[cfg(test)]
 mod tests;

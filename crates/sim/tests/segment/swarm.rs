@@ -5,7 +5,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::address::Path;
 use linesman_proto::command::Command;
 use linesman_proto::time::Span;
-use linesman_sim::fault::{KINDS, PlaceRule};
+use linesman_sim::fault::{KINDS, Kind, PlaceRule};
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{FaultEntry, PlantOptions, SegmentFile, plant};
@@ -15,8 +15,9 @@ use super::rig::{Bench, PLANT, answer, at, frame};
 
 /// A random fault of any kind that can come and go.
 fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
-    let built_in = [FaultName::DeviceWrong, FaultName::DeviceMissing];
-    let kinds: Vec<_> = KINDS.iter().filter(|kind| !built_in.contains(&kind.name)).collect();
+    let is_ring = file.ring.is_some();
+    let fits = |kind: &&Kind| !kind.is_built_in() && (is_ring || kind.place != PlaceRule::RingLink);
+    let kinds: Vec<_> = KINDS.iter().filter(fits).collect();
     let kind = stream.pick(&kinds).unwrap();
     let device = stream.pick(&file.devices).unwrap();
     let (near, far) = (device.on.to_string(), format!("{}.A", device.name));
@@ -28,7 +29,7 @@ fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
         PlaceRule::Line if stream.chance(0.5) => entry.at(format!("{near}>{far}")),
         PlaceRule::Line => entry.at(format!("{far}>{near}")),
         PlaceRule::Device | PlaceRule::Devices => entry.device(&device.name),
-        PlaceRule::Card => entry,
+        PlaceRule::Card | PlaceRule::RingLink | PlaceRule::Entrance => entry,
     }
 }
 
