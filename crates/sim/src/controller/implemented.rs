@@ -115,20 +115,19 @@ const LIVE: &[Register] = &[
 
 /// Where the moment decides whether a write is taken. The other registers marked `r/(w)` in the
 /// table depend on settings that this segment does not have.
-const CONDITIONAL: &[Register] =
-    &[
-        r::AL_CONTROL,
-        r::SII_CONTROL_STATUS,
-        r::SII_ADDRESS,
-        r::SII_DATA,
-        r::SYNC_MANAGER,
-        r::SYNC_ACTIVATION,
-        r::START_TIME,
-        r::SYNC0_CYCLE_TIME,
-        r::SYNC1_CYCLE_TIME,
-        r::LATCH0_CONTROL,
-        r::LATCH1_CONTROL,
-    ];
+const CONDITIONAL: &[Register] = &[
+    r::AL_CONTROL,
+    r::SII_CONTROL_STATUS,
+    r::SII_ADDRESS,
+    r::SII_DATA,
+    r::SYNC_MANAGER,
+    r::SYNC_ACTIVATION,
+    r::START_TIME,
+    r::SYNC0_CYCLE_TIME,
+    r::SYNC1_CYCLE_TIME,
+    r::LATCH0_CONTROL,
+    r::LATCH1_CONTROL,
+];
 
 /// Times of 64 bits, of which clocks of 32 bits have the low half.
 const LONG_TIMES: &[Register] = &[
@@ -290,8 +289,16 @@ mod tests {
             assert_ne!(right(&full, gone), 0, "0x{gone:04X}");
             assert_eq!(right(&small, gone), 0, "0x{gone:04X}");
         }
-        assert_ne!(Rights::of(&full, ClockUnits::default()).byte(0x090C), 0, "receive times are always there");
-        assert_eq!(Rights::of(&full, ClockUnits::default()).byte(0x0910), 0, "the time loop is switched off");
+        assert_ne!(
+            Rights::of(&full, ClockUnits::default()).byte(0x090C),
+            0,
+            "receive times are always there"
+        );
+        assert_eq!(
+            Rights::of(&full, ClockUnits::default()).byte(0x0910),
+            0,
+            "the time loop is switched off"
+        );
         small.features = 0x0004;
         assert_ne!(right(&small, 0x0913), 0);
         assert_eq!(right(&small, 0x0914), 0, "a 32-bit clock");

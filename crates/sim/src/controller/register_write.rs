@@ -150,7 +150,6 @@ impl Core {
             }
         }
     }
-
 }
 
 /// SyncManagers whose registers are being written.

@@ -19,6 +19,7 @@
 //! Unknown keys are errors. The order of devices is the order of their numbers; a device with
 //! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
 
+mod clock;
 mod expand;
 mod plant;
 mod types;
@@ -31,6 +32,7 @@ use linesman_config::attachment::Attachment;
 use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
+pub use clock::SegmentClock;
 pub use expand::parse_counter;
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
@@ -95,6 +97,9 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]
     pub clock_ppm: Option<f64>,
+    /// How else its clock is off: warming up, jitter, what it shows at power-on.
+    #[serde(default)]
+    pub clock: Option<SegmentClock>,
     /// Whether its controllers have counters of forwarded errors; as the segment, or else its type,
     /// has it unless said.
     #[serde(default)]

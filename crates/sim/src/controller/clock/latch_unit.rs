@@ -125,14 +125,17 @@ impl Core {
     /// Which times of inputs a range of addresses touches, as bits for
     /// [`Core::end_latch_reads`].
     pub(super) fn latch_reads(range: &Range<usize>) -> u8 {
-        let times = LatchInput::ALL.into_iter().flat_map(|input| Edge::ALL.map(|edge| (input, edge)));
-        let touched = times.enumerate().filter(|(_, (input, edge))| touches(range, input.time(*edge)));
+        let times =
+            LatchInput::ALL.into_iter().flat_map(|input| Edge::ALL.map(|edge| (input, edge)));
+        let touched =
+            times.enumerate().filter(|(_, (input, edge))| touches(range, input.time(*edge)));
         touched.fold(0, |bits, (index, _)| bits | 1 << index)
     }
 
     /// A good frame has read these times.
     pub(in crate::controller) fn end_latch_reads(&mut self, reads: u8) {
-        let times = LatchInput::ALL.into_iter().flat_map(|input| Edge::ALL.map(|edge| (input, edge)));
+        let times =
+            LatchInput::ALL.into_iter().flat_map(|input| Edge::ALL.map(|edge| (input, edge)));
         for (_, (input, edge)) in times.enumerate().filter(|(index, _)| reads >> index & 1 != 0) {
             if self.latch_is_for_ecat(input) {
                 self.clear_latch_event(input, edge);

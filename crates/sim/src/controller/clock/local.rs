@@ -117,7 +117,8 @@ impl RunningClock {
         for _ in 0..TRIES {
             let left = missing(at);
             if left.abs() <= NEAR {
-                let (mut low, mut high) = (at - Span::ns(4 * NEAR as u64), at + Span::ns(4 * NEAR as u64));
+                let (mut low, mut high) =
+                    (at - Span::ns(4 * NEAR as u64), at + Span::ns(4 * NEAR as u64));
                 low = low.max(from);
                 // Local time is less than the target at `low`, and not at `high`.
                 while low + Span::ns(1) < high {

@@ -117,7 +117,8 @@ mod tests {
             ..LocalClock::default()
         };
         let quartz = Quartz::new(clock, Instant::ZERO);
-        let gained = |s: u64| quartz.counted(Instant::ZERO + Span::s(s)) as i64 - s as i64 * 1_000_000_000;
+        let gained =
+            |s: u64| quartz.counted(Instant::ZERO + Span::s(s)) as i64 - s as i64 * 1_000_000_000;
         // 10 ppm, and 1 ppm more each second: 10 t + t²/2 µs.
         assert_eq!(gained(1), 10_500);
         assert_eq!(gained(2), 22_000);

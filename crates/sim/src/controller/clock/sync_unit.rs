@@ -144,7 +144,12 @@ impl Core {
     // ---- what is written ----
 
     /// Something among the registers of the unit was written; `before` is what the activation was.
-    pub(super) fn sync_written(&mut self, range: &std::ops::Range<usize>, before: u8, end: Instant) {
+    pub(super) fn sync_written(
+        &mut self,
+        range: &std::ops::Range<usize>,
+        before: u8,
+        end: Instant,
+    ) {
         let enhanced = Features(self.hardware.features).enhanced_sync_activation();
         let mut activation = self.activation();
         if !enhanced {
@@ -231,8 +236,8 @@ impl Core {
             }
             let period = self.period(signal);
             counts[index] = (passed - ahead).checked_div(period).map_or(1, |more| more + 1);
-            self.sync.next[index] = (period != 0)
-                .then(|| next.wrapping_add(counts[index].wrapping_mul(period)) & mask);
+            self.sync.next[index] =
+                (period != 0).then(|| next.wrapping_add(counts[index].wrapping_mul(period)) & mask);
             self.sync.pending[index] = false;
             if self.is_enabled(signal) && self.acknowledges() {
                 self.memory.set_u8(signal.status(), 1);
@@ -314,7 +319,8 @@ impl Core {
             self.settle_sync(self.passing.began);
         }
         if self.sync.running {
-            for (register, next) in [&r::START_TIME, &r::NEXT_SYNC1].into_iter().zip(self.sync.next) {
+            for (register, next) in [&r::START_TIME, &r::NEXT_SYNC1].into_iter().zip(self.sync.next)
+            {
                 if let Some(next) = next {
                     self.put_time(register, next);
                 }

@@ -110,9 +110,8 @@ fn a_start_in_the_past_comes_with_the_wrap_of_32_bits() {
     bench.write(0x0990, &past.to_le_bytes());
     bench.write(0x09A0, &1_000_000u32.to_le_bytes());
     bench.write(0x0981, &[0x03]);
-    let next = |bench: &mut Bench| {
-        u32::from_le_bytes(bench.read(0x0990, 4).unwrap().try_into().unwrap())
-    };
+    let next =
+        |bench: &mut Bench| u32::from_le_bytes(bench.read(0x0990, 4).unwrap().try_into().unwrap());
     bench.wait(Span::s(4));
     assert_eq!(next(&mut bench), past);
     bench.wait(Span::ms(300));
@@ -127,7 +126,12 @@ fn listen(pulse: u16, acknowledges: bool) -> (Bench, Arc<Mutex<Vec<(SyncSignal, 
 }
 
 /// When a signal came, as local time behind `zero`, in ns.
-fn times(heard: &Arc<Mutex<Vec<(SyncSignal, Instant)>>>, bench: &Bench, which: SyncSignal, zero: u64) -> Vec<u64> {
+fn times(
+    heard: &Arc<Mutex<Vec<(SyncSignal, Instant)>>>,
+    bench: &Bench,
+    which: SyncSignal,
+    zero: u64,
+) -> Vec<u64> {
     let heard = heard.lock().unwrap();
     let mine = heard.iter().filter(|(signal, _)| *signal == which);
     mine.map(|(_, at)| bench.controller.local_time(*at) - zero).collect()
