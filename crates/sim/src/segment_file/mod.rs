@@ -22,6 +22,7 @@
 mod clock;
 mod expand;
 mod plant;
+mod schedule;
 mod types;
 mod value;
 mod write;
@@ -36,6 +37,7 @@ pub use clock::SegmentClock;
 pub use expand::parse_counter;
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
+pub use schedule::{BurstTimes, RandomTimes, Schedule, Times};
 pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
 
@@ -143,6 +145,9 @@ pub struct FaultEntry {
     /// When it ends; it lasts unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_ms: Option<f64>,
+    /// How often it comes and how long it stays each time; once unless said.
+    #[serde(flatten)]
+    pub schedule: Schedule,
     /// Parameters of the kind, such as `hits_per_s`.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, Value>,

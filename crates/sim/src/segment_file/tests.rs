@@ -55,13 +55,26 @@ kind = "init-refused"
 device = "Term 2 (EL2008)"
 to = "OP"
 code = 27
+
+[[fault]]
+kind = "link-open"
+at = "K1.C-K3.A"
+at_ms = [10.0, 200.5]
+for_ms = 3.0
+times = 7
+burst = { count = 3, every_ms = 20.0 }
+
+[[fault]]
+kind = "device-off"
+device = "K3"
+random = { mean_ms = 500.0, for_ms = 20.0 }
 "#;
 
 #[test]
 fn a_file_reads_and_writes_itself() {
     let file = SegmentFile::parse(PLANT).unwrap();
     assert_eq!(SegmentFile::parse(&file.to_toml()), Ok(file.clone()));
-    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 3));
+    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 5));
     assert_eq!(file.devices[2].cable_m, Some(12.0));
     assert_eq!(file.devices[0].counters["A.physical"], 3);
     let noise = &file.faults[0];
