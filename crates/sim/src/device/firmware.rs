@@ -6,7 +6,7 @@
 use std::fmt::Debug;
 
 use linesman_proto::mailbox::coe::Emergency;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
 use super::signal::Signals;
@@ -59,6 +59,11 @@ pub trait Firmware: Debug + Send {
     /// a mailbox cannot. Faults go through
     /// [`Controller::report`](crate::controller::Controller::report).
     fn report(&mut self, _emergency: Emergency) {}
+
+    /// From now on its work in each cycle takes so long, whatever it needs otherwise; `None` ends that.
+    /// It outlives a restart. Faults go through
+    /// [`Controller::slow_down`](crate::controller::Controller::slow_down).
+    fn slow_down(&mut self, _takes: Option<Span>) {}
 
     /// The supply is gone: outputs are no longer driven. Nothing else can be done any more.
     fn stop(&mut self, _signals: &mut Signals) {}

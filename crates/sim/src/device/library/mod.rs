@@ -13,6 +13,7 @@ mod image;
 pub(super) mod object;
 mod smart;
 mod spec;
+pub(in crate::device) mod synchronisation;
 
 use linesman_proto::port::{Port, PortMap};
 

@@ -5,7 +5,9 @@
 
 mod areas;
 mod check;
+mod in_step;
 mod process_image;
+mod synchronisation;
 
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress, ObjectIndex};
 use linesman_proto::register as r;
@@ -15,13 +17,14 @@ use linesman_proto::time::{Instant, Span};
 
 use self::areas::Areas;
 pub use self::areas::ProcessBuffer;
+use self::synchronisation::Synchronisation;
 use super::application::Channel;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::dictionary::Dictionary;
 use super::firmware::Firmware;
 use super::mailbox::Mailbox;
 use super::signal::Signals;
-use crate::controller::Pdi;
+use crate::controller::{Pdi, SyncSignal};
 
 /// Emergencies that wait for a mailbox; further ones are forgotten.
 const UNTOLD: usize = 8;
@@ -92,6 +95,7 @@ pub struct Processor {
     dictionary: Dictionary,
     mailbox: Mailbox,
     process_data: Areas,
+    synchronisation: Synchronisation,
     /// The step that is being worked on.
     step: Option<Step>,
     next_sample: Instant,
@@ -126,6 +130,7 @@ impl Processor {
             dictionary: description.dictionary.clone(),
             mailbox: Mailbox::new(description.times.mailbox),
             process_data: Areas::default(),
+            synchronisation: Synchronisation::new(&description.dictionary),
             step: None,
             next_sample: Instant::ZERO,
             emergencies: Vec::new(),
@@ -225,6 +230,8 @@ impl Processor {
     fn set_up_process_data(&mut self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
         let areas = Areas::of(&self.dictionary, &self.description.buffers)?;
         check::process_data(pdi, &areas, self.description.mailbox.is_present())?;
+        let outputs = areas.len(Direction::Outputs) > 0;
+        self.synchronisation.set_up(&mut self.dictionary, outputs, pdi)?;
         self.process_data = areas;
         Ok(())
     }
@@ -249,6 +256,9 @@ impl Processor {
     fn go_operational(&mut self, step: Step, now: Instant, pdi: &mut Pdi<'_>) -> Outcome {
         if let Err(code) = self.check_process_data(pdi) {
             return Outcome::Failed(AlState::PreOp, code);
+        }
+        if let Some(outcome) = self.wait_for_clock(step, now) {
+            return outcome;
         }
         if !self.has_outputs() {
             return Outcome::Entered;
@@ -322,14 +332,13 @@ impl Processor {
     }
 
     fn serve_process_data(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if !ApplicationLayer::is_operational(pdi) || !self.has_outputs() {
-            return;
-        }
-        if self.watchdog_ran_out(pdi) {
+        let operational = ApplicationLayer::is_operational(pdi);
+        if operational && self.has_outputs() && self.watchdog_ran_out(pdi) {
             self.fall(pdi, AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG);
-        } else if self.take_outputs(pdi) {
-            self.drive_outputs(now, pdi.signals_mut());
+        } else if ApplicationLayer::state(pdi).has_inputs() {
+            self.serve_outputs(now, pdi);
         }
+        self.serve_due(now, pdi);
     }
 
     fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
@@ -353,6 +362,7 @@ impl Firmware for Processor {
         self.dictionary.restart(&self.description.dictionary);
         self.mailbox.restart();
         self.process_data = Areas::default();
+        self.synchronisation.start(&self.description.dictionary, &mut self.dictionary);
         self.step = None;
         self.emergencies.clear();
         self.next_sample = now;
@@ -373,7 +383,8 @@ impl Firmware for Processor {
             None
         };
         let step = self.step.map(|step| if step.due > now { step.due } else { step.deadline });
-        [again, step].into_iter().flatten().min()
+        let due = self.synchronisation.next(ApplicationLayer::is_operational(pdi));
+        [again, step, due].into_iter().flatten().min()
     }
 
     fn refuse(&mut self, refusal: Option<Refusal>) {
@@ -391,9 +402,22 @@ impl Firmware for Processor {
     }
 
     fn sample(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
+        let with_frames = self.synchronisation.samples_with_frames();
+        if with_frames && now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
             self.sample_inputs(now, pdi);
         }
+    }
+
+    fn synchronises(&self) -> bool {
+        true
+    }
+
+    fn sync(&mut self, signal: SyncSignal, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
+        self.keep_step(signal, now, pdi)
+    }
+
+    fn slow_down(&mut self, takes: Option<Span>) {
+        self.synchronisation.set_takes(takes);
     }
 
     fn stop(&mut self, signals: &mut Signals) {
