@@ -157,8 +157,10 @@ impl Core {
         } else if touches(&range, &r::SYNC_MANAGER) {
             let index = (address - at(&r::SYNC_MANAGER)) / usize::from(r::SYNC_MANAGER.len);
             !super::sync_manager::config(index, &self.memory).activate.enable()
-        } else {
+        } else if address < super::phy::CONTROL {
             self.sii.is_free(&self.memory)
+        } else {
+            self.phys.is_free(&self.memory)
         }
     }
 

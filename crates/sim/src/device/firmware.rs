@@ -37,6 +37,12 @@ pub trait Firmware: Debug + Send {
     /// input sampling at start of frame). Called only where [`Firmware::samples`] asks for it.
     fn sample(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
 
+    /// Whether it plays the EEPROM (S1 11.2.4): then it answers
+    /// [`Pdi::sii_request`]. Asked once, when the controller is made.
+    fn emulates_sii(&self) -> bool {
+        false
+    }
+
     /// From now on a step into the state that `refusal` names is refused with its code; `None` ends
     /// that. It outlives a restart. Faults go through
     /// [`Controller::refuse`](crate::controller::Controller::refuse), which also makes a controller

@@ -10,6 +10,7 @@ pub mod application;
 pub mod application_layer;
 pub mod dictionary;
 pub mod emulated;
+mod emulated_sii;
 pub mod firmware;
 pub mod library;
 pub mod mailbox;
@@ -18,6 +19,7 @@ pub mod signal;
 
 pub use application_layer::Refusal;
 pub use emulated::{DigitalArea, Emulated, WordArea};
+pub use emulated_sii::{EMULATION_TIME, EmulatedSii};
 pub use firmware::{Firmware, NoFirmware};
 pub use signal::{SignalId, Signals};
 

@@ -12,6 +12,7 @@ mod due;
 pub mod history;
 pub mod link;
 mod node;
+mod phy_link;
 pub(crate) mod walk;
 pub(crate) mod world;
 

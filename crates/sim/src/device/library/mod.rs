@@ -14,6 +14,7 @@ mod object;
 mod smart;
 mod spec;
 
+pub use self::chip::controllers;
 use linesman_proto::port::{Port, PortMap};
 
 use self::object::Individual;
