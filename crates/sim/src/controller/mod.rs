@@ -33,7 +33,7 @@ mod sii_emulation;
 mod sync_manager;
 mod watchdog;
 
-pub use clock::LocalClock;
+pub use clock::{Edge, LatchInput, LocalClock, SyncSignal};
 pub use esc::{Controller, Verdict};
 pub use pdi::Pdi;
 pub use phy::{PHY_ACCESS_TIME, PhyAct};

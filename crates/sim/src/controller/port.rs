@@ -165,12 +165,10 @@ impl Core {
     /// The first bit of a frame comes in.
     pub(super) fn enters(&mut self, when: Instant, port: Port, frame: &WireFrame) {
         self.entered[port] = (frame.number, when);
-        if self.hardware.counting.forwarded {
+        if self.keeps_reasons {
             self.frame_until[port] = when + frame.duration();
         }
-        if self.latched == Some(frame.number) && self.loops.is_open(port) {
-            self.latch_receive_time(port, when);
-        }
+        self.latch_entry(port, frame.number, when);
         if self.loops.waits_for_frame(port) && frame.damage.is_intact() {
             self.queue.push(when + frame.duration(), Happening::GoodFrame(port));
         }

@@ -10,7 +10,7 @@ use linesman_proto::time::{Instant, Span};
 use super::application_layer::Refusal;
 use super::firmware::Firmware;
 use super::signal::Signals;
-use crate::controller::{Pdi, SiiRequest};
+use crate::controller::{Pdi, SiiRequest, SyncSignal};
 
 /// How long the processor takes for a request: an interrupt and a copy.
 pub const EMULATION_TIME: Span = Span::us(30);
@@ -96,6 +96,14 @@ impl Firmware for EmulatedSii {
 
     fn sample(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.inner.sample(now, pdi);
+    }
+
+    fn synchronises(&self) -> bool {
+        self.inner.synchronises()
+    }
+
+    fn sync(&mut self, signal: SyncSignal, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
+        self.inner.sync(signal, now, pdi)
     }
 
     fn refuse(&mut self, refusal: Option<Refusal>) {

@@ -10,7 +10,7 @@ use linesman_proto::time::Instant;
 
 use super::application_layer::Refusal;
 use super::signal::Signals;
-use crate::controller::Pdi;
+use crate::controller::{Pdi, SyncSignal};
 
 /// What is behind a controller: a processor with its software, or plain inputs and outputs.
 pub trait Firmware: Debug + Send {
@@ -41,6 +41,18 @@ pub trait Firmware: Debug + Send {
     /// [`Pdi::sii_request`]. Asked once, when the controller is made.
     fn emulates_sii(&self) -> bool {
         false
+    }
+
+    /// Whether [`Firmware::sync`] is wanted. Asked once, after [`Firmware::start`].
+    fn synchronises(&self) -> bool {
+        false
+    }
+
+    /// A pulse of the SYNC unit reaches the processor. Returns the next wake-up as
+    /// [`Firmware::run`] does, but one that was asked for before stays. In acknowledge mode (0x0982
+    /// is 0) the next pulse comes only after [`Pdi::acknowledge_sync`].
+    fn sync(&mut self, _signal: SyncSignal, _now: Instant, _pdi: &mut Pdi<'_>) -> Option<Instant> {
+        None
     }
 
     /// From now on a step into the state that `refusal` names is refused with its code; `None` ends
