@@ -10,16 +10,20 @@ pub mod application;
 pub mod application_layer;
 pub mod dictionary;
 pub mod emulated;
+pub mod files;
 pub mod firmware;
+pub mod history;
 pub mod library;
 pub mod mailbox;
 pub mod processor;
 pub mod signal;
+pub mod trouble;
 
 pub use application_layer::Refusal;
 pub use emulated::{DigitalArea, Emulated, WordArea};
 pub use firmware::{Firmware, NoFirmware};
 pub use signal::{SignalId, Signals};
+pub use trouble::{Trouble, Troubles};
 
 #[cfg(test)]
 mod tests;

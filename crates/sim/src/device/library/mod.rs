@@ -9,6 +9,7 @@ mod box_module;
 mod chip;
 mod coupler;
 mod digital;
+mod file;
 mod image;
 mod object;
 mod smart;
@@ -95,6 +96,12 @@ impl LibraryType {
     #[must_use]
     pub fn ebus_current_ma(&self) -> i16 {
         self.controllers.iter().map(|spec| spec.ebus_current_ma).sum()
+    }
+
+    /// Whether it has a processor, and with it a mailbox.
+    #[must_use]
+    pub fn has_mailbox(&self) -> bool {
+        self.controllers.iter().any(|spec| spec.mailbox().is_present())
     }
 
     /// How many channels it has: outputs, inputs.
@@ -205,7 +212,7 @@ fn with_processor(
         bootstrap: Some(image::bootstrap(spec)),
         times: processor.times,
     };
-    Box::new(Processor::new(description))
+    Box::new(Processor::new(description).with_files(file::files(spec)))
 }
 
 fn channels(
