@@ -131,12 +131,7 @@ impl Files {
     ///
     /// # Errors
     /// The FoE error: no such name, not in this state, wrong password, never written.
-    pub fn read(
-        &self,
-        name: &[u8],
-        password: u32,
-        state: AlState,
-    ) -> Result<&[u8], FoeErrorCode> {
+    pub fn read(&self, name: &[u8], password: u32, state: AlState) -> Result<&[u8], FoeErrorCode> {
         if self.firmware.is_some() && is_firmware_name(name) {
             return Err(FoeErrorCode::ACCESS_DENIED);
         }
@@ -231,12 +226,7 @@ fn is_firmware_name(name: &[u8]) -> bool {
 }
 
 /// Whether a file may be accessed in this state with this password.
-fn may(
-    accessible: Where,
-    password: u32,
-    given: u32,
-    state: AlState,
-) -> Result<(), FoeErrorCode> {
+fn may(accessible: Where, password: u32, given: u32, state: AlState) -> Result<(), FoeErrorCode> {
     match (accessible, state == AlState::Boot) {
         (Where::Boot, false) => Err(FoeErrorCode::BOOTSTRAP_ONLY),
         (Where::NotBoot, true) => Err(FoeErrorCode::NOT_IN_BOOTSTRAP),
@@ -255,8 +245,7 @@ mod tests {
     use super::*;
 
     fn files() -> Files {
-        let slot =
-            FirmwareSlot { type_name: "EL6601".to_owned(), limit: 1_000, password: 0xBEEF };
+        let slot = FirmwareSlot { type_name: "EL6601".to_owned(), limit: 1_000, password: 0xBEEF };
         let files = vec![
             File::new("settings.txt", b"a=1\n", 64),
             File::new("log.txt", b"", 0),

@@ -17,7 +17,8 @@ pub(super) const KIND: Kind = Kind {
         shape: Shape::Number { low: 0.001, high: 600_000.0, default: Some(500.0) },
     }],
     start: |start| {
-        let change = SoftwareChange::Begin(Trouble::SlowMailbox { by: start.milliseconds("by_ms") });
+        let change =
+            SoftwareChange::Begin(Trouble::SlowMailbox { by: start.milliseconds("by_ms") });
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
         Ok(Listed::boxed(nodes.map(|node| (from, Change::Software { node, change }))))

@@ -65,9 +65,7 @@ impl PlaceRule {
             Self::Device => "`device = \"B3\"`, a device",
             Self::Processor => "`device = \"B3\"`, a device with a processor",
             Self::Mailbox => "`device = \"B3\"`, a device with a mailbox",
-            Self::DeviceOrCard => {
-                "`device = \"B3\"`, a device, or `at = \"maindevice\"`, a card"
-            }
+            Self::DeviceOrCard => "`device = \"B3\"`, a device, or `at = \"maindevice\"`, a card",
             Self::Devices => "`device = \"B3\"` or `devices = [\"B3\", \"B4\"]`",
             Self::Card => "`at = \"maindevice\"` or `\"maindevice.B\"`, a card",
         }

@@ -3,8 +3,8 @@
 use std::fmt::Debug;
 
 use linesman_proto::address::Path;
-use linesman_proto::time::Instant;
 use linesman_proto::register::WatchdogTime;
+use linesman_proto::time::Instant;
 use linesman_proto::topology::route::Direction;
 
 use super::software::SoftwareChange;

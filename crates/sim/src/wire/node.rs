@@ -20,10 +20,7 @@ pub(super) enum Act {
     Off,
     On,
     Refuse(Option<Refusal>),
-    Trouble {
-        trouble: Trouble,
-        begins: bool,
-    },
+    Trouble { trouble: Trouble, begins: bool },
     Hang(bool),
     Reboot,
     Watchdog(Option<WatchdogTime>),

@@ -103,8 +103,7 @@ impl World {
                         }
                     }
                     HeldWhat::Emergency(_) => {
-                        let gone =
-                            Emergency { code: 0, register: ErrorRegister(0), data: [0; 5] };
+                        let gone = Emergency { code: 0, register: ErrorRegister(0), data: [0; 5] };
                         node.act_at(at, Act::Report(gone));
                         let sent = Effect::EmergencySent { code: 0 };
                         self.truth.effect(at, Some(fault), place, sent);

@@ -75,12 +75,7 @@ impl Dictionary {
     }
 
     /// Whether a list may be changed like this.
-    fn check_list(
-        &self,
-        object: &Object,
-        subindex: u8,
-        number: u64,
-    ) -> Result<(), SdoAbortCode> {
+    fn check_list(&self, object: &Object, subindex: u8, number: u64) -> Result<(), SdoAbortCode> {
         if subindex > 0 {
             if object.count() != 0 {
                 return Err(SdoAbortCode::SUBINDEX_0_NOT_ZERO);

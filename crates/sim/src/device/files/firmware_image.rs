@@ -59,7 +59,10 @@ mod tests {
         let file = FirmwareImage::build("EL6601", "12", b"123456789");
         assert_eq!(file, b"Linesman firmware EL6601 12 CBF43926\n123456789");
         let image = FirmwareImage::parse(&file).unwrap();
-        assert_eq!((image.type_name, image.version, image.body), ("EL6601", "12", &b"123456789"[..]));
+        assert_eq!(
+            (image.type_name, image.version, image.body),
+            ("EL6601", "12", &b"123456789"[..])
+        );
     }
 
     #[test]

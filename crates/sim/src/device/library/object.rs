@@ -88,7 +88,13 @@ fn restore() -> Object {
     let entry =
         Entry::number(1, "Restore all default parameters", DataType::UDINT, 32, READ_WRITE, 1);
     let index = special::RESTORE_SETTINGS;
-    Object::list(index, "Restore default parameters", ObjectCode::Array, DataType::UDINT, vec![entry])
+    Object::list(
+        index,
+        "Restore default parameters",
+        ObjectCode::Array,
+        DataType::UDINT,
+        vec![entry],
+    )
 }
 
 /// An object of several entries of different types.

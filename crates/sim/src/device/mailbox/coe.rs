@@ -37,7 +37,9 @@ impl CoeServer {
         let Served { dictionary, troubles, state, .. } = served;
         match Message::parse(request) {
             Ok(Message::SdoRequest(request)) => {
-                match begun(&request).and_then(|object| Some((object, troubles.refuses_sdo(object.index)?))) {
+                match begun(&request)
+                    .and_then(|object| Some((object, troubles.refuses_sdo(object.index)?)))
+                {
                     Some((object, RefusedWith::Abort(code))) => {
                         self.transfer = None;
                         Ok(vec![abort(object, code)])

@@ -71,8 +71,7 @@ impl FoeServer {
                 match files.begin_write(name, password, state) {
                     Ok(target) => {
                         let data = Vec::new();
-                        self.transfer =
-                            Some(Transfer::Write { target, data, next: 1, began: now });
+                        self.transfer = Some(Transfer::Write { target, data, next: 1, began: now });
                         vec![write(&Message::Ack { packet: 0 }, rooms)]
                     }
                     Err(code) => refuse(code, code.text(), rooms),
@@ -199,8 +198,7 @@ mod tests {
 
     impl Rig {
         fn new() -> Self {
-            let slot =
-                FirmwareSlot { type_name: "T".to_owned(), limit: 60, password: 0x1234 };
+            let slot = FirmwareSlot { type_name: "T".to_owned(), limit: 60, password: 0x1234 };
             let files = vec![
                 File::new("eight", b"12345678", 0),
                 File::new("nine", b"123456789", 16),

@@ -150,13 +150,7 @@ impl Mailbox {
         }
     }
 
-    fn answer(
-        &mut self,
-        request: &[u8],
-        now: Instant,
-        pdi: &Pdi<'_>,
-        served: &mut Served<'_>,
-    ) {
+    fn answer(&mut self, request: &[u8], now: Instant, pdi: &Pdi<'_>, served: &mut Served<'_>) {
         let message = match Message::parse(request) {
             Ok(message) => message,
             Err(MailboxError::HeaderCutOff { .. }) => return,

@@ -36,9 +36,7 @@ pub(super) fn modules(dictionary: &Dictionary) -> Result<(), AlStatusCode> {
         Some(idents[..used].to_vec())
     };
     match (idents(CONFIGURED_MODULES), idents(DETECTED_MODULES)) {
-        (Some(configured), Some(detected))
-            if !configured.is_empty() && configured != detected =>
-        {
+        (Some(configured), Some(detected)) if !configured.is_empty() && configured != detected => {
             Err(AlStatusCode::MODULE_LIST_MISMATCH)
         }
         _ => Ok(()),
