@@ -20,7 +20,7 @@ pub use card::{FrameTally, HostPort};
 
 use crate::controller::Controller;
 use crate::device::{SignalId, Signals};
-use crate::fault::{self, FaultError, Running};
+use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
 use crate::segment_file::{FaultEntry, SegmentFile};
@@ -201,10 +201,10 @@ impl Segment {
             ebus_ma: &self.ebus_ma,
         };
         let number = self.world.truth.faults().len();
-        let stream = self.seed.stream(&format!("fault {number} {}", entry.kind));
-        let planned = fault::plan(label, entry, &scene, earliest, stream)?;
-        let id = self.world.truth.declare(planned.name, planned.places);
-        self.world.running.push(Running::new(id, planned.from, planned.to, planned.source));
+        let stream = format!("fault {number} {}", entry.kind);
+        let planned = fault::plan(label, entry, &scene, earliest, self.seed, &stream)?;
+        let id = self.world.truth.declare(planned.name, planned.places.clone());
+        self.world.running.push(planned.run(id));
         Ok(id)
     }
 
