@@ -12,8 +12,9 @@ use linesman_proto::time::{Instant, Span};
 use linesman_sim::controller::Pdi;
 use linesman_sim::device::application_layer::{ApplicationLayer, Refusal};
 use linesman_sim::device::dictionary::Dictionary;
-use linesman_sim::device::mailbox::{Mailbox, REQUESTS};
-use linesman_sim::device::{Firmware, SignalId, Signals};
+use linesman_sim::device::files::Files;
+use linesman_sim::device::mailbox::{Mailbox, REQUESTS, Served};
+use linesman_sim::device::{Firmware, SignalId, Signals, Troubles};
 
 use super::learn::{AlStep, MailboxTurn};
 
@@ -39,6 +40,8 @@ pub(super) struct Learned {
     turns: VecDeque<MailboxTurn>,
     message: Option<Message>,
     dictionary: Dictionary,
+    files: Files,
+    troubles: Troubles,
     /// One for each byte of its inputs, in the order of SyncManagers.
     inputs: Vec<SignalId>,
     buffer: Vec<u8>,
@@ -67,6 +70,8 @@ impl Learned {
             turns,
             message: None,
             dictionary,
+            files: Files::default(),
+            troubles: Troubles::default(),
             inputs,
             buffer: Vec::new(),
         }
@@ -97,7 +102,7 @@ impl Learned {
             if step.status & 0x10 != 0 {
                 ApplicationLayer::fail(pdi, state, AlStatusCode(step.code));
             } else {
-                ApplicationLayer::enter(pdi, state);
+                self.application_layer.enter(pdi, state);
             }
         }
         if self.step.is_none()
@@ -121,21 +126,22 @@ impl Learned {
                 answer_at: turn.answered.map(|span| now + span.max(turn.taken + AT_ONCE)),
             });
         }
-        let Some(message) = &mut self.message else {
+        let Some(mut message) = self.message else {
             // Repeats, and messages that wait for room.
-            return self.mailbox.serve(now, pdi, &mut self.dictionary, state);
+            return self.serve(now, pdi);
         };
         if !message.taken {
             if now < message.take_at {
                 return Some(message.take_at);
             }
             message.taken = true;
-            self.mailbox.serve(now, pdi, &mut self.dictionary, state);
+            self.message = Some(message);
+            self.serve(now, pdi);
         }
         match message.answer_at {
             Some(at) if at <= now => {
                 self.message = None;
-                let again = self.mailbox.serve(now, pdi, &mut self.dictionary, state);
+                let again = self.serve(now, pdi);
                 // The next one may be there already.
                 if pdi.mailbox_full(REQUESTS) { Some(now + LOOK_AGAIN) } else { again }
             }
@@ -146,6 +152,16 @@ impl Learned {
             }
             None => None,
         }
+    }
+
+    fn serve(&mut self, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
+        let mut served = Served {
+            dictionary: &mut self.dictionary,
+            files: &mut self.files,
+            troubles: &mut self.troubles,
+            state: ApplicationLayer::state(pdi),
+        };
+        self.mailbox.serve(now, pdi, &mut served)
     }
 
     fn is_ready(pdi: &Pdi<'_>) -> bool {

@@ -10,6 +10,7 @@ use linesman_proto::time::{Instant, Span};
 use super::application_layer::Refusal;
 use super::firmware::Firmware;
 use super::signal::Signals;
+use super::trouble::Trouble;
 use crate::controller::{Pdi, SiiRequest, SyncSignal};
 
 /// How long the processor takes for a request: an interrupt and a copy.
@@ -112,6 +113,27 @@ impl Firmware for EmulatedSii {
 
     fn report(&mut self, emergency: Emergency) {
         self.inner.report(emergency);
+    }
+
+    fn has_processor(&self) -> bool {
+        self.inner.has_processor()
+    }
+
+    fn has_mailbox(&self) -> bool {
+        self.inner.has_mailbox()
+    }
+
+    fn trouble(&mut self, trouble: Trouble, begins: bool) {
+        self.inner.trouble(trouble, begins);
+    }
+
+    fn reboot(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        self.answers_at = None;
+        self.inner.reboot(now, pdi);
+    }
+
+    fn identify(&mut self, id: u16, signals: &mut Signals) -> bool {
+        self.inner.identify(id, signals)
     }
 
     fn stop(&mut self, signals: &mut Signals) {
