@@ -10,6 +10,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
 use super::signal::Signals;
+use super::trouble::Trouble;
 use crate::controller::{Pdi, SyncSignal};
 
 /// What is behind a controller: a processor with its software, or plain inputs and outputs.
@@ -36,6 +37,12 @@ pub trait Firmware: Debug + Send {
     /// A frame begins: controllers that drive inputs themselves latch them now (S1, digital I/O,
     /// input sampling at start of frame). Called only where [`Firmware::samples`] asks for it.
     fn sample(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// Whether it plays the EEPROM (S1 11.2.4): then it answers
+    /// [`Pdi::sii_request`]. Asked once, when the controller is made.
+    fn emulates_sii(&self) -> bool {
+        false
+    }
 
     /// Whether [`Firmware::sync`] is wanted. Asked once, after [`Firmware::start`].
     fn synchronises(&self) -> bool {
@@ -64,6 +71,30 @@ pub trait Firmware: Debug + Send {
     /// It outlives a restart. Faults go through
     /// [`Controller::slow_down`](crate::controller::Controller::slow_down).
     fn slow_down(&mut self, _takes: Option<Span>) {}
+
+    /// Whether a processor with software is behind the controller, which can fail.
+    fn has_processor(&self) -> bool {
+        false
+    }
+
+    /// Whether that software has a mailbox.
+    fn has_mailbox(&self) -> bool {
+        false
+    }
+
+    /// Its software misbehaves from now on, or no longer. It outlives a restart. Faults go through
+    /// [`Controller::trouble`](crate::controller::Controller::trouble).
+    fn trouble(&mut self, _trouble: Trouble, _begins: bool) {}
+
+    /// The processor crashed and has started anew, without its controller: registers stay, what the
+    /// software knew is forgotten.
+    fn reboot(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// The value of its identification, as somebody sets it at its switches. False when it has no
+    /// way of its own to tell it; then it goes into the station alias.
+    fn identify(&mut self, _id: u16, _signals: &mut Signals) -> bool {
+        false
+    }
 
     /// The supply is gone: outputs are no longer driven. Nothing else can be done any more.
     fn stop(&mut self, _signals: &mut Signals) {}
