@@ -12,6 +12,7 @@ use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
+use serde::{Deserialize, Serialize};
 
 pub use audit::Unexplained;
 pub(crate) use audit::{Cause, Ledger};
@@ -38,7 +39,8 @@ pub enum Place {
 }
 
 /// What a cause made happen.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Effect {
     /// A symbol was destroyed, in or outside of a frame: the receiver's physical-layer error.
     SymbolError,
@@ -186,6 +188,12 @@ impl TruthLog {
     #[must_use]
     pub const fn left_out(&self) -> u64 {
         self.left_out
+    }
+
+    /// Hands out the entries and forgets them, for whoever keeps them elsewhere. Faults and what
+    /// they did stay known.
+    pub fn take_entries(&mut self) -> Vec<Entry> {
+        std::mem::take(&mut self.entries)
     }
 
     /// Every fault so far, by [`FaultId`].
