@@ -120,10 +120,12 @@ pub struct FaultRecord {
     pub name: FaultName,
     /// Where it was put: one place, or several that share one cause.
     pub places: Vec<Place>,
-    /// When it began to act.
+    /// When it first began to act.
     pub began: Option<Instant>,
-    /// When it ended or was healed.
+    /// When it ended or was healed, the last time; `None` while it acts.
     pub ended: Option<Instant>,
+    /// How often it has come so far.
+    pub times: u32,
     /// When it first had an effect.
     pub first_effect: Option<Instant>,
     /// Symbols destroyed.
@@ -221,6 +223,7 @@ impl TruthLog {
             places,
             began: None,
             ended: None,
+            times: 0,
             first_effect: None,
             symbol_errors: 0,
             frames_spoiled: 0,
@@ -233,7 +236,9 @@ impl TruthLog {
 
     pub(crate) fn begin(&mut self, at: Instant, fault: FaultId) {
         if let Some(record) = self.faults.get_mut(fault.0 as usize) {
-            record.began = Some(at);
+            record.began.get_or_insert(at);
+            record.ended = None;
+            record.times += 1;
         }
         self.push(Entry::Begin { at, fault });
     }

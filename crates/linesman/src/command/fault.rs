@@ -1,7 +1,6 @@
 //! `linesman fault`: break and heal a virtual segment while it runs on real interfaces, drive its
 //! inputs, and tell what really happened.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use linesman_config::fault::FaultName;
@@ -11,7 +10,7 @@ use linesman_runtime::control::message::{
 use linesman_runtime::control::{ask, listen};
 use linesman_runtime::journal::{EventKind, TruthEvent};
 use linesman_runtime::serve::report::Status as SimStatus;
-use linesman_sim::segment_file::{FaultEntry, OneOrMany, Value};
+use linesman_sim::segment_file::FaultEntry;
 use linesman_sim::truth::Effect;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -49,9 +48,9 @@ enum Action {
         /// How long it lasts; until it is healed unless said
         #[arg(long, value_name = "MS")]
         for_ms: Option<f64>,
-        /// Parameters of its kind, such as hits_per_s=40
+        /// Parameters of its kind, such as hits_per_s=40, and its schedule: every_ms=500 for_ms=20
         #[arg(value_name = "KEY=VALUE", value_parser = parameter)]
-        parameters: Vec<(String, Value)>,
+        parameters: Vec<(String, toml::Value)>,
     },
     /// End a fault, or all of them
     Heal {
@@ -99,14 +98,14 @@ fn level(text: &str) -> Result<i32, String> {
     number.ok_or_else(|| format!("`{text}`: expected true, false or a whole number"))
 }
 
-/// `hits_per_s=40`, `to=SAFEOP`, `code=0x001D`.
-fn parameter(text: &str) -> Result<(String, Value), String> {
+/// `hits_per_s=40`, `to=SAFEOP`, `code=0x001D`, `at_ms=[0,500]`.
+fn parameter(text: &str) -> Result<(String, toml::Value), String> {
     let (key, value) =
         text.split_once('=').ok_or_else(|| format!("`{text}`: expected KEY=VALUE"))?;
-    let as_toml = toml::from_str::<BTreeMap<String, Value>>(&format!("value = {value}"));
+    let as_toml = toml::from_str::<toml::Table>(&format!("value = {value}"));
     let value = match as_toml.ok().and_then(|mut table| table.remove("value")) {
         Some(value) => value,
-        None => Value::Text(value.to_owned()),
+        None => toml::Value::String(value.to_owned()),
     };
     Ok((key.to_owned(), value))
 }
@@ -115,7 +114,7 @@ fn parameter(text: &str) -> Result<(String, Value), String> {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     match &arguments.action {
         Action::Inject { kind, at, device, for_ms, parameters } => {
-            let fault = entry(*kind, at, device, parameters);
+            let fault = entry(*kind, at, device, parameters)?;
             faults(arguments, &Request::Inject { fault, for_ms: *for_ms }, output)
         }
         Action::Heal { no } => faults(arguments, &Request::Heal { no: *no }, output),
@@ -140,21 +139,22 @@ fn entry(
     kind: FaultName,
     at: &[String],
     device: &[String],
-    parameters: &[(String, Value)],
-) -> FaultEntry {
-    let mut fault = FaultEntry::new(kind);
-    fault.at = match at {
+    parameters: &[(String, toml::Value)],
+) -> Result<FaultEntry, Failure> {
+    let mut entry = toml::Table::new();
+    entry.insert("kind".to_owned(), kind.name().into());
+    let mut places = |one: &str, many: &str, names: &[String]| match names {
         [] => None,
-        [one] => Some(OneOrMany::One(one.clone())),
-        more => Some(OneOrMany::Many(more.to_vec())),
+        [name] => entry.insert(one.to_owned(), name.as_str().into()),
+        more => entry.insert(many.to_owned(), more.to_vec().into()),
     };
-    match device {
-        [] => {}
-        [one] => fault.device = Some(one.clone()),
-        more => fault.devices = Some(more.to_vec()),
-    }
-    fault.parameters.extend(parameters.iter().cloned());
-    fault
+    places("at", "at", at);
+    places("device", "devices", device);
+    entry.extend(parameters.iter().cloned());
+    entry.try_into::<FaultEntry>().map_err(|error| {
+        let advice = "see docs/guide/faults.md for what each fault takes";
+        Failure::new(format!("{kind}: {}", error.message()), advice)
+    })
 }
 
 fn asked<T: DeserializeOwned>(arguments: &Arguments, request: &Request) -> Result<T, Failure> {
@@ -307,17 +307,29 @@ mod tests {
     #[test]
     fn parameters_are_numbers_where_they_can_be() {
         let rows = [
-            ("hits=10", Value::Integer(10)),
-            ("hits_per_s=2.5", Value::Number(2.5)),
-            ("code=0x001D", Value::Integer(0x1D)),
-            ("to=SAFEOP", Value::Text("SAFEOP".to_owned())),
-            ("quiet=true", Value::Flag(true)),
+            ("hits=10", toml::Value::Integer(10)),
+            ("hits_per_s=2.5", toml::Value::Float(2.5)),
+            ("code=0x001D", toml::Value::Integer(0x1D)),
+            ("to=SAFEOP", toml::Value::String("SAFEOP".to_owned())),
+            ("quiet=true", toml::Value::Boolean(true)),
         ];
         for (text, expected) in rows {
             let (key, _) = text.split_once('=').unwrap();
             assert_eq!(parameter(text), Ok((key.to_owned(), expected)), "{text}");
         }
         assert!(parameter("hits").is_err());
+    }
+
+    #[test]
+    fn a_schedule_is_taken_with_the_parameters() {
+        let parameters = ["hits_per_s=40", "at_ms=[0, 500]", "for_ms=20"];
+        let parameters: Vec<_> = parameters.iter().map(|text| parameter(text).unwrap()).collect();
+        let places = ["K1.C-K2.A".to_owned()];
+        let fault = entry(FaultName::EmcNoise, &places, &[], &parameters).unwrap();
+        assert_eq!(fault.schedule.at_ms.unwrap().as_slice(), [0.0, 500.0]);
+        assert_eq!(fault.schedule.for_ms, Some(20.0));
+        let keys: Vec<&String> = fault.parameters.keys().collect();
+        assert_eq!(keys, ["hits_per_s"]);
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub const SIGNALS_SCHEMA: &str = "linesman.signals/1";
 pub enum Request {
     /// Put a fault on the line now. The answer is about faults.
     Inject {
-        /// Its kind, place and parameters; its times are those of the request.
+        /// Its kind, place, parameters and schedule; it begins with the request.
         fault: FaultEntry,
         /// How long it lasts, in ms; until it is healed unless said.
         for_ms: Option<f64>,

@@ -50,6 +50,7 @@ fn inject(
     let now_ms = now.as_nanos() as f64 / 1e6;
     fault.from_ms = for_ms.map(|_| now_ms);
     fault.to_ms = for_ms.map(|ms| now_ms + ms);
+    // Its schedule counts from its begin, which is now.
     segment.inject(now, &fault).map(drop).map_err(|error| error.to_string())
 }
 

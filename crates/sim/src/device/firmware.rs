@@ -10,7 +10,7 @@ use linesman_proto::time::Instant;
 
 use super::application_layer::Refusal;
 use super::signal::Signals;
-use crate::controller::Pdi;
+use crate::controller::{Pdi, SyncSignal};
 
 /// What is behind a controller: a processor with its software, or plain inputs and outputs.
 pub trait Firmware: Debug + Send {
@@ -36,6 +36,18 @@ pub trait Firmware: Debug + Send {
     /// A frame begins: controllers that drive inputs themselves latch them now (S1, digital I/O,
     /// input sampling at start of frame). Called only where [`Firmware::samples`] asks for it.
     fn sample(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// Whether [`Firmware::sync`] is wanted. Asked once, after [`Firmware::start`].
+    fn synchronises(&self) -> bool {
+        false
+    }
+
+    /// A pulse of the SYNC unit reaches the processor. Returns the next wake-up as
+    /// [`Firmware::run`] does, but one that was asked for before stays. In acknowledge mode (0x0982
+    /// is 0) the next pulse comes only after [`Pdi::acknowledge_sync`].
+    fn sync(&mut self, _signal: SyncSignal, _now: Instant, _pdi: &mut Pdi<'_>) -> Option<Instant> {
+        None
+    }
 
     /// From now on a step into the state that `refusal` names is refused with its code; `None` ends
     /// that. It outlives a restart. Faults go through

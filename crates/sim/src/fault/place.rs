@@ -95,12 +95,14 @@ impl Scene<'_> {
 
 /// A place, found.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
-pub(super) struct Target {
+pub(crate) struct Target {
     /// For the truth log.
     pub(super) places: Vec<Place>,
     pub(super) lines: Vec<Line>,
     pub(super) links: Vec<usize>,
     pub(super) nodes: Vec<usize>,
+    /// Cards of the MainDevice.
+    pub(super) cards: Vec<Path>,
 }
 
 /// What is written in `at`.
@@ -213,6 +215,7 @@ impl Finder<'_> {
         Ok(Target {
             places: vec![Place::Host(path)],
             lines: self.lines_at_card(link, path),
+            cards: vec![path],
             links: vec![link],
             nodes: Vec::new(),
         })
