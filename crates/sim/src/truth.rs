@@ -9,10 +9,12 @@ use std::collections::BTreeMap;
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::register::ErrorCounter;
+use linesman_proto::register::{ErrorCounter, WatchdogTime};
 use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
 use serde::{Deserialize, Serialize};
+
+use crate::device::Trouble;
 
 pub use audit::Unexplained;
 pub(crate) use audit::{Cause, Ledger};
@@ -71,6 +73,26 @@ pub enum Effect {
     /// A change of state is refused with this AL status code from now on.
     StateRefused {
         /// The code in 0x0134.
+        code: u16,
+    },
+    /// The software of a device misbehaves from now on.
+    Misbehaves(Trouble),
+    /// The processor of a device stopped.
+    ProcessorStopped,
+    /// It runs again.
+    ProcessorRuns,
+    /// It started anew by itself, without its controller.
+    ProcessorRestarted,
+    /// A card sends nothing for a while.
+    CardSilent,
+    /// A watchdog was set to another time than the MainDevice set, or back.
+    WatchdogSet {
+        /// As in 0x0420; `None` for the former one.
+        time: Option<WatchdogTime>,
+    },
+    /// A device was made to send an emergency.
+    EmergencySent {
+        /// Its code; 0 takes the one before back.
         code: u16,
     },
     /// Counters were not 0 at the start: noise at power-on or plugging, old errors.
@@ -159,6 +181,13 @@ impl FaultRecord {
             | Effect::SignalBack
             | Effect::PowerBack
             | Effect::StateRefused { .. }
+            | Effect::Misbehaves(_)
+            | Effect::ProcessorStopped
+            | Effect::ProcessorRuns
+            | Effect::ProcessorRestarted
+            | Effect::EmergencySent { .. }
+            | Effect::CardSilent
+            | Effect::WatchdogSet { .. }
             | Effect::OldCounters
             | Effect::WrongDevice
             | Effect::MissingDevice => {}

@@ -17,7 +17,7 @@ use super::memory::at;
 use super::pdi::Pdi;
 use super::posted::{Happening, PortEvent};
 use super::sii::Outcome;
-use crate::device::{Firmware, Refusal, Signals};
+use crate::device::{Firmware, Refusal, Signals, Trouble};
 use crate::frame::WireFrame;
 use crate::hardware::Hardware;
 
@@ -323,7 +323,7 @@ impl Controller {
             return Verdict::Destroy;
         }
         self.advance(at, signals);
-        if self.samples {
+        if self.samples && !self.core.processor_stuck {
             self.firmware.sample(at, &mut Pdi { core: &mut self.core, signals, now: at });
             self.core.rescheduled = true;
         }
@@ -346,6 +346,12 @@ impl Controller {
     #[must_use]
     pub fn hardware(&self) -> &Hardware {
         &self.core.hardware
+    }
+
+    /// The device behind it.
+    #[must_use]
+    pub fn firmware(&self) -> &dyn Firmware {
+        &*self.firmware
     }
 
     /// The device behind it: for faults that make it misbehave.
@@ -372,6 +378,36 @@ impl Controller {
     /// The device sends an emergency at `at`, or as soon as its mailbox works.
     pub fn report(&mut self, at: Instant, emergency: Emergency) {
         self.firmware.report(emergency);
+        self.core.call_firmware(at);
+        self.reschedule();
+    }
+
+    /// Somebody sets the time of the process data watchdog, 0x0420, at `at`. Gives the former one.
+    pub fn set_watchdog_time(&mut self, at: Instant, time: r::WatchdogTime) -> r::WatchdogTime {
+        let former = r::WatchdogTime(self.core.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA));
+        if self.powered {
+            self.core.memory.set_u16(&r::WATCHDOG_TIME_PROCESS_DATA, time.0);
+            self.core.retime_watchdogs(at);
+            self.reschedule();
+        }
+        former
+    }
+
+    /// The software of the device misbehaves from `at` on, or no longer.
+    pub fn trouble(&mut self, at: Instant, trouble: Trouble, begins: bool) {
+        self.firmware.trouble(trouble, begins);
+        self.core.call_firmware(at);
+        self.reschedule();
+    }
+
+    /// The processor of the device has crashed and runs again from `at` on, without a reset of the
+    /// controller.
+    pub fn reboot_processor(&mut self, at: Instant, signals: &mut Signals) {
+        if !self.powered || !self.core.started {
+            return;
+        }
+        self.core.set_processor_stuck(false, at);
+        self.firmware.reboot(at, &mut Pdi { core: &mut self.core, signals, now: at });
         self.core.call_firmware(at);
         self.reschedule();
     }

@@ -10,6 +10,7 @@ use linesman_proto::time::Instant;
 
 use super::application_layer::Refusal;
 use super::signal::Signals;
+use super::trouble::Trouble;
 use crate::controller::{Pdi, SyncSignal};
 
 /// What is behind a controller: a processor with its software, or plain inputs and outputs.
@@ -59,6 +60,30 @@ pub trait Firmware: Debug + Send {
     /// a mailbox cannot. Faults go through
     /// [`Controller::report`](crate::controller::Controller::report).
     fn report(&mut self, _emergency: Emergency) {}
+
+    /// Whether a processor with software is behind the controller, which can fail.
+    fn has_processor(&self) -> bool {
+        false
+    }
+
+    /// Whether that software has a mailbox.
+    fn has_mailbox(&self) -> bool {
+        false
+    }
+
+    /// Its software misbehaves from now on, or no longer. It outlives a restart. Faults go through
+    /// [`Controller::trouble`](crate::controller::Controller::trouble).
+    fn trouble(&mut self, _trouble: Trouble, _begins: bool) {}
+
+    /// The processor crashed and has started anew, without its controller: registers stay, what the
+    /// software knew is forgotten.
+    fn reboot(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// The value of its identification, as somebody sets it at its switches. False when it has no
+    /// way of its own to tell it; then it goes into the station alias.
+    fn identify(&mut self, _id: u16, _signals: &mut Signals) -> bool {
+        false
+    }
 
     /// The supply is gone: outputs are no longer driven. Nothing else can be done any more.
     fn stop(&mut self, _signals: &mut Signals) {}

@@ -19,13 +19,19 @@ mod device_missing;
 mod device_off;
 mod device_wrong;
 mod emc_noise;
+mod emergency;
+mod firmware_fault;
 mod init_refused;
 mod link_flapping;
 mod link_open;
+mod mailbox_error;
+mod mailbox_slow;
+mod mailbox_stuck;
 mod nic_damaged;
 mod receiver_damaged;
 mod supply_off;
 mod transmitter_damaged;
+mod watchdog_starved;
 
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
@@ -76,6 +82,12 @@ pub const KINDS: &[Kind] = &[
     device_missing::KIND,
     init_refused::KIND,
     nic_damaged::KIND,
+    mailbox_error::KIND,
+    mailbox_slow::KIND,
+    mailbox_stuck::KIND,
+    emergency::KIND,
+    firmware_fault::KIND,
+    watchdog_starved::KIND,
 ];
 
 /// The kind with a name, if a segment can have it.

@@ -24,7 +24,7 @@ use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
 use crate::segment_file::{FaultEntry, SegmentFile};
-use crate::truth::{self, Effect, FaultId, TruthLog, Unexplained};
+use crate::truth::{self, Effect, FaultId, Place, TruthLog, Unexplained};
 use crate::wire::walk::{Outcome, Traveller};
 use crate::wire::world::World;
 
@@ -100,6 +100,13 @@ impl Segment {
         let card = &mut self.world.cards[path.index()];
         if frame.bytes.len() > MAX_LEN || !card.has_carrier(now) {
             card.counts.tx_dropped += 1;
+            self.recycle(frame.bytes);
+            return;
+        }
+        if let Some(fault) = card.silenced_by(now) {
+            card.counts.tx_dropped += 1;
+            let lost = Effect::FrameLost { frame: frame.number };
+            self.world.truth.effect(now, Some(fault), Place::Host(path), lost);
             self.recycle(frame.bytes);
             return;
         }
@@ -317,7 +324,7 @@ impl Segment {
             let at = self.now;
             self.world.nodes[node].controller.set_counter(counter, value);
             self.world.truth.set(device, counter, value);
-            let place = crate::truth::Place::Device(device);
+            let place = Place::Device(device);
             self.world.truth.effect(at, None, place, Effect::OldCounters);
         }
     }
