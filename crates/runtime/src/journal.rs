@@ -49,7 +49,26 @@ pub struct TruthEvent {
     /// `maindevice.A`.
     pub places: Vec<String>,
     /// What the fault did; `null` where it begins or ends.
-    pub effect: Option<Effect>,
+    pub effect: Option<EffectReport>,
+}
+
+/// What a fault did.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EffectReport {
+    /// What it was: `frame-lost`, `frame-spoiled`, `symbol-error`, `signal-lost`, …
+    pub kind: String,
+    /// The number of the frame in the segment, counted from 1, if it was about one.
+    pub frame: Option<u64>,
+    /// The same with all its numbers, for people.
+    pub text: String,
+}
+
+impl From<Effect> for EffectReport {
+    fn from(effect: Effect) -> Self {
+        let kind = <&str>::from(effect).to_owned();
+        Self { kind, frame: effect.frame(), text: format!("{effect:?}") }
+    }
 }
 
 /// What kind of event it is.
@@ -230,7 +249,7 @@ impl Writer {
             fault: fault.map(|FaultId(index)| index + 1),
             name: record.map(|(name, _)| *name),
             places,
-            effect,
+            effect: effect.map(EffectReport::from),
         }
     }
 
@@ -327,7 +346,9 @@ mod tests {
         assert_eq!((begin.fault, begin.name), (Some(1), Some(FaultName::LinkOpen)));
         assert_eq!(begin.places, ["K1.B-I1.A"]);
         assert!(begin.time_ns >= 1_000_000_000 && begin.effect.is_none());
-        assert!(all.iter().any(|event| event.effect == Some(Effect::SignalLost)), "{all:?}");
+        let kinds: Vec<&str> =
+            all.iter().filter_map(|event| event.effect.as_ref()).map(|one| &*one.kind).collect();
+        assert!(kinds.contains(&"signal-lost") && kinds.contains(&"frame-lost"), "{all:?}");
         assert!(all.iter().any(|event| event.event == EventKind::End), "{all:?}");
 
         let again = Journal::begin(&segment, Some(&path)).err().unwrap();

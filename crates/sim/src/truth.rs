@@ -12,7 +12,6 @@ use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::register::{ErrorCounter, WatchdogTime};
 use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
-use serde::{Deserialize, Serialize};
 
 use crate::device::Trouble;
 
@@ -41,8 +40,10 @@ pub enum Place {
 }
 
 /// What a cause made happen.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
+///
+/// Each has a stable name for programs, `<&str>::from(effect)`: `frame-lost`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Effect {
     /// A symbol was destroyed, in or outside of a frame: the receiver's physical-layer error.
     SymbolError,
@@ -101,6 +102,21 @@ pub enum Effect {
     WrongDevice,
     /// A device that was planned is not here.
     MissingDevice,
+}
+
+impl Effect {
+    /// The number of the frame it was about, if it was about one.
+    #[must_use]
+    pub const fn frame(&self) -> Option<u64> {
+        if let Self::FrameSpoiled { frame }
+        | Self::FrameLost { frame }
+        | Self::ContentRefused { frame } = self
+        {
+            Some(*frame)
+        } else {
+            None
+        }
+    }
 }
 
 /// An entry of the log.

@@ -11,7 +11,6 @@ use linesman_runtime::control::{ask, listen};
 use linesman_runtime::journal::{EventKind, TruthEvent};
 use linesman_runtime::serve::report::Status as SimStatus;
 use linesman_sim::segment_file::FaultEntry;
-use linesman_sim::truth::Effect;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -281,23 +280,10 @@ fn event_line(event: &TruthEvent) -> String {
     let what = match (event, effect) {
         (EventKind::Begin, _) => "begins".to_owned(),
         (EventKind::End, _) => "ends".to_owned(),
-        (EventKind::Effect, Some(effect)) => effect_words(effect),
+        (EventKind::Effect, Some(effect)) => effect.text.clone(),
         (EventKind::Effect, None) => "has an effect".to_owned(),
     };
     format!("{:>12}  {who}: {what} at {}", time(*time_ns), places.join(", "))
-}
-
-/// An effect as its JSON has it: `frame-lost (frame 12)`.
-fn effect_words(effect: &Effect) -> String {
-    let Ok(serde_json::Value::Object(mut fields)) = serde_json::to_value(effect) else {
-        return String::new();
-    };
-    let kind = fields.remove("kind");
-    let mut text = kind.as_ref().and_then(|kind| kind.as_str()).unwrap_or_default().to_owned();
-    for (key, value) in fields {
-        text.push_str(&format!(" ({key} {value})"));
-    }
-    text
 }
 
 #[cfg(test)]
@@ -341,11 +327,5 @@ mod tests {
         for wrong in ["", "yes?", "1.5", "0x", "99999999999"] {
             assert!(level(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn an_effect_is_told_with_its_numbers() {
-        assert_eq!(effect_words(&Effect::FrameLost { frame: 12 }), "frame-lost (frame 12)");
-        assert_eq!(effect_words(&Effect::SignalLost), "signal-lost");
     }
 }
