@@ -320,10 +320,10 @@ mod tests {
         let second = Instant::ZERO + Span::s(1);
         let fault = FaultEntry::new(FaultName::LinkOpen).at("K1.B-I1.A");
         let id = segment.inject(second, &fault).unwrap();
-        segment.advance(second + Span::ms(1));
         let mut frame = vec![0xFF; 12];
         frame.extend([0x88, 0xA4, 13, 0x10, 7, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]);
-        segment.handle_frame(second + Span::ms(1), Card::A, &frame);
+        // It meets the break before the port behind which it is has closed.
+        segment.handle_frame(second + Span::ns(100), Card::A, &frame);
         segment.heal(second + Span::ms(2), id);
         segment.advance(second + Span::ms(3));
         journal.take(&mut segment);
