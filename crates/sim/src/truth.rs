@@ -9,9 +9,11 @@ use std::collections::BTreeMap;
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::register::ErrorCounter;
+use linesman_proto::register::{ErrorCounter, WatchdogTime};
 use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
+
+use crate::device::Trouble;
 
 pub use audit::Unexplained;
 pub(crate) use audit::{Cause, Ledger};
@@ -38,7 +40,10 @@ pub enum Place {
 }
 
 /// What a cause made happen.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+///
+/// Each has a stable name for programs, `<&str>::from(effect)`: `frame-lost`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Effect {
     /// A symbol was destroyed, in or outside of a frame: the receiver's physical-layer error.
     SymbolError,
@@ -81,6 +86,26 @@ pub enum Effect {
         /// The code in 0x0134.
         code: u16,
     },
+    /// The software of a device misbehaves from now on.
+    Misbehaves(Trouble),
+    /// The processor of a device stopped.
+    ProcessorStopped,
+    /// It runs again.
+    ProcessorRuns,
+    /// It started anew by itself, without its controller.
+    ProcessorRestarted,
+    /// A card sends nothing for a while.
+    CardSilent,
+    /// A watchdog was set to another time than the MainDevice set, or back.
+    WatchdogSet {
+        /// As in 0x0420; `None` for the former one.
+        time: Option<WatchdogTime>,
+    },
+    /// A device was made to send an emergency.
+    EmergencySent {
+        /// Its code; 0 takes the one before back.
+        code: u16,
+    },
     /// Counters were not 0 at the start: noise at power-on or plugging, old errors.
     OldCounters,
     /// Another type of device than planned sits here.
@@ -89,6 +114,21 @@ pub enum Effect {
     MissingDevice,
     /// A cable is plugged into another port than planned.
     WrongPort,
+}
+
+impl Effect {
+    /// The number of the frame it was about, if it was about one.
+    #[must_use]
+    pub const fn frame(&self) -> Option<u64> {
+        if let Self::FrameSpoiled { frame }
+        | Self::FrameLost { frame }
+        | Self::ContentRefused { frame } = self
+        {
+            Some(*frame)
+        } else {
+            None
+        }
+    }
 }
 
 /// An entry of the log.
@@ -175,6 +215,13 @@ impl FaultRecord {
             | Effect::SignalBack
             | Effect::PowerBack
             | Effect::StateRefused { .. }
+            | Effect::Misbehaves(_)
+            | Effect::ProcessorStopped
+            | Effect::ProcessorRuns
+            | Effect::ProcessorRestarted
+            | Effect::EmergencySent { .. }
+            | Effect::CardSilent
+            | Effect::WatchdogSet { .. }
             | Effect::OldCounters
             | Effect::WrongDevice
             | Effect::MissingDevice
@@ -207,6 +254,12 @@ impl TruthLog {
     #[must_use]
     pub const fn left_out(&self) -> u64 {
         self.left_out
+    }
+
+    /// Hands out the entries and forgets them, for whoever keeps them elsewhere. Faults and what
+    /// they did stay known.
+    pub fn take_entries(&mut self) -> Vec<Entry> {
+        std::mem::take(&mut self.entries)
     }
 
     /// Every fault so far, by [`FaultId`].

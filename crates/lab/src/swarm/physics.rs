@@ -18,6 +18,7 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::frame::{FrameBuilder, FrameView};
 use linesman_proto::time::{Instant, Span};
+use linesman_sim::device::library::{self, LibraryType};
 use linesman_sim::fault::{KINDS, Kind, PlaceRule, Shape};
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment::{FrameTally, Segment};
@@ -189,6 +190,10 @@ impl Run {
         let kinds: Vec<&Kind> = KINDS.iter().filter(fits).collect();
         let kind = self.stream.pick(&kinds)?;
         let mut entry = any_fault(kind, &self.file, &mut self.stream);
+        // Nothing in this plant can have it.
+        if entry.device.is_none() && entry.at.is_none() && kind.place.needs_place() {
+            return None;
+        }
         entry.schedule = any_schedule(&mut self.stream);
         let id = match self.segment.inject(self.now, &entry) {
             Ok(id) => id,
@@ -346,7 +351,11 @@ fn is_for_ever(name: linesman_config::fault::FaultName) -> bool {
 /// A fault of a kind somewhere in a plant, with parameters of chance.
 fn any_fault(kind: &Kind, file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
     let mut entry = FaultEntry::new(kind.name);
-    let Some(device) = stream.pick(&file.devices) else { return entry };
+    let needs_software = matches!(kind.place, PlaceRule::Processor | PlaceRule::Mailbox);
+    let has_software = |name: &str| library::find(name).is_some_and(LibraryType::has_mailbox);
+    let fit = file.devices.iter().filter(|one| !needs_software || has_software(&one.type_name));
+    let fit: Vec<_> = fit.collect();
+    let Some(device) = stream.pick(&fit) else { return entry };
     let (near, far) = (device.on.to_string(), format!("{}.A", device.name));
     let way = match stream.below(3) {
         0 => format!("{near}>{far}"),
@@ -359,7 +368,11 @@ fn any_fault(kind: &Kind, file: &SegmentFile, stream: &mut Stream) -> FaultEntry
         PlaceRule::Link => entry.at(both),
         PlaceRule::Lines | PlaceRule::ManyLines => entry.at(way),
         PlaceRule::Line => entry.at(one),
-        PlaceRule::Device | PlaceRule::Devices => entry.device(&device.name),
+        PlaceRule::Device
+        | PlaceRule::Devices
+        | PlaceRule::Processor
+        | PlaceRule::Mailbox
+        | PlaceRule::DeviceOrCard => entry.device(&device.name),
         PlaceRule::Entrance if stream.chance(0.5) => entry.at(one),
         PlaceRule::Card | PlaceRule::RingLink | PlaceRule::Entrance => entry,
     };

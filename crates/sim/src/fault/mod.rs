@@ -6,6 +6,7 @@
 //! hits) is let go. No kind knows anything of counters.
 
 mod error;
+mod manual;
 mod parameter;
 mod place;
 mod running;
@@ -20,13 +21,18 @@ mod device_off;
 mod device_wrong;
 mod early_link;
 mod emc_noise;
+mod emergency;
 mod false_link;
+mod firmware_fault;
 mod foreign_frames;
 mod host_drops;
 mod host_jitter;
 mod init_refused;
 mod link_flapping;
 mod link_open;
+mod mailbox_error;
+mod mailbox_slow;
+mod mailbox_stuck;
 mod maindevice_wrong_port;
 mod nic_damaged;
 mod ports_swapped;
@@ -35,11 +41,13 @@ mod ring_open;
 mod second_maindevice;
 mod supply_off;
 mod transmitter_damaged;
+mod watchdog_starved;
 
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
 pub use error::FaultError;
+pub use manual::manual;
 pub use parameter::{Parameter, Shape};
 pub use place::PlaceRule;
 pub(crate) use place::Scene;
@@ -112,6 +120,12 @@ pub const KINDS: &[Kind] = &[
     foreign_frames::KIND,
     host_jitter::KIND,
     host_drops::KIND,
+    mailbox_error::KIND,
+    mailbox_slow::KIND,
+    mailbox_stuck::KIND,
+    emergency::KIND,
+    firmware_fault::KIND,
+    watchdog_starved::KIND,
 ];
 
 /// The kind with a name, if a segment can have it.

@@ -30,6 +30,12 @@ pub enum PlaceRule {
     /// `device` or `devices`: what feeds one device or several, and with a coupler the terminals
     /// that it feeds over the E-bus.
     Devices,
+    /// `device`: one device with a processor.
+    Processor,
+    /// `device`: one device with a mailbox.
+    Mailbox,
+    /// `device`: one device; or `at`: a card of the MainDevice, `maindevice` unless said.
+    DeviceOrCard,
     /// `at`: a card of the MainDevice, `maindevice` unless said.
     Card,
     /// `at`: one link of a ring, the one that closes it unless said.
@@ -50,9 +56,16 @@ impl PlaceRule {
             | Self::Card
             | Self::RingLink
             | Self::Entrance => &["at"],
-            Self::Device => &["device"],
+            Self::Device | Self::Processor | Self::Mailbox => &["device"],
+            Self::DeviceOrCard => &["device", "at"],
             Self::Devices => &["device", "devices", "supply"],
         }
+    }
+
+    /// Whether something has to be written.
+    #[must_use]
+    pub const fn needs_place(self) -> bool {
+        !matches!(self, Self::Card | Self::DeviceOrCard | Self::RingLink | Self::Entrance)
     }
 
     /// What has to be written.
@@ -66,6 +79,9 @@ impl PlaceRule {
             }
             Self::Line => "`at = \"K1.C>B3.A\"`, one direction of a link",
             Self::Device => "`device = \"B3\"`, a device",
+            Self::Processor => "`device = \"B3\"`, a device with a processor",
+            Self::Mailbox => "`device = \"B3\"`, a device with a mailbox",
+            Self::DeviceOrCard => "`device = \"B3\"`, a device, or `at = \"maindevice\"`, a card",
             Self::Devices => {
                 "`device = \"B3\"`, `devices = [\"B3\", \"B4\"]` or `supply = \"PS1\"`, a `[[supply]]`"
             }
@@ -158,7 +174,9 @@ pub(super) fn resolve(
     finder.refuse_other_keys(entry)?;
     match kind.place {
         PlaceRule::Device | PlaceRule::Devices => finder.devices(entry),
-        PlaceRule::Card => finder.card(entry),
+        PlaceRule::Processor | PlaceRule::Mailbox => finder.software(entry),
+        PlaceRule::DeviceOrCard if entry.device.is_some() => finder.devices(entry),
+        PlaceRule::Card | PlaceRule::DeviceOrCard => finder.card(entry),
         PlaceRule::RingLink if !is_ring(scene.tree) => Err(FaultError::Combination {
             entry: label.to_owned(),
             kind: kind.name,
@@ -250,6 +268,22 @@ impl Finder<'_> {
         }
         target.nodes.sort_unstable();
         target.nodes.dedup();
+        Ok(target)
+    }
+
+    /// Devices whose software can misbehave. Of one with several controllers those with software.
+    fn software(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
+        let mut target = self.devices(entry)?;
+        let needs_mailbox = self.kind.place == PlaceRule::Mailbox;
+        target.nodes.retain(|node| {
+            let firmware = self.scene.world.nodes[*node].controller.firmware();
+            if needs_mailbox { firmware.has_mailbox() } else { firmware.has_processor() }
+        });
+        if target.nodes.is_empty() {
+            let name = entry.device.as_deref().unwrap_or_default();
+            let what = if needs_mailbox { "mailbox" } else { "processor" };
+            return Err(self.error(format!("`{name}` has no {what}")));
+        }
         Ok(target)
     }
 
@@ -358,7 +392,9 @@ impl Finder<'_> {
             }
         }
         match self.end(at) {
-            Some(End::MainDevice(path)) if self.kind.place == PlaceRule::Card => {
+            Some(End::MainDevice(path))
+                if matches!(self.kind.place, PlaceRule::Card | PlaceRule::DeviceOrCard) =>
+            {
                 Ok(Written::Card(path))
             }
             Some(end) => match self.scene.tree.link_at(end) {

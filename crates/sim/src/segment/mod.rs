@@ -6,6 +6,7 @@
 
 mod build;
 pub(crate) mod card;
+mod ready;
 mod turn;
 
 use std::collections::BTreeMap;
@@ -25,7 +26,7 @@ use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
 use crate::segment_file::{FaultEntry, SegmentFile, Supply};
-use crate::truth::{Effect, FaultId, TruthLog, Unexplained};
+use crate::truth::{self, Effect, FaultId, Place, TruthLog, Unexplained};
 use crate::wire::walk::{Outcome, Traveller};
 use crate::wire::world::World;
 
@@ -104,6 +105,13 @@ impl Segment {
         let card = &mut self.world.cards[path.index()];
         if frame.bytes.len() > MAX_LEN || !card.has_carrier(now) {
             card.counts.tx_dropped += 1;
+            self.recycle(frame.bytes);
+            return;
+        }
+        if let Some(fault) = card.silenced_by(now) {
+            card.counts.tx_dropped += 1;
+            let lost = Effect::FrameLost { frame: frame.number };
+            self.world.truth.effect(now, Some(fault), Place::Host(path), lost);
             self.recycle(frame.bytes);
             return;
         }
@@ -361,6 +369,11 @@ impl Segment {
         &self.world.truth
     }
 
+    /// Takes the entries of the log out of it ([`TruthLog::take_entries`]).
+    pub fn take_truth(&mut self) -> Vec<truth::Entry> {
+        self.world.truth.take_entries()
+    }
+
     /// Error counters that moved, since the audit before, without a cause in the log.
     pub fn audit(&mut self) -> Vec<Unexplained> {
         let nodes = self.world.nodes.iter();
@@ -381,7 +394,7 @@ impl Segment {
             let at = self.now;
             self.world.nodes[node].controller.set_counter(counter, value);
             self.world.truth.set(device, counter, value);
-            let place = crate::truth::Place::Device(device);
+            let place = Place::Device(device);
             self.world.truth.effect(at, None, place, Effect::OldCounters);
         }
     }

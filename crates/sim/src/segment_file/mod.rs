@@ -19,6 +19,7 @@
 //! Unknown keys are errors. The order of devices is the order of their numbers; a device with
 //! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
 
+mod clock;
 mod expand;
 mod plant;
 mod schedule;
@@ -32,14 +33,15 @@ use linesman_config::attachment::Attachment;
 use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
-use crate::wire::Medium;
-
+pub use clock::SegmentClock;
 pub use expand::parse_counter;
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
 pub use schedule::{BurstTimes, RandomTimes, Schedule, Times};
 pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
+
+use crate::wire::Medium;
 
 /// A segment, as described.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
@@ -115,6 +117,9 @@ pub struct SegmentDevice {
     /// programmable logic do; as its type has it unless said.
     #[serde(default)]
     pub remakes_symbol_errors: Option<bool>,
+    /// How else its clock is off: warming up, jitter, what it shows at power-on.
+    #[serde(default)]
+    pub clock: Option<SegmentClock>,
     /// Whether its controllers have counters of forwarded errors; as the segment, or else its type,
     /// has it unless said.
     #[serde(default)]

@@ -245,6 +245,7 @@ impl Builder {
             clock_ppm: None,
             medium: None,
             remakes_symbol_errors: None,
+            clock: None,
             counts_forwarded: None,
             counters: std::collections::BTreeMap::new(),
         });

@@ -39,6 +39,7 @@ on = "K1.C"
 entry = "A"
 cable_m = 12
 clock_ppm = -3.5
+clock = { ramp_ppm_per_s = 0.25, ramp_s = 40.0, jitter_ns = 12 }
 counts_forwarded = true
 
 [ring]
@@ -109,6 +110,9 @@ fn mistakes_are_named() {
         ("entry = \"A\"", "entry = \"X\"", "`entry` is `X`, expected A, B, C or D"),
         ("cable_m = 12", "cable_m = -1", "`cable_m` is -1, expected 0 to 2000"),
         ("clock_ppm = -3.5", "clock_ppm = 300.0", "`clock_ppm` is 300"),
+        ("ramp_ppm_per_s = 0.25", "ramp_ppm_per_s = 99.0", "`clock.ramp_ppm_per_s` is 99"),
+        ("jitter_ns = 12", "jitter_ns = 1001", "`clock.jitter_ns` is 1001, expected 0 to 1000"),
+        ("jitter_ns = 12", "jitter = 12", "unknown field `jitter`"),
         ("\"A.physical\"", "\"A.fysical\"", "no counter is called `A.fysical`"),
         ("name = \"K3\"", "name = \"K1\"", "two devices are called `K1`"),
         ("closes_at = \"K3.C\"", "closes_at = \"K3.B\"", "K3.B is an E-bus contact"),

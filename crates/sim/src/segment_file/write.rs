@@ -67,6 +67,16 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     if let Some(remakes) = device.remakes_symbol_errors {
         line("remakes_symbol_errors", remakes.to_string());
     }
+    if let Some(clock) = &device.clock {
+        let keys = [
+            ("ramp_ppm_per_s", clock.ramp_ppm_per_s.map(number)),
+            ("ramp_s", clock.ramp_s.map(number)),
+            ("jitter_ns", clock.jitter_ns.map(|ns| ns.to_string())),
+            ("start_ns", clock.start_ns.map(|ns| ns.to_string())),
+        ];
+        let said = keys.into_iter().filter_map(|(key, value)| Some(format!("{key} = {}", value?)));
+        line("clock", format!("{{ {} }}", said.collect::<Vec<_>>().join(", ")));
+    }
     if let Some(counts) = device.counts_forwarded {
         line("counts_forwarded", counts.to_string());
     }

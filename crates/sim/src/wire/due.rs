@@ -8,7 +8,7 @@ use linesman_proto::topology::End;
 use super::change::Line;
 use super::link::{EndState, Medium};
 use super::world::World;
-use crate::controller::PortEvent;
+use crate::controller::{PhyAct, PortEvent};
 use crate::hardware::PortKind;
 use crate::truth::{Effect, FaultId, Place};
 
@@ -23,6 +23,8 @@ pub(super) enum Due {
     EndUp { link: usize, end: usize, epoch: u64 },
     /// A link that was up too early carries frames.
     Carries { link: usize, fault: FaultId },
+    /// A PHY does something to its link.
+    Phy { link: usize, end: usize, act: PhyAct },
 }
 
 /// What is due, by time; of the same instant in the order in which it was scheduled.
@@ -48,14 +50,14 @@ impl Agenda {
 }
 
 impl World {
-    /// Whether an end of a link receives symbols: way whole, both ends on. Between media converters
-    /// it is the near one that sends them.
+    /// Whether an end of a link receives symbols: way whole, both ends on and awake. Between media
+    /// converters it is the near one that sends them.
     fn receives(&self, index: usize, end: usize) -> bool {
         let link = &self.links[index];
         let ends = link.both_ends();
-        let (here, there) = (self.is_on(ends[end]), self.is_on(ends[1 - end]));
+        let is_there = |end: usize| self.is_on(ends[end]) && !link.asleep[end];
         let whole = link.contact.is_whole() && link.pair[end].is_whole();
-        here && (link.medium == Medium::Converters || (there && whole))
+        is_there(end) && (link.medium == Medium::Converters || (is_there(1 - end) && whole))
     }
 
     fn is_on(&self, end: End) -> bool {
@@ -114,7 +116,7 @@ impl World {
         }
     }
 
-    fn begins_to_lose(&mut self, index: usize, end: usize, at: Instant) {
+    pub(super) fn begins_to_lose(&mut self, index: usize, end: usize, at: Instant) {
         if self.links[index].ends[end] == EndState::Up {
             self.links[index].ends[end] = EndState::Losing;
             let place = self.links[index].both_ends()[end];
@@ -165,6 +167,7 @@ impl World {
                     }
                 }
             }
+            Due::Phy { link, end, act } => self.phy_acts(link, end, act, at),
             Due::Up { link, epochs } => {
                 if self.links[link].epochs == epochs {
                     self.link_up(link, at);
@@ -184,15 +187,15 @@ impl World {
         }
     }
 
-    fn end_lost(&mut self, index: usize, end: usize, at: Instant) {
+    pub(super) fn end_lost(&mut self, index: usize, end: usize, at: Instant) {
         self.links[index].ends[end] = EndState::Down;
         let place = self.links[index].both_ends()[end];
-        let fault = self.blame(index, at);
-        self.truth.effect(at, fault, self.link_place(index), Effect::SignalLost);
+        let cause = self.cause_of_link(index, at);
+        self.truth.effect(at, cause.fault(), self.link_place(index), Effect::SignalLost);
         match place {
             End::MainDevice(path) => self.cards[path.index()].set_carrier(at, false),
             End::Controller(node, port) => {
-                self.post(node, at, fault.into(), PortEvent::Link { port, up: false });
+                self.post(node, at, cause, PortEvent::Link { port, up: false });
             }
         }
     }
@@ -207,7 +210,7 @@ impl World {
 
     fn end_up(&mut self, index: usize, end: usize, at: Instant) {
         self.links[index].ends[end] = EndState::Up;
-        let fault = self.blame(index, at);
+        let fault = self.cause_of_link(index, at).fault();
         if fault.is_some() {
             self.truth.effect(at, fault, self.link_place(index), Effect::SignalBack);
         }
@@ -221,6 +224,7 @@ impl World {
 
     /// What a link does when it comes up: it may carry nothing yet, and it may be noisy.
     fn comes_up(&mut self, index: usize, at: Instant) {
+        self.links[index].dropped = None;
         if let Some((blind, fault)) = self.links[index].early {
             for passage in &mut self.links[index].passage {
                 passage.break_at(at, fault);
@@ -234,7 +238,7 @@ impl World {
         }
     }
 
-    fn loss_detection(&self, link: usize, end: End) -> Span {
+    pub(super) fn loss_detection(&self, link: usize, end: End) -> Span {
         match end {
             End::MainDevice(path) => self.cards[path.index()].loss_detection,
             End::Controller(node, _) => {
@@ -247,7 +251,7 @@ impl World {
         }
     }
 
-    fn link_up_time(&self, link: usize) -> Span {
+    pub(super) fn link_up_time(&self, link: usize) -> Span {
         let times = self.links[link].both_ends().map(|end| match end {
             End::MainDevice(path) => self.cards[path.index()].link_up,
             End::Controller(node, _) => {

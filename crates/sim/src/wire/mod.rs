@@ -13,7 +13,10 @@ mod due;
 pub mod history;
 pub mod link;
 mod node;
+mod phy_link;
 pub(crate) mod plug_noise;
+pub mod software;
+mod starve;
 pub mod stranger;
 pub(crate) mod walk;
 pub(crate) mod world;
@@ -21,6 +24,7 @@ pub(crate) mod world;
 pub use change::{Change, Line, Source};
 pub use history::History;
 pub use link::{CABLE_NS_PER_M, Link, Medium};
+pub use software::SoftwareChange;
 pub use stranger::Stranger;
 
 #[cfg(test)]

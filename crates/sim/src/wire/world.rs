@@ -249,6 +249,8 @@ impl World {
                 self.apply(at, fault, Change::Refuse { node, refusal: None });
             }
         }
+        self.release_starved(at, fault);
+        self.release_software(at, fault);
         self.truth.end(at, fault);
     }
 
