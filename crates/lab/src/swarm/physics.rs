@@ -184,9 +184,8 @@ impl Run {
 
     fn inject(&mut self) -> Option<FaultId> {
         let is_ring = self.file.ring.is_some();
-        let fits = |kind: &&Kind| {
-            !kind.is_built_in() && (is_ring || kind.place != PlaceRule::RingLink)
-        };
+        let fits =
+            |kind: &&Kind| !kind.is_built_in() && (is_ring || kind.place != PlaceRule::RingLink);
         let kinds: Vec<&Kind> = KINDS.iter().filter(fits).collect();
         let kind = self.stream.pick(&kinds)?;
         let mut entry = any_fault(kind, &self.file, &mut self.stream);
@@ -320,7 +319,10 @@ impl Run {
         let back = tally.whole + tally.damaged + tally.vanished + tally.dropped;
         if back > tally.sent {
             let sent = strangers(&self.segment);
-            self.violation(format!("{back} of {} frames accounted for, and {sent} of others", tally.sent));
+            self.violation(format!(
+                "{back} of {} frames accounted for, and {sent} of others",
+                tally.sent
+            ));
         }
         all
     }

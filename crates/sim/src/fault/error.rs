@@ -27,7 +27,9 @@ pub enum FaultError {
         kind: FaultName,
     },
     /// A fault that is in the line from its making on.
-    #[error("{entry}: `{kind}` is built in: it cannot come while the line runs; write it into the segment file")]
+    #[error(
+        "{entry}: `{kind}` is built in: it cannot come while the line runs; write it into the segment file"
+    )]
     BuiltIn {
         /// Which entry.
         entry: String,

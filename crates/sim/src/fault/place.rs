@@ -11,8 +11,8 @@ use super::error::{FaultError, nearest};
 use crate::hardware::PortKind;
 use crate::segment_file::{FaultEntry, Supply};
 use crate::truth::Place;
-use crate::wire::{Change, Line};
 use crate::wire::world::World;
+use crate::wire::{Change, Line};
 
 /// Where a kind of fault can be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

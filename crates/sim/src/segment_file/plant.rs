@@ -257,13 +257,11 @@ impl Builder {
         let farthest = self.sockets.iter().max_by_key(|socket| socket.depth)?;
         let cable_m = (self.stream.log_uniform(5.0, 80.0) * 10.0).round() / 10.0;
         match farthest.on {
-            Attachment::Device { .. } => {
-                Some(SegmentRing {
-                    closes_at: farthest.on.clone(),
-                    cable_m: Some(cable_m),
-                    medium: None,
-                })
-            }
+            Attachment::Device { .. } => Some(SegmentRing {
+                closes_at: farthest.on.clone(),
+                cable_m: Some(cable_m),
+                medium: None,
+            }),
             Attachment::MainDevice(_) => None,
         }
     }

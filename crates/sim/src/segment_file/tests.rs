@@ -116,7 +116,11 @@ fn mistakes_are_named() {
         ("\"A.physical\"", "\"A.fysical\"", "no counter is called `A.fysical`"),
         ("name = \"K3\"", "name = \"K1\"", "two devices are called `K1`"),
         ("closes_at = \"K3.C\"", "closes_at = \"K3.B\"", "K3.B is an E-bus contact"),
-        ("devices = [\"K1\", \"K3\"]\n\n[[device]]", "devices = [\"K7\"]\n\n[[device]]", "supply `PS1`: no device is called `K7`"),
+        (
+            "devices = [\"K1\", \"K3\"]\n\n[[device]]",
+            "devices = [\"K7\"]\n\n[[device]]",
+            "supply `PS1`: no device is called `K7`",
+        ),
         ("medium = \"converters\"", "medium = \"wire\"", "unknown variant `wire`"),
     ];
     for (from, to, expected) in table {

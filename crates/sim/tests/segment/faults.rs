@@ -503,10 +503,7 @@ fn entries_that_cannot_be_are_refused_with_a_way_out() {
     let entry = |text: &str| format!("{PLANT}\n[[fault]]\n{text}\n");
     let table = [
         ("kind = \"link_open\"", "no fault is called `link_open` (did you mean `link-open`?)"),
-        (
-            "kind = \"one-sided-recording\"",
-            "a segment cannot have the fault `one-sided-recording`",
-        ),
+        ("kind = \"one-sided-recording\"", "a segment cannot have the fault `one-sided-recording`"),
         ("kind = \"link-open\"", "no place is given; expected `at = \"K1.C>B3.A\"`"),
         ("kind = \"early-link\"\nat = \"K1.C>K6.A\"", "is one direction"),
         ("kind = \"ring-open\"", "this line is no ring"),
