@@ -283,7 +283,11 @@ fn emulated(spec: &Spec, outputs: &[SignalId], inputs: &[SignalId]) -> Box<dyn F
         areas(outputs, spec.switching_outputs().as_ref()),
         areas(inputs, spec.switching_inputs().as_ref()),
     );
-    Box::new(emulated.with_words(words.collect()))
+    let emulated = emulated.with_words(words.collect());
+    match inputs.first().filter(|_| spec.coding_switch().is_some()) {
+        Some(switch) => Box::new(emulated.with_coding_switch(*switch)),
+        None => Box::new(emulated),
+    }
 }
 
 #[cfg(test)]
