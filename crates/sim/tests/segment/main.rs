@@ -6,4 +6,5 @@ mod faults;
 mod identification;
 mod rig;
 mod swarm;
+mod traps;
 mod walk;

@@ -14,7 +14,9 @@ mod image;
 pub(super) mod object;
 mod smart;
 mod spec;
+pub(in crate::device) mod synchronisation;
 
+pub use self::chip::controllers;
 use linesman_proto::port::{Port, PortMap};
 
 use self::object::Individual;
