@@ -6,8 +6,8 @@
 
 mod build;
 pub(crate) mod card;
-mod ready;
 mod identification;
+mod ready;
 
 use std::collections::BTreeMap;
 
