@@ -59,6 +59,11 @@ pub(super) const ET1100: Chip = Chip {
     timing: TIMING,
 };
 
+/// The large one with Fast Hot Connect: both ends of a cable have fixed link parameters, so that a
+/// link is there within a few milliseconds instead of one to three seconds (facts, hot connect).
+pub(super) const ET1100_FAST: Chip =
+    Chip { timing: Timing { mii_link_up: Span::ms(5), ..TIMING }, ..ET1100 };
+
 /// The small one: two ports and a third, for simple terminals.
 pub(super) const ET1200: Chip = Chip {
     controller_type: 0x12,
@@ -85,6 +90,10 @@ pub(super) const IP_CORE: Chip = Chip {
     timing: Timing { forward: Span::ns(160), process: Span::ns(180), ..TIMING },
 };
 
+/// The same on the E-bus. Terminals whose SII switches no clock unit on, and that use them all the
+/// same, must have one: its units are always on.
+pub(super) const IP_CORE_EBUS: Chip = Chip { features: FULL, ..IP_CORE };
+
 /// The first generation: four FMMUs and SyncManagers, and no counters of forwarded errors.
 pub(super) const ESC20: Chip = Chip {
     controller_type: 0x02,
@@ -99,6 +108,11 @@ pub(super) const ESC20: Chip = Chip {
 };
 
 impl Chip {
+    /// Whether its cables have Fast Hot Connect: they fit each other only.
+    pub(super) const fn fast_hot_connect(&self) -> bool {
+        self.timing.mii_link_up.as_nanos() < Span::ms(500).as_nanos()
+    }
+
     /// The controller with these ports.
     pub(super) fn with_ports(&self, ports: PortMap<PortKind>) -> Hardware {
         Hardware {

@@ -6,6 +6,7 @@
 
 mod coe;
 mod information;
+mod soe;
 
 use std::collections::VecDeque;
 
@@ -13,6 +14,7 @@ use linesman_proto::mailbox::coe::{Emergency, Message as CoeMessage};
 use linesman_proto::mailbox::{
     BufferTooSmall, Counter, ErrorReply, ErrorReplyCode, Header, MailboxError, MailboxType, Message,
 };
+use linesman_proto::sii::Protocols;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
@@ -32,6 +34,7 @@ const LOOK_AGAIN: Span = Span::ms(1);
 /// The mailbox.
 #[derive(Clone, Debug)]
 pub struct Mailbox {
+    protocols: Protocols,
     coe: CoeServer,
     response_time: Span,
     /// The request that is worked on, and when that ends.
@@ -45,10 +48,11 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// A mailbox that answers after this time.
+    /// A mailbox that speaks these protocols and answers after this time.
     #[must_use]
-    pub fn new(response_time: Span) -> Self {
+    pub fn new(response_time: Span, protocols: Protocols) -> Self {
         Self {
+            protocols,
             coe: CoeServer::default(),
             response_time,
             request: None,
@@ -62,7 +66,7 @@ impl Mailbox {
 
     /// INIT is left, or entered: whatever was under way is forgotten.
     pub fn restart(&mut self) {
-        *self = Self::new(self.response_time);
+        *self = Self::new(self.response_time, self.protocols);
     }
 
     /// Tells the MainDevice of an error on the device's own account.
@@ -153,11 +157,16 @@ impl Mailbox {
         }
         self.last_received = header.counter;
         match header.kind {
-            MailboxType::Coe if state != AlState::Boot => {
+            MailboxType::Coe if state != AlState::Boot && self.protocols.has(Protocols::COE) => {
                 self.serve_coe(message, pdi, dictionary, state);
             }
             // Nobody answers an error with an error.
             MailboxType::Error => {}
+            MailboxType::Soe if state != AlState::Boot && self.protocols.has(Protocols::SOE) => {
+                if let Some(answer) = soe::answer(message.data) {
+                    self.send(MailboxType::Soe, header, pdi, |body| copy(&answer, body));
+                }
+            }
             MailboxType::Coe
             | MailboxType::Aoe
             | MailboxType::Eoe

@@ -8,7 +8,7 @@ mod process_image;
 
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress, ObjectIndex};
 use linesman_proto::register as r;
-use linesman_proto::sii::MailboxPair;
+use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
 
@@ -79,6 +79,8 @@ pub struct Description {
     pub channels: Vec<Box<dyn Channel>>,
     /// The mailbox it likes best; a longer one it does not take.
     pub mailbox: MailboxPair,
+    /// What its mailbox speaks.
+    pub protocols: Protocols,
     /// The mailbox in BOOT, for a device that knows BOOT.
     pub bootstrap: Option<MailboxPair>,
     /// How quick it is.
@@ -126,7 +128,7 @@ impl Processor {
         Self {
             application_layer: ApplicationLayer::new(description.bootstrap.is_some()),
             dictionary: description.dictionary.clone(),
-            mailbox: Mailbox::new(description.times.mailbox),
+            mailbox: Mailbox::new(description.times.mailbox, description.protocols),
             outputs: ProcessImage::default(),
             inputs: ProcessImage::default(),
             step: None,
@@ -141,6 +143,16 @@ impl Processor {
         let now = pdi.now();
         for channel in &mut self.description.channels {
             channel.make_safe(now, &self.dictionary, pdi.signals_mut());
+        }
+        self.hear_channels();
+    }
+
+    /// What channels have to tell of waits for the mailbox.
+    fn hear_channels(&mut self) {
+        for emergency in self.description.channels.iter_mut().filter_map(|one| one.emergency()) {
+            if self.emergencies.len() < UNTOLD {
+                self.emergencies.push(emergency);
+            }
         }
     }
 
@@ -310,6 +322,7 @@ impl Processor {
         for channel in &mut self.description.channels {
             channel.drive(now, &self.dictionary, signals);
         }
+        self.hear_channels();
     }
 
     fn serve_process_data(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
@@ -325,9 +338,12 @@ impl Processor {
 
     fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.next_sample = now + self.description.times.sample;
+        let time = pdi.system_time();
         for channel in &mut self.description.channels {
+            channel.tell_time(time);
             channel.sample(now, &mut self.dictionary, pdi.signals());
         }
+        self.hear_channels();
         if self.inputs.len() > 0 {
             let mut buffer = std::mem::take(&mut self.buffer);
             self.inputs.pack(&self.dictionary, &mut buffer);
