@@ -21,6 +21,19 @@ pub struct HostPort {
     pub rx_length_errors: u64,
 }
 
+/// What became of the frames that the MainDevice's cards sent, since the start of the run.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct FrameTally {
+    /// Given to the wire.
+    pub sent: u64,
+    /// Came back as they should.
+    pub whole: u64,
+    /// Came back damaged: the card drops them.
+    pub damaged: u64,
+    /// Will not come back.
+    pub vanished: u64,
+}
+
 /// A card, with its PHY.
 #[derive(Clone, Debug)]
 pub(crate) struct Card {

@@ -16,7 +16,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 
 pub use build::BuildError;
-pub use card::HostPort;
+pub use card::{FrameTally, HostPort};
 
 use crate::controller::Controller;
 use crate::device::{SignalId, Signals};
@@ -62,6 +62,7 @@ pub struct Segment {
     /// By time of arrival, then in the order of sending.
     arrivals: BTreeMap<(Instant, u64), (Path, WireFrame)>,
     spare: Vec<Vec<u8>>,
+    tally: FrameTally,
 }
 
 /// What a segment knows about a controller beside the controller itself.
@@ -103,13 +104,17 @@ impl Segment {
             return;
         }
         card.counts.tx_frames += 1;
+        self.tally.sent += 1;
         let mut traveller = Traveller::new(frame);
         match self.world.walk(path, now, &mut traveller) {
             Outcome::Arrived(path, at) => {
                 let number = traveller.frame.number;
                 self.arrivals.insert((at, number), (path, traveller.frame));
             }
-            Outcome::Vanished => self.recycle(traveller.frame.bytes),
+            Outcome::Vanished => {
+                self.tally.vanished += 1;
+                self.recycle(traveller.frame.bytes);
+            }
         }
     }
 
@@ -126,11 +131,13 @@ impl Segment {
         let counts = &mut card.counts;
         if intact {
             counts.rx_frames += 1;
+            self.tally.whole += 1;
         } else if frame.bytes.len() < MIN_LEN {
             counts.rx_length_errors += 1;
         } else {
             counts.rx_crc_errors += 1;
         }
+        self.tally.damaged += u64::from(!intact);
         buffer.clear();
         buffer.extend_from_slice(&frame.bytes);
         self.recycle(frame.bytes);
@@ -269,6 +276,12 @@ impl Segment {
     pub fn host(&self, path: Path) -> HostPort {
         let card = self.world.card(path);
         HostPort { carrier: card.has_carrier(self.now), ..card.counts }
+    }
+
+    /// What became of the frames that the cards sent.
+    #[must_use]
+    pub const fn frames(&self) -> FrameTally {
+        self.tally
     }
 
     // ---- truth ----

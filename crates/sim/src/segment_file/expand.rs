@@ -8,8 +8,7 @@ use linesman_proto::sii::Image;
 use linesman_proto::topology::{End, WiringError};
 
 use super::{SegmentFile, SegmentFileError};
-use crate::device::Signals;
-use crate::device::library::{self, LibraryType, UnknownType};
+use crate::device::{DeviceKind, Signals};
 use crate::hardware::PortKind;
 
 /// What a cable is long when nothing is said, in metres.
@@ -25,7 +24,7 @@ pub(crate) struct Planned {
     /// Which controller of the device, from 0.
     pub(crate) part: usize,
     pub(crate) name: String,
-    pub(crate) type_name: String,
+    pub(crate) kind: DeviceKind,
     pub(crate) on: Attachment,
     pub(crate) entry: Port,
     pub(crate) cable_m: f64,
@@ -37,10 +36,10 @@ pub(crate) struct Planned {
 pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileError> {
     let mut planned = Vec::with_capacity(file.devices.len());
     for (index, device) in file.devices.iter().enumerate() {
-        let Some(found) = library::find(&device.type_name) else {
-            let source = UnknownType { name: device.type_name.clone() };
-            return Err(SegmentFileError::Type { device: device.name.clone(), source });
-        };
+        let kind = file.kind(&device.type_name).map_err(|source| SegmentFileError::Type {
+            device: device.name.clone(),
+            source: Box::new(source),
+        })?;
         let entry = match device.entry.as_deref() {
             None => Port::A,
             Some(text) => parse_port(text).ok_or_else(|| SegmentFileError::Range {
@@ -51,7 +50,7 @@ pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileErro
             })?,
         };
         let serial = device.serial.unwrap_or(planned.len() as u32 + 1);
-        expand_device(file, index, found, entry, serial, &mut planned);
+        expand_device(file, index, &kind, entry, serial, &mut planned);
     }
     Ok(planned)
 }
@@ -59,7 +58,7 @@ pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileErro
 fn expand_device(
     file: &SegmentFile,
     index: usize,
-    found: &LibraryType,
+    kind: &DeviceKind,
     entry: Port,
     serial: u32,
     planned: &mut Vec<Planned>,
@@ -69,8 +68,8 @@ fn expand_device(
         0 => device.name.clone(),
         part => format!("{}/{}", device.name, part + 1),
     };
-    for (part, ports) in found.ports().enumerate() {
-        let inner = found.inner_links().iter().find(|link| link.to.0 == part);
+    for (part, ports) in kind.ports().into_iter().enumerate() {
+        let inner = kind.inner_links().iter().find(|link| link.to.0 == part);
         let (on, entry, cable_m) = match inner {
             Some(link) => {
                 let on = Attachment::Device { name: name(link.from.0), port: link.from.1 };
@@ -88,7 +87,7 @@ fn expand_device(
             device: index,
             part,
             name: name(part),
-            type_name: found.name().to_owned(),
+            kind: kind.clone(),
             on,
             entry,
             cable_m,
@@ -179,8 +178,9 @@ fn wiring_error(planned: &[Planned], error: ProjectError) -> SegmentFileError {
     })
 }
 
-/// The counter behind a key of the file.
-pub(crate) fn parse_counter(key: &str) -> Option<linesman_proto::register::ErrorCounter> {
+/// The counter behind a key of the file, such as `A.lost_link`; `None` for what is none.
+#[must_use]
+pub fn parse_counter(key: &str) -> Option<linesman_proto::register::ErrorCounter> {
     use linesman_proto::register::ErrorCounter as Counter;
     match key {
         "processing_unit" => return Some(Counter::ProcessingUnit),
@@ -239,7 +239,7 @@ fn has_port(controller: &Planned, port: Port) -> Result<PortKind, SegmentFileErr
     match controller.ports[port] {
         PortKind::Absent => Err(SegmentFileError::NoPort {
             device: controller.name.clone(),
-            type_name: controller.type_name.clone(),
+            type_name: controller.kind.name().to_owned(),
             port,
             has: controller
                 .ports
@@ -265,7 +265,7 @@ const fn kind_name(kind: PortKind) -> &'static str {
 pub(crate) fn wiring(file: &SegmentFile, planned: &[Planned]) -> Project {
     let devices = planned.iter().map(|controller| ProjectDevice {
         name: controller.name.clone(),
-        type_name: controller.type_name.clone(),
+        type_name: controller.kind.name().to_owned(),
         vendor_id: None,
         product_code: None,
         revision: None,
@@ -288,9 +288,7 @@ pub(super) fn project(
     let mut project = wiring(file, planned);
     let mut signals = Signals::default();
     for (controller, wanted) in planned.iter().zip(&mut project.devices) {
-        let built = library::build(&controller.type_name, controller.serial, &mut signals);
-        let built = built
-            .map_err(|source| SegmentFileError::Type { device: controller.name.clone(), source })?;
+        let built = controller.kind.build(controller.serial, &mut signals);
         let image = built.get(controller.part).and_then(|one| Image::parse(&one.sii).ok());
         if let Some(image) = image {
             wanted.vendor_id = Some(image.identity.vendor_id);

@@ -21,6 +21,7 @@
 
 mod expand;
 mod plant;
+mod types;
 mod value;
 mod write;
 
@@ -30,11 +31,11 @@ use linesman_config::attachment::Attachment;
 use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, parse_counter, wiring};
+pub use expand::parse_counter;
+pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
+pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
-
-use crate::device::library::UnknownType;
 
 /// A segment, as described.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
@@ -62,6 +63,9 @@ pub struct SegmentFile {
     /// What goes wrong, and when.
     #[serde(default, rename = "fault")]
     pub faults: Vec<FaultEntry>,
+    /// The types that it takes from files. They are not written into it.
+    #[serde(skip)]
+    pub types: DescribedTypes,
 }
 
 /// A device of a segment.
@@ -70,7 +74,7 @@ pub struct SegmentFile {
 pub struct SegmentDevice {
     /// Unique name.
     pub name: String,
-    /// Type in the library, such as `EL2004`.
+    /// Type in the library, such as `EL2004`, or `sii:FILE`: the device whose EEPROM that file holds.
     #[serde(rename = "type")]
     pub type_name: String,
     /// Whose port it hangs on: `maindevice`, `maindevice.B`, or `K1.C`.
@@ -189,13 +193,13 @@ pub enum SegmentFileError {
     /// There is nothing in it.
     #[error("there is no `[[device]]` in it: a segment has at least one SubDevice")]
     Empty,
-    /// A type that the library does not have.
+    /// A type that cannot be had.
     #[error("device `{device}`: {source}")]
     Type {
         /// Whose.
         device: String,
-        /// What the library says.
-        source: UnknownType,
+        /// Why not.
+        source: Box<TypeError>,
     },
     /// Names, ports or places contradict each other.
     #[error("{0}")]
@@ -255,11 +259,20 @@ impl SegmentFile {
     /// # Errors
     /// [`SegmentFileError`]: line and column for what is not TOML or not expected, else the device.
     pub fn parse(text: &str) -> Result<Self, SegmentFileError> {
-        let file: Self =
+        Self::parse_with(text, &NoFiles)
+    }
+
+    /// The same with types from files, which are read by `files`.
+    ///
+    /// # Errors
+    /// As [`SegmentFile::parse`], and the file that cannot be read or describes no device.
+    pub fn parse_with(text: &str, files: &dyn DescriptionFiles) -> Result<Self, SegmentFileError> {
+        let mut file: Self =
             toml::from_str(text).map_err(|error| SegmentFileError::Form(error.to_string()))?;
         if file.devices.is_empty() {
             return Err(SegmentFileError::Empty);
         }
+        file.read_types(files)?;
         file.check()?;
         Ok(file)
     }

@@ -53,6 +53,7 @@ pub fn plant(seed: Seed, options: &PlantOptions) -> SegmentFile {
         devices: builder.devices,
         ring,
         faults: Vec::new(),
+        types: super::DescribedTypes::default(),
     };
     in_order(file)
 }

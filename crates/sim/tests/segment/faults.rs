@@ -114,7 +114,7 @@ fn hit(place: &str, hits: u32) -> Bench {
     bench
 }
 
-// proves: HW-18 partial, HW-28 partial
+// proves: HW-18 partial, HW-28
 #[test]
 fn a_hit_on_the_way_out_is_found_next_and_forwarded_by_all_others() {
     let bench = hit("K1.B>T2.A", 3);

@@ -148,9 +148,7 @@ impl Motion {
             Goal::Stop { .. } => self.demanded_velocity == 0.0,
             Goal::Line { until, .. } => at >= until && self.demanded_velocity == 0.0,
             Goal::Velocity { target, .. } => self.demanded_velocity == target,
-            Goal::Position { target, .. } => {
-                self.demand == target && self.demanded_velocity == 0.0
-            }
+            Goal::Position { target, .. } => self.demand == target && self.demanded_velocity == 0.0,
         };
         follows && settled
     }

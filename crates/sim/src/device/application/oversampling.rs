@@ -49,11 +49,7 @@ impl Oversampling {
     /// A device with these outputs.
     #[must_use]
     pub fn new(outputs: Vec<SampledOutput>) -> Self {
-        let playing = |output| Playing {
-            output,
-            began: Instant::ZERO,
-            queue: VecDeque::new(),
-        };
+        let playing = |output| Playing { output, began: Instant::ZERO, queue: VecDeque::new() };
         Self {
             channels: outputs.into_iter().map(playing).collect(),
             application_layer: ApplicationLayer::default(),

@@ -17,7 +17,7 @@ use crate::device::application::two_times::TwoTimes;
 use crate::device::dictionary::Dictionary;
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
 use crate::device::firmware::Firmware;
-use crate::device::processor::{Description, Processor};
+use crate::device::processor::{Description, ProcessBuffer, Processor};
 use crate::device::signal::{SignalId, Signals};
 
 /// Makes one controller with what is behind it.
@@ -31,15 +31,14 @@ pub(super) fn build_one(spec: &Spec, individual: Individual, signals: &mut Signa
             areas(spec, Use::Inputs, &inputs),
         )),
         Behind::CodingSwitch(at) => {
-            let word = inputs.iter().map(|signal| WordArea { sync_manager: 0, at, signal: *signal });
+            let word =
+                inputs.iter().map(|signal| WordArea { sync_manager: 0, at, signal: *signal });
             Box::new(Emulated::default().with_words(word.collect()))
         }
         Behind::Oversampling { .. } => {
             let channels = (0..).zip(outputs.iter());
-            let channels = channels.map(|(sync_manager, signal)| SampledOutput {
-                sync_manager,
-                signal: *signal,
-            });
+            let channels = channels
+                .map(|(sync_manager, signal)| SampledOutput { sync_manager, signal: *signal });
             Box::new(Oversampling::new(channels.collect()))
         }
         Behind::Processor(processor) => {
@@ -85,6 +84,7 @@ fn with_processor(
     let description = Description {
         dictionary,
         channels,
+        buffers: ProcessBuffer::BEHIND_MAILBOX.to_vec(),
         mailbox: spec.mailbox(),
         protocols: Protocols(spec.protocols),
         bootstrap: Some(image::bootstrap(spec)),

@@ -153,11 +153,7 @@ const BRIDGE: Spec = Spec {
         SyncManagerSpec { start: 0x1C00, ..inputs(2) },
     ],
     pdos: BRIDGE_PDOS,
-    protocols: Protocols::AOE
-        | Protocols::EOE
-        | Protocols::COE
-        | Protocols::FOE
-        | Protocols::VOE,
+    protocols: Protocols::AOE | Protocols::EOE | Protocols::COE | Protocols::FOE | Protocols::VOE,
     behind: Behind::Processor(&BRIDGE_PROCESSOR),
     op_modes: &[OpModeSpec::free("FreeRun"), OpModeSpec::with_clock("DcSync", 0x0320)],
     ..TERMINAL

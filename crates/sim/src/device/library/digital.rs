@@ -112,12 +112,7 @@ const LATCHED_INPUTS: &[PdoSpec] = &[
         &[EntrySpec::bit(0x6000, 2, "Input"), EntrySpec::padding(6)],
     ),
     PdoSpec::single(0x1A13, "Latch", Some(1), LATCHES),
-    PdoSpec::single(
-        0x1A15,
-        "SysTime",
-        None,
-        &[register(0x0910, "SysTime", DataType::ULINT, 64)],
-    ),
+    PdoSpec::single(0x1A15, "SysTime", None, &[register(0x0910, "SysTime", DataType::ULINT, 64)]),
 ];
 
 const FOUR_INPUTS: &[PdoSpec] = &[inputs(4)];

@@ -70,10 +70,7 @@ pub(super) const TYPES: &[LibraryType] = &[
             ports: [Mii, Mii, Absent, Absent],
             ebus_current_ma: 0,
             sync_managers: &[OUTPUTS, INPUTS],
-            pdos: &[
-                digital::outputs(16),
-                PdoSpec { sync_manager: Some(1), ..digital::inputs(16) },
-            ],
+            pdos: &[digital::outputs(16), PdoSpec { sync_manager: Some(1), ..digital::inputs(16) }],
             ..digital::TERMINAL
         }],
         inner_links: &[],

@@ -102,6 +102,7 @@ fn general(spec: &Spec, strings: &mut Strings) -> General {
         ports: PortMap(spec.ports.map(|port| match port {
             PortKind::Absent => SiiPort::None,
             PortKind::Ebus => SiiPort::EBus,
+            PortKind::Mii if spec.chip.fast_hot_connect() => SiiPort::FastHotConnect,
             PortKind::Mii => SiiPort::Mii,
         })),
         ..General::default()

@@ -17,8 +17,7 @@ const JUNCTION: Spec = Spec { group: "Infrastructure", ..COUPLER };
 /// On the E-bus, with one cable.
 const ONE_CABLE: Spec = Spec { ports: [Ebus, Absent, Ebus, Mii], ..JUNCTION };
 /// On the E-bus, with two cables.
-const TWO_CABLES: Spec =
-    Spec { ports: [Ebus, Mii, Ebus, Mii], ebus_current_ma: 220, ..JUNCTION };
+const TWO_CABLES: Spec = Spec { ports: [Ebus, Mii, Ebus, Mii], ebus_current_ma: 220, ..JUNCTION };
 
 const fn single(spec: &'static [Spec; 1]) -> LibraryType {
     LibraryType { controllers: spec, inner_links: &[] }

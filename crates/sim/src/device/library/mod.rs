@@ -7,7 +7,7 @@
 mod analog;
 mod assemble;
 mod box_module;
-mod chip;
+pub(super) mod chip;
 mod communication;
 mod coupler;
 mod digital;
@@ -16,7 +16,7 @@ mod feed;
 mod generic;
 mod image;
 mod junction;
-mod object;
+pub(super) mod object;
 mod oversampling;
 mod passive;
 mod smart;
@@ -106,6 +106,17 @@ impl LibraryType {
         self.controllers.iter().map(|spec| spec.ebus_current_ma).sum()
     }
 
+    /// Makes a device: one [`Built`] for each of its controllers, in the order in which frames reach
+    /// them. Its channels become new signals. `revision` stands in identity and dictionary.
+    #[must_use]
+    pub fn build(&self, revision: Option<u32>, serial: u32, signals: &mut Signals) -> Vec<Built> {
+        let build = |spec: &Spec| {
+            let revision = revision.unwrap_or(spec.revision);
+            build_one(spec, Individual { revision, serial }, signals)
+        };
+        self.controllers.iter().map(build).collect()
+    }
+
     /// How many channels it has: outputs, inputs.
     #[must_use]
     pub fn channels(&self) -> (usize, usize) {
@@ -188,11 +199,7 @@ pub fn build_revision(
     signals: &mut Signals,
 ) -> Result<Vec<Built>, UnknownType> {
     let found = find(type_name).ok_or_else(|| UnknownType { name: type_name.to_owned() })?;
-    let build = |spec: &Spec| {
-        let revision = revision.unwrap_or(spec.revision);
-        build_one(spec, Individual { revision, serial }, signals)
-    };
-    Ok(found.controllers.iter().map(build).collect())
+    Ok(found.build(revision, serial, signals))
 }
 
 #[cfg(test)]

@@ -19,13 +19,13 @@ const MODULAR_DEVICE: u64 = 0x0000_1389;
 /// Device type of servo drives (CiA 402).
 const SERVO_DRIVE: u64 = 0x0002_0192;
 /// Data type of a PDO mapping.
-const PDO_MAPPING: DataType = DataType(0x0021);
+pub(in crate::device) const PDO_MAPPING: DataType = DataType(0x0021);
 /// Data type of the identity.
-const IDENTITY: DataType = DataType(0x0023);
+pub(in crate::device) const IDENTITY: DataType = DataType(0x0023);
 /// Data type of a record that is none of the others.
-const RECORD: DataType = DataType(0x002A);
+pub(in crate::device) const RECORD: DataType = DataType(0x002A);
 /// Readable always, writable in PREOP.
-const SET_UP: Access = Access(READ_ONLY.0 | Access::WRITE_PRE_OP);
+pub(in crate::device) const SET_UP: Access = Access(READ_ONLY.0 | Access::WRITE_PRE_OP);
 /// A setting that is kept for a replacement.
 const SETTING: Access = Access(READ_WRITE.0 | Access::BACKUP | Access::SETTING);
 
@@ -71,7 +71,13 @@ pub(super) fn dictionary(
     Dictionary::new(objects, spec.coe.complete_access())
 }
 
-fn record(index: u16, name: &str, data_type: DataType, entries: Vec<Entry>) -> Object {
+/// An object of several entries of different types.
+pub(in crate::device) fn record(
+    index: u16,
+    name: &str,
+    data_type: DataType,
+    entries: Vec<Entry>,
+) -> Object {
     Object::list(ObjectIndex(index), name, ObjectCode::Record, data_type, entries)
 }
 
@@ -110,7 +116,7 @@ pub(super) fn channel_name(name: &str, channel: u8, channels: u8) -> String {
 }
 
 /// The name of a subindex that has no other.
-fn subindex_name(subindex: u8) -> String {
+pub(in crate::device) fn subindex_name(subindex: u8) -> String {
     format!("SubIndex {subindex:03}")
 }
 
@@ -175,7 +181,7 @@ fn value(entry: &EntrySpec, access: Access) -> Entry {
 }
 
 /// Puts an entry where it belongs; one that is there already stays.
-fn insert(object: &mut Object, entry: Entry) {
+pub(in crate::device) fn insert(object: &mut Object, entry: Entry) {
     let place = object.entries.binary_search_by_key(&entry.subindex, |entry| entry.subindex);
     let Err(at) = place else { return };
     object.entries.insert(at, entry);
@@ -222,7 +228,7 @@ fn assignment(spec: &Spec, sync_manager: u8) -> Object {
 
 /// The synchronisation parameters of outputs (0x1C32) or inputs (0x1C33): free run, or with the
 /// frames.
-fn synchronisation(sync_manager: u8) -> Object {
+pub(in crate::device) fn synchronisation(sync_manager: u8) -> Object {
     const FREE_RUN_OR_FRAMES: u64 = 0x0003;
     const SHORTEST_CYCLE_NS: u64 = 100_000;
     let word = |subindex, name: &str, access, value| {

@@ -8,8 +8,8 @@ use linesman_proto::sii::Protocols;
 use super::LibraryType;
 use super::chip::ET1100;
 use super::spec::{
-    BECKHOFF, Behind, COE_WITH_COMPLETE_ACCESS, EntrySpec, Function, OpModeSpec, PdoSpec, ProcessorSpec,
-    SettingSpec, SettingsSpec, Spec, SyncManagerSpec, Use,
+    BECKHOFF, Behind, COE_WITH_COMPLETE_ACCESS, EntrySpec, Function, OpModeSpec, PdoSpec,
+    ProcessorSpec, SettingSpec, SettingsSpec, Spec, SyncManagerSpec, Use,
 };
 use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Ebus};
@@ -74,10 +74,8 @@ pub(super) const fn inputs(length: u16) -> SyncManagerSpec {
 }
 
 /// With the frames, or with SYNC0 and SYNC1.
-pub(super) const SYNCHRONISED: &[OpModeSpec] = &[
-    OpModeSpec::free("Synchron"),
-    OpModeSpec::with_clock("DC-Synchron", 0x0700),
-];
+pub(super) const SYNCHRONISED: &[OpModeSpec] =
+    &[OpModeSpec::free("Synchron"), OpModeSpec::with_clock("DC-Synchron", 0x0700)];
 
 /// A terminal with a processor.
 pub(super) const TERMINAL: Spec = Spec {
@@ -106,7 +104,12 @@ pub(super) const TERMINAL: Spec = Spec {
 const DIAGNOSED_OUTPUTS: &[PdoSpec] = &[
     PdoSpec {
         channels: 4,
-        ..PdoSpec::single(0x1600, "DIG Outputs Channel", Some(2), &[EntrySpec::bit(0x7000, 1, "Output")])
+        ..PdoSpec::single(
+            0x1600,
+            "DIG Outputs Channel",
+            Some(2),
+            &[EntrySpec::bit(0x7000, 1, "Output")],
+        )
     },
     PdoSpec {
         channels: 4,
@@ -172,7 +175,12 @@ const AXIS: &[PdoSpec] = &[
             EntrySpec::padding(8),
         ],
     ),
-    PdoSpec::single(0x1604, "STM Velocity", Some(2), &[EntrySpec::number(0x7010, 0x21, "Velocity", DataType::INT, 16)]),
+    PdoSpec::single(
+        0x1604,
+        "STM Velocity",
+        Some(2),
+        &[EntrySpec::number(0x7010, 0x21, "Velocity", DataType::INT, 16)],
+    ),
     PdoSpec::single(
         0x1A00,
         "ENC Status compact",
@@ -283,10 +291,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(8), inputs(8)],
         pdos: AXIS,
         behind: Behind::Processor(&AXIS_PROCESSOR),
-        op_modes: &[
-            OpModeSpec::free("Synchron"),
-            OpModeSpec::with_clock("DC-Synchron", 0x0300),
-        ],
+        op_modes: &[OpModeSpec::free("Synchron"), OpModeSpec::with_clock("DC-Synchron", 0x0300)],
         ..TERMINAL
     }]),
 ];

@@ -4,15 +4,13 @@
 //! code gives.
 
 use linesman_proto::register::{self as r, SmDirection, SmMode, SyncManagerConfig};
+use linesman_proto::sii::Direction;
 use linesman_proto::state::AlStatusCode;
 
+use super::areas::Areas;
 use crate::controller::Pdi;
 use crate::device::mailbox::{ANSWERS, REQUESTS};
 
-/// The SyncManager of the outputs of a device with a mailbox.
-pub(super) const OUTPUTS: u8 = 2;
-/// The SyncManager of its inputs.
-pub(super) const INPUTS: u8 = 3;
 /// The shortest mailbox that the specification allows, in bytes.
 const SHORTEST_MAILBOX: u16 = 0x22;
 /// Where process-data RAM begins.
@@ -37,26 +35,46 @@ pub(super) fn mailbox(pdi: &Pdi<'_>, longest: u16) -> bool {
         && !overlap(&requests, &answers)
 }
 
-/// Whether process data of `outputs` and `inputs` bytes are set up; if not, the code to show.
+/// Whether all process data are set up; if not, the code to show. `mailbox` says whether SyncManagers
+/// 0 and 1 are those of a mailbox.
 pub(super) fn process_data(
     pdi: &Pdi<'_>,
-    outputs: usize,
-    inputs: usize,
+    areas: &Areas,
+    mailbox: bool,
 ) -> Result<(), AlStatusCode> {
-    let inputs_fit =
-        buffer(pdi, INPUTS, inputs, SmDirection::MainDeviceReads, &[REQUESTS, ANSWERS]);
-    if !inputs_fit {
-        return Err(AlStatusCode::INVALID_INPUT_CONFIGURATION);
+    let mut others = if mailbox { vec![REQUESTS, ANSWERS] } else { Vec::new() };
+    for direction in [Direction::Inputs, Direction::Outputs] {
+        let (way, code) = match direction {
+            Direction::Inputs => {
+                (SmDirection::MainDeviceReads, AlStatusCode::INVALID_INPUT_CONFIGURATION)
+            }
+            Direction::Outputs => {
+                (SmDirection::MainDeviceWrites, AlStatusCode::INVALID_OUTPUT_CONFIGURATION)
+            }
+        };
+        for (index, len) in areas.lengths(direction) {
+            if !buffer(pdi, index, len, way, &others) {
+                return Err(code);
+            }
+            others.push(index);
+        }
     }
-    let others = [REQUESTS, ANSWERS, INPUTS];
-    if !buffer(pdi, OUTPUTS, outputs, SmDirection::MainDeviceWrites, &others) {
-        return Err(AlStatusCode::INVALID_OUTPUT_CONFIGURATION);
-    }
-    let watched = pdi.sync_manager(OUTPUTS).is_some_and(|manager| manager.control.watchdog());
-    if outputs > 0 && watched && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) == 0 {
+    let watched = watched(pdi, areas);
+    if areas.len(Direction::Outputs) > 0
+        && watched
+        && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) == 0
+    {
         return Err(AlStatusCode::INVALID_WATCHDOG);
     }
     Ok(())
+}
+
+/// Whether outputs are to trigger the watchdog.
+pub(super) fn watched(pdi: &Pdi<'_>, areas: &Areas) -> bool {
+    areas
+        .lengths(Direction::Outputs)
+        .filter_map(|(index, _)| pdi.sync_manager(index))
+        .any(|manager| manager.control.watchdog())
 }
 
 /// Whether a SyncManager for `len` bytes of process data is set up, apart from `others`. Without

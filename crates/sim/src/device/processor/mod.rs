@@ -3,16 +3,18 @@
 //! Read first: ETG.1000.6, EtherCAT state machine. [`application_layer`](super::application_layer)
 //! has what all devices share, `check` what this one looks at before it enters a state.
 
+mod areas;
 mod check;
 mod process_image;
 
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress, ObjectIndex};
 use linesman_proto::register as r;
-use linesman_proto::sii::{MailboxPair, Protocols};
+use linesman_proto::sii::{Direction, MailboxPair, Protocols};
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
 
-use self::process_image::ProcessImage;
+use self::areas::Areas;
+pub use self::areas::ProcessBuffer;
 use super::application::Channel;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::dictionary::Dictionary;
@@ -20,11 +22,6 @@ use super::firmware::Firmware;
 use super::mailbox::Mailbox;
 use super::signal::Signals;
 use crate::controller::Pdi;
-
-/// The outputs of a device with a mailbox are assigned here.
-const OUTPUT_ASSIGNMENT: ObjectIndex = ObjectIndex(0x1C12);
-/// The inputs.
-const INPUT_ASSIGNMENT: ObjectIndex = ObjectIndex(0x1C13);
 
 /// Emergencies that wait for a mailbox; further ones are forgotten.
 const UNTOLD: usize = 8;
@@ -77,7 +74,9 @@ pub struct Description {
     pub dictionary: Dictionary,
     /// What its process data do.
     pub channels: Vec<Box<dyn Channel>>,
-    /// The mailbox it likes best; a longer one it does not take.
+    /// Its process data.
+    pub buffers: Vec<ProcessBuffer>,
+    /// The mailbox it likes best; a longer one it does not take. Without a size there is none.
     pub mailbox: MailboxPair,
     /// What its mailbox speaks.
     pub protocols: Protocols,
@@ -94,8 +93,7 @@ pub struct Processor {
     application_layer: ApplicationLayer,
     dictionary: Dictionary,
     mailbox: Mailbox,
-    outputs: ProcessImage,
-    inputs: ProcessImage,
+    process_data: Areas,
     /// The step that is being worked on.
     step: Option<Step>,
     next_sample: Instant,
@@ -129,8 +127,7 @@ impl Processor {
             application_layer: ApplicationLayer::new(description.bootstrap.is_some()),
             dictionary: description.dictionary.clone(),
             mailbox: Mailbox::new(description.times.mailbox, description.protocols),
-            outputs: ProcessImage::default(),
-            inputs: ProcessImage::default(),
+            process_data: Areas::default(),
             step: None,
             next_sample: Instant::ZERO,
             emergencies: Vec::new(),
@@ -172,7 +169,7 @@ impl Processor {
         if listens && let Some(to) = self.application_layer.take_request(pdi) {
             let from = ApplicationLayer::state(pdi);
             // Whoever asks has seen the error, if there was one: outputs may come again.
-            pdi.deactivate_sync_manager(check::OUTPUTS, false);
+            self.lock_outputs(pdi, false);
             let due = now + self.time_for(from, to);
             self.step = Some(Step { to, due, deadline: due + self.description.times.outputs });
         }
@@ -228,29 +225,47 @@ impl Processor {
         Outcome::Entered
     }
 
+    /// Whether the mailbox is set up as the device wants it, if it has one.
     fn has_mailbox(&self, pdi: &Pdi<'_>, boot: bool) -> bool {
+        if !self.description.mailbox.is_present() {
+            return true;
+        }
         let areas = self.description.bootstrap.filter(|_| boot).unwrap_or(self.description.mailbox);
         check::mailbox(pdi, areas.receive.size.max(areas.send.size))
     }
 
     fn set_up_process_data(&mut self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
-        let image =
-            |assignment, code| ProcessImage::of(&self.dictionary, assignment).map_err(|_| code);
-        let inputs = image(INPUT_ASSIGNMENT, AlStatusCode::INVALID_INPUT_MAPPING)?;
-        let outputs = image(OUTPUT_ASSIGNMENT, AlStatusCode::INVALID_OUTPUT_MAPPING)?;
-        check::process_data(pdi, outputs.len(), inputs.len())?;
-        (self.inputs, self.outputs) = (inputs, outputs);
+        let areas = Areas::of(&self.dictionary, &self.description.buffers)?;
+        check::process_data(pdi, &areas, self.description.mailbox.is_present())?;
+        self.process_data = areas;
         Ok(())
     }
 
+    fn check_process_data(&self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
+        check::process_data(pdi, &self.process_data, self.description.mailbox.is_present())
+    }
+
+    fn has_outputs(&self) -> bool {
+        self.process_data.len(Direction::Outputs) > 0
+    }
+
+    /// Locks the buffers of the outputs, or unlocks them.
+    fn lock_outputs(&self, pdi: &mut Pdi<'_>, locked: bool) {
+        for buffer in &self.description.buffers {
+            if buffer.direction == Direction::Outputs {
+                pdi.deactivate_sync_manager(buffer.sync_manager, locked);
+            }
+        }
+    }
+
     fn go_operational(&mut self, step: Step, now: Instant, pdi: &mut Pdi<'_>) -> Outcome {
-        if let Err(code) = check::process_data(pdi, self.outputs.len(), self.inputs.len()) {
+        if let Err(code) = self.check_process_data(pdi) {
             return Outcome::Failed(AlState::PreOp, code);
         }
-        if self.outputs.len() == 0 {
+        if !self.has_outputs() {
             return Outcome::Entered;
         }
-        if self.take_outputs(pdi) && !watchdog_ran_out(pdi) {
+        if self.take_outputs(pdi) && !self.watchdog_ran_out(pdi) {
             self.drive_outputs(now, pdi.signals_mut());
             return Outcome::Entered;
         }
@@ -265,8 +280,8 @@ impl Processor {
     /// counter.
     fn fall(&mut self, pdi: &mut Pdi<'_>, state: AlState, code: AlStatusCode) {
         self.make_safe(pdi);
-        if ApplicationLayer::is_operational(pdi) && self.outputs.len() > 0 {
-            pdi.deactivate_sync_manager(check::OUTPUTS, true);
+        if ApplicationLayer::is_operational(pdi) && self.has_outputs() {
+            self.lock_outputs(pdi, true);
         }
         if !state.has_mailbox() {
             self.mailbox.restart();
@@ -287,7 +302,7 @@ impl Processor {
             self.step = None;
             self.fall(pdi, AlState::Init, code);
         } else if state.has_inputs()
-            && let Err(code) = check::process_data(pdi, self.outputs.len(), self.inputs.len())
+            && let Err(code) = self.check_process_data(pdi)
         {
             self.step = None;
             self.fall(pdi, AlState::PreOp, code);
@@ -309,13 +324,7 @@ impl Processor {
 
     /// Fetches fresh outputs; false when none came yet.
     fn take_outputs(&mut self, pdi: &mut Pdi<'_>) -> bool {
-        self.buffer.clear();
-        self.buffer.resize(self.outputs.len(), 0);
-        if pdi.read_sync_manager(check::OUTPUTS, &mut self.buffer).is_none() {
-            return false;
-        }
-        self.outputs.unpack(&self.buffer, &mut self.dictionary);
-        true
+        self.process_data.take_outputs(pdi, &mut self.dictionary, &mut self.buffer)
     }
 
     fn drive_outputs(&mut self, now: Instant, signals: &mut Signals) {
@@ -326,10 +335,10 @@ impl Processor {
     }
 
     fn serve_process_data(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if !ApplicationLayer::is_operational(pdi) || self.outputs.len() == 0 {
+        if !ApplicationLayer::is_operational(pdi) || !self.has_outputs() {
             return;
         }
-        if watchdog_ran_out(pdi) {
+        if self.watchdog_ran_out(pdi) {
             self.fall(pdi, AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG);
         } else if self.take_outputs(pdi) {
             self.drive_outputs(now, pdi.signals_mut());
@@ -344,28 +353,22 @@ impl Processor {
             channel.sample(now, &mut self.dictionary, pdi.signals());
         }
         self.hear_channels();
-        if self.inputs.len() > 0 {
-            let mut buffer = std::mem::take(&mut self.buffer);
-            self.inputs.pack(&self.dictionary, &mut buffer);
-            pdi.write_sync_manager(check::INPUTS, &buffer);
-            self.buffer = buffer;
-        }
+        self.process_data.put_inputs(pdi, &self.dictionary, &mut self.buffer);
     }
-}
 
-/// Whether the outputs are watched and came too late.
-fn watchdog_ran_out(pdi: &mut Pdi<'_>) -> bool {
-    let watched =
-        pdi.sync_manager(check::OUTPUTS).is_some_and(|manager| manager.control.watchdog());
-    let expired = pdi.watchdog_expired();
-    watched && expired && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) != 0
+    /// Whether the outputs are watched and came too late.
+    fn watchdog_ran_out(&self, pdi: &mut Pdi<'_>) -> bool {
+        let watched = check::watched(pdi, &self.process_data);
+        let expired = pdi.watchdog_expired();
+        watched && expired && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) != 0
+    }
 }
 
 impl Firmware for Processor {
     fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.dictionary.restart(&self.description.dictionary);
         self.mailbox.restart();
-        (self.inputs, self.outputs) = (ProcessImage::default(), ProcessImage::default());
+        self.process_data = Areas::default();
         self.step = None;
         self.emergencies.clear();
         self.next_sample = now;
@@ -379,7 +382,7 @@ impl Firmware for Processor {
         self.serve_process_data(now, pdi);
         self.serve_requests(now, pdi);
         let state = ApplicationLayer::state(pdi);
-        let again = if state.has_mailbox() {
+        let again = if state.has_mailbox() && self.description.mailbox.is_present() {
             self.tell_emergencies(pdi);
             self.mailbox.serve(now, pdi, &mut self.dictionary, state)
         } else {

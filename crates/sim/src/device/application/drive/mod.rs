@@ -172,10 +172,9 @@ impl Cia402 {
                 self.motion.demand(Goal::Coast, limits);
                 self.motion.demand(Goal::Stop { deceleration }, limits);
             }
-            State::SwitchOnDisabled
-            | State::ReadyToSwitchOn
-            | State::SwitchedOn
-            | State::Fault => self.motion.demand(Goal::Coast, limits),
+            State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn | State::Fault => {
+                self.motion.demand(Goal::Coast, limits)
+            }
         }
     }
 
@@ -361,9 +360,8 @@ impl Channel for Cia402 {
         self.move_on(now, dictionary, signals);
         let switches = [self.inputs[1], self.inputs[2], self.inputs[0]];
         let switches = switches.into_iter().enumerate();
-        let switches = switches.fold(0, |word, (bit, signal)| {
-            word | u64::from(signals.is_high(signal)) << bit
-        });
+        let switches = switches
+            .fold(0, |word, (bit, signal)| word | u64::from(signals.is_high(signal)) << bit);
         let word = self.statusword(dictionary, signals);
         let demand = (self.motion.demand + self.offset).round() as i64;
         let objects = self.objects;

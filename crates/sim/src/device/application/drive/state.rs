@@ -61,10 +61,7 @@ impl State {
             (Self::SwitchOnDisabled, DisableVoltage | QuickStop | SwitchOn | EnableOperation) => {
                 Self::SwitchOnDisabled
             }
-            (
-                Self::ReadyToSwitchOn | Self::SwitchedOn,
-                DisableVoltage | QuickStop,
-            )
+            (Self::ReadyToSwitchOn | Self::SwitchedOn, DisableVoltage | QuickStop)
             | (Self::OperationEnabled | Self::QuickStopActive, DisableVoltage) => {
                 Self::SwitchOnDisabled
             }
@@ -119,11 +116,38 @@ mod tests {
     fn every_state_answers_every_request_as_the_profile_has_it() {
         // State; after disable voltage, quick stop, shutdown, switch on, enable operation.
         let table = [
-            (SwitchOnDisabled, [SwitchOnDisabled, SwitchOnDisabled, ReadyToSwitchOn, SwitchOnDisabled, SwitchOnDisabled]),
-            (ReadyToSwitchOn, [SwitchOnDisabled, SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, SwitchedOn]),
-            (SwitchedOn, [SwitchOnDisabled, SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, OperationEnabled]),
-            (OperationEnabled, [SwitchOnDisabled, QuickStopActive, ReadyToSwitchOn, SwitchedOn, OperationEnabled]),
-            (QuickStopActive, [SwitchOnDisabled, QuickStopActive, QuickStopActive, QuickStopActive, OperationEnabled]),
+            (
+                SwitchOnDisabled,
+                [
+                    SwitchOnDisabled,
+                    SwitchOnDisabled,
+                    ReadyToSwitchOn,
+                    SwitchOnDisabled,
+                    SwitchOnDisabled,
+                ],
+            ),
+            (
+                ReadyToSwitchOn,
+                [SwitchOnDisabled, SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, SwitchedOn],
+            ),
+            (
+                SwitchedOn,
+                [SwitchOnDisabled, SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, OperationEnabled],
+            ),
+            (
+                OperationEnabled,
+                [SwitchOnDisabled, QuickStopActive, ReadyToSwitchOn, SwitchedOn, OperationEnabled],
+            ),
+            (
+                QuickStopActive,
+                [
+                    SwitchOnDisabled,
+                    QuickStopActive,
+                    QuickStopActive,
+                    QuickStopActive,
+                    OperationEnabled,
+                ],
+            ),
             (FaultReactionActive, [FaultReactionActive; 5]),
             (Fault, [Fault; 5]),
         ];
