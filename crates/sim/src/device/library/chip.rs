@@ -90,10 +90,6 @@ pub(in crate::device) const IP_CORE: Chip = Chip {
     timing: Timing { forward: Span::ns(160), process: Span::ns(180), ..TIMING },
 };
 
-/// The same on the E-bus. Terminals whose SII switches no clock unit on, and that use them all the
-/// same, must have one: its units are always on.
-pub(super) const IP_CORE_EBUS: Chip = Chip { features: FULL, ..IP_CORE };
-
 /// The first generation: four FMMUs and SyncManagers, and no counters of forwarded errors.
 pub(in crate::device) const ESC20: Chip = Chip {
     controller_type: 0x02,
@@ -106,6 +102,10 @@ pub(in crate::device) const ESC20: Chip = Chip {
     counting: CountingProfile { forwarded: false, ..COUNTING },
     timing: Timing { forward: Span::ns(150), process: Span::ns(170), ..TIMING },
 };
+
+/// The same with clocks of 64 bits. Terminals whose SII switches no clock unit on, and that use them
+/// all the same, must have one like it: its units are always on.
+pub(super) const ESC20_64: Chip = Chip { features: 0x000C, ..ESC20 };
 
 impl Chip {
     /// Whether its cables have Fast Hot Connect: they fit each other only.

@@ -4,7 +4,7 @@ use linesman_proto::mailbox::coe::DataType;
 use linesman_proto::register::SmControl;
 
 use super::LibraryType;
-use super::chip::{ET1200, IP_CORE_EBUS};
+use super::chip::{ESC20_64, ET1200};
 use super::spec::{
     BECKHOFF, Behind, EntrySpec, NO_COE, OpModeSpec, PdoSpec, Spec, SyncManagerSpec, Use,
 };
@@ -190,7 +190,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         title: "EL1252 2Ch. Fast Dig. Input 24V, 1us, DC Latch",
         product: 0x04E4_3052,
         revision: 0x0016_0000,
-        chip: &IP_CORE_EBUS,
+        chip: &ESC20_64,
         ebus_current_ma: 110,
         sync_managers: &[
             SyncManagerSpec { control: SmControl::MAILBOX_IN, ..INPUT_BYTE },

@@ -8,7 +8,7 @@ use linesman_proto::mailbox::coe::DataType;
 use linesman_proto::register::SmControl;
 
 use super::LibraryType;
-use super::chip::IP_CORE_EBUS;
+use super::chip::ESC20_64;
 use super::digital::TERMINAL;
 use super::spec::{Behind, EntrySpec, OpModeSpec, PdoSpec, Spec, SyncManagerSpec, Use};
 
@@ -68,7 +68,7 @@ pub(super) const TYPES: &[LibraryType] = &[LibraryType {
         group: "AnaOutFast",
         product: 0x127C_3052,
         revision: 0x0004_0000,
-        chip: &IP_CORE_EBUS,
+        chip: &ESC20_64,
         ebus_current_ma: 180,
         pdi_control: 0x06,
         sync_impulse: 0x10,
