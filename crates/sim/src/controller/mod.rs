@@ -27,7 +27,7 @@ mod sii;
 mod sync_manager;
 mod watchdog;
 
-pub use clock::LocalClock;
+pub use clock::{Edge, LatchInput, LocalClock, SyncSignal};
 pub use esc::{Controller, Verdict};
 pub use pdi::Pdi;
 pub use posted::{CountKind, PortEvent};

@@ -12,12 +12,15 @@ pub mod application_layer;
 pub mod described;
 pub mod dictionary;
 pub mod emulated;
+pub mod files;
 pub mod firmware;
+pub mod history;
 pub mod kind;
 pub mod library;
 pub mod mailbox;
 pub mod processor;
 pub mod signal;
+pub mod trouble;
 
 pub use application_layer::Refusal;
 pub use described::DescribedType;
@@ -25,6 +28,7 @@ pub use emulated::{DigitalArea, Emulated, WordArea};
 pub use firmware::{Firmware, NoFirmware};
 pub use kind::DeviceKind;
 pub use signal::{SignalId, Signals};
+pub use trouble::{Trouble, Troubles};
 
 #[cfg(test)]
 mod tests;

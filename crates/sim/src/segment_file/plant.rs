@@ -265,6 +265,7 @@ impl Builder {
             cable_m,
             serial,
             clock_ppm: None,
+            clock: None,
             counts_forwarded: None,
             counters: std::collections::BTreeMap::new(),
         });

@@ -5,7 +5,7 @@ use linesman_proto::sii::Protocols;
 
 use super::object::{self, Individual};
 use super::spec::{Behind, Function, ProcessorSpec, Spec, Use};
-use super::{Built, image};
+use super::{Built, file, image};
 use crate::device::application::Channel;
 use crate::device::application::analog::{AnalogInput, AnalogOutput, Range};
 use crate::device::application::digital::DigitalOutput;
@@ -90,7 +90,7 @@ fn with_processor(
         bootstrap: Some(image::bootstrap(spec)),
         times: processor.times,
     };
-    Box::new(Processor::new(description))
+    Box::new(Processor::new(description).with_files(file::files(spec)))
 }
 
 type Channels = Vec<Box<dyn Channel>>;

@@ -22,6 +22,8 @@ const VIRTUAL: u16 = 0x0020;
 const MAILBOX_REPEATS: u8 = 0x04;
 /// EEPROM of devices with a processor: 32 Kbit.
 const LARGE: Size = Size(0x1F);
+/// General flag: the identification value can be asked for through AL control.
+const IDENTIFICATION_BY_AL_STATUS: u8 = 0x08;
 /// General flag: the identification value stands in memory.
 const IDENTIFICATION_IN_MEMORY: u8 = 0x10;
 
@@ -89,13 +91,14 @@ fn general(spec: &Spec, strings: &mut Strings) -> General {
     let memory = spec.coding_switch();
     let in_memory = memory.map_or(0, |_| IDENTIFICATION_IN_MEMORY);
     let has_mailbox = spec.mailbox().is_present();
-    let repeats = if has_mailbox { MAILBOX_REPEATS } else { 0 };
+    let repeats = if has_mailbox { MAILBOX_REPEATS | IDENTIFICATION_BY_AL_STATUS } else { 0 };
     General {
         group,
         order,
         name,
         group_again: group,
         coe: spec.coe,
+        foe: u8::from(Protocols(spec.protocols).has(Protocols::FOE)),
         flags: GeneralFlags(in_memory | repeats),
         physical_memory_address: memory.unwrap_or(RegisterAddress(0)),
         ebus_current_ma: spec.ebus_current_ma,

@@ -13,6 +13,7 @@ mod coupler;
 mod digital;
 mod drive;
 mod feed;
+mod file;
 mod generic;
 mod image;
 mod junction;
@@ -104,6 +105,12 @@ impl LibraryType {
     #[must_use]
     pub fn ebus_current_ma(&self) -> i16 {
         self.controllers.iter().map(|spec| spec.ebus_current_ma).sum()
+    }
+
+    /// Whether it has a processor, and with it a mailbox.
+    #[must_use]
+    pub fn has_mailbox(&self) -> bool {
+        self.controllers.iter().any(|spec| spec.mailbox().is_present())
     }
 
     /// Makes a device: one [`Built`] for each of its controllers, in the order in which frames reach

@@ -12,12 +12,15 @@ use super::spec::{
     COE_WITH_PDO_CONFIGURATION, EntrySpec, PdoSpec, ProcessorSpec, Rights, SettingsSpec, Spec,
     VariableSpec,
 };
-use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE};
+use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE, special};
+use crate::device::history;
 
 /// Device type of modular devices (ETG.5001).
 const MODULAR_DEVICE: u64 = 0x0000_1389;
 /// Device type of servo drives (CiA 402).
 const SERVO_DRIVE: u64 = 0x0002_0192;
+/// How many messages the diagnosis history keeps.
+const HISTORY_ROOM: u8 = 16;
 /// Data type of a PDO mapping.
 pub(in crate::device) const PDO_MAPPING: DataType = DataType(0x0021);
 /// Data type of the identity.
@@ -58,6 +61,7 @@ pub(super) fn dictionary(
     for settings in processor.settings {
         objects.extend((0..settings.channels).map(|channel| setting(settings, channel)));
     }
+    objects.extend([error_settings(), history::object(HISTORY_ROOM), timestamp(), restore()]);
     if processor.function.is_drive() {
         return Dictionary::new(objects, spec.coe.complete_access());
     }
@@ -69,6 +73,37 @@ pub(super) fn dictionary(
     let code_word = Entry::number(0, "Code word", DataType::UDINT, 32, READ_WRITE, 0);
     objects.push(Object::variable(ObjectIndex(0xF008), code_word));
     Dictionary::new(objects, spec.coe.complete_access())
+}
+
+/// How devices react to errors. Subindex 1 is kept and has no function; 2 is how many missed events
+/// in a row a synchronised device forgives.
+fn error_settings() -> Object {
+    let word = |subindex, name, data_type, bits, value| {
+        Entry::number(subindex, name, data_type, bits, READ_WRITE, value)
+    };
+    let entries = vec![
+        word(1, "Local error reaction", DataType::UDINT, 32, 1),
+        word(2, "Sync error counter limit", DataType::UINT, 16, 4),
+    ];
+    record(0x10F1, "Error settings", DataType(0x0281), entries)
+}
+
+fn timestamp() -> Object {
+    let entry = Entry::number(0, "Timestamp object", DataType::ULINT, 64, READ_ONLY, 0);
+    Object::variable(ObjectIndex(0x10F8), entry)
+}
+
+fn restore() -> Object {
+    let entry =
+        Entry::number(1, "Restore all default parameters", DataType::UDINT, 32, READ_WRITE, 1);
+    let index = special::RESTORE_SETTINGS;
+    Object::list(
+        index,
+        "Restore default parameters",
+        ObjectCode::Array,
+        DataType::UDINT,
+        vec![entry],
+    )
 }
 
 /// An object of several entries of different types.

@@ -94,7 +94,7 @@ pub(super) const TERMINAL: Spec = Spec {
     pdi_configuration_2: 0,
     sync_managers: &[],
     pdos: &[],
-    protocols: Protocols::COE,
+    protocols: Protocols::COE | Protocols::FOE,
     coe: COE_WITH_COMPLETE_ACCESS,
     behind: Behind::Plain,
     op_modes: &[],
