@@ -13,6 +13,7 @@ mod due;
 pub mod history;
 pub mod link;
 mod node;
+mod phy_link;
 pub mod software;
 mod starve;
 pub(crate) mod walk;

@@ -23,6 +23,7 @@ mod passive;
 mod smart;
 mod spec;
 
+pub use self::chip::controllers;
 use linesman_proto::port::{Port, PortMap};
 
 use self::assemble::build_one;

@@ -55,7 +55,7 @@ const PDOS: &[PdoSpec] = &[
     PdoSpec::single(
         0x1A82,
         "StartTimeNextOutput",
-        None,
+        Some(2),
         &[EntrySpec::number(0x1D09, 0x98, "StartTimeNextOutput", DataType::UDINT, 32)],
     ),
 ];
