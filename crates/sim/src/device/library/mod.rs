@@ -22,6 +22,7 @@ mod oversampling;
 mod passive;
 mod smart;
 mod spec;
+pub(in crate::device) mod synchronisation;
 
 pub use self::chip::controllers;
 use linesman_proto::port::{Port, PortMap};

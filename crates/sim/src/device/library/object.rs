@@ -12,6 +12,7 @@ use super::spec::{
     COE_WITH_PDO_CONFIGURATION, EntrySpec, PdoSpec, ProcessorSpec, Rights, SettingsSpec, Spec,
     VariableSpec,
 };
+use super::synchronisation::{Clocked, synchronisation};
 use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE, special};
 use crate::device::history;
 
@@ -54,9 +55,10 @@ pub(super) fn dictionary(
         }
     }
     objects.push(sync_manager_types(spec));
+    let outputs = spec.pdos.iter().any(PdoSpec::is_output);
     for sync_manager in [2, 3] {
         objects.push(assignment(spec, sync_manager));
-        objects.push(synchronisation(sync_manager));
+        objects.push(synchronisation(sync_manager, clocked(spec), outputs));
     }
     for settings in processor.settings {
         objects.extend((0..settings.channels).map(|channel| setting(settings, channel)));
@@ -261,33 +263,9 @@ fn assignment(spec: &Spec, sync_manager: u8) -> Object {
     object
 }
 
-/// The synchronisation parameters of outputs (0x1C32) or inputs (0x1C33): free run, or with the
-/// frames.
-pub(in crate::device) fn synchronisation(sync_manager: u8) -> Object {
-    const FREE_RUN_OR_FRAMES: u64 = 0x0003;
-    const SHORTEST_CYCLE_NS: u64 = 100_000;
-    let word = |subindex, name: &str, access, value| {
-        Entry::number(subindex, name, DataType::UINT, 16, access, value)
-    };
-    let double = |subindex, name: &str, value| {
-        Entry::number(subindex, name, DataType::UDINT, 32, READ_ONLY, value)
-    };
-    let mut sync_mode = word(0x01, "Sync mode", SET_UP, 0);
-    sync_mode.maximum = Some(1);
-    let entries = vec![
-        sync_mode,
-        double(0x02, "Cycle time", 0),
-        double(0x03, "Shift time", 0),
-        word(0x04, "Sync modes supported", READ_ONLY, FREE_RUN_OR_FRAMES),
-        double(0x05, "Minimum cycle time", SHORTEST_CYCLE_NS),
-        double(0x06, "Calc and copy time", 0),
-        word(0x0B, "SM event missed counter", READ_ONLY, 0),
-        word(0x0C, "Cycle exceeded counter", READ_ONLY, 0),
-        word(0x0D, "Shift too short counter", READ_ONLY, 0),
-        Entry::number(0x20, "Sync error", DataType::BOOL, 1, READ_ONLY, 0),
-    ];
-    let name = if sync_manager == 2 { "SM output parameter" } else { "SM input parameter" };
-    record(0x1C30 + u16::from(sync_manager), name, RECORD, entries)
+/// Which SYNC signals its operation modes switch on.
+fn clocked(spec: &Spec) -> Clocked {
+    Clocked::of(spec.op_modes.iter().map(|mode| mode.assign_activate))
 }
 
 fn setting(settings: &SettingsSpec, channel: u8) -> Object {
