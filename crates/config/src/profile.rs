@@ -19,6 +19,9 @@ pub struct ProcessSyncManager {
     pub len: u16,
     /// Control byte of register 0x0804 + 8 × index.
     pub control: SmControl,
+    /// There is no such SyncManager (SII, bit 2 of its enable byte): the data are registers, such as
+    /// latched times, to which an FMMU leads without one.
+    pub is_virtual: bool,
 }
 
 /// The mailbox and the SyncManagers that serve it.
@@ -98,10 +101,14 @@ fn process_sync_managers(image: &Image) -> Vec<ProcessSyncManager> {
                 return None;
             }
             let mapped = image.pdo_bits(index, direction).div_ceil(8);
+            if record.enable.is_virtual() && mapped == 0 {
+                return None;
+            }
             // Some images bear no PDOs; then the record's own length is all there is.
             let has_pdos = image.pdos(direction).next().is_some();
             let len = if has_pdos { u16::try_from(mapped).ok()? } else { record.length };
-            Some(ProcessSyncManager { index, direction, start: record.start, len, control })
+            let (start, is_virtual) = (record.start, record.enable.is_virtual());
+            Some(ProcessSyncManager { index, direction, start, len, control, is_virtual })
         })
         .collect()
 }

@@ -246,6 +246,7 @@ impl Builder {
             serial,
             clock_ppm: None,
             counts_forwarded: None,
+            slots: None,
             counters: std::collections::BTreeMap::new(),
         });
         name
