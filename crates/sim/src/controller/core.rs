@@ -10,11 +10,12 @@ use linesman_proto::register::{
 };
 use linesman_proto::time::Instant;
 
-use super::clock::{LocalClock, RunningClock};
+use super::clock::{LocalClock, RunningClock, SyncUnit, TimeLoop};
 use super::fmmu::Fmmus;
-use super::implemented;
+use super::implemented::ClockUnits;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
+use super::phy::Phys;
 use super::posted::Queue;
 use super::shadow::Shadow;
 use super::sii::Sii;
@@ -34,11 +35,18 @@ pub(super) struct Core {
     pub(super) fmmus: Fmmus,
     pub(super) sync_managers: SyncManagers,
     pub(super) sii: Sii,
+    pub(super) phys: Phys,
+    /// The controller keeps reasons of receive errors (0x0320).
+    pub(super) keeps_reasons: bool,
+    /// For those that do: when the last frame of a port ends.
+    pub(super) frame_until: PortMap<Instant>,
     pub(super) shadow: Shadow,
     /// A copy of data that commands which read and write need, kept for its memory.
     pub(super) scratch: Vec<u8>,
     pub(super) clock: RunningClock,
     quartz: LocalClock,
+    pub(super) time_loop: TimeLoop,
+    pub(super) sync: SyncUnit,
     pub(super) powered_at: Instant,
     /// The configuration area is loaded: process-data RAM can be reached.
     pub(super) loaded: bool,
@@ -69,6 +77,8 @@ pub(super) struct Core {
     pub(super) entered: PortMap<(u64, Instant)>,
     /// The frame whose receive times are being latched.
     pub(super) latched: Option<u64>,
+    /// Ports that take the time of the next frame which comes in after an instant.
+    pub(super) latch_waits: PortMap<Option<Instant>>,
     pub(super) passing: Passing,
 }
 
@@ -81,6 +91,8 @@ pub(super) struct Passing {
     pub(super) number: u64,
     pub(super) read_dl_status: bool,
     pub(super) read_al_status: bool,
+    /// Times of the latch unit that were read, one bit each.
+    pub(super) read_latches: u8,
     pub(super) enables_registers: bool,
     pub(super) enables_all: bool,
     /// SyncManagers that were touched, one bit each.
@@ -92,16 +104,21 @@ impl Core {
         Self {
             id,
             memory: Memory::new(&hardware),
-            rights: Rights::of(&hardware, false),
+            rights: Rights::of(&hardware, ClockUnits::default()),
             loops: Loops::new(&hardware),
             queue: Queue::default(),
             fmmus: Fmmus::new(),
-            sync_managers: SyncManagers::new(),
+            sync_managers: SyncManagers::new(Features(hardware.features).sequential_mode()),
             sii: Sii::new(sii, &hardware),
+            phys: Phys::new(&hardware),
+            keeps_reasons: super::implemented::keeps_reasons(&hardware),
+            frame_until: PortMap([Instant::ZERO; 4]),
             shadow: Shadow::with_room(),
             scratch: Vec::new(),
             clock: RunningClock::new(quartz, Instant::ZERO),
             quartz,
+            time_loop: TimeLoop::default(),
+            sync: SyncUnit::default(),
             powered_at: Instant::ZERO,
             loaded: false,
             started: false,
@@ -120,6 +137,7 @@ impl Core {
             firmware_at: None,
             entered: PortMap([(u64::MAX, Instant::ZERO); 4]),
             latched: None,
+            latch_waits: PortMap::default(),
             passing: Passing::default(),
             hardware,
         }
@@ -132,7 +150,9 @@ impl Core {
         self.clock = RunningClock::new(self.quartz, now);
         self.powered_at = now;
         self.loaded = false;
-        self.rights = Rights::of(&self.hardware, false);
+        self.rights = Rights::of(&self.hardware, ClockUnits::default());
+        self.time_loop = TimeLoop::default();
+        self.sync = self.sync.restarted();
         self.started = false;
         self.irq = 0;
         self.process_data_watchdog.stop();
@@ -142,6 +162,7 @@ impl Core {
         (self.loops_change_at, self.loops_return, self.reset_at) = (None, None, None);
         self.firmware_at = None;
         self.latched = None;
+        self.latch_waits = PortMap::default();
         self.shadow.clear();
         self.identify();
         self.put_reset_values();
@@ -150,6 +171,8 @@ impl Core {
         }
         self.configure_fmmus();
         self.sii.power_on(now, &mut self.memory);
+        self.start_phys();
+        self.refresh_leds();
         let status = self.dl_status();
         self.memory.set_u16(&r::DL_STATUS, status.0);
     }
@@ -213,6 +236,7 @@ impl Core {
         (self.loops_change_at, self.loops_return, self.reset_at) = (None, None, None);
         self.firmware_at = None;
         self.irq = 0;
+        self.sync = self.sync.restarted();
     }
 
     /// The configuration area was loaded: what depends on it follows.
@@ -221,8 +245,8 @@ impl Core {
         self.loaded = true;
         let a0 = self.memory.u8(&r::ESC_CONFIGURATION_A0);
         let a5 = self.memory.u16(&r::ESC_CONFIGURATION_A5);
-        let time_loop = implemented::has_time_loop(&self.hardware, a0, a5);
-        self.rights = Rights::of(&self.hardware, time_loop);
+        let units = ClockUnits::configured(&self.hardware, a0, a5);
+        self.rights = Rights::of(&self.hardware, units);
         // Without an interface nobody triggers its watchdog, as the EK1100 shows.
         self.pdi_watchdog_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
     }
@@ -246,17 +270,29 @@ impl Core {
 
     /// A byte of the reset sequence was written: `R`, `E`, `S` in three frames.
     pub(super) fn reset_written(&mut self, value: u8, end: Instant) {
+        let another_frame = self.reset_frame != self.passing.number;
+        self.reset_frame = self.passing.number;
+        self.reset_step(&r::ESC_RESET_ECAT, value, another_frame, end);
+    }
+
+    /// A byte of the reset sequence came to one of its two registers. `fresh` says that it came by
+    /// an access of its own.
+    pub(super) fn reset_step(
+        &mut self,
+        register: &r::Register,
+        value: u8,
+        fresh: bool,
+        when: Instant,
+    ) {
         const SEQUENCE: [u8; 3] = *b"RES";
-        let progress = usize::from(self.memory.u8(&r::ESC_RESET_ECAT));
-        let another_frame = progress == 0 || self.reset_frame != self.passing.number;
+        let progress = usize::from(self.memory.u8(register));
         let step = match SEQUENCE.get(progress) {
-            Some(expected) if *expected == value && another_frame => progress + 1,
+            Some(expected) if *expected == value && (fresh || progress == 0) => progress + 1,
             _ => usize::from(value == SEQUENCE[0]),
         };
-        self.reset_frame = self.passing.number;
-        self.memory.set_u8(&r::ESC_RESET_ECAT, step as u8);
+        self.memory.set_u8(register, step as u8);
         if step == SEQUENCE.len() {
-            self.reset_at = Some(end);
+            self.reset_at = Some(when);
         }
     }
 }

@@ -11,15 +11,16 @@ use linesman_proto::register::{self as r, AlStatus, DlStatus, ErrorCounter, Erro
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::{Instant, Span};
 
-use super::clock::LocalClock;
+use super::clock::{LocalClock, SyncSignal};
 use super::core::Core;
 use super::memory::at;
 use super::pdi::Pdi;
+use super::phy::PhyAct;
 use super::posted::{Happening, PortEvent};
 use super::sii::Outcome;
-use crate::device::{Firmware, Refusal, Signals};
+use crate::device::{Firmware, Refusal, Signals, Trouble};
 use crate::frame::WireFrame;
-use crate::hardware::Hardware;
+use crate::hardware::{Hardware, PortKind};
 
 /// A wake-up is at least this much later than the call that asked for it.
 const SHORTEST_NAP: Span = Span::us(1);
@@ -60,9 +61,11 @@ enum Due {
     Loops,
     LoopsReturn,
     Sii,
+    Phy,
     ProcessDataWatchdog,
     PdiWatchdog,
     Reset,
+    Sync,
     Firmware,
 }
 
@@ -77,8 +80,10 @@ impl Controller {
         firmware: Box<dyn Firmware>,
         sii: Vec<u8>,
     ) -> Self {
+        let mut core = Core::new(id, hardware, clock, sii);
+        core.sii.emulate(firmware.emulates_sii());
         Self {
-            core: Core::new(id, hardware, clock, sii),
+            core,
             firmware,
             powered: false,
             going_dark: false,
@@ -184,9 +189,11 @@ impl Controller {
         consider(core.loops_change_at, Due::Loops);
         consider(core.loops_return.map(|(at, _)| at), Due::LoopsReturn);
         consider(core.sii.done_at(), Due::Sii);
+        consider(core.phys.done_at(), Due::Phy);
         consider(core.process_data_watchdog.expires(), Due::ProcessDataWatchdog);
         consider(core.pdi_watchdog.expires(), Due::PdiWatchdog);
         consider(core.reset_at, Due::Reset);
+        consider(core.sync.due(), Due::Sync);
         consider(core.firmware_at, Due::Firmware);
         first
     }
@@ -206,6 +213,7 @@ impl Controller {
             Due::Loops => core.change_loops(),
             Due::LoopsReturn => core.return_loops(),
             Due::Sii => self.finish_sii(at, signals),
+            Due::Phy => core.finish_phy(),
             Due::ProcessDataWatchdog => core.expire_process_data_watchdog(at),
             Due::PdiWatchdog => core.expire_pdi_watchdog(),
             Due::Reset => {
@@ -213,6 +221,7 @@ impl Controller {
                 self.firmware.stop(signals);
                 core.start(at);
             }
+            Due::Sync => self.serve_sync(at, signals),
             Due::Firmware => self.run_firmware(at, signals),
         }
     }
@@ -230,6 +239,7 @@ impl Controller {
             core.started = true;
             self.firmware.start(at, &mut Pdi { core, signals, now: at });
             self.samples = self.firmware.samples();
+            core.sync.heard = self.firmware.synchronises();
             core.call_firmware(at);
         }
     }
@@ -242,6 +252,20 @@ impl Controller {
         let mut pdi = Pdi { core: &mut self.core, signals, now: at };
         if let Some(wake) = self.firmware.run(at, &mut pdi) {
             self.core.call_firmware(wake.max(at + SHORTEST_NAP));
+        }
+    }
+
+    /// SYNC0, SYNC1 or both come, and the device hears them.
+    fn serve_sync(&mut self, at: Instant, signals: &mut Signals) {
+        let heard = self.core.serve_sync(at);
+        if self.core.processor_stuck {
+            return;
+        }
+        for (signal, _) in SyncSignal::ALL.into_iter().zip(heard).filter(|(_, heard)| *heard) {
+            let mut pdi = Pdi { core: &mut self.core, signals, now: at };
+            if let Some(wake) = self.firmware.sync(signal, at, &mut pdi) {
+                self.core.call_firmware(wake.max(at + SHORTEST_NAP));
+            }
         }
     }
 
@@ -305,7 +329,7 @@ impl Controller {
             return Verdict::Destroy;
         }
         self.advance(at, signals);
-        if self.samples {
+        if self.samples && !self.core.processor_stuck {
             self.firmware.sample(at, &mut Pdi { core: &mut self.core, signals, now: at });
             self.core.rescheduled = true;
         }
@@ -314,6 +338,24 @@ impl Controller {
             self.reschedule();
         }
         verdict
+    }
+
+    /// Whether PHYs are going to do something to their links.
+    #[inline]
+    pub(crate) fn has_phy_acts(&self) -> bool {
+        self.core.phys.has_acts()
+    }
+
+    /// What PHYs were told to do to their links, and when they do it; each is told once.
+    pub(crate) fn take_phy_acts(&mut self) -> Vec<(Instant, Port, PhyAct)> {
+        self.core.phys.take_acts()
+    }
+
+    /// Whether the controller itself closes a port that sees too many bad symbols: enhanced link
+    /// detection (0x0141, bits 1 and 4 to 7), on ports with a PHY.
+    #[must_use]
+    pub fn has_enhanced_link_detection(&self, port: Port) -> bool {
+        self.core.detects_links(port) && self.core.hardware.ports[port] == PortKind::Mii
     }
 
     // ---- for the segment, faults and tests ----
@@ -328,6 +370,12 @@ impl Controller {
     #[must_use]
     pub fn hardware(&self) -> &Hardware {
         &self.core.hardware
+    }
+
+    /// The device behind it.
+    #[must_use]
+    pub fn firmware(&self) -> &dyn Firmware {
+        &*self.firmware
     }
 
     /// The device behind it: for faults that make it misbehave.
@@ -351,9 +399,44 @@ impl Controller {
         self.reschedule();
     }
 
+    /// The work of the device in each cycle takes so long from now on; `None` for as long as it needs.
+    pub fn slow_down(&mut self, takes: Option<Span>) {
+        self.firmware.slow_down(takes);
+    }
+
     /// The device sends an emergency at `at`, or as soon as its mailbox works.
     pub fn report(&mut self, at: Instant, emergency: Emergency) {
         self.firmware.report(emergency);
+        self.core.call_firmware(at);
+        self.reschedule();
+    }
+
+    /// Somebody sets the time of the process data watchdog, 0x0420, at `at`. Gives the former one.
+    pub fn set_watchdog_time(&mut self, at: Instant, time: r::WatchdogTime) -> r::WatchdogTime {
+        let former = r::WatchdogTime(self.core.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA));
+        if self.powered {
+            self.core.memory.set_u16(&r::WATCHDOG_TIME_PROCESS_DATA, time.0);
+            self.core.retime_watchdogs(at);
+            self.reschedule();
+        }
+        former
+    }
+
+    /// The software of the device misbehaves from `at` on, or no longer.
+    pub fn trouble(&mut self, at: Instant, trouble: Trouble, begins: bool) {
+        self.firmware.trouble(trouble, begins);
+        self.core.call_firmware(at);
+        self.reschedule();
+    }
+
+    /// The processor of the device has crashed and runs again from `at` on, without a reset of the
+    /// controller.
+    pub fn reboot_processor(&mut self, at: Instant, signals: &mut Signals) {
+        if !self.powered || !self.core.started {
+            return;
+        }
+        self.core.set_processor_stuck(false, at);
+        self.firmware.reboot(at, &mut Pdi { core: &mut self.core, signals, now: at });
         self.core.call_firmware(at);
         self.reschedule();
     }
@@ -414,8 +497,38 @@ impl Controller {
         self.core.clock.local(at)
     }
 
-    /// Changes the speed of the local clock, without a jump.
-    pub fn set_drift(&mut self, at: Instant, ppb: i64) {
-        self.core.clock.change_speed(at, ppb);
+    /// Changes the speed of the local clock, without a jump: `ppb` parts per thousand million too
+    /// fast, and `ramp_ppb_per_s` more each second for as long as `ramp`.
+    pub fn set_drift(&mut self, at: Instant, ppb: i64, ramp_ppb_per_s: i64, ramp: Span) {
+        self.core.clock.change_speed(at, ppb, ramp_ppb_per_s, ramp);
+        self.replan_sync(at);
+    }
+
+    /// The local clock has the speed of its own quartz again.
+    pub fn restore_drift(&mut self, at: Instant) {
+        self.core.clock.restore_speed(at);
+        self.replan_sync(at);
+    }
+
+    /// The local clock starts anew at `at`, as after a dip of its supply that nothing else noticed.
+    pub fn restart_clock(&mut self, at: Instant) {
+        self.core.restart_clock(at);
+        self.replan_sync(at);
+    }
+
+    /// The line from the SYNC unit to the processor breaks, or is whole again.
+    pub fn cut_sync(&mut self, cut: bool) {
+        self.core.sync.cut = cut;
+        if !cut {
+            // A pulse that nobody ended is found on the line, and ended.
+            for signal in SyncSignal::ALL {
+                self.core.acknowledge_sync(signal);
+            }
+        }
+    }
+
+    fn replan_sync(&mut self, at: Instant) {
+        self.core.plan_sync(at);
+        self.reschedule();
     }
 }

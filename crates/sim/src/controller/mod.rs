@@ -15,23 +15,31 @@ mod esc;
 mod event;
 mod fmmu;
 mod implemented;
+mod led;
 mod loops;
 mod memory;
 pub mod pdi;
+mod pdi_register;
+mod phy;
 mod port;
 mod posted;
+mod preset;
 mod processing_unit;
 mod register_write;
+mod rx_code;
 mod shadow;
 mod sii;
+mod sii_emulation;
 mod sync_manager;
 mod watchdog;
 
-pub use clock::LocalClock;
+pub use clock::{Edge, LatchInput, LocalClock, SyncSignal};
 pub use esc::{Controller, Verdict};
 pub use pdi::Pdi;
+pub use phy::{PHY_ACCESS_TIME, PhyAct};
 pub use posted::{CountKind, PortEvent};
 pub use sii::{LOAD_TIME, PROGRAMMING_TIME, READ_TIME, STARTUP_DELAY, WRITE_TIME};
+pub use sii_emulation::SiiRequest;
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -12,19 +12,25 @@ pub mod application_layer;
 pub mod described;
 pub mod dictionary;
 pub mod emulated;
+mod emulated_sii;
+pub mod files;
 pub mod firmware;
+pub mod history;
 pub mod kind;
 pub mod library;
 pub mod mailbox;
 pub mod processor;
 pub mod signal;
+pub mod trouble;
 
 pub use application_layer::Refusal;
 pub use described::DescribedType;
 pub use emulated::{DigitalArea, Emulated, WordArea};
+pub use emulated_sii::{EMULATION_TIME, EmulatedSii};
 pub use firmware::{Firmware, NoFirmware};
 pub use kind::DeviceKind;
 pub use signal::{SignalId, Signals};
+pub use trouble::{Trouble, Troubles};
 
 #[cfg(test)]
 mod tests;

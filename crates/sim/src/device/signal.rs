@@ -49,6 +49,13 @@ impl Signals {
         }
     }
 
+    /// Lets go of it: nothing drives it any more.
+    pub fn release(&mut self, signal: SignalId) {
+        if let Some(slot) = self.0.get_mut(signal.0 as usize) {
+            *slot = None;
+        }
+    }
+
     /// Its value, if anything has driven it yet: a wire that nothing is connected to says nothing.
     #[must_use]
     pub fn driven(&self, signal: SignalId) -> Option<i32> {
@@ -75,7 +82,10 @@ mod tests {
         assert_eq!((signals.value(added), signals.is_high(added)), (-7, true));
         assert!(!signals.is_high(SignalId(0)));
         assert_eq!((signals.driven(SignalId(0)), signals.driven(added)), (None, Some(-7)));
+        signals.release(added);
+        assert_eq!(signals.driven(added), None);
         signals.set(SignalId(9), 1);
+        signals.release(SignalId(9));
         assert_eq!(signals.value(SignalId(9)), 0, "a signal that leads nowhere reads low");
     }
 }

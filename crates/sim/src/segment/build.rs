@@ -8,7 +8,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::sii::word;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
 use super::{DeviceInfo, Segment};
@@ -188,12 +188,21 @@ fn build_one(one: &Placed, signals: &mut Signals) -> Option<Built> {
     kind.build(*serial, signals).into_iter().nth(*part)
 }
 
-/// A quartz that is a little off, and has run for some time.
+/// A quartz that is a little off, warms up, and has run for some time.
 fn clock(file: &SegmentFile, planned: &Planned, seed: Seed) -> LocalClock {
     let mut stream = seed.stream(&format!("clock {}", planned.name));
     let start = stream.below(1_000_000_000_000);
     let ppm = stream.fraction() * 50.0 - 25.0;
-    LocalClock::with_ppm(start, file.devices[planned.device].clock_ppm.unwrap_or(ppm))
+    let device = &file.devices[planned.device];
+    let mut clock = LocalClock::with_ppm(start, device.clock_ppm.unwrap_or(ppm));
+    clock.ramp_ppb_per_s = (stream.fraction() * 40.0 - 20.0).round() as i64;
+    clock.ramp = Span::s(stream.between(60, 300));
+    clock.jitter_ns = stream.between(0, 6) as u16;
+    clock.seed = stream.number();
+    if let Some(said) = &device.clock {
+        said.apply(&mut clock);
+    }
+    clock
 }
 
 fn set_revision(sii: &mut [u8], revision: u32) {

@@ -6,6 +6,7 @@
 
 mod build;
 pub(crate) mod card;
+mod ready;
 
 use std::collections::BTreeMap;
 
@@ -20,11 +21,11 @@ pub use card::{FrameTally, HostPort};
 
 use crate::controller::Controller;
 use crate::device::{SignalId, Signals};
-use crate::fault::{self, FaultError, Running};
+use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
 use crate::segment_file::{FaultEntry, SegmentFile};
-use crate::truth::{Effect, FaultId, TruthLog, Unexplained};
+use crate::truth::{self, Effect, FaultId, Place, TruthLog, Unexplained};
 use crate::wire::walk::{Outcome, Traveller};
 use crate::wire::world::World;
 
@@ -100,6 +101,13 @@ impl Segment {
         let card = &mut self.world.cards[path.index()];
         if frame.bytes.len() > MAX_LEN || !card.has_carrier(now) {
             card.counts.tx_dropped += 1;
+            self.recycle(frame.bytes);
+            return;
+        }
+        if let Some(fault) = card.silenced_by(now) {
+            card.counts.tx_dropped += 1;
+            let lost = Effect::FrameLost { frame: frame.number };
+            self.world.truth.effect(now, Some(fault), Place::Host(path), lost);
             self.recycle(frame.bytes);
             return;
         }
@@ -194,10 +202,10 @@ impl Segment {
             ebus_ma: &self.ebus_ma,
         };
         let number = self.world.truth.faults().len();
-        let stream = self.seed.stream(&format!("fault {number} {}", entry.kind));
-        let planned = fault::plan(label, entry, &scene, earliest, stream)?;
-        let id = self.world.truth.declare(planned.name, planned.places);
-        self.world.running.push(Running::new(id, planned.from, planned.to, planned.source));
+        let stream = format!("fault {number} {}", entry.kind);
+        let planned = fault::plan(label, entry, &scene, earliest, self.seed, &stream)?;
+        let id = self.world.truth.declare(planned.name, planned.places.clone());
+        self.world.running.push(planned.run(id));
         Ok(id)
     }
 
@@ -292,6 +300,11 @@ impl Segment {
         &self.world.truth
     }
 
+    /// Takes the entries of the log out of it ([`TruthLog::take_entries`]).
+    pub fn take_truth(&mut self) -> Vec<truth::Entry> {
+        self.world.truth.take_entries()
+    }
+
     /// Error counters that moved, since the audit before, without a cause in the log.
     pub fn audit(&mut self) -> Vec<Unexplained> {
         let nodes = self.world.nodes.iter();
@@ -312,7 +325,7 @@ impl Segment {
             let at = self.now;
             self.world.nodes[node].controller.set_counter(counter, value);
             self.world.truth.set(device, counter, value);
-            let place = crate::truth::Place::Device(device);
+            let place = Place::Device(device);
             self.world.truth.effect(at, None, place, Effect::OldCounters);
         }
     }

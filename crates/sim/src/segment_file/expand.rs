@@ -120,6 +120,9 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
         if let Some(ppm) = device.clock_ppm.filter(|ppm| !(-200.0..=200.0).contains(ppm)) {
             return Err(out_of_range("clock_ppm", ppm, "-200 to 200"));
         }
+        if let Some(clock) = &device.clock {
+            clock.check(&device.name)?;
+        }
         if let Some(given) = device.counters.keys().find(|key| parse_counter(key).is_none()) {
             return Err(SegmentFileError::Counter {
                 device: device.name.clone(),

@@ -19,8 +19,10 @@
 //! Unknown keys are errors. The order of devices is the order of their numbers; a device with
 //! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
 
+mod clock;
 mod expand;
 mod plant;
+mod schedule;
 mod types;
 mod value;
 mod write;
@@ -31,9 +33,11 @@ use linesman_config::attachment::Attachment;
 use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
+pub use clock::SegmentClock;
 pub use expand::parse_counter;
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
+pub use schedule::{BurstTimes, RandomTimes, Schedule, Times};
 pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
 
@@ -96,6 +100,9 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]
     pub clock_ppm: Option<f64>,
+    /// How else its clock is off: warming up, jitter, what it shows at power-on.
+    #[serde(default)]
+    pub clock: Option<SegmentClock>,
     /// Whether its controllers have counters of forwarded errors; as the segment, or else its type,
     /// has it unless said.
     #[serde(default)]
@@ -143,6 +150,9 @@ pub struct FaultEntry {
     /// When it ends; it lasts unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_ms: Option<f64>,
+    /// How often it comes and how long it stays each time; once unless said.
+    #[serde(flatten)]
+    pub schedule: Schedule,
     /// Parameters of the kind, such as `hits_per_s`.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, Value>,

@@ -245,6 +245,7 @@ impl Builder {
             cable_m,
             serial,
             clock_ppm: None,
+            clock: None,
             counts_forwarded: None,
             slots: None,
             counters: std::collections::BTreeMap::new(),

@@ -57,6 +57,9 @@ impl World {
             Change::Glitch { node, part, flip } => {
                 self.nodes[node].glitches.push_back(Glitch { from: at, part, flip, fault });
             }
+            Change::Silence { path, until } => self.silence(at, fault, path, until),
+            Change::Watchdog { node, time } => self.set_watchdog(at, fault, node, time),
+            Change::Software { node, change } => self.change_software(at, fault, node, change),
             Change::Refuse { node, refusal } => {
                 self.nodes[node].refused_by = refusal.map(|_| fault);
                 self.nodes[node].act_at(at, Act::Refuse(refusal));
@@ -92,6 +95,9 @@ impl World {
         let (_, to) = self.links[line.link].from_to(line.downstream);
         if let End::Controller(node, port) = to {
             self.post(node, at, cause, PortEvent::Count { port, kind: CountKind::SymbolError });
+            if self.nodes[node].controller.has_enhanced_link_detection(port) {
+                self.watch_symbols(at, cause, line);
+            }
         }
     }
 

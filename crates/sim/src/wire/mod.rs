@@ -13,12 +13,16 @@ mod due;
 pub mod history;
 pub mod link;
 mod node;
+mod phy_link;
+pub mod software;
+mod starve;
 pub(crate) mod walk;
 pub(crate) mod world;
 
 pub use change::{Change, Line, Source};
 pub use history::History;
 pub use link::{CABLE_NS_PER_M, Link};
+pub use software::SoftwareChange;
 
 #[cfg(test)]
 mod tests;

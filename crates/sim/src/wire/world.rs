@@ -187,8 +187,10 @@ impl World {
         match self.running[index].step() {
             crate::fault::Step::Begin(at) => self.truth.begin(at, fault),
             crate::fault::Step::Change(at, change) => self.apply(at, fault, change),
-            crate::fault::Step::End { at, healed } => {
-                self.running.remove(index);
+            crate::fault::Step::End { at, healed, for_good } => {
+                if for_good {
+                    self.running.remove(index);
+                }
                 if healed {
                     self.disarm(fault);
                 }
@@ -223,6 +225,8 @@ impl World {
                 self.apply(at, fault, Change::Refuse { node, refusal: None });
             }
         }
+        self.release_starved(at, fault);
+        self.release_software(at, fault);
         self.truth.end(at, fault);
     }
 

@@ -463,6 +463,42 @@ fn faults_of_a_file_come_and_go_at_their_times() {
 }
 
 #[test]
+fn a_schedule_lets_a_fault_come_again_and_again() {
+    let text = format!(
+        "{PLANT}\n[[fault]]\nkind = \"device-off\"\ndevice = \"T5\"\nfrom_ms = 100\nto_ms = 10000\n\
+         every_ms = 2000\nfor_ms = 500\ntimes = 3\n"
+    );
+    let mut bench = Bench::new(&text);
+    let mut seen = Vec::new();
+    for _ in 0..12 {
+        bench.wait(Span::ms(550));
+        seen.push(bench.count());
+        assert_eq!(bench.segment.audit(), []);
+    }
+    // Gone from 100, 2,100 and 4,100 ms for half a second each.
+    let gone: Vec<usize> =
+        seen.iter().enumerate().filter(|(_, count)| **count == Some(7)).map(|(at, _)| at).collect();
+    assert_eq!(gone, [0, 3, 7], "{seen:?}");
+    let record = &bench.segment.truth().faults()[0];
+    assert_eq!((record.times, record.supplies_lost, record.is_active()), (3, 3, false));
+}
+
+#[test]
+fn what_is_healed_does_not_come_again() {
+    let mut bench = Bench::plant();
+    let mut entry = FaultEntry::new(FaultName::LinkOpen).at("T4.B-T5.A");
+    entry.schedule.every_ms = Some(100.0);
+    entry.schedule.for_ms = Some(10.0);
+    let fault = bench.inject(&entry);
+    bench.wait(Span::ms(250));
+    assert_eq!(bench.segment.truth().faults()[0].times, 3);
+    bench.heal(fault);
+    bench.wait(Span::s(2));
+    assert_eq!(bench.segment.truth().faults()[0].times, 3);
+    assert_eq!(bench.count(), Some(8));
+}
+
+#[test]
 fn entries_that_cannot_be_are_refused_with_a_way_out() {
     let entry = |text: &str| format!("{PLANT}\n[[fault]]\n{text}\n");
     let table = [

@@ -5,4 +5,5 @@
 mod faults;
 mod rig;
 mod swarm;
+mod traps;
 mod walk;

@@ -9,11 +9,14 @@ mod box_module;
 pub(super) mod chip;
 mod coupler;
 mod digital;
+mod file;
 mod image;
 pub(super) mod object;
 mod smart;
 mod spec;
+pub(in crate::device) mod synchronisation;
 
+pub use self::chip::controllers;
 use linesman_proto::port::{Port, PortMap};
 
 use self::object::Individual;
@@ -95,6 +98,12 @@ impl LibraryType {
     #[must_use]
     pub fn ebus_current_ma(&self) -> i16 {
         self.controllers.iter().map(|spec| spec.ebus_current_ma).sum()
+    }
+
+    /// Whether it has a processor, and with it a mailbox.
+    #[must_use]
+    pub fn has_mailbox(&self) -> bool {
+        self.controllers.iter().any(|spec| spec.mailbox().is_present())
     }
 
     /// Makes a device: one [`Built`] for each of its controllers, in the order in which frames reach
@@ -213,7 +222,7 @@ fn with_processor(
         bootstrap: Some(image::bootstrap(spec)),
         times: processor.times,
     };
-    Box::new(Processor::new(description))
+    Box::new(Processor::new(description).with_files(file::files(spec)))
 }
 
 fn channels(

@@ -9,10 +9,14 @@ use linesman_proto::sii::SyncManagerKind;
 
 use super::image::{VENDOR, sync_manager_kind};
 use super::spec::{EntrySpec, PdoSpec, ProcessorSpec, SettingsSpec, Spec};
-use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE};
+use super::synchronisation::{Clocked, synchronisation};
+use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE, special};
+use crate::device::history;
 
 /// Device type of modular devices (ETG.5001).
 const MODULAR_DEVICE: u64 = 0x0000_1389;
+/// How many messages the diagnosis history keeps.
+const HISTORY_ROOM: u8 = 16;
 /// Data type of a PDO mapping.
 pub(in crate::device) const PDO_MAPPING: DataType = DataType(0x0021);
 /// Data type of the identity.
@@ -45,9 +49,10 @@ pub(super) fn dictionary(
         }
     }
     objects.push(sync_manager_types(spec));
+    let outputs = spec.pdos.iter().any(PdoSpec::is_output);
     for sync_manager in [2, 3] {
         objects.push(assignment(spec, sync_manager));
-        objects.push(synchronisation(sync_manager));
+        objects.push(synchronisation(sync_manager, clocked(spec), outputs));
     }
     for settings in processor.settings {
         objects.extend((0..settings.channels).map(|channel| setting(settings, channel)));
@@ -59,7 +64,39 @@ pub(super) fn dictionary(
     objects.push(record(0xF000, "Modular device profile", RECORD, profile));
     let code_word = Entry::number(0, "Code word", DataType::UDINT, 32, READ_WRITE, 0);
     objects.push(Object::variable(ObjectIndex(0xF008), code_word));
+    objects.extend([error_settings(), history::object(HISTORY_ROOM), timestamp(), restore()]);
     Dictionary::new(objects, spec.coe.complete_access())
+}
+
+/// How devices react to errors. Subindex 1 is kept and has no function; 2 is how many missed events
+/// in a row a synchronised device forgives.
+fn error_settings() -> Object {
+    let word = |subindex, name, data_type, bits, value| {
+        Entry::number(subindex, name, data_type, bits, READ_WRITE, value)
+    };
+    let entries = vec![
+        word(1, "Local error reaction", DataType::UDINT, 32, 1),
+        word(2, "Sync error counter limit", DataType::UINT, 16, 4),
+    ];
+    record(0x10F1, "Error settings", DataType(0x0281), entries)
+}
+
+fn timestamp() -> Object {
+    let entry = Entry::number(0, "Timestamp object", DataType::ULINT, 64, READ_ONLY, 0);
+    Object::variable(ObjectIndex(0x10F8), entry)
+}
+
+fn restore() -> Object {
+    let entry =
+        Entry::number(1, "Restore all default parameters", DataType::UDINT, 32, READ_WRITE, 1);
+    let index = special::RESTORE_SETTINGS;
+    Object::list(
+        index,
+        "Restore default parameters",
+        ObjectCode::Array,
+        DataType::UDINT,
+        vec![entry],
+    )
 }
 
 /// An object of several entries of different types.
@@ -191,33 +228,9 @@ fn assignment(spec: &Spec, sync_manager: u8) -> Object {
     object
 }
 
-/// The synchronisation parameters of outputs (0x1C32) or inputs (0x1C33): free run, or with the
-/// frames.
-pub(in crate::device) fn synchronisation(sync_manager: u8) -> Object {
-    const FREE_RUN_OR_FRAMES: u64 = 0x0003;
-    const SHORTEST_CYCLE_NS: u64 = 100_000;
-    let word = |subindex, name: &str, access, value| {
-        Entry::number(subindex, name, DataType::UINT, 16, access, value)
-    };
-    let double = |subindex, name: &str, value| {
-        Entry::number(subindex, name, DataType::UDINT, 32, READ_ONLY, value)
-    };
-    let mut sync_mode = word(0x01, "Sync mode", SET_UP, 0);
-    sync_mode.maximum = Some(1);
-    let entries = vec![
-        sync_mode,
-        double(0x02, "Cycle time", 0),
-        double(0x03, "Shift time", 0),
-        word(0x04, "Sync modes supported", READ_ONLY, FREE_RUN_OR_FRAMES),
-        double(0x05, "Minimum cycle time", SHORTEST_CYCLE_NS),
-        double(0x06, "Calc and copy time", 0),
-        word(0x0B, "SM event missed counter", READ_ONLY, 0),
-        word(0x0C, "Cycle exceeded counter", READ_ONLY, 0),
-        word(0x0D, "Shift too short counter", READ_ONLY, 0),
-        Entry::number(0x20, "Sync error", DataType::BOOL, 1, READ_ONLY, 0),
-    ];
-    let name = if sync_manager == 2 { "SM output parameter" } else { "SM input parameter" };
-    record(0x1C30 + u16::from(sync_manager), name, RECORD, entries)
+/// Which SYNC signals its operation modes switch on.
+fn clocked(spec: &Spec) -> Clocked {
+    Clocked::of(spec.op_modes.iter().map(|mode| mode.assign_activate))
 }
 
 fn setting(settings: &SettingsSpec, channel: u8) -> Object {

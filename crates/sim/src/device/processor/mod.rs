@@ -5,9 +5,13 @@
 
 mod areas;
 mod check;
+mod in_step;
+mod note;
 mod process_image;
+mod synchronisation;
+mod update;
 
-use linesman_proto::mailbox::coe::{Emergency, ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::register as r;
 use linesman_proto::sii::{Direction, MailboxPair};
 use linesman_proto::state::{AlState, AlStatusCode};
@@ -15,16 +19,22 @@ use linesman_proto::time::{Instant, Span};
 
 use self::areas::Areas;
 pub use self::areas::ProcessBuffer;
+use self::synchronisation::Synchronisation;
 use super::application::Channel;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::dictionary::Dictionary;
+use super::files::Files;
 use super::firmware::Firmware;
-use super::mailbox::Mailbox;
+use super::history::History;
+use super::mailbox::{Mailbox, Served};
 use super::signal::Signals;
-use crate::controller::Pdi;
+use super::trouble::{Trouble, Troubles};
+use crate::controller::{Pdi, SyncSignal};
 
 /// Emergencies that wait for a mailbox; further ones are forgotten.
 const UNTOLD: usize = 8;
+/// How long new firmware takes to start.
+const FIRST_START: Span = Span::ms(400);
 
 /// How long a processor takes for what it does.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -92,9 +102,13 @@ pub struct Processor {
     dictionary: Dictionary,
     mailbox: Mailbox,
     process_data: Areas,
+    synchronisation: Synchronisation,
     /// The step that is being worked on.
     step: Option<Step>,
     next_sample: Instant,
+    files: Files,
+    history: History,
+    troubles: Troubles,
     /// Errors to tell of.
     emergencies: Vec<Emergency>,
     buffer: Vec<u8>,
@@ -121,17 +135,30 @@ impl Processor {
     /// A device that has not started yet.
     #[must_use]
     pub fn new(description: Description) -> Self {
+        let mut application_layer = ApplicationLayer::new(description.bootstrap.is_some());
+        // Until somebody sets another number.
+        application_layer.identify(0);
         Self {
-            application_layer: ApplicationLayer::new(description.bootstrap.is_some()),
+            application_layer,
             dictionary: description.dictionary.clone(),
             mailbox: Mailbox::new(description.times.mailbox),
             process_data: Areas::default(),
+            synchronisation: Synchronisation::new(&description.dictionary),
             step: None,
             next_sample: Instant::ZERO,
+            files: Files::default(),
+            history: History::default(),
+            troubles: Troubles::default(),
             emergencies: Vec::new(),
             buffer: Vec::new(),
             description,
         }
+    }
+
+    /// The same with files that FoE reads and writes.
+    #[must_use]
+    pub fn with_files(self, files: Files) -> Self {
+        Self { files, ..self }
     }
 
     fn make_safe(&mut self, pdi: &mut Pdi<'_>) {
@@ -144,10 +171,13 @@ impl Processor {
     // ---- states ----
 
     fn serve_requests(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        if self.troubles.has(Trouble::DeafToRequests) {
+            return;
+        }
         if let Some(step) = self.step.filter(|step| step.due <= now) {
             self.step = None;
             match self.go(step, now, pdi) {
-                Outcome::Entered => ApplicationLayer::enter(pdi, step.to),
+                Outcome::Entered => self.application_layer.enter(pdi, step.to),
                 Outcome::Failed(state, code) => self.fall(pdi, state, code),
                 Outcome::Waits => self.step = Some(step),
             }
@@ -169,6 +199,7 @@ impl Processor {
             (AlState::Init, AlState::PreOp | AlState::Boot) => times.to_preop,
             (AlState::PreOp, AlState::SafeOp) => times.to_safeop,
             (AlState::SafeOp, AlState::Op) => times.to_op,
+            (AlState::Boot, AlState::Init) if self.files.has_new_firmware() => FIRST_START,
             (
                 AlState::Init | AlState::Boot | AlState::PreOp | AlState::SafeOp | AlState::Op,
                 AlState::Init | AlState::Boot | AlState::PreOp | AlState::SafeOp | AlState::Op,
@@ -185,7 +216,7 @@ impl Processor {
         match step.to {
             AlState::Init => {
                 self.mailbox.restart();
-                Outcome::Entered
+                if from == AlState::Boot { self.leave_boot(pdi) } else { Outcome::Entered }
             }
             AlState::PreOp => self.start_mailbox(from, pdi, AlStatusCode::INVALID_MAILBOX_PREOP),
             AlState::Boot => self.start_mailbox(from, pdi, AlStatusCode::INVALID_MAILBOX_BOOT),
@@ -204,27 +235,35 @@ impl Processor {
         if !pdi.sii_load_ok() {
             return Outcome::Failed(AlState::Init, AlStatusCode::EEPROM_ERROR);
         }
-        if !self.has_mailbox(pdi, code == AlStatusCode::INVALID_MAILBOX_BOOT) {
+        if let Err(code) = self.check_mailbox(pdi, code) {
             return Outcome::Failed(AlState::Init, code);
         }
         if !from.has_mailbox() {
             self.mailbox.restart();
+            if code == AlStatusCode::INVALID_MAILBOX_PREOP {
+                self.note_communication(pdi);
+            }
         }
         Outcome::Entered
     }
 
-    /// Whether the mailbox is set up as the device wants it, if it has one.
-    fn has_mailbox(&self, pdi: &Pdi<'_>, boot: bool) -> bool {
+    /// Whether the mailbox is set up as the device wants it, if it has one; `wrong` is the code for
+    /// most of what can be wrong.
+    fn check_mailbox(&self, pdi: &Pdi<'_>, wrong: AlStatusCode) -> Result<(), AlStatusCode> {
         if !self.description.mailbox.is_present() {
-            return true;
+            return Ok(());
         }
+        let boot = wrong == AlStatusCode::INVALID_MAILBOX_BOOT;
         let areas = self.description.bootstrap.filter(|_| boot).unwrap_or(self.description.mailbox);
-        check::mailbox(pdi, areas.receive.size.max(areas.send.size))
+        check::mailbox(pdi, areas.receive.size.max(areas.send.size), wrong)
     }
 
     fn set_up_process_data(&mut self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
         let areas = Areas::of(&self.dictionary, &self.description.buffers)?;
+        check::modules(&self.dictionary)?;
         check::process_data(pdi, &areas, self.description.mailbox.is_present())?;
+        let outputs = areas.len(Direction::Outputs) > 0;
+        self.synchronisation.set_up(&mut self.dictionary, outputs, pdi)?;
         self.process_data = areas;
         Ok(())
     }
@@ -249,6 +288,9 @@ impl Processor {
     fn go_operational(&mut self, step: Step, now: Instant, pdi: &mut Pdi<'_>) -> Outcome {
         if let Err(code) = self.check_process_data(pdi) {
             return Outcome::Failed(AlState::PreOp, code);
+        }
+        if let Some(outcome) = self.wait_for_clock(step, now) {
+            return outcome;
         }
         if !self.has_outputs() {
             return Outcome::Entered;
@@ -275,18 +317,21 @@ impl Processor {
             self.mailbox.restart();
         }
         ApplicationLayer::fail(pdi, state, code);
+        self.note_failure(state, code, pdi);
     }
 
     /// A SyncManager was switched on or off: what the state needs is to be there still.
     fn check_again(&mut self, pdi: &mut Pdi<'_>) {
         let state = ApplicationLayer::state(pdi);
-        if state.has_mailbox() && !self.has_mailbox(pdi, state == AlState::Boot) {
-            let code = match state {
-                AlState::Boot => AlStatusCode::INVALID_MAILBOX_BOOT,
-                AlState::Init | AlState::PreOp | AlState::SafeOp | AlState::Op => {
-                    AlStatusCode::INVALID_MAILBOX_PREOP
-                }
-            };
+        let wrong = match state {
+            AlState::Boot => AlStatusCode::INVALID_MAILBOX_BOOT,
+            AlState::Init | AlState::PreOp | AlState::SafeOp | AlState::Op => {
+                AlStatusCode::INVALID_MAILBOX_PREOP
+            }
+        };
+        if state.has_mailbox()
+            && let Err(code) = self.check_mailbox(pdi, wrong)
+        {
             self.step = None;
             self.fall(pdi, AlState::Init, code);
         } else if state.has_inputs()
@@ -294,17 +339,6 @@ impl Processor {
         {
             self.step = None;
             self.fall(pdi, AlState::PreOp, code);
-        }
-    }
-
-    /// Hands over what is to be told, and keeps the error register.
-    fn tell_emergencies(&mut self, pdi: &Pdi<'_>) {
-        for emergency in self.emergencies.drain(..) {
-            let register = ObjectAddress { index: ObjectIndex::ERROR_REGISTER, subindex: 0 };
-            if let Some(register) = self.dictionary.find(register) {
-                self.dictionary.set_number(register, u64::from(emergency.register.0));
-            }
-            self.mailbox.report(emergency, pdi);
         }
     }
 
@@ -316,26 +350,30 @@ impl Processor {
     }
 
     fn drive_outputs(&mut self, now: Instant, signals: &mut Signals) {
+        if self.troubles.has(Trouble::FrozenApplication) {
+            return;
+        }
         for channel in &mut self.description.channels {
             channel.drive(now, &self.dictionary, signals);
         }
     }
 
     fn serve_process_data(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if !ApplicationLayer::is_operational(pdi) || !self.has_outputs() {
-            return;
-        }
-        if self.watchdog_ran_out(pdi) {
+        let operational = ApplicationLayer::is_operational(pdi);
+        if operational && self.has_outputs() && self.watchdog_ran_out(pdi) {
             self.fall(pdi, AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG);
-        } else if self.take_outputs(pdi) {
-            self.drive_outputs(now, pdi.signals_mut());
+        } else if ApplicationLayer::state(pdi).has_inputs() {
+            self.serve_outputs(now, pdi);
         }
+        self.serve_due(now, pdi);
     }
 
     fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.next_sample = now + self.description.times.sample;
-        for channel in &mut self.description.channels {
-            channel.sample(now, &mut self.dictionary, pdi.signals());
+        if !self.troubles.has(Trouble::FrozenApplication) {
+            for channel in &mut self.description.channels {
+                channel.sample(now, &mut self.dictionary, pdi.signals());
+            }
         }
         self.process_data.put_inputs(pdi, &self.dictionary, &mut self.buffer);
     }
@@ -351,8 +389,13 @@ impl Processor {
 impl Firmware for Processor {
     fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.dictionary.restart(&self.description.dictionary);
+        self.history = History::default();
         self.mailbox.restart();
+        // An update that the loss of the supply broke off is forgotten; the old firmware runs.
+        self.files.take_broken_update();
+        self.start_new_firmware(pdi);
         self.process_data = Areas::default();
+        self.synchronisation.start(&self.description.dictionary, &mut self.dictionary);
         self.step = None;
         self.emergencies.clear();
         self.next_sample = now;
@@ -368,12 +411,22 @@ impl Firmware for Processor {
         let state = ApplicationLayer::state(pdi);
         let again = if state.has_mailbox() && self.description.mailbox.is_present() {
             self.tell_emergencies(pdi);
-            self.mailbox.serve(now, pdi, &mut self.dictionary, state)
+            self.tell_time(pdi);
+            let mut served = Served {
+                dictionary: &mut self.dictionary,
+                files: &mut self.files,
+                troubles: &mut self.troubles,
+                state,
+            };
+            let again = self.mailbox.serve(now, pdi, &mut served);
+            self.follow_up();
+            again
         } else {
             None
         };
         let step = self.step.map(|step| if step.due > now { step.due } else { step.deadline });
-        [again, step].into_iter().flatten().min()
+        let due = self.synchronisation.next(ApplicationLayer::is_operational(pdi));
+        [again, step, due].into_iter().flatten().min()
     }
 
     fn refuse(&mut self, refusal: Option<Refusal>) {
@@ -386,14 +439,57 @@ impl Firmware for Processor {
         }
     }
 
+    fn has_processor(&self) -> bool {
+        true
+    }
+
+    fn has_mailbox(&self) -> bool {
+        self.description.mailbox.is_present()
+    }
+
+    fn trouble(&mut self, trouble: Trouble, begins: bool) {
+        if begins {
+            self.troubles.begin(trouble);
+        } else {
+            self.troubles.end(trouble);
+        }
+    }
+
+    fn reboot(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        // What the MainDevice asked meanwhile nobody has heard.
+        pdi.take_al_control_event();
+        self.start(now, pdi);
+        self.lock_outputs(pdi, false);
+        ApplicationLayer::fail(pdi, AlState::Init, AlStatusCode::RESTARTED_LOCALLY);
+        self.note_crash(pdi);
+    }
+
+    fn identify(&mut self, id: u16, _signals: &mut Signals) -> bool {
+        self.application_layer.identify(id);
+        true
+    }
+
     fn samples(&self) -> bool {
         self.description.channels.iter().any(|channel| channel.has_inputs())
     }
 
     fn sample(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
+        let with_frames = self.synchronisation.samples_with_frames();
+        if with_frames && now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
             self.sample_inputs(now, pdi);
         }
+    }
+
+    fn synchronises(&self) -> bool {
+        true
+    }
+
+    fn sync(&mut self, signal: SyncSignal, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
+        self.keep_step(signal, now, pdi)
+    }
+
+    fn slow_down(&mut self, takes: Option<Span>) {
+        self.synchronisation.set_takes(takes);
     }
 
     fn stop(&mut self, signals: &mut Signals) {

@@ -23,6 +23,7 @@ mod process_data;
 mod recorded;
 mod sdo;
 mod state;
+mod synchronisation;
 
 /// Where its process data lie in the logical memory: outputs first.
 const LOGICAL: u32 = 0x0001_0000;

@@ -86,7 +86,7 @@ fn what_cannot_be_done_is_aborted_with_its_code() {
         (0x8000, 0x01, &[2], 0x0609_0031),
         (0x1C13, 1, &[0x00, 0x1A], 0x0601_0003),
         (0x1C13, 0, &[9], 0x0609_0031),
-        (0x1C32, 1, &[2, 0], 0x0609_0031),
+        (0x1C32, 1, &[4, 0], 0x0609_0031),
     ];
     for (index, subindex, data, code) in table {
         let found = device.download(index, subindex, data);
@@ -209,7 +209,7 @@ fn the_dictionary_can_be_asked_for() {
     assert_eq!(mappable, [0x7000, 0x7010]);
     let (_, bytes) = information(&mut device, ask(ListKind::Counts)).unwrap();
     let counts = ObjectList::parse(&bytes).unwrap().counts().unwrap();
-    assert_eq!(counts, [all.len() as u16, 2, 2, 2, 2]);
+    assert_eq!(counts, [all.len() as u16, 2, 3, 2, 2]);
     assert_eq!(information(&mut device, ask(ListKind::Other(9))), Err(0x0609_0030));
 
     for index in &all {
