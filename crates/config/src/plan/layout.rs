@@ -332,14 +332,8 @@ mod tests {
 
     fn manager(index: u8, direction: Direction, start: u16, len: u16) -> ProcessSyncManager {
         let control = SmControl(0x20);
-        ProcessSyncManager {
-            index,
-            direction,
-            start: RegisterAddress(start),
-            len,
-            control,
-            is_virtual: false,
-        }
+        let (start, is_virtual) = (RegisterAddress(start), false);
+        ProcessSyncManager { index, direction, start, len, control, is_virtual }
     }
 
     fn planned(process: Vec<ProcessSyncManager>, no_lrw: bool) -> PlannedDevice {

@@ -94,7 +94,9 @@ impl Device {
                 if manager.direction != direction {
                     continue;
                 }
-                self.guard(manager.index, manager.start.0, manager.len, manager.control);
+                if !manager.is_virtual {
+                    self.guard(manager.index, manager.start.0, manager.len, manager.control);
+                }
                 if manager.len > 0 {
                     let read = direction == Direction::Inputs;
                     let map = FmmuConfig {
