@@ -116,7 +116,9 @@ impl Run {
     fn new(seed: u64, looks: u64) -> Self {
         let mut stream = Seed(seed).stream("physics swarm");
         let ring = stream.chance(0.25);
-        let options = PlantOptions { min_devices: 1, max_devices: 24, junction: false, ring };
+        let all_types = stream.chance(0.5);
+        let options =
+            PlantOptions { min_devices: 1, max_devices: 24, junction: false, ring, all_types };
         let mut file = plant(Seed(seed), &options);
         file.noise_at_link_up = stream.chance(0.3).then_some(3.0);
         let mut faults = Vec::new();
