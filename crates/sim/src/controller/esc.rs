@@ -399,11 +399,22 @@ impl Controller {
         self.reschedule();
     }
 
+    /// The work of the device in each cycle takes so long from now on; `None` for as long as it needs.
+    pub fn slow_down(&mut self, takes: Option<Span>) {
+        self.firmware.slow_down(takes);
+    }
+
     /// The device sends an emergency at `at`, or as soon as its mailbox works.
     pub fn report(&mut self, at: Instant, emergency: Emergency) {
         self.firmware.report(emergency);
         self.core.call_firmware(at);
         self.reschedule();
+    }
+
+    /// A coding switch is wired to the controller: its value stands at `address` from every start on.
+    pub fn set_coding_switch(&mut self, address: RegisterAddress, value: u16) {
+        self.core.coding_switch = Some((address, value));
+        self.core.put_coding_switch();
     }
 
     /// Somebody sets the time of the process data watchdog, 0x0420, at `at`. Gives the former one.
@@ -514,6 +525,12 @@ impl Controller {
     /// The line from the SYNC unit to the processor breaks, or is whole again.
     pub fn cut_sync(&mut self, cut: bool) {
         self.core.sync.cut = cut;
+        if !cut {
+            // A pulse that nobody ended is found on the line, and ended.
+            for signal in SyncSignal::ALL {
+                self.core.acknowledge_sync(signal);
+            }
+        }
     }
 
     fn replan_sync(&mut self, at: Instant) {
