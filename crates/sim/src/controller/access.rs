@@ -96,7 +96,7 @@ impl Core {
         }
         if end > RAM && self.loaded {
             let from = place.max(RAM);
-            copy(&self.memory.bytes()[from..end], &mut out[from - place..], ors);
+            copy(self.memory.ram(from, end), &mut out[from - place..], ors);
             any = true;
         }
         any
@@ -118,6 +118,7 @@ impl Core {
                 any |= self.write_guarded(from, &data[from - start..end - start]);
             }
         }
+        self.passing.wrote |= any;
         any
     }
 
@@ -216,7 +217,7 @@ impl Core {
         }
         if end > RAM && self.loaded {
             let from = place.max(RAM);
-            self.memory.put(from, &data[from - place..]);
+            self.memory.copy_in(from, &data[from - place..]);
             any = true;
         }
         any

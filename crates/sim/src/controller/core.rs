@@ -2,6 +2,8 @@
 //!
 //! Reference: S2 chapter 2 (identity), the reset values in each register's chapter.
 
+use std::sync::Arc;
+
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
@@ -13,6 +15,7 @@ use linesman_proto::time::Instant;
 use super::clock::{LocalClock, RunningClock};
 use super::fmmu::Fmmus;
 use super::implemented;
+use super::kind::ControllerKind;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
 use super::posted::Queue;
@@ -20,15 +23,15 @@ use super::shadow::Shadow;
 use super::sii::Sii;
 use super::sync_manager::{self, SyncManagers};
 use super::watchdog::Watchdog;
-use crate::hardware::{Hardware, PortKind};
+use crate::hardware::PortKind;
 
 /// All that a MainDevice sees.
 #[derive(Debug)]
 pub(super) struct Core {
     pub(super) id: DeviceId,
-    pub(super) hardware: Hardware,
+    pub(super) hardware: ControllerKind,
     pub(super) memory: Memory,
-    pub(super) rights: Rights,
+    pub(super) rights: Arc<Rights>,
     pub(super) loops: Loops,
     pub(super) queue: Queue,
     pub(super) fmmus: Fmmus,
@@ -83,22 +86,29 @@ pub(super) struct Passing {
     pub(super) read_al_status: bool,
     pub(super) enables_registers: bool,
     pub(super) enables_all: bool,
+    /// Something was written, be it at once or at the frame's end.
+    pub(super) wrote: bool,
     /// SyncManagers that were touched, one bit each.
     pub(super) touched: u16,
 }
 
 impl Core {
-    pub(super) fn new(id: DeviceId, hardware: Hardware, quartz: LocalClock, sii: Vec<u8>) -> Self {
+    pub(super) fn new(
+        id: DeviceId,
+        hardware: ControllerKind,
+        quartz: LocalClock,
+        sii: Vec<u8>,
+    ) -> Self {
         Self {
             id,
             memory: Memory::new(&hardware),
-            rights: Rights::of(&hardware, false),
+            rights: hardware.rights(false),
             loops: Loops::new(&hardware),
             queue: Queue::default(),
             fmmus: Fmmus::new(),
             sync_managers: SyncManagers::new(),
             sii: Sii::new(sii, &hardware),
-            shadow: Shadow::with_room(),
+            shadow: Shadow::default(),
             scratch: Vec::new(),
             clock: RunningClock::new(quartz, Instant::ZERO),
             quartz,
@@ -132,7 +142,7 @@ impl Core {
         self.clock = RunningClock::new(self.quartz, now);
         self.powered_at = now;
         self.loaded = false;
-        self.rights = Rights::of(&self.hardware, false);
+        self.rights = self.hardware.rights(false);
         self.started = false;
         self.irq = 0;
         self.process_data_watchdog.stop();
@@ -155,7 +165,7 @@ impl Core {
     }
 
     fn identify(&mut self) {
-        let hardware = &self.hardware;
+        let hardware = &*self.hardware;
         let ports = Port::ALL.into_iter().fold(PortDescriptor::default(), |ports, port| {
             let kind = match hardware.ports[port] {
                 PortKind::Absent => PortType::NotImplemented,
@@ -222,7 +232,7 @@ impl Core {
         let a0 = self.memory.u8(&r::ESC_CONFIGURATION_A0);
         let a5 = self.memory.u16(&r::ESC_CONFIGURATION_A5);
         let time_loop = implemented::has_time_loop(&self.hardware, a0, a5);
-        self.rights = Rights::of(&self.hardware, time_loop);
+        self.rights = self.hardware.rights(time_loop);
         // Without an interface nobody triggers its watchdog, as the EK1100 shows.
         self.pdi_watchdog_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
     }

@@ -11,13 +11,16 @@
 mod access;
 mod clock;
 mod core;
+mod direct;
 mod esc;
 mod event;
 mod fmmu;
 mod implemented;
+mod kind;
 mod loops;
 mod memory;
 pub mod pdi;
+mod plain_read;
 mod port;
 mod posted;
 mod processing_unit;
@@ -28,9 +31,13 @@ mod sync_manager;
 mod watchdog;
 
 pub use clock::LocalClock;
+pub(crate) use direct::Manner;
 pub use esc::{Controller, Verdict};
+pub use kind::{ControllerKind, ControllerKinds};
 pub use pdi::Pdi;
+pub(crate) use plain_read::{Answer, PlainRead};
 pub use posted::{CountKind, PortEvent};
+pub(crate) use processing_unit::Header;
 pub use sii::{LOAD_TIME, PROGRAMMING_TIME, READ_TIME, STARTUP_DELAY, WRITE_TIME};
 
 #[cfg(test)]

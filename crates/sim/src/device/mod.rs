@@ -18,7 +18,7 @@ pub mod signal;
 
 pub use application_layer::Refusal;
 pub use emulated::{DigitalArea, Emulated, WordArea};
-pub use firmware::{Firmware, NoFirmware};
+pub use firmware::{Firmware, NoFirmware, SampleAgain};
 pub use signal::{SignalId, Signals};
 
 #[cfg(test)]

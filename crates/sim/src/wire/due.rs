@@ -106,6 +106,7 @@ impl World {
     }
 
     fn end_lost(&mut self, index: usize, end: usize, at: Instant) {
+        self.way_changes(at);
         self.links[index].ends[end] = EndState::Down;
         let place = self.links[index].both_ends()[end];
         let fault = self.blame(index, at);
@@ -120,6 +121,7 @@ impl World {
 
     /// Both ends have a link.
     pub(super) fn link_up(&mut self, index: usize, at: Instant) {
+        self.way_changes(at);
         self.links[index].ends = [EndState::Up; 2];
         let fault = self.blame(index, at);
         if fault.is_some() {

@@ -6,9 +6,11 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
 use super::change::{Change, Line};
+use super::direct::Direct;
 use super::due::Agenda;
-use super::link::{Ambush, CABLE_NS_PER_M, Hit, Link};
-use super::node::{Act, Glitch, Node};
+use super::link::{Ambush, CABLE_NS_PER_M, Hit, Link, Noise};
+use super::node::{Act, Glitch};
+use super::nodes::Nodes;
 use crate::controller::{Controller, CountKind, PortEvent};
 use crate::device::{Refusal, Signals};
 use crate::fault::Running;
@@ -23,7 +25,7 @@ const MEMORY: Span = Span::ms(2);
 #[derive(Debug)]
 pub(crate) struct World {
     /// By node of the tree.
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Nodes,
     /// In the order of [`Tree::links`].
     pub(crate) links: Vec<Link>,
     pub(crate) cards: [Card; 2],
@@ -38,6 +40,12 @@ pub(crate) struct World {
     /// An upper bound of the time that a frame of no length takes through all of it, twice.
     round: Span,
     pub(crate) frames: u64,
+    /// Links on which something lies in wait.
+    pub(super) noisy: Vec<usize>,
+    /// The last instant, so far as is known, at which a link or a supply changed.
+    pub(super) changed_at: Instant,
+    /// What frames can be spared of the walk.
+    pub(crate) direct: Direct,
 }
 
 impl World {
@@ -51,7 +59,7 @@ impl World {
         signals: Signals,
     ) -> Self {
         let mut world = Self {
-            nodes: controllers.into_iter().map(Node::new).collect(),
+            nodes: Nodes::new(controllers),
             links: Vec::new(),
             cards: [Card::default(), Card::default()],
             signals,
@@ -62,18 +70,21 @@ impl World {
             horizon: Instant::ZERO,
             round: Span::ZERO,
             frames: 0,
+            noisy: Vec::new(),
+            changed_at: Instant::ZERO,
+            direct: Direct::default(),
         };
         for (index, wired) in tree.links().iter().enumerate() {
             world.plug(*wired, index, cable_m.get(index).copied().unwrap_or(0.0));
         }
         world.round = world.measure_round();
-        for node in &mut world.nodes {
+        for node in world.nodes.iter_mut() {
             node.controller.power_on_before(Instant::ZERO, &mut world.signals);
         }
         for link in 0..world.links.len() {
             world.link_up(link, Instant::ZERO);
         }
-        for node in &mut world.nodes {
+        for node in world.nodes.iter_mut() {
             node.touch(Instant::ZERO, &mut world.signals);
         }
         world
@@ -142,20 +153,33 @@ impl World {
     /// Makes all changes that a frame of `frame_time` which enters at `now` can meet.
     pub(crate) fn look_ahead(&mut self, now: Instant, frame_time: Span) {
         self.change_until(now + self.round + frame_time);
-        let forgotten = now - MEMORY;
-        for link in &mut self.links {
-            for noise in &mut link.noise {
-                noise.forget(forgotten);
+        if !self.noisy.is_empty() {
+            self.forget_noise(now - MEMORY);
+        }
+    }
+
+    fn forget_noise(&mut self, before: Instant) {
+        let links = &mut self.links;
+        self.noisy.retain(|link| {
+            let noise = &mut links[*link].noise;
+            for line in &mut *noise {
+                line.forget(before);
             }
+            !noise.iter().all(Noise::is_quiet)
+        });
+    }
+
+    /// Something lies in wait on a link.
+    fn is_noisy(&mut self, link: usize) {
+        if !self.noisy.contains(&link) {
+            self.noisy.push(link);
         }
     }
 
     /// Brings everything to `now`.
     pub(crate) fn advance(&mut self, now: Instant) {
         self.change_until(now);
-        for node in &mut self.nodes {
-            node.touch(now, &mut self.signals);
-        }
+        self.nodes.touch_due(now, &mut self.signals);
     }
 
     /// Makes all changes up to and at an instant.
@@ -204,7 +228,7 @@ impl World {
         for noise in self.links.iter_mut().flat_map(|link| &mut link.noise) {
             noise.disarm(fault);
         }
-        for node in &mut self.nodes {
+        for node in self.nodes.iter_mut() {
             node.glitches.retain(|glitch| glitch.fault != fault);
         }
     }
@@ -235,8 +259,10 @@ impl World {
             Change::FrameHit { line, part, flip } => {
                 let ambush = Ambush { from: at, part, flip, fault };
                 self.links[line.link].noise[usize::from(line.downstream)].push_ambush(ambush);
+                self.is_noisy(line.link);
             }
             Change::Open { link } => {
+                self.way_changes(at);
                 let was_whole = self.links[link].contact.is_whole();
                 self.links[link].contact.break_at(at, fault);
                 if was_whole {
@@ -244,12 +270,14 @@ impl World {
                 }
             }
             Change::Close { link } => {
+                self.way_changes(at);
                 self.links[link].contact.mend_at(at, fault);
                 if self.links[link].contact.is_whole() {
                     self.signal_changed(link, at);
                 }
             }
             Change::Off { node } => {
+                self.way_changes(at);
                 let was_on = self.nodes[node].power.is_whole();
                 self.nodes[node].power.break_at(at, fault);
                 let place = Place::Device(self.id(node));
@@ -260,6 +288,7 @@ impl World {
                 }
             }
             Change::On { node } => {
+                self.way_changes(at);
                 self.nodes[node].power.mend_at(at, fault);
                 if self.nodes[node].power.is_whole() {
                     let place = Place::Device(self.id(node));
@@ -283,6 +312,12 @@ impl World {
         }
     }
 
+    /// What lies on the way of frames changes at an instant that may be ahead.
+    pub(super) fn way_changes(&mut self, at: Instant) {
+        self.changed_at = self.changed_at.max(at);
+        self.direct.forget_routes();
+    }
+
     fn supply_changed(&mut self, node: usize, at: Instant) {
         let links = self.nodes[node].leaving.0;
         for line in links.into_iter().flatten() {
@@ -297,6 +332,7 @@ impl World {
             return;
         }
         link.noise[usize::from(line.downstream)].push_hit(Hit { at, flip, fault });
+        self.is_noisy(line.link);
         self.symbol_error(at, Cause::Fault(fault), line);
     }
 

@@ -16,7 +16,7 @@ use self::process_image::ProcessImage;
 use super::application::Channel;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::dictionary::Dictionary;
-use super::firmware::Firmware;
+use super::firmware::{Firmware, SampleAgain};
 use super::mailbox::Mailbox;
 use super::signal::Signals;
 use crate::controller::Pdi;
@@ -391,6 +391,11 @@ impl Firmware for Processor {
         if now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
             self.sample_inputs(now, pdi);
         }
+    }
+
+    fn sample_again(&self, pdi: &Pdi<'_>) -> SampleAgain {
+        let samples = ApplicationLayer::state(pdi).has_inputs();
+        SampleAgain::From(if samples { self.next_sample } else { Instant::MAX })
     }
 
     fn stop(&mut self, signals: &mut Signals) {
