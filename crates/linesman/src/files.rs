@@ -5,12 +5,15 @@ use std::path::Path;
 
 use linesman_config::project::Project;
 use linesman_sim::segment::Segment;
-use linesman_sim::segment_file::SegmentFile;
+use linesman_sim::segment_file::{DescriptionFiles, SegmentFile};
 
 use crate::failure::Failure;
 
 /// Longest text file that is read, in bytes; nobody writes more by hand.
 const MAX_TEXT: u64 = 16 * 1024 * 1024;
+
+/// Longest device description that is read, in bytes; the largest of vendors have 50 MB.
+const MAX_DESCRIPTION: u64 = 128 * 1024 * 1024;
 
 /// The text of a file.
 pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
@@ -59,7 +62,30 @@ impl Plant {
 /// A segment file.
 pub(crate) fn segment_file(path: &Path) -> Result<SegmentFile, Failure> {
     let text = text(path, "a segment file")?;
-    SegmentFile::parse(&text).map_err(|error| in_file(path, &error))
+    let files = Beside(path.parent().unwrap_or(Path::new("")));
+    SegmentFile::parse_with(&text, &files).map_err(|error| in_file(path, &error))
+}
+
+/// Files that a segment file names, relative to where that is.
+struct Beside<'a>(&'a Path);
+
+impl DescriptionFiles for Beside<'_> {
+    fn read(&self, name: &str) -> Result<Vec<u8>, String> {
+        let path = self.0.join(name);
+        let place = path.display();
+        let refuse = |error: std::io::Error| {
+            format!("reading {place}: {error}; the path is relative to that of the segment file")
+        };
+        let about = fs::metadata(&path).map_err(refuse)?;
+        if !about.is_file() {
+            return Err(format!("{place} is no file"));
+        }
+        if about.len() > MAX_DESCRIPTION {
+            let len = about.len();
+            return Err(format!("{place}: {len} bytes, expected at most {MAX_DESCRIPTION}"));
+        }
+        fs::read(&path).map_err(refuse)
+    }
 }
 
 /// A project file.

@@ -79,6 +79,11 @@ fn faults() -> String {
             }
             PlaceRule::Line => "`at`: one direction of a link, `K1.C>B3.A`",
             PlaceRule::Device => "`device`",
+            PlaceRule::Processor => "`device`, one with a processor",
+            PlaceRule::Mailbox => "`device`, one with a mailbox",
+            PlaceRule::DeviceOrCard => {
+                "`device`; or `at`: a card, `maindevice` (unless said) or `maindevice.B`"
+            }
             PlaceRule::Devices => "`device`, or `devices` with a list",
             PlaceRule::Card => "`at`: a card, `maindevice` (unless said) or `maindevice.B`",
         };

@@ -35,7 +35,7 @@ const WAITING: usize = 16;
 pub enum Request {
     /// Put a fault on the line now.
     Inject {
-        /// Its kind, place and parameters; its times are those of the request.
+        /// Its kind, place, parameters and schedule; it begins with the request.
         fault: FaultEntry,
         /// How long it lasts, in ms; until it is healed unless said.
         for_ms: Option<f64>,
@@ -190,6 +190,7 @@ fn obey(request: Request, now: Instant, segment: &mut Segment) -> Result<(), Str
             let now_ms = now.as_nanos() as f64 / 1e6;
             fault.from_ms = for_ms.map(|_| now_ms);
             fault.to_ms = for_ms.map(|ms| now_ms + ms);
+            // Its schedule counts from its begin, which is now.
             segment.inject(now, &fault).map(drop).map_err(|error| error.to_string())
         }
         Request::Heal { no } => {

@@ -9,9 +9,11 @@ use std::collections::BTreeMap;
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::register::ErrorCounter;
+use linesman_proto::register::{ErrorCounter, WatchdogTime};
 use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
+
+use crate::device::Trouble;
 
 pub use audit::Unexplained;
 pub(crate) use audit::{Cause, Ledger};
@@ -71,6 +73,26 @@ pub enum Effect {
         /// The code in 0x0134.
         code: u16,
     },
+    /// The software of a device misbehaves from now on.
+    Misbehaves(Trouble),
+    /// The processor of a device stopped.
+    ProcessorStopped,
+    /// It runs again.
+    ProcessorRuns,
+    /// It started anew by itself, without its controller.
+    ProcessorRestarted,
+    /// A card sends nothing for a while.
+    CardSilent,
+    /// A watchdog was set to another time than the MainDevice set, or back.
+    WatchdogSet {
+        /// As in 0x0420; `None` for the former one.
+        time: Option<WatchdogTime>,
+    },
+    /// A device was made to send an emergency.
+    EmergencySent {
+        /// Its code; 0 takes the one before back.
+        code: u16,
+    },
     /// Counters were not 0 at the start: noise at power-on or plugging, old errors.
     OldCounters,
     /// Another type of device than planned sits here.
@@ -118,10 +140,12 @@ pub struct FaultRecord {
     pub name: FaultName,
     /// Where it was put: one place, or several that share one cause.
     pub places: Vec<Place>,
-    /// When it began to act.
+    /// When it first began to act.
     pub began: Option<Instant>,
-    /// When it ended or was healed.
+    /// When it ended or was healed, the last time; `None` while it acts.
     pub ended: Option<Instant>,
+    /// How often it has come so far.
+    pub times: u32,
     /// When it first had an effect.
     pub first_effect: Option<Instant>,
     /// Symbols destroyed.
@@ -155,6 +179,13 @@ impl FaultRecord {
             | Effect::SignalBack
             | Effect::PowerBack
             | Effect::StateRefused { .. }
+            | Effect::Misbehaves(_)
+            | Effect::ProcessorStopped
+            | Effect::ProcessorRuns
+            | Effect::ProcessorRestarted
+            | Effect::EmergencySent { .. }
+            | Effect::CardSilent
+            | Effect::WatchdogSet { .. }
             | Effect::OldCounters
             | Effect::WrongDevice
             | Effect::MissingDevice => {}
@@ -213,6 +244,7 @@ impl TruthLog {
             places,
             began: None,
             ended: None,
+            times: 0,
             first_effect: None,
             symbol_errors: 0,
             frames_spoiled: 0,
@@ -225,7 +257,9 @@ impl TruthLog {
 
     pub(crate) fn begin(&mut self, at: Instant, fault: FaultId) {
         if let Some(record) = self.faults.get_mut(fault.0 as usize) {
-            record.began = Some(at);
+            record.began.get_or_insert(at);
+            record.ended = None;
+            record.times += 1;
         }
         self.push(Entry::Begin { at, fault });
     }

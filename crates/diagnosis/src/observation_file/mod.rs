@@ -93,7 +93,7 @@ pub struct ObservedDevice {
     pub al_code: Option<Word>,
     /// What was read of its ports.
     #[serde(default)]
-    pub ports: ObservedPorts,
+    pub ports: Ports<ObservedPort>,
     /// Processing unit errors, register 0x030C.
     #[serde(default)]
     pub processing_unit: Option<u8>,
@@ -102,22 +102,30 @@ pub struct ObservedDevice {
     pub before: Option<EarlierDevice>,
 }
 
-/// The four ports.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "UPPERCASE")]
-pub struct ObservedPorts {
+/// The four ports, as they are or as they were.
+#[derive(Clone, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "UPPERCASE", bound = "T: Deserialize<'de>")]
+#[schemars(rename = "{T}s")]
+pub struct Ports<T> {
     /// Port A, number 0.
     #[serde(default)]
-    pub a: Option<ObservedPort>,
+    pub a: Option<T>,
     /// Port B, number 1.
     #[serde(default)]
-    pub b: Option<ObservedPort>,
+    pub b: Option<T>,
     /// Port C, number 2.
     #[serde(default)]
-    pub c: Option<ObservedPort>,
+    pub c: Option<T>,
     /// Port D, number 3.
     #[serde(default)]
-    pub d: Option<ObservedPort>,
+    pub d: Option<T>,
+}
+
+// Derived, it would ask for a default of what a port is.
+impl<T> Default for Ports<T> {
+    fn default() -> Self {
+        Self { a: None, b: None, c: None, d: None }
+    }
 }
 
 /// A port as somebody read it.
@@ -156,28 +164,10 @@ pub struct ObservedPort {
 pub struct EarlierDevice {
     /// Of its ports.
     #[serde(default)]
-    pub ports: EarlierPorts,
+    pub ports: Ports<EarlierPort>,
     /// Processing unit errors.
     #[serde(default)]
     pub processing_unit: Option<u8>,
-}
-
-/// Earlier values of the four ports.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "UPPERCASE")]
-pub struct EarlierPorts {
-    /// Port A, number 0.
-    #[serde(default)]
-    pub a: Option<EarlierPort>,
-    /// Port B, number 1.
-    #[serde(default)]
-    pub b: Option<EarlierPort>,
-    /// Port C, number 2.
-    #[serde(default)]
-    pub c: Option<EarlierPort>,
-    /// Port D, number 3.
-    #[serde(default)]
-    pub d: Option<EarlierPort>,
 }
 
 /// Earlier values of a port's counters.
@@ -383,7 +373,7 @@ impl ObservedDevice {
     }
 }
 
-impl ObservedPorts {
+impl Ports<ObservedPort> {
     /// By port.
     #[must_use]
     pub fn all(&self) -> PortMap<Option<ObservedPort>> {
@@ -391,7 +381,7 @@ impl ObservedPorts {
     }
 }
 
-impl EarlierPorts {
+impl Ports<EarlierPort> {
     /// By port.
     #[must_use]
     pub fn all(&self) -> PortMap<Option<EarlierPort>> {

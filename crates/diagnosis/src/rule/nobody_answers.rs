@@ -17,6 +17,7 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View};
@@ -39,6 +40,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const CERTAIN: u64 = 8;
 /// More in a row than noise takes from a line that still answers.
 const LONG: u64 = 32;
+/// How likely it is the card.
+const CARD: f64 = 0.1;
 /// With fewer, the end of the input may have cut off the answer.
 const FEW: u64 = 3;
 
@@ -63,12 +66,6 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     let line = view.line;
     let was_answered = line.traffic.answered > 0;
     let carrier = carrier_during(line, silence);
-    // Without a carrier it is the first hop for sure; with one, something forwards nothing.
-    let (open, off, dead_link, card) = match carrier {
-        Some(false) => (0.6, 0.3, 0.0, 0.1),
-        Some(true) => (0.35, 0.25, 0.2, 0.1),
-        None => (0.45, 0.3, 0.1, 0.1),
-    };
     let since = silence.since;
     let text = if was_answered {
         format!("from here on {} requests in a row did not come back", silence.frames)
@@ -77,18 +74,10 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     };
     let spoiled = line.host.card(Path::A).crc;
     let is_spoiled = spoiled.of_spell() > 0 && spoiled.last.is_some_and(|last| last >= since.at);
-    let mut condition = if is_spoiled {
-        // They do come back, but damaged, and no counter can be asked where.
-        let place = Place::Network { network: line.network };
-        Condition::new(&PAGE, place, FaultName::CableDegraded, since.at)
-            .confidence(0.4)
-            .or(FaultName::TransmitterDamaged, 0.15)
-            .or(FaultName::DeviceInternal, 0.15)
-            .or(FaultName::EmcNoise, 0.1)
-    } else {
-        Condition::new(&PAGE, first_link(line), FaultName::LinkOpen, since.at).confidence(open)
-    };
-    condition = condition.shown_by(Evidence::frame(since.at, since.frame.unwrap_or(0), text));
+    let frame = since.frame.unwrap_or(0);
+    let mut condition =
+        if is_spoiled { spoiling(line, since.at) } else { cut(line, since.at, carrier) };
+    condition = condition.shown_by(Evidence::frame(since.at, frame, text));
     if is_spoiled {
         let text = format!(
             "the card received {} damaged frames meanwhile: the way round is whole, but something on \
@@ -109,16 +98,6 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
         let at = line.host.card(Path::A).carrier.map(|carrier| carrier.at);
         condition = condition.shown_by(Evidence::host(at, text));
     }
-    if !is_spoiled {
-        condition = match first_device(line) {
-            Some(id) => condition.or_at(FaultName::DeviceOff, Place::device(line.network, id), off),
-            None => condition.or(FaultName::DeviceOff, off),
-        };
-        if dead_link > 0.0 {
-            condition = condition.or(FaultName::FalseLink, dead_link);
-        }
-    }
-    condition = condition.or_at(FaultName::NicDamaged, Place::Host, card);
     if silence.frames >= CERTAIN || view.has_ended {
         condition = condition.confirmed(silence.last.at);
     }
@@ -152,6 +131,38 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
             .advise("Then read the error counters: they name the link.");
     }
     advise(condition, carrier)
+}
+
+/// Frames do not come back at all: the first hop, or what is behind it.
+fn cut(line: &Line, at: Instant, carrier: Option<bool>) -> Condition {
+    // Without a carrier it is the first hop for sure; with one, something forwards nothing.
+    let (open, off, dead_link) = match carrier {
+        Some(false) => (0.6, 0.3, 0.0),
+        Some(true) => (0.35, 0.25, 0.2),
+        None => (0.45, 0.3, 0.1),
+    };
+    let condition =
+        Condition::new(&PAGE, first_link(line), FaultName::LinkOpen, at).confidence(open);
+    let condition = match first_device(line) {
+        Some(id) => condition.or_at(FaultName::DeviceOff, Place::device(line.network, id), off),
+        None => condition.or(FaultName::DeviceOff, off),
+    };
+    let condition = match carrier {
+        Some(false) => condition,
+        Some(true) | None => condition.or(FaultName::FalseLink, dead_link),
+    };
+    condition.or_at(FaultName::NicDamaged, Place::Host, CARD)
+}
+
+/// Frames do come back, but damaged, and no counter can be asked where.
+fn spoiling(line: &Line, at: Instant) -> Condition {
+    let place = Place::Network { network: line.network };
+    Condition::new(&PAGE, place, FaultName::CableDegraded, at)
+        .confidence(0.4)
+        .or(FaultName::TransmitterDamaged, 0.15)
+        .or(FaultName::DeviceInternal, 0.15)
+        .or(FaultName::EmcNoise, 0.1)
+        .or_at(FaultName::NicDamaged, Place::Host, CARD)
 }
 
 /// Whether the card had a link during a silence; `None` when the host does not say.

@@ -27,10 +27,13 @@
 //! SubDevices have reached the target state; `at` waits for a time, the other steps happen where
 //! they stand.
 
+pub mod ground;
 pub mod parse;
 pub mod run;
 pub mod step;
+mod witness;
 
+pub use ground::Ground;
 pub use parse::{Front, SegmentText, Story, StoryError};
 pub use run::{StepReport, StoryReport, exit_status, play};
 pub use step::{Expectation, Heal, Step, StepAt, What};

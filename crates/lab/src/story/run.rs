@@ -13,6 +13,7 @@ use linesman_sim::truth::{FaultId, FaultRecord};
 
 use super::parse::{SegmentText, Story};
 use super::step::{Expectation, Heal, Step, StepAt, What};
+use super::witness::Witness;
 use crate::lab::Lab;
 use crate::options::LabOptions;
 use crate::verdict::judge::{Company, best_finding};
@@ -117,11 +118,14 @@ fn try_play(
         project: story.front.project,
         ..LabOptions::default()
     };
-    let lab = Lab::new(&file, options).map_err(|error| error.to_string())?;
-    let mut stage = Stage { lab, start: Instant::ZERO, faults: Vec::new() };
+    let mut lab = Lab::new(&file, options).map_err(|error| error.to_string())?;
+    let (witness, tap) = Witness::new();
+    lab.set_tap(tap);
+    let mut stage = Stage { lab, start: Instant::ZERO, faults: Vec::new(), witness };
     // A line that does not come up is for the steps to judge: it may be what the story is about.
     stage.bring_up()?;
     stage.start = stage.lab.now();
+    stage.witness.mark(&stage.lab);
     report.up_in = stage.start.since(Instant::ZERO);
     for step in &story.steps {
         let failure = stage.step(step).err();
@@ -133,13 +137,19 @@ fn try_play(
         }
     }
     report.diagnosis = Some(stage.lab.diagnosis());
-    Ok(())
+    let unexplained = stage.lab.audit();
+    if unexplained.is_empty() {
+        Ok(())
+    } else {
+        Err(format!("counters moved without a cause in the truth log: {unexplained:?}"))
+    }
 }
 
 struct Stage {
     lab: Lab,
     start: Instant,
     faults: Vec<FaultId>,
+    witness: Witness,
 }
 
 impl Stage {
@@ -171,6 +181,7 @@ impl Stage {
                     let end = self.lab.now() + *lasts;
                     entry.to_ms = Some(end.as_nanos() as f64 / 1e6);
                 }
+                self.witness.mark(&self.lab);
                 let id = self.lab.inject(&entry).map_err(|error| error.to_string())?;
                 self.faults.push(id);
                 Ok(())
@@ -201,12 +212,15 @@ impl Stage {
     }
 
     fn expect(&mut self, what: &Expectation, within: Span) -> Result<(), String> {
+        if let Expectation::Ground(ground) = what {
+            self.witness.names(&self.lab, ground);
+        }
         let what = self.resolve(what)?;
         let held = self
             .lab
-            .run_while(within, LOOK, |lab| holds(&what, lab).is_ok())
+            .run_while(within, LOOK, |lab| holds(&what, lab, &self.witness).is_ok())
             .map_err(|error| error.to_string())?;
-        if held { Ok(()) } else { holds(&what, &self.lab) }
+        if held { Ok(()) } else { holds(&what, &self.lab, &self.witness) }
     }
 
     fn resolve<'a>(&self, what: &'a Expectation) -> Result<Resolved<'a>, String> {
@@ -268,7 +282,7 @@ struct Resolved<'a> {
 }
 
 /// Whether an expectation holds now; what is so instead if not.
-fn holds(resolved: &Resolved<'_>, lab: &Lab) -> Result<(), String> {
+fn holds(resolved: &Resolved<'_>, lab: &Lab, witness: &Witness) -> Result<(), String> {
     let diagnosis = lab.diagnosis();
     let check = |held: bool, expected: &str| {
         if held { Ok(()) } else { Err(format!("expected {expected}\n{}", said(&diagnosis))) }
@@ -310,6 +324,7 @@ fn holds(resolved: &Resolved<'_>, lab: &Lab) -> Result<(), String> {
             let found = exit_status(&diagnosis);
             check(found == *status, &format!("exit status {status}, found {found}"))
         }
+        Expectation::Ground(ground) => witness.holds(ground, lab),
     }
 }
 

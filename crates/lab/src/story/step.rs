@@ -14,12 +14,15 @@
 //! [at TIME] expect all closed [within TIME]
 //! [at TIME] expect line up [within TIME]
 //! [at TIME] expect exit N
+//! [at TIME] expect …            what is so on the segment: see `ground`
 //! ```
 //! `PLACE` is `K1.C-B3.A` (a link), `K1.C>B3.A` (one direction), `device K1`, `host` or `network`.
 //! `TIME` is a whole number of `us`, `ms` or `s`. Back-quotes are for the reader only.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
+
+use super::ground::Ground;
 
 /// A step and where it stands.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -102,6 +105,8 @@ pub enum Expectation {
     LineUp,
     /// What `diagnose` would exit with.
     Exit(u8),
+    /// Something is so on the segment, whatever the diagnosis says.
+    Ground(Ground),
 }
 
 /// Reads the text of a list item; the error says what was expected.
@@ -198,6 +203,11 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             let on = words.take("on").then(|| fault(words.next())).transpose()?;
             Expectation::Verdict(on)
         }
+        "no" if words.take("other") => {
+            words.expect("counter")?;
+            Expectation::Ground(Ground::NoOtherCounter)
+        }
+        "no" if words.take("carrier") => Expectation::Ground(Ground::Carrier(false)),
         "no" => {
             words.expect("finding")?;
             let what = words.next();
@@ -218,10 +228,15 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             Expectation::Exit(status.parse().map_err(|_| format!("`{status}` is no exit status"))?)
         }
         other => {
+            if let Some(ground) = Ground::parse(other, words)? {
+                return Ok(Step::Expect { what: Expectation::Ground(ground), within });
+            }
             let count = other.parse().map_err(|_| {
                 format!(
                     "`{other}` cannot be expected: expected `verdict`, `finding`, `no finding`, `N findings`, \
-                     `healthy`, `inconclusive`, `all closed`, `line up` or `exit N`"
+                     `healthy`, `inconclusive`, `all closed`, `line up`, `exit N`, or something of the \
+                     segment: `counter`, `no other counter`, `port`, `state`, `lost frames`, \
+                     `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`"
                 )
             })?;
             if !words.take("findings") {
@@ -246,18 +261,18 @@ fn fault(word: &str) -> Result<FaultName, String> {
 }
 
 /// The rest of a step, word by word.
-struct Words<'a> {
-    rest: &'a str,
+pub(super) struct Words<'a> {
+    pub(super) rest: &'a str,
 }
 
 impl<'a> Words<'a> {
-    fn next(&mut self) -> &'a str {
+    pub(super) fn next(&mut self) -> &'a str {
         let (word, rest) = self.rest.split_once(' ').unwrap_or((self.rest, ""));
         self.rest = rest.trim_start();
         word
     }
 
-    fn take(&mut self, word: &str) -> bool {
+    pub(super) fn take(&mut self, word: &str) -> bool {
         let mut ahead = Words { rest: self.rest };
         let found = ahead.next() == word;
         if found {
@@ -266,7 +281,7 @@ impl<'a> Words<'a> {
         found
     }
 
-    fn expect(&mut self, word: &str) -> Result<(), String> {
+    pub(super) fn expect(&mut self, word: &str) -> Result<(), String> {
         if self.take(word) {
             return Ok(());
         }

@@ -262,6 +262,13 @@ impl<'a> Episode<'a> {
                 | Effect::PowerLost
                 | Effect::PowerBack
                 | Effect::StateRefused { .. }
+                | Effect::Misbehaves(_)
+                | Effect::ProcessorStopped
+                | Effect::ProcessorRuns
+                | Effect::ProcessorRestarted
+                | Effect::EmergencySent { .. }
+                | Effect::CardSilent
+                | Effect::WatchdogSet { .. }
                 | Effect::OldCounters
                 | Effect::WrongDevice
                 | Effect::MissingDevice => false,

@@ -1,11 +1,10 @@
 //! `linesman fault`: break and heal a virtual segment while it runs on real interfaces.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use linesman_config::fault::FaultName;
 use linesman_runtime::control::{Answer, FaultState, Request, ask};
-use linesman_sim::segment_file::{FaultEntry, OneOrMany, Value};
+use linesman_sim::segment_file::FaultEntry;
 
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -39,9 +38,9 @@ enum Action {
         /// How long it lasts; until it is healed unless said
         #[arg(long, value_name = "MS")]
         for_ms: Option<f64>,
-        /// Parameters of its kind, such as hits_per_s=40
+        /// Parameters of its kind, such as hits_per_s=40, and its schedule: every_ms=500 for_ms=20
         #[arg(value_name = "KEY=VALUE", value_parser = parameter)]
-        parameters: Vec<(String, Value)>,
+        parameters: Vec<(String, toml::Value)>,
     },
     /// End a fault, or all of them
     Heal {
@@ -52,21 +51,21 @@ enum Action {
     List,
 }
 
-/// `hits_per_s=40`, `to=SAFEOP`, `code=0x001D`.
-fn parameter(text: &str) -> Result<(String, Value), String> {
+/// `hits_per_s=40`, `to=SAFEOP`, `code=0x001D`, `at_ms=[0,500]`.
+fn parameter(text: &str) -> Result<(String, toml::Value), String> {
     let (key, value) =
         text.split_once('=').ok_or_else(|| format!("`{text}`: expected KEY=VALUE"))?;
-    let as_toml = toml::from_str::<BTreeMap<String, Value>>(&format!("value = {value}"));
+    let as_toml = toml::from_str::<toml::Table>(&format!("value = {value}"));
     let value = match as_toml.ok().and_then(|mut table| table.remove("value")) {
         Some(value) => value,
-        None => Value::Text(value.to_owned()),
+        None => toml::Value::String(value.to_owned()),
     };
     Ok((key.to_owned(), value))
 }
 
 /// Asks the segment and tells what it says.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let request = request(&arguments.action);
+    let request = request(&arguments.action)?;
     let path = arguments.socket.display();
     let answer = ask(&arguments.socket, &request).map_err(|error| {
         let advice = "start the segment with `linesman sim SEGMENT.toml --on NIC --control SOCKET`, \
@@ -85,26 +84,28 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     Ok(Status::Good)
 }
 
-fn request(action: &Action) -> Request {
-    match action {
+fn request(action: &Action) -> Result<Request, Failure> {
+    Ok(match action {
         Action::Inject { kind, at, device, for_ms, parameters } => {
-            let mut fault = FaultEntry::new(*kind);
-            fault.at = match at.as_slice() {
+            let mut entry = toml::Table::new();
+            entry.insert("kind".to_owned(), kind.name().into());
+            let mut places = |one: &str, many: &str, names: &[String]| match names {
                 [] => None,
-                [one] => Some(OneOrMany::One(one.clone())),
-                more => Some(OneOrMany::Many(more.to_vec())),
+                [name] => entry.insert(one.to_owned(), name.as_str().into()),
+                more => entry.insert(many.to_owned(), more.to_vec().into()),
             };
-            match device.as_slice() {
-                [] => {}
-                [one] => fault.device = Some(one.clone()),
-                more => fault.devices = Some(more.to_vec()),
-            }
-            fault.parameters.extend(parameters.iter().cloned());
+            places("at", "at", at);
+            places("device", "devices", device);
+            entry.extend(parameters.iter().cloned());
+            let fault = entry.try_into::<FaultEntry>().map_err(|error| {
+                let advice = "see docs/guide/faults.md for what each fault takes";
+                Failure::new(format!("{kind}: {}", error.message()), advice)
+            })?;
             Request::Inject { fault, for_ms: *for_ms }
         }
         Action::Heal { no } => Request::Heal { no: *no },
         Action::List => Request::List,
-    }
+    })
 }
 
 fn table(answer: &Answer, output: &Output) -> String {
@@ -137,16 +138,33 @@ mod tests {
     #[test]
     fn parameters_are_numbers_where_they_can_be() {
         let rows = [
-            ("hits=10", Value::Integer(10)),
-            ("hits_per_s=2.5", Value::Number(2.5)),
-            ("code=0x001D", Value::Integer(0x1D)),
-            ("to=SAFEOP", Value::Text("SAFEOP".to_owned())),
-            ("quiet=true", Value::Flag(true)),
+            ("hits=10", toml::Value::Integer(10)),
+            ("hits_per_s=2.5", toml::Value::Float(2.5)),
+            ("code=0x001D", toml::Value::Integer(0x1D)),
+            ("to=SAFEOP", toml::Value::String("SAFEOP".to_owned())),
+            ("quiet=true", toml::Value::Boolean(true)),
         ];
         for (text, expected) in rows {
             let (key, _) = text.split_once('=').unwrap();
             assert_eq!(parameter(text), Ok((key.to_owned(), expected)), "{text}");
         }
         assert!(parameter("hits").is_err());
+    }
+
+    #[test]
+    fn a_schedule_is_taken_with_the_parameters() {
+        let parameters = ["hits_per_s=40", "at_ms=[0, 500]", "for_ms=20"];
+        let action = Action::Inject {
+            kind: FaultName::EmcNoise,
+            at: vec!["K1.C-K2.A".to_owned()],
+            device: Vec::new(),
+            for_ms: None,
+            parameters: parameters.iter().map(|text| parameter(text).unwrap()).collect(),
+        };
+        let Ok(Request::Inject { fault, .. }) = request(&action) else { panic!("no request") };
+        assert_eq!(fault.schedule.at_ms.unwrap().as_slice(), [0.0, 500.0]);
+        assert_eq!(fault.schedule.for_ms, Some(20.0));
+        let keys: Vec<&String> = fault.parameters.keys().collect();
+        assert_eq!(keys, ["hits_per_s"]);
     }
 }

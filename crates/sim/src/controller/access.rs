@@ -17,6 +17,8 @@ use super::sync_manager::Grant;
 const GUARDED: usize = at(&r::DIGITAL_OUTPUT);
 /// Where writes need no shadow.
 const UNSHADOWED: usize = RAM_START.0 as usize;
+/// The chapter of distributed clocks, whose registers are worked out when they are read.
+const CLOCK: Range<usize> = 0x0900..0x0A00;
 
 impl Core {
     /// Puts memory from `address` on into `out`, or ORs it in. True when at least one byte could be
@@ -47,22 +49,11 @@ impl Core {
         let range = start..end;
         self.passing.read_dl_status |= touches(&range, &r::DL_STATUS);
         self.passing.read_al_status |= touches(&range, &r::AL_STATUS);
-        if touches(&range, &r::SYSTEM_TIME) {
-            self.put_system_time();
+        if end > CLOCK.start && start < CLOCK.end {
+            self.refresh_clock(&range);
         }
         copy(&self.memory.bytes()[range], out, ors);
         true
-    }
-
-    /// The system time is that of the moment the frame began.
-    fn put_system_time(&mut self) {
-        let time = self.system_time(self.passing.began).to_le_bytes();
-        let address = at(&r::SYSTEM_TIME);
-        for (offset, byte) in time.into_iter().enumerate() {
-            if self.rights.byte(address + offset) & Rights::READ != 0 {
-                self.memory.bytes_mut()[address + offset] = byte;
-            }
-        }
     }
 
     fn read_guarded(&mut self, start: usize, out: &mut [u8], ors: bool) -> bool {
@@ -158,6 +149,8 @@ impl Core {
         } else if touches(&range, &r::SYNC_MANAGER) {
             let index = (address - at(&r::SYNC_MANAGER)) / usize::from(r::SYNC_MANAGER.len);
             !super::sync_manager::config(index, &self.memory).activate.enable()
+        } else if CLOCK.contains(&address) {
+            self.clock_is_for_ecat(address)
         } else {
             self.sii.is_free(&self.memory)
         }

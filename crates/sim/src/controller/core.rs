@@ -12,9 +12,9 @@ use linesman_proto::register::{
 };
 use linesman_proto::time::Instant;
 
-use super::clock::{LocalClock, RunningClock};
+use super::clock::{LocalClock, RunningClock, SyncUnit, TimeLoop};
 use super::fmmu::Fmmus;
-use super::implemented;
+use super::implemented::ClockUnits;
 use super::kind::ControllerKind;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
@@ -42,6 +42,8 @@ pub(super) struct Core {
     pub(super) scratch: Vec<u8>,
     pub(super) clock: RunningClock,
     quartz: LocalClock,
+    pub(super) time_loop: TimeLoop,
+    pub(super) sync: SyncUnit,
     pub(super) powered_at: Instant,
     /// The configuration area is loaded: process-data RAM can be reached.
     pub(super) loaded: bool,
@@ -72,6 +74,8 @@ pub(super) struct Core {
     pub(super) entered: PortMap<(u64, Instant)>,
     /// The frame whose receive times are being latched.
     pub(super) latched: Option<u64>,
+    /// Ports that take the time of the next frame which comes in after an instant.
+    pub(super) latch_waits: PortMap<Option<Instant>>,
     pub(super) passing: Passing,
 }
 
@@ -84,6 +88,8 @@ pub(super) struct Passing {
     pub(super) number: u64,
     pub(super) read_dl_status: bool,
     pub(super) read_al_status: bool,
+    /// Times of the latch unit that were read, one bit each.
+    pub(super) read_latches: u8,
     pub(super) enables_registers: bool,
     pub(super) enables_all: bool,
     /// Something was written, be it at once or at the frame's end.
@@ -102,7 +108,7 @@ impl Core {
         Self {
             id,
             memory: Memory::new(&hardware),
-            rights: hardware.rights(false),
+            rights: hardware.rights(ClockUnits::default()),
             loops: Loops::new(&hardware),
             queue: Queue::default(),
             fmmus: Fmmus::new(),
@@ -112,6 +118,8 @@ impl Core {
             scratch: Vec::new(),
             clock: RunningClock::new(quartz, Instant::ZERO),
             quartz,
+            time_loop: TimeLoop::default(),
+            sync: SyncUnit::default(),
             powered_at: Instant::ZERO,
             loaded: false,
             started: false,
@@ -130,6 +138,7 @@ impl Core {
             firmware_at: None,
             entered: PortMap([(u64::MAX, Instant::ZERO); 4]),
             latched: None,
+            latch_waits: PortMap::default(),
             passing: Passing::default(),
             hardware,
         }
@@ -142,7 +151,9 @@ impl Core {
         self.clock = RunningClock::new(self.quartz, now);
         self.powered_at = now;
         self.loaded = false;
-        self.rights = self.hardware.rights(false);
+        self.rights = self.hardware.rights(ClockUnits::default());
+        self.time_loop = TimeLoop::default();
+        self.sync = self.sync.restarted();
         self.started = false;
         self.irq = 0;
         self.process_data_watchdog.stop();
@@ -152,6 +163,7 @@ impl Core {
         (self.loops_change_at, self.loops_return, self.reset_at) = (None, None, None);
         self.firmware_at = None;
         self.latched = None;
+        self.latch_waits = PortMap::default();
         self.shadow.clear();
         self.identify();
         self.put_reset_values();
@@ -223,6 +235,7 @@ impl Core {
         (self.loops_change_at, self.loops_return, self.reset_at) = (None, None, None);
         self.firmware_at = None;
         self.irq = 0;
+        self.sync = self.sync.restarted();
     }
 
     /// The configuration area was loaded: what depends on it follows.
@@ -231,8 +244,8 @@ impl Core {
         self.loaded = true;
         let a0 = self.memory.u8(&r::ESC_CONFIGURATION_A0);
         let a5 = self.memory.u16(&r::ESC_CONFIGURATION_A5);
-        let time_loop = implemented::has_time_loop(&self.hardware, a0, a5);
-        self.rights = self.hardware.rights(time_loop);
+        let units = ClockUnits::configured(&self.hardware, a0, a5);
+        self.rights = self.hardware.rights(units);
         // Without an interface nobody triggers its watchdog, as the EK1100 shows.
         self.pdi_watchdog_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
     }

@@ -4,6 +4,7 @@
 //! does at each only what leaves a trace there. [`Manner`] is what it must know of a controller to
 //! do so; the rest is the pieces of [`Controller::process`], one by one.
 
+use linesman_proto::port::Port;
 use linesman_proto::register::{self as r, DlControl, FmmuConfig};
 use linesman_proto::time::Instant;
 
@@ -66,10 +67,13 @@ impl Controller {
         let control = DlControl(core.memory.u32(&r::DL_CONTROL));
         let writes_registers =
             |config: &FmmuConfig| config.writes && config.physical_start.0 < REGISTERS_END;
+        let waits_for_time =
+            |port: Port| core.latch_waits[port].is_some() && core.loops.is_open(port);
         Manner {
             open: if self.powered { core.loops.open_bits() } else { 0 },
             meddles: core.loops.port_zero_closes_ring()
                 || core.loops.waits_for_any_frame()
+                || Port::ALL.into_iter().any(waits_for_time)
                 || core.fmmus.active().any(writes_registers),
             marks_source: control.destroys_foreign_frames(),
             samples: self.samples,
@@ -106,16 +110,23 @@ impl Controller {
         self.core.irq
     }
 
+    /// A frame that did not walk came in at a port.
+    #[inline]
+    pub(crate) fn note_entry(&mut self, port: Port, number: u64, at: Instant) {
+        self.core.entered[port] = (number, at);
+    }
+
     // ---- sampling ----
 
     /// Whether sampling at `at` could change anything.
     #[inline]
     pub(crate) fn wants_sample(&self, at: Instant, signals: &Signals) -> bool {
-        match self.sampling.again {
+        let wanted = match self.sampling.again {
             SampleAgain::NextFrame => true,
             SampleAgain::From(from) => from <= at,
             SampleAgain::OnceSignalsChange => self.sampling.seen != signals.edition(),
-        }
+        };
+        wanted && !self.core.processor_stuck
     }
 
     /// A frame begins at `at`: the device behind samples its inputs.

@@ -11,7 +11,7 @@ use linesman_proto::register::{self as r, AlStatus, DlStatus, ErrorCounter, Erro
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::{Instant, Span};
 
-use super::clock::LocalClock;
+use super::clock::{LocalClock, SyncSignal};
 use super::core::Core;
 use super::direct::Sampling;
 use super::kind::ControllerKind;
@@ -19,7 +19,7 @@ use super::memory::at;
 use super::pdi::Pdi;
 use super::posted::{Happening, PortEvent};
 use super::sii::Outcome;
-use crate::device::{Firmware, Refusal, Signals};
+use crate::device::{Firmware, Refusal, Signals, Trouble};
 use crate::frame::WireFrame;
 use crate::hardware::Hardware;
 
@@ -66,6 +66,7 @@ enum Due {
     ProcessDataWatchdog,
     PdiWatchdog,
     Reset,
+    Sync,
     Firmware,
 }
 
@@ -192,6 +193,7 @@ impl Controller {
         consider(core.process_data_watchdog.expires(), Due::ProcessDataWatchdog);
         consider(core.pdi_watchdog.expires(), Due::PdiWatchdog);
         consider(core.reset_at, Due::Reset);
+        consider(core.sync.due(), Due::Sync);
         consider(core.firmware_at, Due::Firmware);
         first
     }
@@ -218,6 +220,7 @@ impl Controller {
                 self.firmware.stop(signals);
                 core.start(at);
             }
+            Due::Sync => self.serve_sync(at, signals),
             Due::Firmware => self.run_firmware(at, signals),
         }
     }
@@ -235,6 +238,7 @@ impl Controller {
             core.started = true;
             self.firmware.start(at, &mut Pdi { core, signals, now: at });
             self.samples = self.firmware.samples();
+            core.sync.heard = self.firmware.synchronises();
             core.call_firmware(at);
         }
     }
@@ -247,6 +251,20 @@ impl Controller {
         let mut pdi = Pdi { core: &mut self.core, signals, now: at };
         if let Some(wake) = self.firmware.run(at, &mut pdi) {
             self.core.call_firmware(wake.max(at + SHORTEST_NAP));
+        }
+    }
+
+    /// SYNC0, SYNC1 or both come, and the device hears them.
+    fn serve_sync(&mut self, at: Instant, signals: &mut Signals) {
+        let heard = self.core.serve_sync(at);
+        if self.core.processor_stuck {
+            return;
+        }
+        for (signal, _) in SyncSignal::ALL.into_iter().zip(heard).filter(|(_, heard)| *heard) {
+            let mut pdi = Pdi { core: &mut self.core, signals, now: at };
+            if let Some(wake) = self.firmware.sync(signal, at, &mut pdi) {
+                self.core.call_firmware(wake.max(at + SHORTEST_NAP));
+            }
         }
     }
 
@@ -310,7 +328,7 @@ impl Controller {
             return Verdict::Destroy;
         }
         self.advance(at, signals);
-        if self.samples {
+        if self.samples && !self.core.processor_stuck {
             self.sample(at, signals);
         }
         let verdict = self.core.process(at, frame);
@@ -330,6 +348,12 @@ impl Controller {
     #[must_use]
     pub fn hardware(&self) -> &Hardware {
         &self.core.hardware
+    }
+
+    /// The device behind it.
+    #[must_use]
+    pub fn firmware(&self) -> &dyn Firmware {
+        &*self.firmware
     }
 
     /// The device behind it: for faults that make it misbehave.
@@ -357,6 +381,36 @@ impl Controller {
     /// The device sends an emergency at `at`, or as soon as its mailbox works.
     pub fn report(&mut self, at: Instant, emergency: Emergency) {
         self.firmware.report(emergency);
+        self.core.call_firmware(at);
+        self.reschedule();
+    }
+
+    /// Somebody sets the time of the process data watchdog, 0x0420, at `at`. Gives the former one.
+    pub fn set_watchdog_time(&mut self, at: Instant, time: r::WatchdogTime) -> r::WatchdogTime {
+        let former = r::WatchdogTime(self.core.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA));
+        if self.powered {
+            self.core.memory.set_u16(&r::WATCHDOG_TIME_PROCESS_DATA, time.0);
+            self.core.retime_watchdogs(at);
+            self.reschedule();
+        }
+        former
+    }
+
+    /// The software of the device misbehaves from `at` on, or no longer.
+    pub fn trouble(&mut self, at: Instant, trouble: Trouble, begins: bool) {
+        self.firmware.trouble(trouble, begins);
+        self.core.call_firmware(at);
+        self.reschedule();
+    }
+
+    /// The processor of the device has crashed and runs again from `at` on, without a reset of the
+    /// controller.
+    pub fn reboot_processor(&mut self, at: Instant, signals: &mut Signals) {
+        if !self.powered || !self.core.started {
+            return;
+        }
+        self.core.set_processor_stuck(false, at);
+        self.firmware.reboot(at, &mut Pdi { core: &mut self.core, signals, now: at });
         self.core.call_firmware(at);
         self.reschedule();
     }
@@ -429,8 +483,32 @@ impl Controller {
         self.core.clock.local(at)
     }
 
-    /// Changes the speed of the local clock, without a jump.
-    pub fn set_drift(&mut self, at: Instant, ppb: i64) {
-        self.core.clock.change_speed(at, ppb);
+    /// Changes the speed of the local clock, without a jump: `ppb` parts per thousand million too
+    /// fast, and `ramp_ppb_per_s` more each second for as long as `ramp`.
+    pub fn set_drift(&mut self, at: Instant, ppb: i64, ramp_ppb_per_s: i64, ramp: Span) {
+        self.core.clock.change_speed(at, ppb, ramp_ppb_per_s, ramp);
+        self.replan_sync(at);
+    }
+
+    /// The local clock has the speed of its own quartz again.
+    pub fn restore_drift(&mut self, at: Instant) {
+        self.core.clock.restore_speed(at);
+        self.replan_sync(at);
+    }
+
+    /// The local clock starts anew at `at`, as after a dip of its supply that nothing else noticed.
+    pub fn restart_clock(&mut self, at: Instant) {
+        self.core.restart_clock(at);
+        self.replan_sync(at);
+    }
+
+    /// The line from the SYNC unit to the processor breaks, or is whole again.
+    pub fn cut_sync(&mut self, cut: bool) {
+        self.core.sync.cut = cut;
+    }
+
+    fn replan_sync(&mut self, at: Instant) {
+        self.core.plan_sync(at);
+        self.reschedule();
     }
 }

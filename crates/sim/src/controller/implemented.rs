@@ -62,17 +62,44 @@ const ALWAYS: &[Register] = &[
     r::USER_RAM,
 ];
 
-/// What the time loop control unit of distributed clocks has. The difference (0x092C) and what the
-/// loop makes of it (0x0932) are not computed, and so are not there; neither are the SYNC and latch
-/// units.
+/// What the time loop control unit of distributed clocks has.
 const TIME_LOOP: &[Register] = &[
     r::SYSTEM_TIME,
     r::RECEIVE_TIME_PROCESSING_UNIT,
     r::SYSTEM_TIME_OFFSET,
     r::SYSTEM_TIME_DELAY,
+    r::SYSTEM_TIME_DIFFERENCE,
     r::SPEED_COUNTER_START,
+    r::SPEED_COUNTER_DIFF,
     r::DIFFERENCE_FILTER_DEPTH,
     r::SPEED_FILTER_DEPTH,
+];
+
+/// What SYNC and latch unit share.
+const CYCLIC_UNITS: &[Register] = &[r::CYCLIC_UNIT_CONTROL];
+
+/// What the unit that makes SYNC0 and SYNC1 has.
+const SYNC_UNIT: &[Register] = &[
+    r::SYNC_ACTIVATION,
+    r::SYNC_PULSE_LENGTH,
+    r::SYNC0_STATUS,
+    r::SYNC1_STATUS,
+    r::START_TIME,
+    r::NEXT_SYNC1,
+    r::SYNC0_CYCLE_TIME,
+    r::SYNC1_CYCLE_TIME,
+];
+
+/// What the unit that takes the times of inputs has.
+const LATCH_UNIT: &[Register] = &[
+    r::LATCH0_CONTROL,
+    r::LATCH1_CONTROL,
+    r::LATCH0_STATUS,
+    r::LATCH1_STATUS,
+    r::LATCH0_POSITIVE,
+    r::LATCH0_NEGATIVE,
+    r::LATCH1_POSITIVE,
+    r::LATCH1_NEGATIVE,
 ];
 
 /// Where a write is a command, beside those that clear (whose access says so).
@@ -88,12 +115,57 @@ const LIVE: &[Register] = &[
 
 /// Where the moment decides whether a write is taken. The other registers marked `r/(w)` in the
 /// table depend on settings that this segment does not have.
-const CONDITIONAL: &[Register] =
-    &[r::AL_CONTROL, r::SII_CONTROL_STATUS, r::SII_ADDRESS, r::SII_DATA, r::SYNC_MANAGER];
+const CONDITIONAL: &[Register] = &[
+    r::AL_CONTROL,
+    r::SII_CONTROL_STATUS,
+    r::SII_ADDRESS,
+    r::SII_DATA,
+    r::SYNC_MANAGER,
+    r::SYNC_ACTIVATION,
+    r::START_TIME,
+    r::SYNC0_CYCLE_TIME,
+    r::SYNC1_CYCLE_TIME,
+    r::LATCH0_CONTROL,
+    r::LATCH1_CONTROL,
+];
 
-/// Fills in the rights of every register byte that `hardware` has. `time_loop` says whether the time
-/// loop control unit is on.
-pub(super) fn fill(hardware: &Hardware, time_loop: bool, rights: &mut [u8]) {
+/// Times of 64 bits, of which clocks of 32 bits have the low half.
+const LONG_TIMES: &[Register] = &[
+    r::SYSTEM_TIME,
+    r::RECEIVE_TIME_PROCESSING_UNIT,
+    r::SYSTEM_TIME_OFFSET,
+    r::START_TIME,
+    r::NEXT_SYNC1,
+    r::LATCH0_POSITIVE,
+    r::LATCH0_NEGATIVE,
+    r::LATCH1_POSITIVE,
+    r::LATCH1_NEGATIVE,
+];
+
+/// Which units of distributed clocks are on, beside the receive times.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub(super) struct ClockUnits {
+    pub(super) time_loop: bool,
+    pub(super) sync: bool,
+    pub(super) latch: bool,
+}
+
+impl ClockUnits {
+    /// By the configuration from the SII. ET1100 and ET1200 switch the time loop off to save power
+    /// when neither SYNC nor latch unit is wanted and A5 does not ask for it; receive times are there
+    /// all the same (S2 2.6.2, 2.6.3).
+    pub(super) fn configured(hardware: &Hardware, a0: u8, a5: u16) -> Self {
+        const SYNC_UNIT: u8 = 1 << 2;
+        const LATCH_UNIT: u8 = 1 << 3;
+        const TIME_LOOP_UNIT: u16 = 1 << 8;
+        let (sync, latch) = (a0 & SYNC_UNIT != 0, a0 & LATCH_UNIT != 0);
+        let wanted = sync || latch || a5 & TIME_LOOP_UNIT != 0;
+        Self { time_loop: wanted || !has_configuration_a5(hardware), sync, latch }
+    }
+}
+
+/// Fills in the rights of every register byte that `hardware` has.
+pub(super) fn fill(hardware: &Hardware, units: ClockUnits, rights: &mut [u8]) {
     for register in ALWAYS {
         add(register, hardware, rights);
     }
@@ -105,20 +177,25 @@ pub(super) fn fill(hardware: &Hardware, time_loop: bool, rights: &mut [u8]) {
     }
     if Features(hardware.features).distributed_clocks() {
         add(&r::RECEIVE_TIME, hardware, rights);
-        for register in TIME_LOOP.iter().filter(|_| time_loop) {
-            add(register, hardware, rights);
+        let parts = [
+            (units.time_loop, TIME_LOOP),
+            (units.sync || units.latch, CYCLIC_UNITS),
+            (units.sync, SYNC_UNIT),
+            (units.latch, LATCH_UNIT),
+        ];
+        for (_, registers) in parts.into_iter().filter(|(is_on, _)| *is_on) {
+            for register in registers {
+                add(register, hardware, rights);
+            }
+        }
+        let kind = ControllerType(hardware.controller_type);
+        if units.time_loop && kind == ControllerType::ET1200 {
+            add(&r::RECEIVE_TIME_LATCH_MODE, hardware, rights);
+        }
+        if units.sync && kind == ControllerType::IP_CORE {
+            add(&r::SYNC_ACTIVATION_STATUS, hardware, rights);
         }
     }
-}
-
-/// Whether the time loop control unit is on, by the configuration from the SII. ET1100 and ET1200
-/// switch it off to save power when neither SYNC nor latch unit is wanted and A5 does not ask for
-/// it; receive times are there all the same (S2 2.6.2, 2.6.3).
-pub(super) fn has_time_loop(hardware: &Hardware, a0: u8, a5: u16) -> bool {
-    const SYNC_OR_LATCH_UNIT: u8 = 0b1100;
-    const TIME_LOOP_UNIT: u16 = 1 << 8;
-    let wanted = a0 & SYNC_OR_LATCH_UNIT != 0 || a5 & TIME_LOOP_UNIT != 0;
-    wanted || !has_configuration_a5(hardware)
 }
 
 /// Whether SII word 5 goes to 0x0142.
@@ -168,9 +245,7 @@ fn has_member(register: &Register, index: u16, hardware: &Hardware) -> bool {
 
 /// Bytes of the register: clocks of 32 bits have the low half of long times only.
 fn width(register: &Register, hardware: &Hardware) -> u16 {
-    let long_time = [r::SYSTEM_TIME, r::RECEIVE_TIME_PROCESSING_UNIT, r::SYSTEM_TIME_OFFSET]
-        .iter()
-        .any(|other| other.address == register.address);
+    let long_time = LONG_TIMES.iter().any(|other| other.address == register.address);
     if long_time && !Features(hardware.features).clock_64_bit() { 4 } else { register.len }
 }
 
@@ -179,8 +254,11 @@ mod tests {
     use super::super::tests::rig;
     use super::*;
 
+    const ALL_UNITS: ClockUnits = ClockUnits { time_loop: true, sync: true, latch: true };
+    const LOOP: ClockUnits = ClockUnits { time_loop: true, sync: false, latch: false };
+
     fn right(hardware: &Hardware, address: usize) -> u8 {
-        Rights::of(hardware, true).byte(address)
+        Rights::of(hardware, ALL_UNITS).byte(address)
     }
 
     // proves: HW-29 partial
@@ -192,7 +270,13 @@ mod tests {
         assert_eq!(right(&full, 0x0300), Rights::READ | Rights::WRITE | Rights::LIVE);
         assert_eq!(right(&full, 0x000A), 0, "reserved");
         assert_eq!(right(&full, 0x0510), 0, "PHY management is not done");
-        assert_eq!(right(&full, 0x092C), 0, "the difference is not computed");
+        assert_eq!(right(&full, 0x092C), Rights::READ, "the difference cannot be written");
+        assert_eq!(right(&full, 0x0984), 0, "not in an ET1100");
+        assert_eq!(right(&full, 0x0936), 0, "an ET1200 has it");
+        for gone in [0x0980, 0x0981, 0x0990, 0x09AE] {
+            assert_ne!(right(&full, gone), 0, "0x{gone:04X}");
+            assert_eq!(Rights::of(&full, LOOP).byte(gone), 0, "0x{gone:04X}: its unit is off");
+        }
 
         let mut small = full.clone();
         small.counting.forwarded = false;
@@ -205,8 +289,16 @@ mod tests {
             assert_ne!(right(&full, gone), 0, "0x{gone:04X}");
             assert_eq!(right(&small, gone), 0, "0x{gone:04X}");
         }
-        assert_ne!(Rights::of(&full, false).byte(0x090C), 0, "receive times are always there");
-        assert_eq!(Rights::of(&full, false).byte(0x0910), 0, "the time loop is switched off");
+        assert_ne!(
+            Rights::of(&full, ClockUnits::default()).byte(0x090C),
+            0,
+            "receive times are always there"
+        );
+        assert_eq!(
+            Rights::of(&full, ClockUnits::default()).byte(0x0910),
+            0,
+            "the time loop is switched off"
+        );
         small.features = 0x0004;
         assert_ne!(right(&small, 0x0913), 0);
         assert_eq!(right(&small, 0x0914), 0, "a 32-bit clock");
@@ -215,7 +307,7 @@ mod tests {
 
     #[test]
     fn a_sync_manager_is_written_by_its_rules() {
-        let rights = Rights::of(&rig::hardware(), true);
+        let rights = Rights::of(&rig::hardware(), ALL_UNITS);
         let both = Rights::READ | Rights::WRITE;
         for offset in 0..5 {
             assert_eq!(rights.byte(0x0810 + offset), both | Rights::CONDITIONAL);

@@ -2,8 +2,9 @@
 //! registers. On a line of thousands it is there once.
 
 use std::ops::Deref;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
+use super::implemented::ClockUnits;
 use super::memory::Rights;
 use crate::hardware::Hardware;
 
@@ -14,21 +15,24 @@ pub struct ControllerKind(Arc<Inner>);
 #[derive(Debug)]
 struct Inner {
     hardware: Hardware,
-    /// Without and with the time loop.
-    rights: [Arc<Rights>; 2],
+    /// By the units of distributed clocks that are on.
+    rights: [OnceLock<Arc<Rights>>; 8],
 }
 
 impl ControllerKind {
-    /// The rights, while the time loop control unit is on or off.
-    pub(super) fn rights(&self, time_loop: bool) -> Arc<Rights> {
-        Arc::clone(&self.0.rights[usize::from(time_loop)])
+    /// The rights, while these units are on.
+    pub(super) fn rights(&self, units: ClockUnits) -> Arc<Rights> {
+        let ClockUnits { time_loop, sync, latch } = units;
+        let of_units =
+            [time_loop, sync, latch].into_iter().fold(0, |at, on| at << 1 | usize::from(on));
+        let rights = || Arc::new(Rights::of(&self.0.hardware, units));
+        Arc::clone(self.0.rights[of_units].get_or_init(rights))
     }
 }
 
 impl From<Hardware> for ControllerKind {
     fn from(hardware: Hardware) -> Self {
-        let rights = [false, true].map(|time_loop| Arc::new(Rights::of(&hardware, time_loop)));
-        Self(Arc::new(Inner { hardware, rights }))
+        Self(Arc::new(Inner { hardware, rights: Default::default() }))
     }
 }
 

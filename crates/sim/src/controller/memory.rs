@@ -8,7 +8,7 @@ use std::fmt;
 
 use linesman_proto::register::{PROCESS_RAM_START, Register};
 
-use super::implemented;
+use super::implemented::{self, ClockUnits};
 use crate::hardware::Hardware;
 
 /// Where process-data RAM begins.
@@ -179,9 +179,9 @@ impl Rights {
     /// What is written is not what it holds then: a write is a command.
     pub(super) const LIVE: u8 = 1 << 3;
 
-    pub(super) fn of(hardware: &Hardware, time_loop: bool) -> Self {
+    pub(super) fn of(hardware: &Hardware, units: ClockUnits) -> Self {
         let mut rights = [0; RAM];
-        implemented::fill(hardware, time_loop, &mut rights[..]);
+        implemented::fill(hardware, units, &mut rights[..]);
         Self(rights)
     }
 

@@ -30,7 +30,7 @@ mod sii;
 mod sync_manager;
 mod watchdog;
 
-pub use clock::LocalClock;
+pub use clock::{Edge, LatchInput, LocalClock, SyncSignal};
 pub(crate) use direct::Manner;
 pub use esc::{Controller, Verdict};
 pub use kind::{ControllerKind, ControllerKinds};

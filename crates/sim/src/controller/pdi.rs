@@ -9,6 +9,7 @@ use linesman_proto::register::{self as r, AlControl, AlEvents, AlStatus, SyncMan
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::Instant;
 
+use super::clock::{Edge, LatchInput, SyncSignal};
 use super::core::Core;
 use super::memory::RAM;
 use super::sync_manager;
@@ -245,6 +246,38 @@ impl Pdi<'_> {
     /// An access of the processor went wrong: 0x030D.
     pub fn count_pdi_error(&mut self) {
         self.core.increment(r::PDI_ERROR_COUNTER.address);
+    }
+
+    // ---- SYNC and latch unit ----
+
+    /// What the MainDevice switched on in 0x0981: bit 0 the unit, bits 1 and 2 SYNC0 and SYNC1.
+    #[must_use]
+    pub fn sync_activation(&self) -> u8 {
+        self.core.memory.u8(&r::SYNC_ACTIVATION)
+    }
+
+    /// The cycle of a signal: 0x09A0 or 0x09A4, in ns.
+    #[must_use]
+    pub fn sync_cycle(&self, signal: SyncSignal) -> u32 {
+        self.core.memory.u32(match signal {
+            SyncSignal::Sync0 => &r::SYNC0_CYCLE_TIME,
+            SyncSignal::Sync1 => &r::SYNC1_CYCLE_TIME,
+        })
+    }
+
+    /// Reads the status of a signal, which ends its pulse in acknowledge mode.
+    pub fn acknowledge_sync(&mut self, signal: SyncSignal) {
+        self.core.acknowledge_sync(signal);
+    }
+
+    /// An input of the latch unit has this level since `when`.
+    pub fn set_latch_input(&mut self, input: LatchInput, high: bool, when: Instant) {
+        self.core.set_latch_input(input, high, when);
+    }
+
+    /// Reads the system time of an edge, which takes its event if this side owns the input.
+    pub fn latch_time(&mut self, input: LatchInput, edge: Edge) -> u64 {
+        self.core.read_latch_time(input, edge)
     }
 
     // ---- time and signals ----

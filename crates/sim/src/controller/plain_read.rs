@@ -12,7 +12,7 @@ use super::core::Core;
 use super::memory::Rights;
 
 /// Where reading is without effect on what is read, and the bytes are what memory holds.
-const PLAIN: [Range<usize>; 8] = [
+const PLAIN: [Range<usize>; 7] = [
     0x0000..0x0160,
     0x0200..0x0230,
     0x0300..0x0320,
@@ -20,7 +20,6 @@ const PLAIN: [Range<usize>; 8] = [
     0x0500..0x0510,
     0x0600..0x0700,
     0x0800..0x0880,
-    0x0900..0x0910,
 ];
 
 /// A read without effect.

@@ -150,9 +150,7 @@ impl Core {
     /// The first bit of a frame comes in.
     pub(super) fn enters(&mut self, when: Instant, port: Port, frame: &WireFrame) {
         self.entered[port] = (frame.number, when);
-        if self.latched == Some(frame.number) && self.loops.is_open(port) {
-            self.latch_receive_time(port, when);
-        }
+        self.latch_entry(port, frame.number, when);
         if self.loops.waits_for_frame(port) && frame.damage.is_intact() {
             self.queue.push(when + frame.duration(), Happening::GoodFrame(port));
         }

@@ -349,6 +349,9 @@ impl Core {
         if passing.read_al_status {
             self.clear_ecat_events(EcatEvents::AL_STATUS);
         }
+        if passing.read_latches != 0 {
+            self.end_latch_reads(passing.read_latches);
+        }
         if !self.shadow.is_empty() {
             self.commit(end);
         }

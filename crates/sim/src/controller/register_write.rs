@@ -31,6 +31,7 @@ impl Core {
         let range = write.address..write.address + write.len;
         let loops_before = DlControl(self.memory.u32(&r::DL_CONTROL));
         let managers = self.written_sync_managers(&range);
+        let clock_before = self.before_clock_write(&range);
         self.store(&range, data);
         // By pages, since nearly every write concerns one register.
         for page in range.start >> 8..=(range.end - 1) >> 8 {
@@ -43,7 +44,7 @@ impl Core {
                 0x05 => self.sii_written(&range, data, end),
                 0x06 => self.configure_fmmus(),
                 0x08 => self.sync_managers_written(managers.clone(), end),
-                0x09 => self.clock_written(&range, write.latches),
+                0x09 => self.clock_written(&range, data, clock_before, write.latches, end),
                 0x0F => self.call_firmware(end),
                 _ => {}
             }
@@ -147,12 +148,6 @@ impl Core {
             if activate != managers.activate[index] {
                 self.raise_al_events(AlEvents::SYNC_MANAGER_ACTIVATION, end);
             }
-        }
-    }
-
-    fn clock_written(&mut self, range: &Range<usize>, latches: bool) {
-        if latches && range.contains(&at(&r::RECEIVE_TIME)) {
-            self.latch_receive_times();
         }
     }
 }

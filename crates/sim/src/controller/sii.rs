@@ -254,6 +254,7 @@ impl Sii {
         memory.set_u8(&r::ESC_CONFIGURATION_A0, area[1] & !kept | before & kept);
         memory.set_u8(&r::PDI_CONFIGURATION, area[2]);
         memory.set_u8(&r::SYNC_LATCH_CONFIGURATION, area[3]);
+        memory.set_u16(&r::SYNC_PULSE_LENGTH, u16::from_le_bytes([area[4], area[5]]));
         memory.set_u16(&r::PDI_CONFIGURATION_EXTENDED, u16::from_le_bytes([area[6], area[7]]));
         if !self.loaded_once {
             memory.set_u16(&r::STATION_ALIAS, u16::from_le_bytes([area[8], area[9]]));

@@ -16,6 +16,8 @@ pub struct Refusal {
     pub transition_to: AlState,
     /// The AL status code it shows instead.
     pub code: AlStatusCode,
+    /// How many requests it refuses before it takes one; `None` for all.
+    pub times: Option<u32>,
 }
 
 /// The application layer of a SubDevice: what stands in AL status and why.
@@ -23,6 +25,8 @@ pub struct Refusal {
 pub struct ApplicationLayer {
     boots: bool,
     refusal: Option<Refusal>,
+    /// What it answers who asks for its identification; `None` when it does not know how.
+    identification: Option<u16>,
 }
 
 impl ApplicationLayer {
@@ -37,10 +41,15 @@ impl ApplicationLayer {
         self.refusal = refusal;
     }
 
-    /// Whether it refuses a step.
+    /// Whether it was told to refuse a step.
     #[must_use]
     pub fn refuses(&self) -> bool {
         self.refusal.is_some()
+    }
+
+    /// From now on it tells this number to who asks for its identification through AL control.
+    pub fn identify(&mut self, identification: u16) {
+        self.identification = Some(identification);
     }
 
     /// The state it is in. A register that holds no state counts as INIT: only a controller with
@@ -53,7 +62,7 @@ impl ApplicationLayer {
     /// Takes a new request, if there is one, and answers what needs no check. Returns the state to
     /// enter when the checks of the device pass; [`ApplicationLayer::enter`] or
     /// [`ApplicationLayer::fail`] ends the step.
-    pub fn take_request(&self, pdi: &mut Pdi<'_>) -> Option<AlState> {
+    pub fn take_request(&mut self, pdi: &mut Pdi<'_>) -> Option<AlState> {
         let control = pdi.take_al_control_event()?;
         let (status, current) = (pdi.al_status(), Self::state(pdi));
         let Response::Act { clears_error, answer } = respond(current, status, control, self.boots)
@@ -71,21 +80,27 @@ impl ApplicationLayer {
                 return None;
             }
         };
-        if let Some(refusal) = self.refusal
+        if let Some(refusal) = &mut self.refusal
             && refusal.transition_to == requested
-            && requested != current
+            && requested > current
+            && refusal.times != Some(0)
         {
-            Self::fail(pdi, current, refusal.code);
+            refusal.times = refusal.times.map(|times| times - 1);
+            let code = refusal.code;
+            Self::fail(pdi, current, code);
             return None;
         }
         Some(requested)
     }
 
-    /// It is in `state`, without error. No device here has an identification to show, so bit 5 of AL
-    /// control stays unanswered.
-    pub fn enter(pdi: &mut Pdi<'_>, state: AlState) {
-        pdi.set_al_code(AlStatusCode::NO_ERROR);
-        pdi.set_al_status(AlStatus::new(state));
+    /// It is in `state`, without error. While AL control asks for the identification (bit 5), that
+    /// stands in place of the status code, and bit 5 of AL status says so.
+    pub fn enter(&self, pdi: &mut Pdi<'_>, state: AlState) {
+        let asked = pdi.al_control().requests_identification();
+        let identification = self.identification.filter(|_| asked);
+        pdi.set_al_code(identification.map_or(AlStatusCode::NO_ERROR, AlStatusCode));
+        let loaded = identification.is_some();
+        pdi.set_al_status(AlStatus::new(state).with_identification_loaded(loaded));
     }
 
     /// It stays in `state`, or falls back to it, because of an error.
@@ -95,9 +110,9 @@ impl ApplicationLayer {
     }
 
     /// Answers all requests of a device that checks nothing.
-    pub fn serve_unchecked(&self, pdi: &mut Pdi<'_>) {
+    pub fn serve_unchecked(&mut self, pdi: &mut Pdi<'_>) {
         if let Some(state) = self.take_request(pdi) {
-            Self::enter(pdi, state);
+            self.enter(pdi, state);
         }
     }
 

@@ -128,6 +128,13 @@ impl Firmware for Emulated {
         if guards.any(buffered) { SampleAgain::NextFrame } else { SampleAgain::OnceSignalsChange }
     }
 
+    fn identify(&mut self, id: u16, signals: &mut Signals) -> bool {
+        for word in &self.words {
+            signals.set(word.signal, i32::from(id));
+        }
+        !self.words.is_empty()
+    }
+
     fn stop(&mut self, signals: &mut Signals) {
         for signal in self.outputs.iter().flat_map(|area| &area.signals) {
             signals.set(*signal, 0);
@@ -268,8 +275,11 @@ mod tests {
     fn told_to_refuse_a_step_it_answers_as_a_device_with_a_processor() {
         let mut bench = bench(vec![area(0, 0x0F00, 0, 8)], vec![]);
         bench.write(0x0120, &[2, 0]);
-        let refusal =
-            Refusal { transition_to: AlState::SafeOp, code: AlStatusCode::INVALID_SYNC_MANAGER };
+        let refusal = Refusal {
+            transition_to: AlState::SafeOp,
+            code: AlStatusCode::INVALID_SYNC_MANAGER,
+            times: None,
+        };
         bench.controller.refuse(bench.now, Some(refusal));
         bench.write(0x0120, &[4, 0]);
         assert_eq!((bench.word(0x0130), bench.word(0x0134)), (0x12, 0x0017));

@@ -10,7 +10,8 @@ use linesman_proto::time::Instant;
 
 use super::application_layer::Refusal;
 use super::signal::Signals;
-use crate::controller::Pdi;
+use super::trouble::Trouble;
+use crate::controller::{Pdi, SyncSignal};
 
 /// When inputs are to be sampled again.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,6 +56,18 @@ pub trait Firmware: Debug + Send {
         SampleAgain::NextFrame
     }
 
+    /// Whether [`Firmware::sync`] is wanted. Asked once, after [`Firmware::start`].
+    fn synchronises(&self) -> bool {
+        false
+    }
+
+    /// A pulse of the SYNC unit reaches the processor. Returns the next wake-up as
+    /// [`Firmware::run`] does, but one that was asked for before stays. In acknowledge mode (0x0982
+    /// is 0) the next pulse comes only after [`Pdi::acknowledge_sync`].
+    fn sync(&mut self, _signal: SyncSignal, _now: Instant, _pdi: &mut Pdi<'_>) -> Option<Instant> {
+        None
+    }
+
     /// From now on a step into the state that `refusal` names is refused with its code; `None` ends
     /// that. It outlives a restart. Faults go through
     /// [`Controller::refuse`](crate::controller::Controller::refuse), which also makes a controller
@@ -65,6 +78,30 @@ pub trait Firmware: Debug + Send {
     /// a mailbox cannot. Faults go through
     /// [`Controller::report`](crate::controller::Controller::report).
     fn report(&mut self, _emergency: Emergency) {}
+
+    /// Whether a processor with software is behind the controller, which can fail.
+    fn has_processor(&self) -> bool {
+        false
+    }
+
+    /// Whether that software has a mailbox.
+    fn has_mailbox(&self) -> bool {
+        false
+    }
+
+    /// Its software misbehaves from now on, or no longer. It outlives a restart. Faults go through
+    /// [`Controller::trouble`](crate::controller::Controller::trouble).
+    fn trouble(&mut self, _trouble: Trouble, _begins: bool) {}
+
+    /// The processor crashed and has started anew, without its controller: registers stay, what the
+    /// software knew is forgotten.
+    fn reboot(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// The value of its identification, as somebody sets it at its switches. False when it has no
+    /// way of its own to tell it; then it goes into the station alias.
+    fn identify(&mut self, _id: u16, _signals: &mut Signals) -> bool {
+        false
+    }
 
     /// The supply is gone: outputs are no longer driven. Nothing else can be done any more.
     fn stop(&mut self, _signals: &mut Signals) {}

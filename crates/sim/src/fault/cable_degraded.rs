@@ -3,7 +3,7 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::{Envelope, Shower, frame_hits};
+use super::source::{Envelope, HITS, Shower, frame_hits};
 use super::{Kind, Parameter, PlaceRule, Shape};
 
 pub(super) const KIND: Kind = Kind {
@@ -20,11 +20,7 @@ pub(super) const KIND: Kind = Kind {
             meaning: "Period of the movement, in ms; 0 for a cable at rest: errors come evenly.",
             shape: Shape::Number { low: 0.0, high: 3.6e6, default: Some(800.0) },
         },
-        Parameter {
-            key: "hits",
-            meaning: "Exactly so many frames are hit, evenly over time and even if that takes longer than `to_ms`, instead of `hits_per_s`.",
-            shape: Shape::Whole { low: 1, high: 1_000_000, default: None },
-        },
+        HITS,
     ],
     start: |start| {
         let interval = start.interval();

@@ -6,7 +6,7 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
-use super::source::{flip, frame_hits};
+use super::source::{HITS, flip, frame_hits};
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
 use crate::wire::{Change, Line, Source};
@@ -30,11 +30,7 @@ pub(super) const KIND: Kind = Kind {
             meaning: "Duration of a burst, in ms.",
             shape: Shape::Number { low: 0.001, high: 1_000.0, default: Some(5.0) },
         },
-        Parameter {
-            key: "hits",
-            meaning: "Exactly so many frames are hit, evenly over time and even if that takes longer than `to_ms`, instead of `hits_per_s`.",
-            shape: Shape::Whole { low: 1, high: 1_000_000, default: None },
-        },
+        HITS,
     ],
     start: |start| {
         let interval = start.interval();

@@ -85,7 +85,8 @@ impl FaultError {
     pub(super) fn unknown_key(label: &str, kind: &Kind, key: &str) -> Self {
         let keys =
             || kind.place.keys().iter().copied().chain(kind.parameters.iter().map(|p| p.key));
-        let common = ["from_ms", "to_ms"];
+        let common =
+            ["from_ms", "to_ms", "at_ms", "every_ms", "random", "for_ms", "times", "burst"];
         let near = nearest(key, keys().chain(common));
         let allowed = keys().chain(common).collect::<Vec<_>>().join(", ");
         let (entry, key) = (label.to_owned(), key.to_owned());

@@ -1,4 +1,4 @@
-//! `init-refused`: a device refuses a change of state and gives a status code.
+//! `init-refused`: a device refuses a step up and gives a status code, again and again or a few times.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::state::{AlState, AlStatusCode};
@@ -14,23 +14,26 @@ pub(super) const KIND: Kind = Kind {
     parameters: &[
         Parameter {
             key: "to",
-            meaning: "The state that it does not go to.",
-            shape: Shape::Word { words: &["SAFEOP", "PREOP", "OP"] },
+            meaning: "The state that it does not go up to; down it goes to any.",
+            shape: Shape::Word { words: &["SAFEOP", "PREOP", "OP", "BOOT"] },
         },
         Parameter {
             key: "code",
             meaning: "The AL status code that it gives.",
             shape: Shape::Whole { low: 1, high: 0xFFFF, default: Some(0x001E) },
         },
+        Parameter {
+            key: "times",
+            meaning: "How many requests it refuses before it takes one; 0 for all.",
+            shape: Shape::Whole { low: 0, high: 1_000_000, default: Some(0) },
+        },
     ],
     start: |start| {
-        let transition_to = match start.values.text("to") {
-            Some("PREOP") => AlState::PreOp,
-            Some("OP") => AlState::Op,
-            Some(_) | None => AlState::SafeOp,
-        };
+        let to = start.values.text("to").and_then(AlState::from_name);
+        let transition_to = to.unwrap_or(AlState::SafeOp);
         let code = AlStatusCode(start.values.whole("code").unwrap_or(0x001E) as u16);
-        let refusal = Some(Refusal { transition_to, code });
+        let times = start.values.whole("times").filter(|times| *times > 0);
+        let refusal = Some(Refusal { transition_to, code, times });
         let from = start.from;
         // Of a device with several controllers it is the first.
         let node = start.target.nodes.into_iter().take(1);

@@ -9,6 +9,7 @@ mod error;
 mod parameter;
 mod place;
 mod running;
+mod schedule;
 mod source;
 
 mod brown_out;
@@ -18,13 +19,19 @@ mod device_missing;
 mod device_off;
 mod device_wrong;
 mod emc_noise;
+mod emergency;
+mod firmware_fault;
 mod init_refused;
 mod link_flapping;
 mod link_open;
+mod mailbox_error;
+mod mailbox_slow;
+mod mailbox_stuck;
 mod nic_damaged;
 mod receiver_damaged;
 mod supply_off;
 mod transmitter_damaged;
+mod watchdog_starved;
 
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
@@ -38,12 +45,14 @@ pub(crate) use running::{Running, Step};
 pub(crate) use device_missing::missing_device;
 pub(crate) use device_wrong::{Replacement, replacement};
 
-use crate::seed::Stream;
+use crate::seed::{Seed, Stream};
 use crate::segment_file::FaultEntry;
-use crate::truth::Place;
+use crate::truth::{FaultId, Place};
 use crate::wire::Source;
 use parameter::Values;
-use place::Target;
+pub(crate) use place::Target;
+use schedule::Window;
+pub(crate) use schedule::Windows;
 
 /// A kind of fault.
 #[derive(Debug)]
@@ -73,6 +82,12 @@ pub const KINDS: &[Kind] = &[
     device_missing::KIND,
     init_refused::KIND,
     nic_damaged::KIND,
+    mailbox_error::KIND,
+    mailbox_slow::KIND,
+    mailbox_stuck::KIND,
+    emergency::KIND,
+    firmware_fault::KIND,
+    watchdog_starved::KIND,
 ];
 
 /// The kind with a name, if a segment can have it.
@@ -115,49 +130,80 @@ impl Start<'_> {
     }
 }
 
+/// What a fault is made from, each time that it comes.
+#[derive(Debug)]
+pub(crate) struct Plot {
+    label: String,
+    kind: &'static Kind,
+    target: Target,
+    values: Values,
+    seed: Seed,
+    /// Name of its streams of chance.
+    stream: String,
+}
+
+impl Plot {
+    /// Its changes when it comes for the `nth` time, from 0.
+    fn source(&self, nth: u32, window: Window) -> Result<Box<dyn Source>, FaultError> {
+        let stream = match nth {
+            0 => self.seed.stream(&self.stream),
+            nth => self.seed.stream(&format!("{} time {nth}", self.stream)),
+        };
+        (self.kind.start)(Start {
+            label: &self.label,
+            name: self.kind.name,
+            from: window.from,
+            to: window.to,
+            target: self.target.clone(),
+            values: self.values.clone(),
+            stream,
+        })
+    }
+}
+
 /// A fault that is ready to run.
 pub(crate) struct Planned {
     pub(crate) name: FaultName,
     pub(crate) places: Vec<Place>,
-    pub(crate) from: Instant,
-    pub(crate) to: Option<Instant>,
-    pub(crate) source: Box<dyn Source>,
+    plot: Plot,
+    windows: Windows,
+    source: Box<dyn Source>,
 }
 
-/// Works out what an entry means here. It begins at its own time, but not before `earliest`.
+impl Planned {
+    /// Lets it run.
+    pub(crate) fn run(self, id: FaultId) -> Running {
+        Running::new(id, Some(self.plot), self.windows, self.source)
+    }
+}
+
+/// Works out what an entry means here. It begins at its own time, but not before `earliest`; its
+/// chance is that of `seed` under the name `stream`.
 pub(crate) fn plan(
     label: &str,
     entry: &FaultEntry,
     scene: &Scene<'_>,
     earliest: Instant,
-    stream: Stream,
+    seed: Seed,
+    stream: &str,
 ) -> Result<Planned, FaultError> {
     let kind = known_kind(label, entry)?;
     let target = place::resolve(label, kind, entry, scene)?;
-    let values = parameter::read(label, kind, &entry.parameters)?;
-    let at = |ms: f64| Instant::from_nanos((ms * 1e6) as u64);
-    for (key, value) in [("from_ms", entry.from_ms), ("to_ms", entry.to_ms)] {
-        if value.is_some_and(|ms| !(0.0..=1e12).contains(&ms)) {
-            let given = value.map_or(String::new(), |ms| ms.to_string());
-            let allowed = "0 and more".to_owned();
-            let (entry, key) = (label.to_owned(), key.to_owned());
-            return Err(FaultError::Value { entry, key, given, allowed });
-        }
-    }
-    let from = entry.from_ms.map_or(earliest, at).max(earliest);
-    let to = entry.to_ms.map(at);
-    if let Some(to) = to
-        && to <= from
+    let (mut schedule, mut parameters) = (entry.schedule.clone(), entry.parameters.clone());
+    // What a kind takes itself is its own.
+    if kind.parameters.iter().any(|parameter| parameter.key == "every_ms")
+        && let Some(every) = schedule.every_ms.take()
     {
-        let (entry, key) = (label.to_owned(), "to_ms".to_owned());
-        let given = format!("{} ms", to.as_nanos() / 1_000_000);
-        let allowed = format!("later than its begin, {} ms", from.as_nanos() / 1_000_000);
-        return Err(FaultError::Value { entry, key, given, allowed });
+        parameters.insert("every_ms".to_owned(), every.into());
     }
-    let places = target.places.clone();
-    let name = kind.name;
-    let source = (kind.start)(Start { label, name, from, to, target, values, stream })?;
-    Ok(Planned { name, places, from, to, source })
+    let values = parameter::read(label, kind, &parameters)?;
+    let times = seed.stream(&format!("{stream} times"));
+    let windows = schedule::windows(label, entry, &schedule, earliest, times)?;
+    let (places, name) = (target.places.clone(), kind.name);
+    let (label, stream) = (label.to_owned(), stream.to_owned());
+    let plot = Plot { label, kind, target, values, seed, stream };
+    let source = plot.source(0, windows.first())?;
+    Ok(Planned { name, places, plot, windows, source })
 }
 
 fn known_kind(label: &str, entry: &FaultEntry) -> Result<&'static Kind, FaultError> {

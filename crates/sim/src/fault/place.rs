@@ -30,6 +30,12 @@ pub enum PlaceRule {
     /// `device` or `devices`: what feeds one device or several, and with a coupler the terminals
     /// that it feeds over the E-bus.
     Devices,
+    /// `device`: one device with a processor.
+    Processor,
+    /// `device`: one device with a mailbox.
+    Mailbox,
+    /// `device`: one device; or `at`: a card of the MainDevice, `maindevice` unless said.
+    DeviceOrCard,
     /// `at`: a card of the MainDevice, `maindevice` unless said.
     Card,
 }
@@ -40,7 +46,8 @@ impl PlaceRule {
     pub const fn keys(self) -> &'static [&'static str] {
         match self {
             Self::Link | Self::Lines | Self::ManyLines | Self::Line | Self::Card => &["at"],
-            Self::Device => &["device"],
+            Self::Device | Self::Processor | Self::Mailbox => &["device"],
+            Self::DeviceOrCard => &["device", "at"],
             Self::Devices => &["device", "devices"],
         }
     }
@@ -56,6 +63,9 @@ impl PlaceRule {
             }
             Self::Line => "`at = \"K1.C>B3.A\"`, one direction of a link",
             Self::Device => "`device = \"B3\"`, a device",
+            Self::Processor => "`device = \"B3\"`, a device with a processor",
+            Self::Mailbox => "`device = \"B3\"`, a device with a mailbox",
+            Self::DeviceOrCard => "`device = \"B3\"`, a device, or `at = \"maindevice\"`, a card",
             Self::Devices => "`device = \"B3\"` or `devices = [\"B3\", \"B4\"]`",
             Self::Card => "`at = \"maindevice\"` or `\"maindevice.B\"`, a card",
         }
@@ -95,12 +105,14 @@ impl Scene<'_> {
 
 /// A place, found.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
-pub(super) struct Target {
+pub(crate) struct Target {
     /// For the truth log.
     pub(super) places: Vec<Place>,
     pub(super) lines: Vec<Line>,
     pub(super) links: Vec<usize>,
     pub(super) nodes: Vec<usize>,
+    /// Cards of the MainDevice.
+    pub(super) cards: Vec<Path>,
 }
 
 /// What is written in `at`.
@@ -123,7 +135,9 @@ pub(super) fn resolve(
     finder.refuse_other_keys(entry)?;
     match kind.place {
         PlaceRule::Device | PlaceRule::Devices => finder.devices(entry),
-        PlaceRule::Card => finder.card(entry),
+        PlaceRule::Processor | PlaceRule::Mailbox => finder.software(entry),
+        PlaceRule::DeviceOrCard if entry.device.is_some() => finder.devices(entry),
+        PlaceRule::Card | PlaceRule::DeviceOrCard => finder.card(entry),
         PlaceRule::Link | PlaceRule::Lines | PlaceRule::ManyLines | PlaceRule::Line => {
             finder.lines(entry)
         }
@@ -190,6 +204,22 @@ impl Finder<'_> {
         Ok(target)
     }
 
+    /// Devices whose software can misbehave. Of one with several controllers those with software.
+    fn software(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
+        let mut target = self.devices(entry)?;
+        let needs_mailbox = self.kind.place == PlaceRule::Mailbox;
+        target.nodes.retain(|node| {
+            let firmware = self.scene.world.nodes[*node].controller.firmware();
+            if needs_mailbox { firmware.has_mailbox() } else { firmware.has_processor() }
+        });
+        if target.nodes.is_empty() {
+            let name = entry.device.as_deref().unwrap_or_default();
+            let what = if needs_mailbox { "mailbox" } else { "processor" };
+            return Err(self.error(format!("`{name}` has no {what}")));
+        }
+        Ok(target)
+    }
+
     fn no_device(&self, name: &str) -> String {
         let near = nearest(name, self.scene.names.iter().map(String::as_str));
         let near = near.map_or(String::new(), |near| format!(" (did you mean `{near}`?)"));
@@ -213,6 +243,7 @@ impl Finder<'_> {
         Ok(Target {
             places: vec![Place::Host(path)],
             lines: self.lines_at_card(link, path),
+            cards: vec![path],
             links: vec![link],
             nodes: Vec::new(),
         })
@@ -282,7 +313,9 @@ impl Finder<'_> {
             }
         }
         match self.end(at) {
-            Some(End::MainDevice(path)) if self.kind.place == PlaceRule::Card => {
+            Some(End::MainDevice(path))
+                if matches!(self.kind.place, PlaceRule::Card | PlaceRule::DeviceOrCard) =>
+            {
                 Ok(Written::Card(path))
             }
             Some(end) => match self.scene.tree.link_at(end) {

@@ -4,8 +4,37 @@ use std::collections::VecDeque;
 
 use linesman_proto::time::{Instant, Span};
 
+use super::{Parameter, Shape, Start};
 use crate::seed::Stream;
 use crate::wire::{Change, Line, Source};
+
+/// For kinds that destroy symbols: an exact number of spoiled frames instead of a rate.
+pub(super) const HITS: Parameter = Parameter {
+    key: "hits",
+    meaning: "Exactly so many frames are hit, evenly over time and even if that takes longer than `to_ms`, instead of `hits_per_s`.",
+    shape: Shape::Whole { low: 1, high: 1_000_000, default: None },
+};
+
+/// What a damaged output or input stage of a port takes.
+pub(super) const PORT_CIRCUIT: &[Parameter] = &[
+    Parameter {
+        key: "hits_per_s",
+        meaning: "Mean number of destroyed symbols a second.",
+        shape: Shape::Number { low: 0.0, high: 1e6, default: Some(100.0) },
+    },
+    HITS,
+];
+
+/// Damage that always acts, whatever is moved or switched: `hits` spoiled frames if so many were
+/// asked for, else `hits_per_s` destroyed symbols.
+pub(super) fn steady(start: &Start<'_>, lines: Vec<Line>) -> Box<dyn Source> {
+    let mut stream = start.stream.clone();
+    if let Some(count) = start.values.whole(HITS.key) {
+        return frame_hits(count, start.interval(), &lines, &mut stream);
+    }
+    let rate = start.number("hits_per_s");
+    Box::new(Shower::new(lines, rate, Envelope::Constant, start.from, stream))
+}
 
 /// A few changes that are known from the start.
 #[derive(Clone, Default, Debug)]

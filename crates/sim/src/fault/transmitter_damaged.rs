@@ -6,32 +6,15 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::{Envelope, Shower, frame_hits};
-use super::{Kind, Parameter, PlaceRule, Shape};
+use super::source::{PORT_CIRCUIT, steady};
+use super::{Kind, PlaceRule};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::TransmitterDamaged,
     place: PlaceRule::Line,
-    parameters: &[
-        Parameter {
-            key: "hits_per_s",
-            meaning: "Mean number of destroyed symbols a second.",
-            shape: Shape::Number { low: 0.0, high: 1e6, default: Some(100.0) },
-        },
-        Parameter {
-            key: "hits",
-            meaning: "Exactly so many frames are hit, evenly over time and even if that takes longer than `to_ms`, instead of `hits_per_s`.",
-            shape: Shape::Whole { low: 1, high: 1_000_000, default: None },
-        },
-    ],
+    parameters: PORT_CIRCUIT,
     start: |start| {
-        let interval = start.interval();
-        let mut stream = start.stream.clone();
-        if let Some(count) = start.values.whole("hits") {
-            return Ok(frame_hits(count, interval, &start.target.lines, &mut stream));
-        }
-        let rate = start.number("hits_per_s");
-        let lines = start.target.lines;
-        Ok(Box::new(Shower::new(lines, rate, Envelope::Constant, start.from, stream)))
+        let lines = start.target.lines.clone();
+        Ok(steady(&start, lines))
     },
 };

@@ -8,18 +8,18 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::sii::word;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
 use super::arrivals::Arrivals;
 use super::{DeviceInfo, Segment};
 use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
-use crate::device::library::{self, Built, UnknownType};
+use crate::device::library::Built;
 use crate::fault::{self, FaultError};
 use crate::hardware::PortKind;
 use crate::seed::Seed;
-use crate::segment_file::{self, Planned, SegmentFile, SegmentFileError};
+use crate::segment_file::{self, Planned, SegmentFile, SegmentFileError, TypeError};
 use crate::truth::Effect;
 use crate::wire::world::World;
 
@@ -40,8 +40,8 @@ pub enum BuildError {
     Replacement {
         /// Which fault.
         entry: String,
-        /// What the library says.
-        source: UnknownType,
+        /// Why not.
+        source: Box<TypeError>,
     },
     /// The type that is to sit in another's place does not fit there.
     #[error("{entry}: a {type_name} does not fit in the place of `{device}`: {why}")]
@@ -75,7 +75,7 @@ pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
     for (index, entry) in file.faults.iter().enumerate() {
         let label = label(index);
         if let Some(replacement) = fault::replacement(&label, entry)? {
-            replace(&label, &mut placed, &replacement)?;
+            replace(&label, file, &mut placed, &replacement)?;
         }
         if let Some(device) = fault::missing_device(entry) {
             remove(&mut placed, device, &mut ring);
@@ -105,7 +105,8 @@ fn assemble(
     let mut devices = Vec::with_capacity(placed.len());
     let mut made = Vec::with_capacity(placed.len());
     for one in &placed {
-        let mut built = build_one(one, &mut signals)?;
+        // What is planned has as many parts as its type.
+        let Some(mut built) = build_one(one, &mut signals) else { continue };
         if let Some(revision) = one.revision {
             set_revision(&mut built.sii, revision);
         }
@@ -130,9 +131,7 @@ fn assemble(
     let world = World::new(&tree, made, &cable_m, signals);
     let nodes: BTreeMap<DeviceId, usize> =
         placed.iter().enumerate().map(|(node, one)| (one.id, node)).collect();
-    let current = |one: &Placed| {
-        library::find(&one.planned.type_name).map_or(0, library::LibraryType::ebus_current_ma)
-    };
+    let current = |one: &Placed| one.planned.kind.ebus_current_ma();
     let mut segment = Segment {
         ebus_ma: placed.iter().map(current).collect(),
         name: file.name.clone(),
@@ -145,6 +144,7 @@ fn assemble(
         now: Instant::ZERO,
         arrivals: Arrivals::default(),
         spare: Vec::new(),
+        tally: super::FrameTally::default(),
     };
     if file.old_counters {
         age(&mut segment);
@@ -185,22 +185,26 @@ fn schedule(
     Ok(())
 }
 
-fn build_one(one: &Placed, signals: &mut Signals) -> Result<Built, BuildError> {
-    let Planned { name, type_name, serial, part, .. } = &one.planned;
-    let unknown = |source: UnknownType| {
-        BuildError::File(SegmentFileError::Type { device: name.clone(), source })
-    };
-    let built = library::build(type_name, *serial, signals).map_err(unknown)?;
-    let found = built.into_iter().nth(*part);
-    found.ok_or_else(|| unknown(UnknownType { name: type_name.clone() }))
+fn build_one(one: &Placed, signals: &mut Signals) -> Option<Built> {
+    let Planned { kind, serial, part, .. } = &one.planned;
+    kind.build(*serial, signals).into_iter().nth(*part)
 }
 
-/// A quartz that is a little off, and has run for some time.
+/// A quartz that is a little off, warms up, and has run for some time.
 fn clock(file: &SegmentFile, planned: &Planned, seed: Seed) -> LocalClock {
     let mut stream = seed.stream(&format!("clock {}", planned.name));
     let start = stream.below(1_000_000_000_000);
     let ppm = stream.fraction() * 50.0 - 25.0;
-    LocalClock::with_ppm(start, file.devices[planned.device].clock_ppm.unwrap_or(ppm))
+    let device = &file.devices[planned.device];
+    let mut clock = LocalClock::with_ppm(start, device.clock_ppm.unwrap_or(ppm));
+    clock.ramp_ppb_per_s = (stream.fraction() * 40.0 - 20.0).round() as i64;
+    clock.ramp = Span::s(stream.between(60, 300));
+    clock.jitter_ns = stream.between(0, 6) as u16;
+    clock.seed = stream.number();
+    if let Some(said) = &device.clock {
+        said.apply(&mut clock);
+    }
+    clock
 }
 
 fn set_revision(sii: &mut [u8], revision: u32) {
@@ -234,6 +238,7 @@ fn age(segment: &mut Segment) {
 /// Puts another device in a place.
 fn replace(
     label: &str,
+    file: &SegmentFile,
     placed: &mut [Placed],
     replacement: &fault::Replacement,
 ) -> Result<(), BuildError> {
@@ -243,21 +248,23 @@ fn replace(
     };
     placed[index].revision = replacement.revision;
     let Some(type_name) = &replacement.type_name else { return Ok(()) };
-    let Some(found) = library::find(type_name) else {
-        let source = UnknownType { name: type_name.clone() };
-        return Err(BuildError::Replacement { entry: label.to_owned(), source });
-    };
+    let kind = file.kind(type_name).map_err(|source| BuildError::Replacement {
+        entry: label.to_owned(),
+        source: Box::new(source),
+    })?;
     let misfit = |why: String| BuildError::Misfit {
         entry: label.to_owned(),
         device: replacement.device.clone(),
-        type_name: found.name().to_owned(),
+        type_name: kind.name().to_owned(),
         why,
     };
     let parts = placed.iter().filter(|one| one.planned.is_of(&placed[index].planned)).count();
-    let Some(ports) = found.ports().next().filter(|_| parts == 1 && found.ports().count() == 1)
-    else {
+    let [ports] = kind.ports()[..] else {
         return Err(misfit("devices with several controllers cannot be exchanged".to_owned()));
     };
+    if parts != 1 {
+        return Err(misfit("devices with several controllers cannot be exchanged".to_owned()));
+    }
     let used = used_ports(placed, index);
     for port in used {
         let (was, is) = (placed[index].planned.ports[port], ports[port]);
@@ -266,7 +273,7 @@ fn replace(
         }
     }
     placed[index].planned.ports = ports;
-    placed[index].planned.type_name = found.name().to_owned();
+    placed[index].planned.kind = kind;
     Ok(())
 }
 

@@ -2,6 +2,8 @@
 
 use linesman_proto::time::{Instant, Span};
 
+use crate::truth::FaultId;
+
 /// What a card's driver tells: carrier and counters since the start of the run.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct HostPort {
@@ -21,6 +23,19 @@ pub struct HostPort {
     pub rx_length_errors: u64,
 }
 
+/// What became of the frames that the MainDevice's cards sent, since the start of the run.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct FrameTally {
+    /// Given to the wire.
+    pub sent: u64,
+    /// Came back as they should.
+    pub whole: u64,
+    /// Came back damaged: the card drops them.
+    pub damaged: u64,
+    /// Will not come back.
+    pub vanished: u64,
+}
+
 /// A card, with its PHY.
 #[derive(Clone, Debug)]
 pub(crate) struct Card {
@@ -32,6 +47,8 @@ pub(crate) struct Card {
     pub(crate) link_up: Span,
     /// Counters; its carrier is that of `carrier`.
     pub(crate) counts: HostPort,
+    /// When it sends nothing, and whose doing that is.
+    silent: Vec<(Instant, Instant, FaultId)>,
     /// Changes of the carrier that are known, in the order of time.
     carrier: Vec<(Instant, bool)>,
 }
@@ -43,6 +60,7 @@ impl Default for Card {
             loss_detection: Span::ms(1),
             link_up: Span::ms(1_600),
             counts: HostPort::default(),
+            silent: Vec::new(),
             carrier: Vec::new(),
         }
     }
@@ -56,6 +74,27 @@ impl Card {
     pub(crate) fn has_carrier(&self, at: Instant) -> bool {
         let known = self.carrier.iter().rev().find(|(since, _)| *since <= at);
         known.map_or(self.counts.carrier, |(_, up)| *up)
+    }
+
+    /// From one instant to another it sends nothing.
+    pub(crate) fn hush(&mut self, from: Instant, until: Instant, fault: FaultId) {
+        self.silent.retain(|(_, end, _)| *end > from);
+        self.silent.push((from, until, fault));
+    }
+
+    /// A fault is over: it sends again.
+    pub(crate) fn speak(&mut self, at: Instant, fault: FaultId) {
+        for (_, until, by) in &mut self.silent {
+            if *by == fault {
+                *until = at.min(*until);
+            }
+        }
+    }
+
+    /// Whose doing it is that it sends nothing at an instant.
+    pub(crate) fn silenced_by(&self, at: Instant) -> Option<FaultId> {
+        let silent = self.silent.iter().find(|(from, until, _)| (*from..*until).contains(&at));
+        silent.map(|(_, _, fault)| *fault)
     }
 
     /// Makes the changes of the carrier up to `now`.

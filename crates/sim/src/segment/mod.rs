@@ -17,16 +17,16 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 
 pub use build::BuildError;
-pub use card::HostPort;
+pub use card::{FrameTally, HostPort};
 
 use self::arrivals::Arrivals;
 use crate::controller::Controller;
 use crate::device::{SignalId, Signals};
-use crate::fault::{self, FaultError, Running};
+use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
 use crate::segment_file::{FaultEntry, SegmentFile};
-use crate::truth::{Effect, FaultId, TruthLog, Unexplained};
+use crate::truth::{Effect, FaultId, Place, TruthLog, Unexplained};
 use crate::wire::walk::{Outcome, Traveller};
 use crate::wire::world::World;
 
@@ -63,6 +63,7 @@ pub struct Segment {
     now: Instant,
     arrivals: Arrivals,
     spare: Vec<Vec<u8>>,
+    tally: FrameTally,
 }
 
 /// What a segment knows about a controller beside the controller itself.
@@ -103,11 +104,22 @@ impl Segment {
             self.recycle(frame.bytes);
             return;
         }
+        if let Some(fault) = card.silenced_by(now) {
+            card.counts.tx_dropped += 1;
+            let lost = Effect::FrameLost { frame: frame.number };
+            self.world.truth.effect(now, Some(fault), Place::Host(path), lost);
+            self.recycle(frame.bytes);
+            return;
+        }
         card.counts.tx_frames += 1;
+        self.tally.sent += 1;
         let mut traveller = Traveller::new(frame);
         match self.world.carry(path, now, &mut traveller) {
             Outcome::Arrived(path, at) => self.arrivals.push(at, path, traveller.frame),
-            Outcome::Vanished => self.recycle(traveller.frame.bytes),
+            Outcome::Vanished => {
+                self.tally.vanished += 1;
+                self.recycle(traveller.frame.bytes);
+            }
         }
     }
 
@@ -120,11 +132,13 @@ impl Segment {
         let counts = &mut card.counts;
         if intact {
             counts.rx_frames += 1;
+            self.tally.whole += 1;
         } else if frame.bytes.len() < MIN_LEN {
             counts.rx_length_errors += 1;
         } else {
             counts.rx_crc_errors += 1;
         }
+        self.tally.damaged += u64::from(!intact);
         buffer.clear();
         buffer.extend_from_slice(&frame.bytes);
         self.recycle(frame.bytes);
@@ -194,10 +208,10 @@ impl Segment {
             ebus_ma: &self.ebus_ma,
         };
         let number = self.world.truth.faults().len();
-        let stream = self.seed.stream(&format!("fault {number} {}", entry.kind));
-        let planned = fault::plan(label, entry, &scene, earliest, stream)?;
-        let id = self.world.truth.declare(planned.name, planned.places);
-        self.world.running.push(Running::new(id, planned.from, planned.to, planned.source));
+        let stream = format!("fault {number} {}", entry.kind);
+        let planned = fault::plan(label, entry, &scene, earliest, self.seed, &stream)?;
+        let id = self.world.truth.declare(planned.name, planned.places.clone());
+        self.world.running.push(planned.run(id));
         Ok(id)
     }
 
@@ -278,6 +292,12 @@ impl Segment {
         HostPort { carrier: card.has_carrier(self.now), ..card.counts }
     }
 
+    /// What became of the frames that the cards sent.
+    #[must_use]
+    pub const fn frames(&self) -> FrameTally {
+        self.tally
+    }
+
     // ---- truth ----
 
     /// What was done to the segment, and what came of it.
@@ -306,7 +326,7 @@ impl Segment {
             let at = self.now;
             self.world.nodes[node].controller.set_counter(counter, value);
             self.world.truth.set(device, counter, value);
-            let place = crate::truth::Place::Device(device);
+            let place = Place::Device(device);
             self.world.truth.effect(at, None, place, Effect::OldCounters);
         }
     }

@@ -12,8 +12,7 @@ use linesman_proto::topology::wiring::ports_after;
 use linesman_proto::topology::{End, WiringError};
 
 use super::{SegmentDevice, SegmentFile, SegmentFileError};
-use crate::device::Signals;
-use crate::device::library::{self, LibraryType, UnknownType};
+use crate::device::{DeviceKind, Signals};
 use crate::hardware::PortKind;
 
 /// What a cable is long when nothing is said, in metres.
@@ -33,7 +32,7 @@ pub(crate) struct Planned {
     /// Which controller of the device, from 0.
     pub(crate) part: usize,
     pub(crate) name: String,
-    pub(crate) type_name: String,
+    pub(crate) kind: DeviceKind,
     pub(crate) on: Attachment,
     pub(crate) entry: Port,
     pub(crate) cable_m: f64,
@@ -52,10 +51,10 @@ impl Planned {
 pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileError> {
     let mut planned = Vec::with_capacity(file.devices.len());
     for (index, device) in file.devices.iter().enumerate() {
-        let Some(found) = library::find(&device.type_name) else {
-            let source = UnknownType { name: device.type_name.clone() };
-            return Err(SegmentFileError::Type { device: device.name.clone(), source });
-        };
+        let kind = file.kind(&device.type_name).map_err(|source| SegmentFileError::Type {
+            device: device.name.clone(),
+            source: Box::new(source),
+        })?;
         let entry = match device.entry.as_deref() {
             None => Port::A,
             Some(text) => parse_port(text).ok_or_else(|| SegmentFileError::Range {
@@ -67,14 +66,14 @@ pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileErro
         };
         let Some(repeat) = device.repeat else {
             let serial = device.serial.unwrap_or(planned.len() as u32 + 1);
-            expand_device(device, (index, 0), found, entry, serial, &mut planned);
+            expand_device(device, (index, 0), &kind, entry, serial, &mut planned);
             continue;
         };
         for copy in 0..count_of(device, repeat)? {
             let no = copy as u32 + 1;
             let on = match copy {
                 0 => device.on.clone(),
-                copy => behind(device, found, entry, copy)?,
+                copy => behind(device, &kind, entry, copy)?,
             };
             let one = SegmentDevice {
                 name: format!("{}[{no}]", device.name),
@@ -84,7 +83,7 @@ pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileErro
             };
             let next = planned.len() as u32 + 1;
             let serial = device.serial.map_or(next, |first| first.wrapping_add(no - 1));
-            expand_device(&one, (index, copy), found, entry, serial, &mut planned);
+            expand_device(&one, (index, copy), &kind, entry, serial, &mut planned);
         }
     }
     Ok(planned)
@@ -107,12 +106,13 @@ fn count_of(device: &SegmentDevice, repeat: u32) -> Result<usize, SegmentFileErr
 /// of the kind by which it is entered itself.
 fn behind(
     device: &SegmentDevice,
-    found: &LibraryType,
+    found: &DeviceKind,
     entry: Port,
     copy: usize,
 ) -> Result<Attachment, SegmentFileError> {
-    let kind = found.ports().next().unwrap_or_default()[entry];
-    for (part, ports) in found.ports().enumerate() {
+    let all = found.ports();
+    let kind = all.first().copied().unwrap_or_default()[entry];
+    for (part, ports) in all.into_iter().enumerate() {
         let taken = |port: Port| {
             let links = found.inner_links().iter();
             links.flat_map(|link| [link.from, link.to]).any(|end| end == (part, port))
@@ -142,14 +142,14 @@ fn part_name(device: &str, part: usize) -> String {
 fn expand_device(
     device: &SegmentDevice,
     (index, copy): (usize, usize),
-    found: &LibraryType,
+    kind: &DeviceKind,
     entry: Port,
     serial: u32,
     planned: &mut Vec<Planned>,
 ) {
     let name = |part: usize| part_name(&device.name, part);
-    for (part, ports) in found.ports().enumerate() {
-        let inner = found.inner_links().iter().find(|link| link.to.0 == part);
+    for (part, ports) in kind.ports().into_iter().enumerate() {
+        let inner = kind.inner_links().iter().find(|link| link.to.0 == part);
         let (on, entry, cable_m) = match inner {
             Some(link) => {
                 let on = Attachment::Device { name: name(link.from.0), port: link.from.1 };
@@ -168,7 +168,7 @@ fn expand_device(
             copy,
             part,
             name: name(part),
-            type_name: found.name().to_owned(),
+            kind: kind.clone(),
             on,
             entry,
             cable_m,
@@ -200,6 +200,9 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
         }
         if let Some(ppm) = device.clock_ppm.filter(|ppm| !(-200.0..=200.0).contains(ppm)) {
             return Err(out_of_range("clock_ppm", ppm, "-200 to 200"));
+        }
+        if let Some(clock) = &device.clock {
+            clock.check(&device.name)?;
         }
         if let Some(given) = device.counters.keys().find(|key| parse_counter(key).is_none()) {
             return Err(SegmentFileError::Counter {
@@ -259,8 +262,9 @@ fn wiring_error(planned: &[Planned], error: ProjectError) -> SegmentFileError {
     })
 }
 
-/// The counter behind a key of the file.
-pub(crate) fn parse_counter(key: &str) -> Option<linesman_proto::register::ErrorCounter> {
+/// The counter behind a key of the file, such as `A.lost_link`; `None` for what is none.
+#[must_use]
+pub fn parse_counter(key: &str) -> Option<linesman_proto::register::ErrorCounter> {
     use linesman_proto::register::ErrorCounter as Counter;
     match key {
         "processing_unit" => return Some(Counter::ProcessingUnit),
@@ -319,7 +323,7 @@ fn has_port(controller: &Planned, port: Port) -> Result<PortKind, SegmentFileErr
     match controller.ports[port] {
         PortKind::Absent => Err(SegmentFileError::NoPort {
             device: controller.name.clone(),
-            type_name: controller.type_name.clone(),
+            type_name: controller.kind.name().to_owned(),
             port,
             has: controller
                 .ports
@@ -345,7 +349,7 @@ const fn kind_name(kind: PortKind) -> &'static str {
 pub(crate) fn wiring(file: &SegmentFile, planned: &[Planned]) -> Project {
     let devices = planned.iter().map(|controller| ProjectDevice {
         name: controller.name.clone(),
-        type_name: controller.type_name.clone(),
+        type_name: controller.kind.name().to_owned(),
         vendor_id: None,
         product_code: None,
         revision: None,
@@ -368,9 +372,7 @@ pub(super) fn project(
     let mut project = wiring(file, planned);
     let mut signals = Signals::default();
     for (controller, wanted) in planned.iter().zip(&mut project.devices) {
-        let built = library::build(&controller.type_name, controller.serial, &mut signals);
-        let built = built
-            .map_err(|source| SegmentFileError::Type { device: controller.name.clone(), source })?;
+        let built = controller.kind.build(controller.serial, &mut signals);
         let image = built.get(controller.part).and_then(|one| Image::parse(&one.sii).ok());
         if let Some(image) = image {
             wanted.vendor_id = Some(image.identity.vendor_id);

@@ -19,8 +19,11 @@
 //! Unknown keys are errors. The order of devices is the order of their numbers; a device with
 //! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
 
+mod clock;
 mod expand;
 mod plant;
+mod schedule;
+mod types;
 mod value;
 mod write;
 
@@ -30,11 +33,13 @@ use linesman_config::attachment::Attachment;
 use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, parse_counter, wiring};
+pub use clock::SegmentClock;
+pub use expand::parse_counter;
+pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
+pub use schedule::{BurstTimes, RandomTimes, Schedule, Times};
+pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
-
-use crate::device::library::UnknownType;
 
 /// A segment, as described.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
@@ -62,6 +67,9 @@ pub struct SegmentFile {
     /// What goes wrong, and when.
     #[serde(default, rename = "fault")]
     pub faults: Vec<FaultEntry>,
+    /// The types that it takes from files. They are not written into it.
+    #[serde(skip)]
+    pub types: DescribedTypes,
 }
 
 /// A device of a segment.
@@ -76,7 +84,7 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = 1, max = 65535))]
     pub repeat: Option<u32>,
-    /// Type in the library, such as `EL2004`.
+    /// Type in the library, such as `EL2004`, or `sii:FILE`: the device whose EEPROM that file holds.
     #[serde(rename = "type")]
     pub type_name: String,
     /// Whose port it hangs on: `maindevice`, `maindevice.B`, or `K1.C`.
@@ -97,6 +105,9 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]
     pub clock_ppm: Option<f64>,
+    /// How else its clock is off: warming up, jitter, what it shows at power-on.
+    #[serde(default)]
+    pub clock: Option<SegmentClock>,
     /// Whether its controllers have counters of forwarded errors; as the segment, or else its type,
     /// has it unless said.
     #[serde(default)]
@@ -140,6 +151,9 @@ pub struct FaultEntry {
     /// When it ends; it lasts unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_ms: Option<f64>,
+    /// How often it comes and how long it stays each time; once unless said.
+    #[serde(flatten)]
+    pub schedule: Schedule,
     /// Parameters of the kind, such as `hits_per_s`.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, Value>,
@@ -195,13 +209,13 @@ pub enum SegmentFileError {
     /// There is nothing in it.
     #[error("there is no `[[device]]` in it: a segment has at least one SubDevice")]
     Empty,
-    /// A type that the library does not have.
+    /// A type that cannot be had.
     #[error("device `{device}`: {source}")]
     Type {
         /// Whose.
         device: String,
-        /// What the library says.
-        source: UnknownType,
+        /// Why not.
+        source: Box<TypeError>,
     },
     /// Names, ports or places contradict each other.
     #[error("{0}")]
@@ -274,11 +288,20 @@ impl SegmentFile {
     /// # Errors
     /// [`SegmentFileError`]: line and column for what is not TOML or not expected, else the device.
     pub fn parse(text: &str) -> Result<Self, SegmentFileError> {
-        let file: Self =
+        Self::parse_with(text, &NoFiles)
+    }
+
+    /// The same with types from files, which are read by `files`.
+    ///
+    /// # Errors
+    /// As [`SegmentFile::parse`], and the file that cannot be read or describes no device.
+    pub fn parse_with(text: &str, files: &dyn DescriptionFiles) -> Result<Self, SegmentFileError> {
+        let mut file: Self =
             toml::from_str(text).map_err(|error| SegmentFileError::Form(error.to_string()))?;
         if file.devices.is_empty() {
             return Err(SegmentFileError::Empty);
         }
+        file.read_types(files)?;
         file.check()?;
         Ok(file)
     }

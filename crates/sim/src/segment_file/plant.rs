@@ -53,6 +53,7 @@ pub fn plant(seed: Seed, options: &PlantOptions) -> SegmentFile {
         devices: builder.devices,
         ring,
         faults: Vec::new(),
+        types: super::DescribedTypes::default(),
     };
     in_order(file)
 }
@@ -245,6 +246,7 @@ impl Builder {
             cable_m,
             serial,
             clock_ppm: None,
+            clock: None,
             counts_forwarded: None,
             counters: std::collections::BTreeMap::new(),
         });

@@ -32,6 +32,7 @@ on = "K1.C"
 entry = "A"
 cable_m = 12
 clock_ppm = -3.5
+clock = { ramp_ppm_per_s = 0.25, ramp_s = 40.0, jitter_ns = 12 }
 counts_forwarded = true
 
 [ring]
@@ -54,13 +55,26 @@ kind = "init-refused"
 device = "Term 2 (EL2008)"
 to = "OP"
 code = 27
+
+[[fault]]
+kind = "link-open"
+at = "K1.C-K3.A"
+at_ms = [10.0, 200.5]
+for_ms = 3.0
+times = 7
+burst = { count = 3, every_ms = 20.0 }
+
+[[fault]]
+kind = "device-off"
+device = "K3"
+random = { mean_ms = 500.0, for_ms = 20.0 }
 "#;
 
 #[test]
 fn a_file_reads_and_writes_itself() {
     let file = SegmentFile::parse(PLANT).unwrap();
     assert_eq!(SegmentFile::parse(&file.to_toml()), Ok(file.clone()));
-    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 3));
+    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 5));
     assert_eq!(file.devices[2].cable_m, Some(12.0));
     assert_eq!(file.devices[0].counters["A.physical"], 3);
     let noise = &file.faults[0];
@@ -85,6 +99,9 @@ fn mistakes_are_named() {
         ("entry = \"A\"", "entry = \"X\"", "`entry` is `X`, expected A, B, C or D"),
         ("cable_m = 12", "cable_m = -1", "`cable_m` is -1, expected 0 to 2000"),
         ("clock_ppm = -3.5", "clock_ppm = 300.0", "`clock_ppm` is 300"),
+        ("ramp_ppm_per_s = 0.25", "ramp_ppm_per_s = 99.0", "`clock.ramp_ppm_per_s` is 99"),
+        ("jitter_ns = 12", "jitter_ns = 1001", "`clock.jitter_ns` is 1001, expected 0 to 1000"),
+        ("jitter_ns = 12", "jitter = 12", "unknown field `jitter`"),
         ("\"A.physical\"", "\"A.fysical\"", "no counter is called `A.fysical`"),
         ("name = \"K3\"", "name = \"K1\"", "two devices are called `K1`"),
         ("closes_at = \"K3.C\"", "closes_at = \"K3.B\"", "K3.B is an E-bus contact"),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{FaultEntry, OneOrMany, SegmentDevice, SegmentFile, Value};
+use super::{FaultEntry, OneOrMany, Schedule, SegmentDevice, SegmentFile, Times, Value};
 
 pub(super) fn to_toml(file: &SegmentFile) -> String {
     let mut text = format!("name = {}\n", quoted(&file.name));
@@ -52,6 +52,16 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     if let Some(ppm) = device.clock_ppm {
         line("clock_ppm", number(ppm));
     }
+    if let Some(clock) = &device.clock {
+        let keys = [
+            ("ramp_ppm_per_s", clock.ramp_ppm_per_s.map(number)),
+            ("ramp_s", clock.ramp_s.map(number)),
+            ("jitter_ns", clock.jitter_ns.map(|ns| ns.to_string())),
+            ("start_ns", clock.start_ns.map(|ns| ns.to_string())),
+        ];
+        let said = keys.into_iter().filter_map(|(key, value)| Some(format!("{key} = {}", value?)));
+        line("clock", format!("{{ {} }}", said.collect::<Vec<_>>().join(", ")));
+    }
     if let Some(counts) = device.counts_forwarded {
         line("counts_forwarded", counts.to_string());
     }
@@ -89,6 +99,7 @@ fn write_fault(fault: &FaultEntry, text: &mut String) {
     if let Some(to_ms) = fault.to_ms {
         line("to_ms", number(to_ms));
     }
+    write_schedule(&fault.schedule, &mut line);
     for (key, value) in &fault.parameters {
         let value = match value {
             Value::Flag(flag) => flag.to_string(),
@@ -97,6 +108,34 @@ fn write_fault(fault: &FaultEntry, text: &mut String) {
             Value::Text(text) => quoted(text),
         };
         line(&key_of(key), value);
+    }
+}
+
+fn write_schedule(schedule: &Schedule, line: &mut impl FnMut(&str, String)) {
+    match &schedule.at_ms {
+        Some(Times::One(at)) => line("at_ms", number(*at)),
+        Some(Times::Many(times)) => {
+            let times: Vec<_> = times.iter().map(|at| number(*at)).collect();
+            line("at_ms", format!("[{}]", times.join(", ")));
+        }
+        None => {}
+    }
+    if let Some(every) = schedule.every_ms {
+        line("every_ms", number(every));
+    }
+    if let Some(random) = schedule.random {
+        let stays = random.for_ms.map_or(String::new(), |ms| format!(", for_ms = {}", number(ms)));
+        line("random", format!("{{ mean_ms = {}{stays} }}", number(random.mean_ms)));
+    }
+    if let Some(stays) = schedule.for_ms {
+        line("for_ms", number(stays));
+    }
+    if let Some(times) = schedule.times {
+        line("times", times.to_string());
+    }
+    if let Some(burst) = schedule.burst {
+        let every = number(burst.every_ms);
+        line("burst", format!("{{ count = {}, every_ms = {every} }}", burst.count));
     }
 }
 

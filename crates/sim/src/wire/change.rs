@@ -2,9 +2,12 @@
 
 use std::fmt::Debug;
 
+use linesman_proto::address::Path;
+use linesman_proto::register::WatchdogTime;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::route::Direction;
 
+use super::software::SoftwareChange;
 use crate::device::Refusal;
 
 /// One direction of a link: a line that symbols travel along.
@@ -84,6 +87,28 @@ pub enum Change {
         node: usize,
         /// The state that it does not go to, and the code it gives.
         refusal: Option<Refusal>,
+    },
+    /// A card sends nothing: what it is given vanishes.
+    Silence {
+        /// Which.
+        path: Path,
+        /// Until when.
+        until: Instant,
+    },
+    /// The process data watchdog of a controller is set to another time than the MainDevice set, or
+    /// back.
+    Watchdog {
+        /// Which.
+        node: usize,
+        /// The time, as it is written to 0x0420; `None` for the former one.
+        time: Option<WatchdogTime>,
+    },
+    /// Something happens to the software of a device.
+    Software {
+        /// Which.
+        node: usize,
+        /// What.
+        change: SoftwareChange,
     },
 }
 

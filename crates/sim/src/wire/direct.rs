@@ -30,6 +30,9 @@ use crate::controller::{Answer, Header, PlainRead};
 /// As many answers to "who maps these logical bytes" are kept.
 const KEPT_QUERIES: usize = 1_024;
 
+/// As many routes may wait to be noted.
+const MOST_UNNOTED: usize = 8;
+
 /// What is kept from frame to frame.
 #[derive(Default, Debug)]
 pub(crate) struct Direct {
@@ -46,8 +49,18 @@ pub(crate) struct Direct {
     mappings: u64,
     /// Nodes at which something is due, nodes that were touched: kept for their memory.
     due: Vec<u32>,
+    /// The last frame on each route since the last walk: where it came in is not noted yet.
+    unnoted: Vec<Passed>,
     touched: Vec<u32>,
     places: Vec<u32>,
+}
+
+/// A frame that did not walk.
+#[derive(Debug)]
+struct Passed {
+    route: Arc<Route>,
+    at: Instant,
+    number: u64,
 }
 
 /// What is known of the way from a card.
@@ -93,7 +106,35 @@ impl World {
                 self.direct.frames += 1;
                 outcome
             }
-            None => self.walk(card, at, traveller),
+            None => {
+                self.note_entries();
+                self.walk(card, at, traveller)
+            }
+        }
+    }
+
+    /// Controllers learn when frames came in at their ports that did not walk: some of them latch
+    /// the time of a frame other than the one that asks for it.
+    fn note_entries(&mut self) {
+        for Passed { route, at, number } in self.direct.unnoted.drain(..) {
+            for (node, port, after) in &route.entries {
+                let controller = &mut self.nodes.quietly(*node as usize).controller;
+                controller.note_entry(*port, number, at + *after);
+            }
+        }
+    }
+
+    fn passed(&mut self, route: Arc<Route>, at: Instant, number: u64) {
+        if self.direct.unnoted.len() >= MOST_UNNOTED {
+            self.note_entries();
+        }
+        let known = &mut self.direct.unnoted;
+        match known.last_mut() {
+            Some(last) if Arc::ptr_eq(&last.route, &route) => (last.at, last.number) = (at, number),
+            _ => {
+                known.retain(|passed| !Arc::ptr_eq(&passed.route, &route));
+                known.push(Passed { route, at, number });
+            }
         }
     }
 
@@ -122,7 +163,9 @@ impl World {
         }
         self.execute_all(&journey, &mut bytes[first..]);
         self.end_all(&journey);
-        Some(Outcome::Arrived(route.arrives_at, at + route.takes + duration))
+        let outcome = Outcome::Arrived(route.arrives_at, at + route.takes + duration);
+        self.passed(route, at, number);
+        Some(outcome)
     }
 
     fn route(&mut self, card: Path) -> Option<Arc<Route>> {

@@ -8,6 +8,7 @@
 //!
 //! Read first: "The physical model" in `ARCHITECTURE.md`; S1 chapters 3, 6 and 14.1.
 
+mod apply;
 pub mod change;
 mod direct;
 mod directory;
@@ -17,12 +18,15 @@ pub mod link;
 mod node;
 mod nodes;
 mod route;
+pub mod software;
+mod starve;
 pub(crate) mod walk;
 pub(crate) mod world;
 
 pub use change::{Change, Line, Source};
 pub use history::History;
 pub use link::{CABLE_NS_PER_M, Link};
+pub use software::SoftwareChange;
 
 #[cfg(test)]
 mod tests;

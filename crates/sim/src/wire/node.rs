@@ -2,14 +2,17 @@
 
 use std::collections::VecDeque;
 
+use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::{Port, PortMap};
+use linesman_proto::register::WatchdogTime;
 use linesman_proto::time::Instant;
 
 use super::change::Line;
 use super::history::History;
 use super::nodes::Entry;
+use super::software::Held;
 use crate::controller::Controller;
-use crate::device::{Refusal, Signals};
+use crate::device::{Refusal, Signals, Trouble};
 use crate::truth::FaultId;
 
 /// What happens to a controller and cannot be posted to it.
@@ -18,6 +21,11 @@ pub(super) enum Act {
     Off,
     On,
     Refuse(Option<Refusal>),
+    Trouble { trouble: Trouble, begins: bool },
+    Hang(bool),
+    Reboot,
+    Watchdog(Option<WatchdogTime>),
+    Report(Emergency),
 }
 
 /// A fault inside that waits for a frame.
@@ -39,6 +47,11 @@ pub(crate) struct Node {
     pub(super) glitches: VecDeque<Glitch>,
     /// Whose doing it is that the device refuses a state.
     pub(super) refused_by: Option<FaultId>,
+    /// Whose doing it is that its watchdog has another time, and the time before.
+    pub(super) watchdog_by: Option<FaultId>,
+    former_watchdog: Option<WatchdogTime>,
+    /// What faults have done to its software.
+    pub(super) software: Vec<Held>,
     /// In the order of time.
     acts: VecDeque<(Instant, Act)>,
     /// What the book of all nodes keeps of it.
@@ -55,6 +68,9 @@ impl Node {
             power: History::default(),
             glitches: VecDeque::new(),
             refused_by: None,
+            watchdog_by: None,
+            former_watchdog: None,
+            software: Vec::new(),
             acts: VecDeque::new(),
             entry: Entry::default(),
             last_frame: 0,
@@ -75,6 +91,13 @@ impl Node {
                 Act::Off => self.controller.power_off(at),
                 Act::On => self.controller.power_on(at),
                 Act::Refuse(refusal) => self.controller.refuse(at, refusal),
+                Act::Trouble { trouble, begins } => self.controller.trouble(at, trouble, begins),
+                Act::Hang(hangs) => self.controller.set_processor_stuck(at, hangs),
+                Act::Watchdog(time) => {
+                    self.set_watchdog(at, time);
+                }
+                Act::Reboot => self.controller.reboot_processor(at, signals),
+                Act::Report(emergency) => self.controller.report(at, emergency),
             }
         }
         self.controller.advance(now, signals);
@@ -91,6 +114,16 @@ impl Node {
     pub(super) fn next_way_event(&self) -> Instant {
         let act = self.acts.front().map_or(Instant::MAX, |(at, _)| *at);
         self.controller.next_way_event().unwrap_or(Instant::MAX).min(act)
+    }
+
+    /// Sets the time of the watchdog, or back to what it was.
+    fn set_watchdog(&mut self, at: Instant, time: Option<WatchdogTime>) {
+        if let Some(time) = time {
+            let former = self.controller.set_watchdog_time(at, time);
+            self.former_watchdog.get_or_insert(former);
+        } else if let Some(former) = self.former_watchdog.take() {
+            self.controller.set_watchdog_time(at, former);
+        }
     }
 
     /// A glitch that spoils a frame which passes at `at`, if one waits.

@@ -26,6 +26,8 @@ pub(super) struct Visit {
 pub(super) struct Route {
     /// Processing units, in the order of the way.
     pub(super) visits: Vec<Visit>,
+    /// Ports by which it comes in anywhere, in the order of the way.
+    pub(super) entries: Vec<(u32, Port, Span)>,
     /// Places in `visits` at which a device samples inputs.
     pub(super) samplers: Vec<u32>,
     /// The card at which it ends.
@@ -62,6 +64,7 @@ impl World {
         let mut after = Span::ZERO;
         let mut route = Route {
             visits: Vec::with_capacity(self.nodes.len()),
+            entries: Vec::with_capacity(2 * self.nodes.len()),
             samplers: Vec::new(),
             arrives_at: card,
             takes: Span::ZERO,
@@ -85,6 +88,7 @@ impl World {
                     return Some(route);
                 }
             };
+            route.entries.push((node as u32, port, after));
             (line, after) = self.lead_on(node, port, after, &mut route)?;
         }
         None

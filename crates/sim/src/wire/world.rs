@@ -1,22 +1,20 @@
 //! The segment as physics knows it, and how it changes.
 
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
 use super::change::{Change, Line};
 use super::direct::Direct;
 use super::due::Agenda;
-use super::link::{Ambush, CABLE_NS_PER_M, Hit, Link, Noise};
-use super::node::{Act, Glitch};
+use super::link::{CABLE_NS_PER_M, Link, Noise};
 use super::nodes::Nodes;
-use crate::controller::{Controller, CountKind, PortEvent};
-use crate::device::{Refusal, Signals};
+use crate::controller::Controller;
+use crate::device::Signals;
 use crate::fault::Running;
 use crate::hardware::PortKind;
 use crate::segment::card::Card;
-use crate::truth::{Cause, Effect, FaultId, Place, TruthLog};
+use crate::truth::{FaultId, Place, TruthLog};
 
 /// Hits are kept this long: longer than any frame is on its way.
 const MEMORY: Span = Span::ms(2);
@@ -170,7 +168,7 @@ impl World {
     }
 
     /// Something lies in wait on a link.
-    fn is_noisy(&mut self, link: usize) {
+    pub(super) fn is_noisy(&mut self, link: usize) {
         if !self.noisy.contains(&link) {
             self.noisy.push(link);
         }
@@ -212,8 +210,10 @@ impl World {
         match self.running[index].step() {
             crate::fault::Step::Begin(at) => self.truth.begin(at, fault),
             crate::fault::Step::Change(at, change) => self.apply(at, fault, change),
-            crate::fault::Step::End { at, healed } => {
-                self.running.remove(index);
+            crate::fault::Step::End { at, healed, for_good } => {
+                if for_good {
+                    self.running.remove(index);
+                }
                 if healed {
                     self.disarm(fault);
                 }
@@ -248,118 +248,15 @@ impl World {
                 self.apply(at, fault, Change::Refuse { node, refusal: None });
             }
         }
+        self.release_starved(at, fault);
+        self.release_software(at, fault);
         self.truth.end(at, fault);
-    }
-
-    // ---- changes ----
-
-    fn apply(&mut self, at: Instant, fault: FaultId, change: Change) {
-        match change {
-            Change::Hit { line, flip } => self.hit(at, fault, line, flip),
-            Change::FrameHit { line, part, flip } => {
-                let ambush = Ambush { from: at, part, flip, fault };
-                self.links[line.link].noise[usize::from(line.downstream)].push_ambush(ambush);
-                self.is_noisy(line.link);
-            }
-            Change::Open { link } => {
-                self.way_changes(at);
-                let was_whole = self.links[link].contact.is_whole();
-                self.links[link].contact.break_at(at, fault);
-                if was_whole {
-                    self.signal_changed(link, at);
-                }
-            }
-            Change::Close { link } => {
-                self.way_changes(at);
-                self.links[link].contact.mend_at(at, fault);
-                if self.links[link].contact.is_whole() {
-                    self.signal_changed(link, at);
-                }
-            }
-            Change::Off { node } => {
-                self.way_changes(at);
-                let was_on = self.nodes[node].power.is_whole();
-                self.nodes[node].power.break_at(at, fault);
-                let place = Place::Device(self.id(node));
-                self.truth.effect(at, Some(fault), place, Effect::PowerLost);
-                if was_on {
-                    self.nodes[node].act_at(at, Act::Off);
-                    self.supply_changed(node, at);
-                }
-            }
-            Change::On { node } => {
-                self.way_changes(at);
-                self.nodes[node].power.mend_at(at, fault);
-                if self.nodes[node].power.is_whole() {
-                    let place = Place::Device(self.id(node));
-                    self.truth.effect(at, Some(fault), place, Effect::PowerBack);
-                    self.nodes[node].act_at(at, Act::On);
-                    self.supply_changed(node, at);
-                }
-            }
-            Change::Glitch { node, part, flip } => {
-                self.nodes[node].glitches.push_back(Glitch { from: at, part, flip, fault });
-            }
-            Change::Refuse { node, refusal } => {
-                self.nodes[node].refused_by = refusal.map(|_| fault);
-                self.nodes[node].act_at(at, Act::Refuse(refusal));
-                if let Some(Refusal { code, .. }) = refusal {
-                    let place = Place::Device(self.id(node));
-                    let effect = Effect::StateRefused { code: code.0 };
-                    self.truth.effect(at, Some(fault), place, effect);
-                }
-            }
-        }
     }
 
     /// What lies on the way of frames changes at an instant that may be ahead.
     pub(super) fn way_changes(&mut self, at: Instant) {
         self.changed_at = self.changed_at.max(at);
         self.direct.forget_routes();
-    }
-
-    fn supply_changed(&mut self, node: usize, at: Instant) {
-        let links = self.nodes[node].leaving.0;
-        for line in links.into_iter().flatten() {
-            self.signal_changed(line.link, at);
-        }
-    }
-
-    /// A symbol is destroyed. Without a signal there is none to destroy.
-    fn hit(&mut self, at: Instant, fault: FaultId, line: Line, flip: u8) {
-        let link = &mut self.links[line.link];
-        if !link.signal {
-            return;
-        }
-        link.noise[usize::from(line.downstream)].push_hit(Hit { at, flip, fault });
-        self.is_noisy(line.link);
-        self.symbol_error(at, Cause::Fault(fault), line);
-    }
-
-    /// The receiver of a line sees a symbol that it cannot decode.
-    pub(super) fn symbol_error(&mut self, at: Instant, cause: Cause, line: Line) {
-        self.truth.effect(at, cause.fault(), self.line_place(line), Effect::SymbolError);
-        let (_, to) = self.links[line.link].from_to(line.downstream);
-        if let End::Controller(node, port) = to {
-            self.post(node, at, cause, PortEvent::Count { port, kind: CountKind::SymbolError });
-        }
-    }
-
-    /// Tells a controller, and the log what may move because of it.
-    pub(super) fn post(&mut self, node: usize, at: Instant, cause: Cause, event: PortEvent) {
-        self.nodes[node].controller.post(at, event);
-        let counter = match event {
-            PortEvent::Link { up: true, .. } => return,
-            PortEvent::Link { port, up: false } => ErrorCounter::LostLink(port),
-            PortEvent::Count { port, kind } => match kind {
-                CountKind::SymbolError => ErrorCounter::PhysicalLayer(port),
-                CountKind::InvalidFrame => ErrorCounter::InvalidFrame(port),
-                CountKind::ForwardedError => ErrorCounter::Forwarded(port),
-                CountKind::ProcessingUnitError => ErrorCounter::ProcessingUnit,
-                CountKind::LostLink => ErrorCounter::LostLink(port),
-            },
-        };
-        self.truth.may_move(self.id(node), counter, cause);
     }
 
     // ---- blame ----

@@ -114,7 +114,7 @@ fn hit(place: &str, hits: u32) -> Bench {
     bench
 }
 
-// proves: HW-18 partial, HW-28 partial
+// proves: HW-18 partial, HW-28
 #[test]
 fn a_hit_on_the_way_out_is_found_next_and_forwarded_by_all_others() {
     let bench = hit("K1.B>T2.A", 3);
@@ -460,6 +460,42 @@ fn faults_of_a_file_come_and_go_at_their_times() {
     let record = &bench.segment.truth().faults()[0];
     let times = [record.began, record.ended].map(|at| at.unwrap().as_nanos());
     assert_eq!(times, [100_000_000, 200_000_000]);
+}
+
+#[test]
+fn a_schedule_lets_a_fault_come_again_and_again() {
+    let text = format!(
+        "{PLANT}\n[[fault]]\nkind = \"device-off\"\ndevice = \"T5\"\nfrom_ms = 100\nto_ms = 10000\n\
+         every_ms = 2000\nfor_ms = 500\ntimes = 3\n"
+    );
+    let mut bench = Bench::new(&text);
+    let mut seen = Vec::new();
+    for _ in 0..12 {
+        bench.wait(Span::ms(550));
+        seen.push(bench.count());
+        assert_eq!(bench.segment.audit(), []);
+    }
+    // Gone from 100, 2,100 and 4,100 ms for half a second each.
+    let gone: Vec<usize> =
+        seen.iter().enumerate().filter(|(_, count)| **count == Some(7)).map(|(at, _)| at).collect();
+    assert_eq!(gone, [0, 3, 7], "{seen:?}");
+    let record = &bench.segment.truth().faults()[0];
+    assert_eq!((record.times, record.supplies_lost, record.is_active()), (3, 3, false));
+}
+
+#[test]
+fn what_is_healed_does_not_come_again() {
+    let mut bench = Bench::plant();
+    let mut entry = FaultEntry::new(FaultName::LinkOpen).at("T4.B-T5.A");
+    entry.schedule.every_ms = Some(100.0);
+    entry.schedule.for_ms = Some(10.0);
+    let fault = bench.inject(&entry);
+    bench.wait(Span::ms(250));
+    assert_eq!(bench.segment.truth().faults()[0].times, 3);
+    bench.heal(fault);
+    bench.wait(Span::s(2));
+    assert_eq!(bench.segment.truth().faults()[0].times, 3);
+    assert_eq!(bench.count(), Some(8));
 }
 
 #[test]

@@ -5,6 +5,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::address::Path;
 use linesman_proto::command::Command;
 use linesman_proto::time::Span;
+use linesman_sim::device::library::{self, LibraryType};
 use linesman_sim::fault::{KINDS, PlaceRule};
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment::Segment;
@@ -18,7 +19,11 @@ pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
     let built_in = [FaultName::DeviceWrong, FaultName::DeviceMissing];
     let kinds: Vec<_> = KINDS.iter().filter(|kind| !built_in.contains(&kind.name)).collect();
     let kind = stream.pick(&kinds).unwrap();
-    let device = stream.pick(&file.devices).unwrap();
+    let needs_software = matches!(kind.place, PlaceRule::Processor | PlaceRule::Mailbox);
+    let has_software = |name: &str| library::find(name).is_some_and(LibraryType::has_mailbox);
+    let fit = file.devices.iter().filter(|one| !needs_software || has_software(&one.type_name));
+    let fit: Vec<_> = fit.collect();
+    let Some(device) = stream.pick(&fit) else { return any_fault(file, stream) };
     let (near, far) = (device.on.to_string(), format!("{}.A", device.name));
     let entry = FaultEntry::new(kind.name);
     match kind.place {
@@ -27,7 +32,11 @@ pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
         }
         PlaceRule::Line if stream.chance(0.5) => entry.at(format!("{near}>{far}")),
         PlaceRule::Line => entry.at(format!("{far}>{near}")),
-        PlaceRule::Device | PlaceRule::Devices => entry.device(&device.name),
+        PlaceRule::Device
+        | PlaceRule::Devices
+        | PlaceRule::Processor
+        | PlaceRule::Mailbox
+        | PlaceRule::DeviceOrCard => entry.device(&device.name),
         PlaceRule::Card => entry,
     }
 }

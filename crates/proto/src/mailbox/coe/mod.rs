@@ -5,6 +5,7 @@
 //! SubDevice. Read first: ETG.1000.6, CoE; for object types and entries ETG.1020.
 
 pub mod data_type;
+pub mod diagnosis;
 pub mod emergency;
 pub mod information;
 pub mod message;
@@ -12,6 +13,7 @@ pub mod object;
 pub mod sdo;
 
 pub use data_type::DataType;
+pub use diagnosis::{DiagnosisMessage, Severity};
 pub use emergency::{Emergency, EmergencyClass, ErrorRegister};
 pub use message::{COE_HEADER_LEN, CoeError, Header, Message, Service};
 pub use object::{ObjectAddress, ObjectIndex};

@@ -1,6 +1,6 @@
 //! Receive times and system time.
 
-use linesman_proto::address::DeviceId;
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::command::Command;
 use linesman_proto::port::Port;
 use linesman_proto::register::Features;
@@ -74,6 +74,60 @@ fn a_port_entered_before_the_unit_is_timed_too() {
     assert_eq!(u64_at(&mut bench, 0x0918), local + 300);
 }
 
+/// The first generation knows no frames: ports behind take what comes next.
+#[test]
+fn on_a_busy_line_some_controllers_take_another_frame() {
+    for (kind, next_frame) in [(0x02, true), (0x12, true), (0x11, false)] {
+        let mut hardware = hardware();
+        hardware.controller_type = kind;
+        let mut bench = Bench::with(hardware, sii(false), Box::new(NoFirmware));
+        bench.link(Port::B, true);
+        let left = u32_at(&mut bench, 0x0904);
+        // One frame is still out when the one that latches comes.
+        let mut early = frame(&[(Command::Brd, at(0, 0), &[0])]);
+        early.number = 1_000;
+        let mut latch = frame(&[(Command::Bwr, at(0, 0x0900), &[0; 4])]);
+        latch.number = 1_001;
+        let start = bench.now;
+        for (frame, after) in [(&mut early, 0), (&mut latch, 20_000)] {
+            let when = start + Span::ns(after);
+            bench.controller.enters(when, Port::A, frame);
+            let _ = bench.controller.process(when, frame, &mut bench.signals);
+        }
+        bench.controller.enters(start + Span::us(30), Port::B, &early);
+        let local = bench.controller.local_time(start) as u32;
+        let expected = if next_frame { local + 30_000 } else { left };
+        let shown = |bench: &Bench, address: u16| {
+            let byte = |offset| bench.controller.register(RegisterAddress(address + offset));
+            u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])
+        };
+        assert_eq!(shown(&bench, 0x0904), expected, "type 0x{kind:02X}");
+        bench.controller.enters(start + Span::us(50), Port::B, &latch);
+        let expected = if next_frame { local + 30_000 } else { local + 50_000 };
+        assert_eq!(shown(&bench, 0x0904), expected, "type 0x{kind:02X}");
+        assert_eq!(shown(&bench, 0x0900), local + 20_000);
+    }
+}
+
+#[test]
+fn an_et1200_entered_from_behind_takes_the_frame_before() {
+    let mut hardware = hardware();
+    hardware.controller_type = 0x12;
+    let mut bench = Bench::with(hardware, sii(false), Box::new(NoFirmware));
+    bench.link(Port::B, true);
+    bench.write(0x0936, &[1]);
+    let start = bench.now;
+    let mut probe = frame(&[(Command::Bwr, at(0, 0x0900), &[0; 4])]);
+    probe.number = 77;
+    // It passes on its way out, and is processed when it comes back.
+    bench.controller.enters(start, Port::B, &probe);
+    bench.controller.enters(start + Span::us(3), Port::A, &probe);
+    let _ = bench.controller.process(start + Span::us(3), &mut probe, &mut bench.signals);
+    bench.wait(Span::us(30));
+    let local = bench.controller.local_time(start) as u32;
+    assert_eq!((u32_at(&mut bench, 0x0904), u32_at(&mut bench, 0x0900)), (local, local + 3_000));
+}
+
 #[test]
 fn only_some_commands_latch() {
     let table = [
@@ -140,7 +194,7 @@ fn quartzes_differ() {
     controller.power_on_before(Instant::from_nanos(1_000), &mut signals);
     let second = Instant::from_nanos(1_000_001_000);
     assert_eq!(controller.local_time(second), 5 + 1_000_025_000);
-    controller.set_drift(second, -25_000);
+    controller.set_drift(second, -25_000, 0, Span::ZERO);
     assert_eq!(controller.local_time(second + Span::s(1)), 5 + 2_000_000_000);
     // A new start begins at the beginning.
     controller.power_off(second);

@@ -106,8 +106,8 @@ fn what_cannot_be_read_or_written_counts_nothing() {
         (0x0110, 2, true, false),  // DL status
         (0x0130, 6, true, false),  // AL status and code
         (0x0510, 6, false, false), // PHY management
-        (0x092C, 4, false, false), // system time difference
-        (0x0980, 2, false, false), // SYNC unit
+        (0x092C, 4, true, false),  // system time difference
+        (0x0984, 1, false, false), // activation status, of other types
         (0x0E00, 8, false, false), // power-on values
         (0x0F80, 4, true, true),   // user RAM
         (0x0F04, 4, false, false), // behind the digital outputs

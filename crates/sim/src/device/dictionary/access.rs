@@ -2,11 +2,12 @@
 
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::information::{Access, ObjectCode};
-use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::coe::{DataType, ObjectAddress};
 use linesman_proto::state::AlState;
 
 use super::bits::{BitReader, BitWriter};
 use super::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE};
+use crate::device::history::HISTORY;
 
 impl Dictionary {
     /// The value of an entry, as an SDO upload brings it.
@@ -17,6 +18,7 @@ impl Dictionary {
         let object = self.object(address.index).ok_or(SdoAbortCode::NO_OBJECT)?;
         let entry = object.entry(address.subindex).ok_or(SdoAbortCode::NO_SUBINDEX)?;
         may_read(entry, state)?;
+        Self::check_presence(object, address.subindex)?;
         Ok(entry.value.clone())
     }
 
@@ -41,7 +43,9 @@ impl Dictionary {
                 }
                 0 => {}
                 // A list that can be made shorter ends where subindex 0 says.
-                subindex if object.is_assignment() && u64::from(subindex) > object.count() => break,
+                subindex if object.is_closed_list() && u64::from(subindex) > object.count() => {
+                    break;
+                }
                 _ => {
                     may_read(entry, state)?;
                     bits.put(&entry.value, entry.bits);
@@ -65,12 +69,10 @@ impl Dictionary {
         let object = self.object(address.index).ok_or(SdoAbortCode::NO_OBJECT)?;
         let at = object.place(address.subindex).ok_or(SdoAbortCode::NO_SUBINDEX)?;
         let value = self.checked(object, &object.entries[at], data, state)?;
-        if object.is_assignment() {
-            self.check_assignment(object, address.subindex, data)?;
-        }
         if let Ok(object) = self.place(address.index) {
             self.objects[object].entries[at].value = value;
         }
+        self.written = Some(address);
         Ok(())
     }
 
@@ -86,8 +88,8 @@ impl Dictionary {
         state: AlState,
     ) -> Result<(), SdoAbortCode> {
         let object = self.whole(address)?;
-        if object.is_assignment() {
-            return self.assign_all(address, data, state);
+        if object.is_closed_list() {
+            return self.list_all(address, data, state);
         }
         let mut bits = BitReader::new(data);
         let mut values = Vec::new();
@@ -112,11 +114,12 @@ impl Dictionary {
                 self.objects[object].entries[at].value = value;
             }
         }
+        self.written = Some(address);
         Ok(())
     }
 
-    /// A whole list of PDOs at once: as if it had been emptied, filled and closed one by one.
-    fn assign_all(
+    /// A whole list at once: as if it had been emptied, filled and closed entry by entry.
+    fn list_all(
         &mut self,
         address: ObjectAddress,
         data: &[u8],
@@ -126,16 +129,18 @@ impl Dictionary {
             return Err(SdoAbortCode::UNSUPPORTED_ACCESS);
         }
         let (count, rest) = data.split_first_chunk::<2>().ok_or(SdoAbortCode::TOO_SHORT)?;
-        let (words, odd) = rest.as_chunks::<2>();
+        let width = self.object(address.index).and_then(|list| list.entries.get(1));
+        let width = width.map_or(1, |entry| usize::from(entry.bits / 8).max(1));
+        let words = rest.chunks(width);
         let count = usize::from(u16::from_le_bytes(*count));
-        if !odd.is_empty() || words.len() != count {
+        if !rest.len().is_multiple_of(width) || words.len() != count {
             return Err(SdoAbortCode::LENGTH_MISMATCH);
         }
         let before = self.clone();
-        let mut steps = || {
+        let steps = || {
             let entry = |subindex| ObjectAddress { subindex, ..address };
             self.download(entry(0), &[0], state)?;
-            for (word, subindex) in words.iter().zip(1..=u8::MAX) {
+            for (word, subindex) in words.zip(1..=u8::MAX) {
                 self.download(entry(subindex), word, state)?;
             }
             let count = u8::try_from(count).map_err(|_| SdoAbortCode::VALUE_TOO_HIGH)?;
@@ -151,7 +156,8 @@ impl Dictionary {
     /// The object that complete access is to, if it can be had whole.
     fn whole(&self, address: ObjectAddress) -> Result<&Object, SdoAbortCode> {
         let object = self.object(address.index).ok_or(SdoAbortCode::NO_OBJECT)?;
-        if object.code == ObjectCode::Variable || !self.complete_access {
+        let single = object.code == ObjectCode::Variable || object.index == HISTORY;
+        if single || !self.complete_access {
             return Err(SdoAbortCode::COMPLETE_ACCESS);
         }
         if address.subindex > 1 {
@@ -184,42 +190,8 @@ impl Dictionary {
         if out_of_bits || entry.maximum.is_some_and(|maximum| number > u64::from(maximum)) {
             return Err(SdoAbortCode::VALUE_TOO_HIGH);
         }
-        if object.is_assignment() && entry.subindex == 0 && number >= object.entries.len() as u64 {
-            return Err(SdoAbortCode::VALUE_TOO_HIGH);
-        }
+        self.check_number(object, entry, number)?;
         Ok(taken.value)
-    }
-
-    /// Whether a list of PDOs may be changed like this.
-    fn check_assignment(
-        &self,
-        object: &Object,
-        subindex: u8,
-        data: &[u8],
-    ) -> Result<(), SdoAbortCode> {
-        let outputs = object.index.0.is_multiple_of(2);
-        if subindex > 0 {
-            if object.count() != 0 {
-                return Err(SdoAbortCode::SUBINDEX_0_NOT_ZERO);
-            }
-            let number = data.first_chunk().map_or(0, |word| u16::from_le_bytes(*word));
-            return self.check_pdo(number, outputs);
-        }
-        let wanted = usize::from(data.first().copied().unwrap_or(0));
-        for entry in object.entries.iter().skip(1).take(wanted) {
-            self.check_pdo(entry.as_number() as u16, outputs)?;
-        }
-        Ok(())
-    }
-
-    /// Whether there is such a PDO in this direction.
-    fn check_pdo(&self, number: u16, outputs: bool) -> Result<(), SdoAbortCode> {
-        let range = if outputs { 0x1600..=0x17FF } else { 0x1A00..=0x1BFF };
-        if range.contains(&number) && self.object(ObjectIndex(number)).is_some() {
-            Ok(())
-        } else {
-            Err(SdoAbortCode::NOT_MAPPABLE)
-        }
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod access;
 mod bits;
+pub mod special;
 
 use linesman_proto::mailbox::coe::information::{Access, ListKind, ObjectCode};
 use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex};
@@ -146,13 +147,6 @@ impl Object {
     pub fn entry(&self, subindex: u8) -> Option<&Entry> {
         self.place(subindex).map(|at| &self.entries[at])
     }
-
-    /// Whether a MainDevice assigns or lists PDOs here: entries can be written only while subindex
-    /// 0 is 0, and that is written last.
-    #[must_use]
-    pub fn is_assignment(&self) -> bool {
-        (0x1C10..=0x1C2F).contains(&self.index.0)
-    }
 }
 
 /// The place of an entry in a [`Dictionary`], for those who look often.
@@ -168,6 +162,8 @@ pub struct Dictionary {
     objects: Vec<Object>,
     /// Whole objects can be had at once.
     complete_access: bool,
+    /// What a MainDevice wrote last, until the device has looked.
+    written: Option<ObjectAddress>,
 }
 
 /// Largest object that is taken by download, in bytes: more no device of the library has.
@@ -178,7 +174,7 @@ impl Dictionary {
     /// counts.
     #[must_use]
     pub fn new(objects: Vec<Object>, complete_access: bool) -> Self {
-        let mut dictionary = Self { objects: Vec::new(), complete_access };
+        let mut dictionary = Self { objects: Vec::new(), complete_access, written: None };
         for object in objects {
             match dictionary.place(object.index) {
                 Ok(at) => dictionary.objects[at] = object,
@@ -190,6 +186,17 @@ impl Dictionary {
 
     fn place(&self, index: ObjectIndex) -> Result<usize, usize> {
         self.objects.binary_search_by_key(&index, |object| object.index)
+    }
+
+    /// Whether there are no objects at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.objects.is_empty()
+    }
+
+    /// What a MainDevice wrote since the last call: the entry, or subindex 0 or 1 for a whole object.
+    pub fn take_written(&mut self) -> Option<ObjectAddress> {
+        self.written.take()
     }
 
     /// All objects in order of their indices.
@@ -234,6 +241,27 @@ impl Dictionary {
         let object = self.objects.get_mut(at.object);
         if let Some(entry) = object.and_then(|object| object.entries.get_mut(at.entry)) {
             entry.set_number(value);
+        }
+    }
+
+    /// Sets the bytes of a value from the device's side: a text, or a string of bytes. Nothing for an
+    /// entry that is not there.
+    pub fn set_bytes(&mut self, address: ObjectAddress, value: Vec<u8>) {
+        let place = self.place(address.index).ok().map(|at| &mut self.objects[at]);
+        if let Some(object) = place
+            && let Some(at) = object.place(address.subindex)
+        {
+            object.entries[at].value = value;
+        }
+    }
+
+    /// All settings that are kept are again as in `fresh`, a dictionary of the same objects.
+    pub fn restore(&mut self, fresh: &Self) {
+        let entries = self.objects.iter_mut().flat_map(|object| &mut object.entries);
+        for (entry, fresh) in entries.zip(fresh.objects.iter().flat_map(|object| &object.entries)) {
+            if entry.access.has(Access::BACKUP) {
+                entry.value.clone_from(&fresh.value);
+            }
         }
     }
 

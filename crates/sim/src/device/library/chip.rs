@@ -11,7 +11,7 @@ use crate::hardware::{CountingProfile, Hardware, PortKind, Timing};
 
 /// A controller without its ports.
 #[derive(Debug)]
-pub(super) struct Chip {
+pub(in crate::device) struct Chip {
     controller_type: u8,
     revision: u8,
     build: u16,
@@ -47,7 +47,7 @@ const COUNTING: CountingProfile = CountingProfile {
 };
 
 /// The large one: up to four ports, used in couplers, junctions and terminals with a processor.
-pub(super) const ET1100: Chip = Chip {
+pub(in crate::device) const ET1100: Chip = Chip {
     controller_type: 0x11,
     revision: 0,
     build: 2,
@@ -60,7 +60,7 @@ pub(super) const ET1100: Chip = Chip {
 };
 
 /// The small one: two ports and a third, for simple terminals.
-pub(super) const ET1200: Chip = Chip {
+pub(in crate::device) const ET1200: Chip = Chip {
     controller_type: 0x12,
     revision: 0,
     build: 1,
@@ -73,7 +73,7 @@ pub(super) const ET1200: Chip = Chip {
 };
 
 /// Programmable logic with the IP core: it makes symbol errors anew when it forwards a bad frame.
-pub(super) const IP_CORE: Chip = Chip {
+pub(in crate::device) const IP_CORE: Chip = Chip {
     controller_type: 0x04,
     revision: 3,
     build: 0x0300,
@@ -86,7 +86,7 @@ pub(super) const IP_CORE: Chip = Chip {
 };
 
 /// The first generation: four FMMUs and SyncManagers, and no counters of forwarded errors.
-pub(super) const ESC20: Chip = Chip {
+pub(in crate::device) const ESC20: Chip = Chip {
     controller_type: 0x02,
     revision: 1,
     build: 0,
@@ -100,7 +100,7 @@ pub(super) const ESC20: Chip = Chip {
 
 impl Chip {
     /// The controller with these ports.
-    pub(super) fn with_ports(&self, ports: PortMap<PortKind>) -> Hardware {
+    pub(in crate::device) fn with_ports(&self, ports: PortMap<PortKind>) -> Hardware {
         Hardware {
             controller_type: self.controller_type,
             revision: self.revision,

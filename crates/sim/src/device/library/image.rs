@@ -22,6 +22,8 @@ const FIXED: PdoFlags = PdoFlags(0x0010);
 const MAILBOX_REPEATS: u8 = 0x04;
 /// EEPROM of devices with a processor: 32 Kbit.
 const LARGE: Size = Size(0x1F);
+/// General flag: the identification value can be asked for through AL control.
+const IDENTIFICATION_BY_AL_STATUS: u8 = 0x08;
 /// General flag: the identification value stands in memory.
 const IDENTIFICATION_IN_MEMORY: u8 = 0x10;
 
@@ -69,7 +71,7 @@ fn image(spec: &Spec, individual: Individual) -> Image {
         },
         bootstrap_mailbox: bootstrap(spec),
         standard_mailbox: spec.mailbox(),
-        protocols: Protocols(if has_mailbox { Protocols::COE } else { 0 }),
+        protocols: Protocols(if has_mailbox { Protocols::COE | Protocols::FOE } else { 0 }),
         size: if has_mailbox { LARGE } else { Size::default() },
         categories,
         ..Image::default()
@@ -88,13 +90,14 @@ fn general(spec: &Spec, strings: &mut Strings) -> General {
     let memory = spec.coding_switch();
     let in_memory = memory.map_or(0, |_| IDENTIFICATION_IN_MEMORY);
     let has_mailbox = spec.mailbox().is_present();
-    let repeats = if has_mailbox { MAILBOX_REPEATS } else { 0 };
+    let repeats = if has_mailbox { MAILBOX_REPEATS | IDENTIFICATION_BY_AL_STATUS } else { 0 };
     General {
         group,
         order,
         name,
         group_again: group,
         coe: spec.coe,
+        foe: u8::from(has_mailbox),
         flags: GeneralFlags(in_memory | repeats),
         physical_memory_address: memory.unwrap_or(RegisterAddress(0)),
         ebus_current_ma: spec.ebus_current_ma,

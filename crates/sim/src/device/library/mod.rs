@@ -6,11 +6,12 @@
 
 mod analog;
 mod box_module;
-mod chip;
+pub(super) mod chip;
 mod coupler;
 mod digital;
+mod file;
 mod image;
-mod object;
+pub(super) mod object;
 mod smart;
 mod spec;
 
@@ -26,7 +27,7 @@ pub use super::application_layer::Refusal;
 use super::dictionary::Dictionary;
 use super::emulated::{DigitalArea, Emulated, WordArea};
 use super::firmware::Firmware;
-use super::processor::{Description, Processor};
+use super::processor::{Description, ProcessBuffer, Processor};
 use super::signal::{SignalId, Signals};
 use crate::hardware::{Hardware, PortKind};
 
@@ -95,6 +96,23 @@ impl LibraryType {
     #[must_use]
     pub fn ebus_current_ma(&self) -> i16 {
         self.controllers.iter().map(|spec| spec.ebus_current_ma).sum()
+    }
+
+    /// Whether it has a processor, and with it a mailbox.
+    #[must_use]
+    pub fn has_mailbox(&self) -> bool {
+        self.controllers.iter().any(|spec| spec.mailbox().is_present())
+    }
+
+    /// Makes a device: one [`Built`] for each of its controllers, in the order in which frames reach
+    /// them. Its channels become new signals. `revision` stands in identity and dictionary.
+    #[must_use]
+    pub fn build(&self, revision: Option<u32>, serial: u32, signals: &mut Signals) -> Vec<Built> {
+        let build = |spec: &Spec| {
+            let revision = revision.unwrap_or(spec.revision);
+            build_one(spec, Individual { revision, serial }, signals)
+        };
+        self.controllers.iter().map(build).collect()
     }
 
     /// How many channels it has: outputs, inputs.
@@ -167,11 +185,7 @@ pub fn build_revision(
     signals: &mut Signals,
 ) -> Result<Vec<Built>, UnknownType> {
     let found = find(type_name).ok_or_else(|| UnknownType { name: type_name.to_owned() })?;
-    let build = |spec: &Spec| {
-        let revision = revision.unwrap_or(spec.revision);
-        build_one(spec, Individual { revision, serial }, signals)
-    };
-    Ok(found.controllers.iter().map(build).collect())
+    Ok(found.build(revision, serial, signals))
 }
 
 fn build_one(spec: &Spec, individual: Individual, signals: &mut Signals) -> Built {
@@ -201,11 +215,12 @@ fn with_processor(
     let description = Description {
         dictionary,
         channels,
+        buffers: ProcessBuffer::BEHIND_MAILBOX.to_vec(),
         mailbox: spec.mailbox(),
         bootstrap: Some(image::bootstrap(spec)),
         times: processor.times,
     };
-    Box::new(Processor::new(description))
+    Box::new(Processor::new(description).with_files(file::files(spec)))
 }
 
 fn channels(

@@ -9,18 +9,21 @@ use linesman_proto::sii::SyncManagerKind;
 
 use super::image::{VENDOR, sync_manager_kind};
 use super::spec::{EntrySpec, PdoSpec, ProcessorSpec, SettingsSpec, Spec};
-use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE};
+use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE, special};
+use crate::device::history;
 
 /// Device type of modular devices (ETG.5001).
 const MODULAR_DEVICE: u64 = 0x0000_1389;
+/// How many messages the diagnosis history keeps.
+const HISTORY_ROOM: u8 = 16;
 /// Data type of a PDO mapping.
-const PDO_MAPPING: DataType = DataType(0x0021);
+pub(in crate::device) const PDO_MAPPING: DataType = DataType(0x0021);
 /// Data type of the identity.
-const IDENTITY: DataType = DataType(0x0023);
+pub(in crate::device) const IDENTITY: DataType = DataType(0x0023);
 /// Data type of a record that is none of the others.
-const RECORD: DataType = DataType(0x002A);
+pub(in crate::device) const RECORD: DataType = DataType(0x002A);
 /// Readable always, writable in PREOP.
-const SET_UP: Access = Access(READ_ONLY.0 | Access::WRITE_PRE_OP);
+pub(in crate::device) const SET_UP: Access = Access(READ_ONLY.0 | Access::WRITE_PRE_OP);
 /// A setting that is kept for a replacement.
 const SETTING: Access = Access(READ_WRITE.0 | Access::BACKUP | Access::SETTING);
 
@@ -59,10 +62,48 @@ pub(super) fn dictionary(
     objects.push(record(0xF000, "Modular device profile", RECORD, profile));
     let code_word = Entry::number(0, "Code word", DataType::UDINT, 32, READ_WRITE, 0);
     objects.push(Object::variable(ObjectIndex(0xF008), code_word));
+    objects.extend([error_settings(), history::object(HISTORY_ROOM), timestamp(), restore()]);
     Dictionary::new(objects, spec.coe.complete_access())
 }
 
-fn record(index: u16, name: &str, data_type: DataType, entries: Vec<Entry>) -> Object {
+/// How devices react to errors. Subindex 1 is kept and has no function; 2 is how many missed events
+/// in a row a synchronised device forgives.
+fn error_settings() -> Object {
+    let word = |subindex, name, data_type, bits, value| {
+        Entry::number(subindex, name, data_type, bits, READ_WRITE, value)
+    };
+    let entries = vec![
+        word(1, "Local error reaction", DataType::UDINT, 32, 1),
+        word(2, "Sync error counter limit", DataType::UINT, 16, 4),
+    ];
+    record(0x10F1, "Error settings", DataType(0x0281), entries)
+}
+
+fn timestamp() -> Object {
+    let entry = Entry::number(0, "Timestamp object", DataType::ULINT, 64, READ_ONLY, 0);
+    Object::variable(ObjectIndex(0x10F8), entry)
+}
+
+fn restore() -> Object {
+    let entry =
+        Entry::number(1, "Restore all default parameters", DataType::UDINT, 32, READ_WRITE, 1);
+    let index = special::RESTORE_SETTINGS;
+    Object::list(
+        index,
+        "Restore default parameters",
+        ObjectCode::Array,
+        DataType::UDINT,
+        vec![entry],
+    )
+}
+
+/// An object of several entries of different types.
+pub(in crate::device) fn record(
+    index: u16,
+    name: &str,
+    data_type: DataType,
+    entries: Vec<Entry>,
+) -> Object {
     Object::list(ObjectIndex(index), name, ObjectCode::Record, data_type, entries)
 }
 
@@ -101,7 +142,7 @@ pub(super) fn channel_name(name: &str, channel: u8, channels: u8) -> String {
 }
 
 /// The name of a subindex that has no other.
-fn subindex_name(subindex: u8) -> String {
+pub(in crate::device) fn subindex_name(subindex: u8) -> String {
     format!("SubIndex {subindex:03}")
 }
 
@@ -139,7 +180,7 @@ fn value(entry: &EntrySpec, access: Access) -> Entry {
 }
 
 /// Puts an entry where it belongs; one that is there already stays.
-fn insert(object: &mut Object, entry: Entry) {
+pub(in crate::device) fn insert(object: &mut Object, entry: Entry) {
     let place = object.entries.binary_search_by_key(&entry.subindex, |entry| entry.subindex);
     if let Err(at) = place {
         object.entries.insert(at, entry);
@@ -187,7 +228,7 @@ fn assignment(spec: &Spec, sync_manager: u8) -> Object {
 
 /// The synchronisation parameters of outputs (0x1C32) or inputs (0x1C33): free run, or with the
 /// frames.
-fn synchronisation(sync_manager: u8) -> Object {
+pub(in crate::device) fn synchronisation(sync_manager: u8) -> Object {
     const FREE_RUN_OR_FRAMES: u64 = 0x0003;
     const SHORTEST_CYCLE_NS: u64 = 100_000;
     let word = |subindex, name: &str, access, value| {

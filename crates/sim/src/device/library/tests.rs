@@ -92,7 +92,7 @@ fn profiles_of_devices_with_a_processor() {
         assert_eq!((mailbox.areas.receive.size, mailbox.areas.send.size), (size, size), "{name}");
         let old = ["EL3004", "EL3102", "EL3162"].contains(&name);
         assert_eq!(mailbox.complete_access, !old, "{name}");
-        assert!(mailbox.protocols.0 == 0x0004, "{name}");
+        assert!(mailbox.protocols.0 == 0x000C, "{name}");
         assert!(!profile.device_emulation, "{name}");
         for manager in &profile.process {
             let record = image.sync_managers()[usize::from(manager.index)];

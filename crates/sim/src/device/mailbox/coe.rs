@@ -9,11 +9,9 @@ use linesman_proto::mailbox::coe::sdo::{Abort, Initial, Request, Response, Segme
 use linesman_proto::mailbox::coe::{CoeError, Message, ObjectAddress};
 use linesman_proto::state::AlState;
 
-use super::information;
+use super::{Answers, Served, information};
 use crate::device::dictionary::{Dictionary, LARGEST};
-
-/// Bodies of the answers to one request, in order.
-pub(super) type Answers = Vec<Vec<u8>>;
+use crate::device::trouble::RefusedWith;
 
 /// The server.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
@@ -33,13 +31,22 @@ impl CoeServer {
     pub(super) fn answer(
         &mut self,
         request: &[u8],
-        dictionary: &mut Dictionary,
-        state: AlState,
+        served: &mut Served<'_>,
         room: usize,
     ) -> Result<Answers, ErrorReplyCode> {
+        let Served { dictionary, troubles, state, .. } = served;
         match Message::parse(request) {
             Ok(Message::SdoRequest(request)) => {
-                Ok(vec![self.sdo(request, dictionary, state, room)])
+                match begun(&request)
+                    .and_then(|object| Some((object, troubles.refuses_sdo(object.index)?)))
+                {
+                    Some((object, RefusedWith::Abort(code))) => {
+                        self.transfer = None;
+                        Ok(vec![abort(object, code)])
+                    }
+                    Some((_, RefusedWith::ErrorReply(code))) => Err(code),
+                    None => Ok(vec![self.sdo(request, dictionary, *state, room)]),
+                }
             }
             Ok(Message::Abort(_)) => {
                 self.transfer = None;
@@ -190,6 +197,14 @@ fn store(
         dictionary.download_all(object, data, state)
     } else {
         dictionary.download(object, data, state)
+    }
+}
+
+/// The object that a transfer begins to be about; `None` amid one.
+const fn begun(request: &Request<'_>) -> Option<ObjectAddress> {
+    match request {
+        Request::Upload { object, .. } | Request::Download { object, .. } => Some(*object),
+        Request::UploadSegment { .. } | Request::DownloadSegment(_) => None,
     }
 }
 

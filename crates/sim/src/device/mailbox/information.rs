@@ -8,7 +8,8 @@ use linesman_proto::mailbox::coe::information::{
 };
 use linesman_proto::mailbox::coe::{DataType, Message as CoeMessage, ObjectAddress, ObjectIndex};
 
-use super::coe::{Answers, write};
+use super::Answers;
+use super::coe::write;
 use crate::device::dictionary::{Dictionary, LARGEST, Object};
 
 /// Answers a question, in as many messages as it takes.

@@ -1,23 +1,29 @@
 //! The mailbox of a SubDevice: takes messages, answers them, repeats what was lost.
 //!
-//! Read first: ETG.1000.4 (mailbox), ETG.1000.6 (CoE). SyncManager 0 brings requests, SyncManager 1
-//! takes answers. One request is worked on at a time; the next stays in its SyncManager, which tells
-//! the MainDevice to wait.
+//! Read first: ETG.1000.4 (mailbox), ETG.1000.6 (CoE, FoE). SyncManager 0 brings requests,
+//! SyncManager 1 takes answers. One request is worked on at a time; the next stays in its
+//! SyncManager, which tells the MainDevice to wait.
 
 mod coe;
+mod foe;
 mod information;
+mod outbox;
 
 use std::collections::VecDeque;
 
 use linesman_proto::mailbox::coe::{Emergency, Message as CoeMessage};
 use linesman_proto::mailbox::{
-    BufferTooSmall, Counter, ErrorReply, ErrorReplyCode, Header, MailboxError, MailboxType, Message,
+    Counter, ErrorReply, ErrorReplyCode, Header, MailboxError, MailboxType, Message,
 };
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
 use self::coe::CoeServer;
+use self::foe::FoeServer;
+use self::outbox::{Envelope, Outbox};
 use super::dictionary::Dictionary;
+use super::files::Files;
+use super::trouble::{Trouble, Troubles};
 use crate::controller::Pdi;
 
 /// The SyncManager that requests come by.
@@ -26,21 +32,35 @@ pub const REQUESTS: u8 = 0;
 pub const ANSWERS: u8 = 1;
 /// Messages that wait to be fetched; when there are more, no request is taken.
 const WAITING: usize = 4;
+/// Emergencies that wait to be sent; further ones are forgotten.
+const UNTOLD: usize = 8;
 /// How soon a full mailbox is looked at again, where its SyncManager tells nothing.
 const LOOK_AGAIN: Span = Span::ms(1);
+
+/// What the mailbox serves: the parts of the device that messages are about.
+#[derive(Debug)]
+pub struct Served<'a> {
+    /// The objects that CoE is about; without any there is no CoE.
+    pub dictionary: &'a mut Dictionary,
+    /// The files that FoE is about; without any there is no FoE.
+    pub files: &'a mut Files,
+    /// What is wrong with the device.
+    pub troubles: &'a mut Troubles,
+    /// The state the device is in.
+    pub state: AlState,
+}
 
 /// The mailbox.
 #[derive(Clone, Debug)]
 pub struct Mailbox {
     coe: CoeServer,
+    foe: FoeServer,
     response_time: Span,
     /// The request that is worked on, and when that ends.
     request: Option<(Vec<u8>, Instant)>,
     last_received: Counter,
-    sent: Counter,
-    /// The last message in SyncManager 1, in case it is lost.
-    last_message: Vec<u8>,
-    outbox: VecDeque<Vec<u8>>,
+    outbox: Outbox,
+    emergencies: VecDeque<Emergency>,
     buffer: Vec<u8>,
 }
 
@@ -50,12 +70,12 @@ impl Mailbox {
     pub fn new(response_time: Span) -> Self {
         Self {
             coe: CoeServer::default(),
+            foe: FoeServer::default(),
             response_time,
             request: None,
             last_received: Counter::NONE,
-            sent: Counter::NONE,
-            last_message: Vec::new(),
-            outbox: VecDeque::new(),
+            outbox: Outbox::default(),
+            emergencies: VecDeque::new(),
             buffer: Vec::new(),
         }
     }
@@ -65,12 +85,11 @@ impl Mailbox {
         *self = Self::new(self.response_time);
     }
 
-    /// Tells the MainDevice of an error on the device's own account.
-    pub fn report(&mut self, emergency: Emergency, pdi: &Pdi<'_>) {
-        let to_main_device = Header::new(MailboxType::Coe, Counter::NONE, 0);
-        self.send(MailboxType::Coe, to_main_device, pdi, |body| {
-            CoeMessage::Emergency(emergency).write(body)
-        });
+    /// Tells the MainDevice of an error on the device's own account, as soon as there is room.
+    pub fn report(&mut self, emergency: Emergency) {
+        if self.emergencies.len() < UNTOLD {
+            self.emergencies.push_back(emergency);
+        }
     }
 
     /// Does what can be done now, and says when to come again.
@@ -78,71 +97,67 @@ impl Mailbox {
         &mut self,
         now: Instant,
         pdi: &mut Pdi<'_>,
-        dictionary: &mut Dictionary,
-        state: AlState,
+        served: &mut Served<'_>,
     ) -> Option<Instant> {
-        self.repeat(pdi);
-        self.take(now, pdi);
+        let fills = !served.troubles.has(Trouble::MailboxNotFilled);
+        if fills && pdi.repeat_requested(ANSWERS) {
+            self.outbox.repeat(pdi);
+            pdi.acknowledge_repeat(ANSWERS);
+        }
+        self.take(now, pdi, served);
         if let Some((request, due)) = self.request.take() {
             if due <= now {
-                self.answer(&request, pdi, dictionary, state);
-                self.deliver(pdi);
-                self.take(now, pdi);
+                self.answer(&request, now, pdi, served);
+                if fills {
+                    self.outbox.deliver(pdi);
+                }
+                self.take(now, pdi, served);
             } else {
                 self.request = Some((request, due));
             }
         }
-        self.deliver(pdi);
+        self.tell(served.state);
+        if fills {
+            self.outbox.deliver(pdi);
+        }
         let due = self.request.as_ref().map(|(_, due)| *due);
-        let again = (!self.outbox.is_empty()).then(|| now + LOOK_AGAIN);
+        let again = (self.outbox.len() > 0 && fills).then(|| now + LOOK_AGAIN);
         [due, again].into_iter().flatten().min()
     }
 
-    /// The MainDevice did not get the last message: here it is again.
-    fn repeat(&mut self, pdi: &mut Pdi<'_>) {
-        if pdi.repeat_requested(ANSWERS) {
-            if !pdi.mailbox_full(ANSWERS) && !self.last_message.is_empty() {
-                pdi.write_sync_manager(ANSWERS, &self.last_message);
-            }
-            pdi.acknowledge_repeat(ANSWERS);
-        }
-    }
-
     /// Takes a request out of SyncManager 0.
-    fn take(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if self.request.is_some() || self.outbox.len() >= WAITING {
+    fn take(&mut self, now: Instant, pdi: &mut Pdi<'_>, served: &Served<'_>) {
+        let dead = served.troubles.has(Trouble::MailboxNotRead);
+        if dead || self.request.is_some() || self.outbox.len() >= WAITING {
             return;
         }
-        let len = pdi.sync_manager(REQUESTS).map_or(0, |manager| usize::from(manager.length));
+        let len = request_room(pdi);
         self.buffer.resize(len, 0);
         if pdi.read_sync_manager(REQUESTS, &mut self.buffer).is_some() {
-            self.request = Some((self.buffer.clone(), now + self.response_time));
+            let due = now + self.response_time + served.troubles.mailbox_delay();
+            self.request = Some((self.buffer.clone(), due));
         }
     }
 
-    /// Puts the next answer into SyncManager 1.
-    fn deliver(&mut self, pdi: &mut Pdi<'_>) {
-        if let Some(message) = self.outbox.front()
-            && pdi.write_sync_manager(ANSWERS, message)
+    /// Puts emergencies among the messages that wait, while there is room. In BOOT there is no CoE.
+    fn tell(&mut self, state: AlState) {
+        while state != AlState::Boot
+            && self.outbox.len() < WAITING
+            && let Some(emergency) = self.emergencies.pop_front()
         {
-            self.last_message = self.outbox.pop_front().unwrap_or_default();
+            let body = coe::write(&CoeMessage::Emergency(emergency));
+            self.outbox.push(MailboxType::Coe, Envelope::UNASKED, body);
         }
     }
 
-    fn answer(
-        &mut self,
-        request: &[u8],
-        pdi: &Pdi<'_>,
-        dictionary: &mut Dictionary,
-        state: AlState,
-    ) {
+    fn answer(&mut self, request: &[u8], now: Instant, pdi: &Pdi<'_>, served: &mut Served<'_>) {
         let message = match Message::parse(request) {
             Ok(message) => message,
             Err(MailboxError::HeaderCutOff { .. }) => return,
             Err(MailboxError::DataCutOff { .. }) => {
                 let header = Header::parse(request);
                 if let Ok(header) = header {
-                    self.refuse(header, ErrorReplyCode::InvalidSize, pdi);
+                    self.refuse(header, ErrorReplyCode::InvalidSize);
                 }
                 return;
             }
@@ -152,78 +167,53 @@ impl Mailbox {
             return;
         }
         self.last_received = header.counter;
-        match header.kind {
-            MailboxType::Coe if state != AlState::Boot => {
-                self.serve_coe(message, pdi, dictionary, state);
+        let unsupported = || Err(ErrorReplyCode::UnsupportedProtocol);
+        let answers = match header.kind {
+            MailboxType::Coe if served.state != AlState::Boot && !served.dictionary.is_empty() => {
+                self.coe.answer(message.data, served, answer_room(pdi))
+            }
+            MailboxType::Foe if !served.files.is_empty() => {
+                let rooms = foe::Rooms { requests: request_room(pdi), answers: answer_room(pdi) };
+                self.foe.answer(message.data, served.files, served.state, now, rooms)
             }
             // Nobody answers an error with an error.
-            MailboxType::Error => {}
+            MailboxType::Error => return,
             MailboxType::Coe
             | MailboxType::Aoe
             | MailboxType::Eoe
             | MailboxType::Foe
             | MailboxType::Soe
             | MailboxType::Voe
-            | MailboxType::Reserved(_) => {
-                self.refuse(header, ErrorReplyCode::UnsupportedProtocol, pdi);
-            }
-        }
-    }
-
-    fn serve_coe(
-        &mut self,
-        message: Message<'_>,
-        pdi: &Pdi<'_>,
-        dictionary: &mut Dictionary,
-        state: AlState,
-    ) {
-        let room = answer_room(pdi);
-        let mut coe = std::mem::take(&mut self.coe);
-        let answers = coe.answer(message.data, dictionary, state, room);
-        self.coe = coe;
+            | MailboxType::Reserved(_) => unsupported(),
+        };
         match answers {
             Ok(answers) => {
                 for answer in answers {
-                    self.send(MailboxType::Coe, message.header, pdi, |body| copy(&answer, body));
+                    self.outbox.push(header.kind, Envelope::answering(&header), answer);
                 }
             }
-            Err(code) => self.refuse(message.header, code, pdi),
+            Err(code) => self.refuse(header, code),
         }
     }
 
     /// Answers that a message cannot be handled at all.
-    fn refuse(&mut self, to: Header, code: ErrorReplyCode, pdi: &Pdi<'_>) {
-        self.send(MailboxType::Error, to, pdi, |body| ErrorReply { code }.write(body));
-    }
-
-    /// Queues a message. One that does not fit into the mailbox is not sent.
-    fn send(
-        &mut self,
-        kind: MailboxType,
-        to: Header,
-        pdi: &Pdi<'_>,
-        body: impl FnOnce(&mut [u8]) -> Result<usize, BufferTooSmall>,
-    ) {
-        let counter = self.sent.next();
-        let mut buffer = vec![0; answer_room(pdi)];
-        let header = Header { address: to.address, ..Header::new(kind, counter, 0) };
-        if let Ok(len) = header.write_message(&mut buffer, body) {
-            buffer.truncate(len);
-            self.outbox.push_back(buffer);
-            self.sent = counter;
+    fn refuse(&mut self, to: Header, code: ErrorReplyCode) {
+        let mut body = vec![0; ErrorReply::LEN];
+        if (ErrorReply { code }).write(&mut body).is_ok() {
+            self.outbox.push(MailboxType::Error, Envelope::answering(&to), body);
         }
     }
+}
+
+/// Bodies of the answers to one request, in order.
+type Answers = Vec<Vec<u8>>;
+
+/// Length of SyncManager 0.
+fn request_room(pdi: &Pdi<'_>) -> usize {
+    pdi.sync_manager(REQUESTS).map_or(0, |manager| usize::from(manager.length))
 }
 
 /// Length of SyncManager 1.
 fn answer_room(pdi: &Pdi<'_>) -> usize {
     pdi.sync_manager(ANSWERS).map_or(0, |manager| usize::from(manager.length))
-}
-
-/// Writes a body that is ready.
-fn copy(body: &[u8], buffer: &mut [u8]) -> Result<usize, BufferTooSmall> {
-    let (needed, available) = (body.len(), buffer.len());
-    let slot = buffer.get_mut(..needed).ok_or(BufferTooSmall { needed, available })?;
-    slot.copy_from_slice(body);
-    Ok(needed)
 }

@@ -3,27 +3,66 @@
 //! Read first: ETG.1000.6, state transitions; the codes are those that the public SubDevice stack
 //! code gives.
 
+use linesman_proto::mailbox::coe::ObjectIndex;
 use linesman_proto::register::{self as r, SmDirection, SmMode, SyncManagerConfig};
+use linesman_proto::sii::Direction;
 use linesman_proto::state::AlStatusCode;
 
+use super::areas::Areas;
 use crate::controller::Pdi;
+use crate::device::dictionary::Dictionary;
 use crate::device::mailbox::{ANSWERS, REQUESTS};
 
-/// The SyncManager of the outputs of a device with a mailbox.
-pub(super) const OUTPUTS: u8 = 2;
-/// The SyncManager of its inputs.
-pub(super) const INPUTS: u8 = 3;
 /// The shortest mailbox that the specification allows, in bytes.
 const SHORTEST_MAILBOX: u16 = 0x22;
 /// Where process-data RAM begins.
 const RAM: u16 = 0x1000;
 
+/// Detected modules of a modular device.
+const DETECTED_MODULES: ObjectIndex = ObjectIndex(0xF050);
+/// Modules that the MainDevice expects.
+const CONFIGURED_MODULES: ObjectIndex = ObjectIndex(0xF030);
+
+/// Whether the modules of a modular device are those that the MainDevice has configured. One that
+/// configures none (subindex 0 is 0) takes what there is; empty slots (ident 0) at the end do not
+/// count.
+pub(super) fn modules(dictionary: &Dictionary) -> Result<(), AlStatusCode> {
+    let idents = |index| {
+        let object = dictionary.object(index)?;
+        let count = object.entry(0)?.as_number() as usize;
+        let idents = object.entries.iter().skip(1).take(count).map(|entry| entry.as_number());
+        let idents: Vec<u64> = idents.collect();
+        let used = idents.iter().rposition(|ident| *ident != 0).map_or(0, |last| last + 1);
+        Some(idents[..used].to_vec())
+    };
+    match (idents(CONFIGURED_MODULES), idents(DETECTED_MODULES)) {
+        (Some(configured), Some(detected)) if !configured.is_empty() && configured != detected => {
+            Err(AlStatusCode::MODULE_LIST_MISMATCH)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether the device reaches its controller in words of 16 bits: PDI 0x08 and 0x0A (S2 2.6).
+fn reads_words(pdi: &Pdi<'_>) -> bool {
+    matches!(pdi.register(r::PDI_CONTROL.address), 0x08 | 0x0A)
+}
+
+/// Whether a SyncManager begins where the device can reach it.
+fn is_reachable(manager: &SyncManagerConfig, pdi: &Pdi<'_>) -> bool {
+    manager.start.0.is_multiple_of(2) || !reads_words(pdi)
+}
+
 /// Whether both SyncManagers of the mailbox are set up. `longest` is the longest one that the device
-/// takes.
-pub(super) fn mailbox(pdi: &Pdi<'_>, longest: u16) -> bool {
+/// takes, `wrong` the code for most of what can be wrong.
+pub(super) fn mailbox(
+    pdi: &Pdi<'_>,
+    longest: u16,
+    wrong: AlStatusCode,
+) -> Result<(), AlStatusCode> {
     let (Some(requests), Some(answers)) = (pdi.sync_manager(REQUESTS), pdi.sync_manager(ANSWERS))
     else {
-        return false;
+        return Err(wrong);
     };
     let sound = |manager: &SyncManagerConfig, direction: SmDirection| {
         manager.activate.enable()
@@ -32,31 +71,66 @@ pub(super) fn mailbox(pdi: &Pdi<'_>, longest: u16) -> bool {
             && (SHORTEST_MAILBOX..=longest).contains(&manager.length)
             && is_in_ram(manager, pdi)
     };
-    sound(&requests, SmDirection::MainDeviceWrites)
+    let both = sound(&requests, SmDirection::MainDeviceWrites)
         && sound(&answers, SmDirection::MainDeviceReads)
-        && !overlap(&requests, &answers)
+        && !overlap(&requests, &answers);
+    if !both {
+        Err(wrong)
+    } else if [requests, answers].iter().all(|manager| is_reachable(manager, pdi)) {
+        Ok(())
+    } else {
+        Err(AlStatusCode::INVALID_SYNC_MANAGER)
+    }
 }
 
-/// Whether process data of `outputs` and `inputs` bytes are set up; if not, the code to show.
+/// Whether all process data are set up; if not, the code to show. `mailbox` says whether SyncManagers
+/// 0 and 1 are those of a mailbox.
 pub(super) fn process_data(
     pdi: &Pdi<'_>,
-    outputs: usize,
-    inputs: usize,
+    areas: &Areas,
+    mailbox: bool,
 ) -> Result<(), AlStatusCode> {
-    let inputs_fit =
-        buffer(pdi, INPUTS, inputs, SmDirection::MainDeviceReads, &[REQUESTS, ANSWERS]);
-    if !inputs_fit {
-        return Err(AlStatusCode::INVALID_INPUT_CONFIGURATION);
+    let mut others = if mailbox { vec![REQUESTS, ANSWERS] } else { Vec::new() };
+    for direction in [Direction::Inputs, Direction::Outputs] {
+        let (way, code) = match direction {
+            Direction::Inputs => {
+                (SmDirection::MainDeviceReads, AlStatusCode::INVALID_INPUT_CONFIGURATION)
+            }
+            Direction::Outputs => {
+                (SmDirection::MainDeviceWrites, AlStatusCode::INVALID_OUTPUT_CONFIGURATION)
+            }
+        };
+        for (index, len) in areas.lengths(direction) {
+            if !buffer(pdi, index, len, way, &others) {
+                return Err(code);
+            }
+            others.push(index);
+        }
     }
-    let others = [REQUESTS, ANSWERS, INPUTS];
-    if !buffer(pdi, OUTPUTS, outputs, SmDirection::MainDeviceWrites, &others) {
-        return Err(AlStatusCode::INVALID_OUTPUT_CONFIGURATION);
+    let mut used = areas.lengths(Direction::Inputs).chain(areas.lengths(Direction::Outputs));
+    let unreachable = |(index, _)| {
+        let manager: Option<SyncManagerConfig> = pdi.sync_manager(index);
+        manager.is_some_and(|used| used.activate.enable() && !is_reachable(&used, pdi))
+    };
+    if used.any(unreachable) {
+        return Err(AlStatusCode::INVALID_SYNC_MANAGER);
     }
-    let watched = pdi.sync_manager(OUTPUTS).is_some_and(|manager| manager.control.watchdog());
-    if outputs > 0 && watched && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) == 0 {
+    let watched = watched(pdi, areas);
+    if areas.len(Direction::Outputs) > 0
+        && watched
+        && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) == 0
+    {
         return Err(AlStatusCode::INVALID_WATCHDOG);
     }
     Ok(())
+}
+
+/// Whether outputs are to trigger the watchdog.
+pub(super) fn watched(pdi: &Pdi<'_>, areas: &Areas) -> bool {
+    areas
+        .lengths(Direction::Outputs)
+        .filter_map(|(index, _)| pdi.sync_manager(index))
+        .any(|manager| manager.control.watchdog())
 }
 
 /// Whether a SyncManager for `len` bytes of process data is set up, apart from `others`. Without

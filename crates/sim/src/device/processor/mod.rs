@@ -3,31 +3,35 @@
 //! Read first: ETG.1000.6, EtherCAT state machine. [`application_layer`](super::application_layer)
 //! has what all devices share, `check` what this one looks at before it enters a state.
 
+mod areas;
 mod check;
+mod note;
 mod process_image;
+mod update;
 
-use linesman_proto::mailbox::coe::{Emergency, ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::register as r;
-use linesman_proto::sii::MailboxPair;
+use linesman_proto::sii::{Direction, MailboxPair};
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
 
-use self::process_image::ProcessImage;
+use self::areas::Areas;
+pub use self::areas::ProcessBuffer;
 use super::application::Channel;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::dictionary::Dictionary;
+use super::files::Files;
 use super::firmware::{Firmware, SampleAgain};
-use super::mailbox::Mailbox;
+use super::history::History;
+use super::mailbox::{Mailbox, Served};
 use super::signal::Signals;
+use super::trouble::{Trouble, Troubles};
 use crate::controller::Pdi;
-
-/// The outputs of a device with a mailbox are assigned here.
-const OUTPUT_ASSIGNMENT: ObjectIndex = ObjectIndex(0x1C12);
-/// The inputs.
-const INPUT_ASSIGNMENT: ObjectIndex = ObjectIndex(0x1C13);
 
 /// Emergencies that wait for a mailbox; further ones are forgotten.
 const UNTOLD: usize = 8;
+/// How long new firmware takes to start.
+const FIRST_START: Span = Span::ms(400);
 
 /// How long a processor takes for what it does.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -77,7 +81,9 @@ pub struct Description {
     pub dictionary: Dictionary,
     /// What its process data do.
     pub channels: Vec<Box<dyn Channel>>,
-    /// The mailbox it likes best; a longer one it does not take.
+    /// Its process data.
+    pub buffers: Vec<ProcessBuffer>,
+    /// The mailbox it likes best; a longer one it does not take. Without a size there is none.
     pub mailbox: MailboxPair,
     /// The mailbox in BOOT, for a device that knows BOOT.
     pub bootstrap: Option<MailboxPair>,
@@ -92,11 +98,13 @@ pub struct Processor {
     application_layer: ApplicationLayer,
     dictionary: Dictionary,
     mailbox: Mailbox,
-    outputs: ProcessImage,
-    inputs: ProcessImage,
+    process_data: Areas,
     /// The step that is being worked on.
     step: Option<Step>,
     next_sample: Instant,
+    files: Files,
+    history: History,
+    troubles: Troubles,
     /// Errors to tell of.
     emergencies: Vec<Emergency>,
     buffer: Vec<u8>,
@@ -123,18 +131,29 @@ impl Processor {
     /// A device that has not started yet.
     #[must_use]
     pub fn new(description: Description) -> Self {
+        let mut application_layer = ApplicationLayer::new(description.bootstrap.is_some());
+        // Until somebody sets another number.
+        application_layer.identify(0);
         Self {
-            application_layer: ApplicationLayer::new(description.bootstrap.is_some()),
+            application_layer,
             dictionary: description.dictionary.clone(),
             mailbox: Mailbox::new(description.times.mailbox),
-            outputs: ProcessImage::default(),
-            inputs: ProcessImage::default(),
+            process_data: Areas::default(),
             step: None,
             next_sample: Instant::ZERO,
+            files: Files::default(),
+            history: History::default(),
+            troubles: Troubles::default(),
             emergencies: Vec::new(),
             buffer: Vec::new(),
             description,
         }
+    }
+
+    /// The same with files that FoE reads and writes.
+    #[must_use]
+    pub fn with_files(self, files: Files) -> Self {
+        Self { files, ..self }
     }
 
     fn make_safe(&mut self, pdi: &mut Pdi<'_>) {
@@ -147,10 +166,13 @@ impl Processor {
     // ---- states ----
 
     fn serve_requests(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        if self.troubles.has(Trouble::DeafToRequests) {
+            return;
+        }
         if let Some(step) = self.step.filter(|step| step.due <= now) {
             self.step = None;
             match self.go(step, now, pdi) {
-                Outcome::Entered => ApplicationLayer::enter(pdi, step.to),
+                Outcome::Entered => self.application_layer.enter(pdi, step.to),
                 Outcome::Failed(state, code) => self.fall(pdi, state, code),
                 Outcome::Waits => self.step = Some(step),
             }
@@ -160,7 +182,7 @@ impl Processor {
         if listens && let Some(to) = self.application_layer.take_request(pdi) {
             let from = ApplicationLayer::state(pdi);
             // Whoever asks has seen the error, if there was one: outputs may come again.
-            pdi.deactivate_sync_manager(check::OUTPUTS, false);
+            self.lock_outputs(pdi, false);
             let due = now + self.time_for(from, to);
             self.step = Some(Step { to, due, deadline: due + self.description.times.outputs });
         }
@@ -172,6 +194,7 @@ impl Processor {
             (AlState::Init, AlState::PreOp | AlState::Boot) => times.to_preop,
             (AlState::PreOp, AlState::SafeOp) => times.to_safeop,
             (AlState::SafeOp, AlState::Op) => times.to_op,
+            (AlState::Boot, AlState::Init) if self.files.has_new_firmware() => FIRST_START,
             (
                 AlState::Init | AlState::Boot | AlState::PreOp | AlState::SafeOp | AlState::Op,
                 AlState::Init | AlState::Boot | AlState::PreOp | AlState::SafeOp | AlState::Op,
@@ -188,7 +211,7 @@ impl Processor {
         match step.to {
             AlState::Init => {
                 self.mailbox.restart();
-                Outcome::Entered
+                if from == AlState::Boot { self.leave_boot(pdi) } else { Outcome::Entered }
             }
             AlState::PreOp => self.start_mailbox(from, pdi, AlStatusCode::INVALID_MAILBOX_PREOP),
             AlState::Boot => self.start_mailbox(from, pdi, AlStatusCode::INVALID_MAILBOX_BOOT),
@@ -207,38 +230,62 @@ impl Processor {
         if !pdi.sii_load_ok() {
             return Outcome::Failed(AlState::Init, AlStatusCode::EEPROM_ERROR);
         }
-        if !self.has_mailbox(pdi, code == AlStatusCode::INVALID_MAILBOX_BOOT) {
+        if let Err(code) = self.check_mailbox(pdi, code) {
             return Outcome::Failed(AlState::Init, code);
         }
         if !from.has_mailbox() {
             self.mailbox.restart();
+            if code == AlStatusCode::INVALID_MAILBOX_PREOP {
+                self.note_communication(pdi);
+            }
         }
         Outcome::Entered
     }
 
-    fn has_mailbox(&self, pdi: &Pdi<'_>, boot: bool) -> bool {
+    /// Whether the mailbox is set up as the device wants it, if it has one; `wrong` is the code for
+    /// most of what can be wrong.
+    fn check_mailbox(&self, pdi: &Pdi<'_>, wrong: AlStatusCode) -> Result<(), AlStatusCode> {
+        if !self.description.mailbox.is_present() {
+            return Ok(());
+        }
+        let boot = wrong == AlStatusCode::INVALID_MAILBOX_BOOT;
         let areas = self.description.bootstrap.filter(|_| boot).unwrap_or(self.description.mailbox);
-        check::mailbox(pdi, areas.receive.size.max(areas.send.size))
+        check::mailbox(pdi, areas.receive.size.max(areas.send.size), wrong)
     }
 
     fn set_up_process_data(&mut self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
-        let image =
-            |assignment, code| ProcessImage::of(&self.dictionary, assignment).map_err(|_| code);
-        let inputs = image(INPUT_ASSIGNMENT, AlStatusCode::INVALID_INPUT_MAPPING)?;
-        let outputs = image(OUTPUT_ASSIGNMENT, AlStatusCode::INVALID_OUTPUT_MAPPING)?;
-        check::process_data(pdi, outputs.len(), inputs.len())?;
-        (self.inputs, self.outputs) = (inputs, outputs);
+        let areas = Areas::of(&self.dictionary, &self.description.buffers)?;
+        check::modules(&self.dictionary)?;
+        check::process_data(pdi, &areas, self.description.mailbox.is_present())?;
+        self.process_data = areas;
         Ok(())
     }
 
+    fn check_process_data(&self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
+        check::process_data(pdi, &self.process_data, self.description.mailbox.is_present())
+    }
+
+    fn has_outputs(&self) -> bool {
+        self.process_data.len(Direction::Outputs) > 0
+    }
+
+    /// Locks the buffers of the outputs, or unlocks them.
+    fn lock_outputs(&self, pdi: &mut Pdi<'_>, locked: bool) {
+        for buffer in &self.description.buffers {
+            if buffer.direction == Direction::Outputs {
+                pdi.deactivate_sync_manager(buffer.sync_manager, locked);
+            }
+        }
+    }
+
     fn go_operational(&mut self, step: Step, now: Instant, pdi: &mut Pdi<'_>) -> Outcome {
-        if let Err(code) = check::process_data(pdi, self.outputs.len(), self.inputs.len()) {
+        if let Err(code) = self.check_process_data(pdi) {
             return Outcome::Failed(AlState::PreOp, code);
         }
-        if self.outputs.len() == 0 {
+        if !self.has_outputs() {
             return Outcome::Entered;
         }
-        if self.take_outputs(pdi) && !watchdog_ran_out(pdi) {
+        if self.take_outputs(pdi) && !self.watchdog_ran_out(pdi) {
             self.drive_outputs(now, pdi.signals_mut());
             return Outcome::Entered;
         }
@@ -253,43 +300,35 @@ impl Processor {
     /// counter.
     fn fall(&mut self, pdi: &mut Pdi<'_>, state: AlState, code: AlStatusCode) {
         self.make_safe(pdi);
-        if ApplicationLayer::is_operational(pdi) && self.outputs.len() > 0 {
-            pdi.deactivate_sync_manager(check::OUTPUTS, true);
+        if ApplicationLayer::is_operational(pdi) && self.has_outputs() {
+            self.lock_outputs(pdi, true);
         }
         if !state.has_mailbox() {
             self.mailbox.restart();
         }
         ApplicationLayer::fail(pdi, state, code);
+        self.note_failure(state, code, pdi);
     }
 
     /// A SyncManager was switched on or off: what the state needs is to be there still.
     fn check_again(&mut self, pdi: &mut Pdi<'_>) {
         let state = ApplicationLayer::state(pdi);
-        if state.has_mailbox() && !self.has_mailbox(pdi, state == AlState::Boot) {
-            let code = match state {
-                AlState::Boot => AlStatusCode::INVALID_MAILBOX_BOOT,
-                AlState::Init | AlState::PreOp | AlState::SafeOp | AlState::Op => {
-                    AlStatusCode::INVALID_MAILBOX_PREOP
-                }
-            };
+        let wrong = match state {
+            AlState::Boot => AlStatusCode::INVALID_MAILBOX_BOOT,
+            AlState::Init | AlState::PreOp | AlState::SafeOp | AlState::Op => {
+                AlStatusCode::INVALID_MAILBOX_PREOP
+            }
+        };
+        if state.has_mailbox()
+            && let Err(code) = self.check_mailbox(pdi, wrong)
+        {
             self.step = None;
             self.fall(pdi, AlState::Init, code);
         } else if state.has_inputs()
-            && let Err(code) = check::process_data(pdi, self.outputs.len(), self.inputs.len())
+            && let Err(code) = self.check_process_data(pdi)
         {
             self.step = None;
             self.fall(pdi, AlState::PreOp, code);
-        }
-    }
-
-    /// Hands over what is to be told, and keeps the error register.
-    fn tell_emergencies(&mut self, pdi: &Pdi<'_>) {
-        for emergency in self.emergencies.drain(..) {
-            let register = ObjectAddress { index: ObjectIndex::ERROR_REGISTER, subindex: 0 };
-            if let Some(register) = self.dictionary.find(register) {
-                self.dictionary.set_number(register, u64::from(emergency.register.0));
-            }
-            self.mailbox.report(emergency, pdi);
         }
     }
 
@@ -297,26 +336,23 @@ impl Processor {
 
     /// Fetches fresh outputs; false when none came yet.
     fn take_outputs(&mut self, pdi: &mut Pdi<'_>) -> bool {
-        self.buffer.clear();
-        self.buffer.resize(self.outputs.len(), 0);
-        if pdi.read_sync_manager(check::OUTPUTS, &mut self.buffer).is_none() {
-            return false;
-        }
-        self.outputs.unpack(&self.buffer, &mut self.dictionary);
-        true
+        self.process_data.take_outputs(pdi, &mut self.dictionary, &mut self.buffer)
     }
 
     fn drive_outputs(&mut self, now: Instant, signals: &mut Signals) {
+        if self.troubles.has(Trouble::FrozenApplication) {
+            return;
+        }
         for channel in &mut self.description.channels {
             channel.drive(now, &self.dictionary, signals);
         }
     }
 
     fn serve_process_data(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if !ApplicationLayer::is_operational(pdi) || self.outputs.len() == 0 {
+        if !ApplicationLayer::is_operational(pdi) || !self.has_outputs() {
             return;
         }
-        if watchdog_ran_out(pdi) {
+        if self.watchdog_ran_out(pdi) {
             self.fall(pdi, AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG);
         } else if self.take_outputs(pdi) {
             self.drive_outputs(now, pdi.signals_mut());
@@ -325,31 +361,31 @@ impl Processor {
 
     fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.next_sample = now + self.description.times.sample;
-        for channel in &mut self.description.channels {
-            channel.sample(now, &mut self.dictionary, pdi.signals());
+        if !self.troubles.has(Trouble::FrozenApplication) {
+            for channel in &mut self.description.channels {
+                channel.sample(now, &mut self.dictionary, pdi.signals());
+            }
         }
-        if self.inputs.len() > 0 {
-            let mut buffer = std::mem::take(&mut self.buffer);
-            self.inputs.pack(&self.dictionary, &mut buffer);
-            pdi.write_sync_manager(check::INPUTS, &buffer);
-            self.buffer = buffer;
-        }
+        self.process_data.put_inputs(pdi, &self.dictionary, &mut self.buffer);
     }
-}
 
-/// Whether the outputs are watched and came too late.
-fn watchdog_ran_out(pdi: &mut Pdi<'_>) -> bool {
-    let watched =
-        pdi.sync_manager(check::OUTPUTS).is_some_and(|manager| manager.control.watchdog());
-    let expired = pdi.watchdog_expired();
-    watched && expired && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) != 0
+    /// Whether the outputs are watched and came too late.
+    fn watchdog_ran_out(&self, pdi: &mut Pdi<'_>) -> bool {
+        let watched = check::watched(pdi, &self.process_data);
+        let expired = pdi.watchdog_expired();
+        watched && expired && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) != 0
+    }
 }
 
 impl Firmware for Processor {
     fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.dictionary.restart(&self.description.dictionary);
+        self.history = History::default();
         self.mailbox.restart();
-        (self.inputs, self.outputs) = (ProcessImage::default(), ProcessImage::default());
+        // An update that the loss of the supply broke off is forgotten; the old firmware runs.
+        self.files.take_broken_update();
+        self.start_new_firmware(pdi);
+        self.process_data = Areas::default();
         self.step = None;
         self.emergencies.clear();
         self.next_sample = now;
@@ -363,9 +399,18 @@ impl Firmware for Processor {
         self.serve_process_data(now, pdi);
         self.serve_requests(now, pdi);
         let state = ApplicationLayer::state(pdi);
-        let again = if state.has_mailbox() {
+        let again = if state.has_mailbox() && self.description.mailbox.is_present() {
             self.tell_emergencies(pdi);
-            self.mailbox.serve(now, pdi, &mut self.dictionary, state)
+            self.tell_time(pdi);
+            let mut served = Served {
+                dictionary: &mut self.dictionary,
+                files: &mut self.files,
+                troubles: &mut self.troubles,
+                state,
+            };
+            let again = self.mailbox.serve(now, pdi, &mut served);
+            self.follow_up();
+            again
         } else {
             None
         };
@@ -381,6 +426,36 @@ impl Firmware for Processor {
         if self.emergencies.len() < UNTOLD {
             self.emergencies.push(emergency);
         }
+    }
+
+    fn has_processor(&self) -> bool {
+        true
+    }
+
+    fn has_mailbox(&self) -> bool {
+        self.description.mailbox.is_present()
+    }
+
+    fn trouble(&mut self, trouble: Trouble, begins: bool) {
+        if begins {
+            self.troubles.begin(trouble);
+        } else {
+            self.troubles.end(trouble);
+        }
+    }
+
+    fn reboot(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        // What the MainDevice asked meanwhile nobody has heard.
+        pdi.take_al_control_event();
+        self.start(now, pdi);
+        self.lock_outputs(pdi, false);
+        ApplicationLayer::fail(pdi, AlState::Init, AlStatusCode::RESTARTED_LOCALLY);
+        self.note_crash(pdi);
+    }
+
+    fn identify(&mut self, id: u16, _signals: &mut Signals) -> bool {
+        self.application_layer.identify(id);
+        true
     }
 
     fn samples(&self) -> bool {

@@ -61,12 +61,14 @@ fn a_lost_answer_is_repeated() {
 #[test]
 fn what_is_no_message_is_answered_with_an_error() {
     // message, code of the error reply
-    let table: [(&[u8], u16); 7] = [
+    let table: [(&[u8], u16); 9] = [
         // More data than there is mailbox.
         (&[0xFF, 0, 0, 0, 0, 0x13], 8),
-        // EoE, FoE and a reserved protocol.
+        // AoE, EoE, SoE, VoE and a reserved protocol.
+        (&[10, 0, 0, 0, 0, 0x11], 2),
         (&[10, 0, 0, 0, 0, 0x12], 2),
-        (&[10, 0, 0, 0, 0, 0x14], 2),
+        (&[10, 0, 0, 0, 0, 0x15], 2),
+        (&[10, 0, 0, 0, 0, 0x1F], 2),
         (&[10, 0, 0, 0, 0, 0x19], 2),
         // CoE: no header, a service that does not exist, one that only devices have.
         (&[1, 0, 0, 0, 0, 0x13], 6),

@@ -209,7 +209,7 @@ fn the_dictionary_can_be_asked_for() {
     assert_eq!(mappable, [0x7000, 0x7010]);
     let (_, bytes) = information(&mut device, ask(ListKind::Counts)).unwrap();
     let counts = ObjectList::parse(&bytes).unwrap().counts().unwrap();
-    assert_eq!(counts, [all.len() as u16, 2, 2, 2, 2]);
+    assert_eq!(counts, [all.len() as u16, 2, 3, 2, 2]);
     assert_eq!(information(&mut device, ask(ListKind::Other(9))), Err(0x0609_0030));
 
     for index in &all {

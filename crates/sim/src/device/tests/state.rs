@@ -188,7 +188,7 @@ fn told_to_refuse_every_type_refuses() {
     for known in crate::device::library::types() {
         let mut device = Device::of(known.name());
         let code = AlStatusCode(0x8001);
-        let refusal = Refusal { transition_to: AlState::SafeOp, code };
+        let refusal = Refusal { transition_to: AlState::SafeOp, code, times: None };
         let now = device.bench.now;
         device.bench.controller.refuse(now, Some(refusal));
         device.enter_preop();

@@ -12,7 +12,7 @@ use proptest::prelude::*;
 use crate::controller::tests::rig::{answers, at, frame, hardware, sii};
 use crate::controller::{Controller, LocalClock};
 use crate::device::{NoFirmware, Signals};
-use crate::fault::Running;
+use crate::fault::{Running, Windows};
 use crate::frame::WireFrame;
 use crate::hardware::{Hardware, PortKind};
 use crate::truth::FaultId;
@@ -86,7 +86,12 @@ impl Bench {
     /// From now on these things happen.
     pub(super) fn script(&mut self, changes: Vec<(Instant, Change)>) -> FaultId {
         let id = self.world.truth.declare(FaultName::EmcNoise, Vec::new());
-        self.world.running.push(Running::new(id, self.now, None, Box::new(Script(changes))));
+        self.world.running.push(Running::new(
+            id,
+            None,
+            Windows::once(self.now, None),
+            Box::new(Script(changes)),
+        ));
         id
     }
 

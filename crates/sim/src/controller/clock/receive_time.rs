@@ -1,0 +1,88 @@
+//! Receive times: the local times at which the frame that wrote to 0x0900 came in at each port.
+//!
+//! Reference: S2 2.15.1; S1 9.1.2. The first generation and the ET1200 know the time of that frame
+//! for the port it is processed from only; the other ports take the next frame that comes in, which
+//! is the same one as long as nothing else is on the line. An ET1200 that is entered from behind
+//! (0x0936 = 1) takes the frame before instead.
+
+use linesman_proto::port::Port;
+use linesman_proto::register as r;
+use linesman_proto::register::ControllerType;
+use linesman_proto::time::Instant;
+
+use crate::controller::core::{Core, Passing};
+use crate::hardware::PortKind;
+
+impl Core {
+    /// The frame that just passed wrote to 0x0900: its receive times are kept, those of ports that
+    /// it has not reached yet when it does.
+    pub(in crate::controller) fn latch_receive_times(&mut self) {
+        let Passing { number, began, .. } = self.passing;
+        let local = self.clock.taken(began);
+        self.memory.set_u64(&r::RECEIVE_TIME_PROCESSING_UNIT, local);
+        if self.latches_next_frame() {
+            self.latch_next_frames(number, began);
+            return;
+        }
+        self.latched = Some(number);
+        for port in Port::ALL {
+            let (frame, when) = self.entered[port];
+            if frame == number && self.hardware.ports[port] != PortKind::Absent {
+                self.latch_receive_time(port, when);
+            }
+        }
+    }
+
+    /// A frame comes in at a port: its time is kept if this is the one that is waited for.
+    pub(in crate::controller) fn latch_entry(&mut self, port: Port, number: u64, when: Instant) {
+        if !self.loops.is_open(port) {
+            return;
+        }
+        let waited = self.latch_waits[port].is_some_and(|from| from < when);
+        if waited {
+            self.latch_waits[port] = None;
+        }
+        if waited || self.latched == Some(number) {
+            self.latch_receive_time(port, when);
+        }
+    }
+
+    /// Whether ports other than A take the next frame, whichever it is.
+    fn latches_next_frame(&self) -> bool {
+        let kind = ControllerType(self.hardware.controller_type);
+        matches!(kind, ControllerType::ESC20 | ControllerType::ET1200)
+    }
+
+    fn latch_next_frames(&mut self, number: u64, began: Instant) {
+        let reversed = ControllerType(self.hardware.controller_type) == ControllerType::ET1200
+            && self.memory.u8(&r::RECEIVE_TIME_LATCH_MODE) & 1 != 0;
+        for port in Port::ALL {
+            if self.hardware.ports[port] == PortKind::Absent {
+                continue;
+            }
+            let (frame, when) = self.entered[port];
+            if port == Port::A {
+                if frame == number {
+                    self.latch_receive_time(port, when);
+                } else {
+                    self.latch_waits[port] = Some(began);
+                }
+            } else if reversed {
+                if frame != u64::MAX {
+                    self.latch_receive_time(port, when);
+                }
+            } else if frame != u64::MAX && when > began {
+                // One that was ahead of it comes back only now.
+                self.latch_receive_time(port, when);
+            } else {
+                self.latch_waits[port] = Some(began);
+            }
+        }
+    }
+
+    fn latch_receive_time(&mut self, port: Port, when: Instant) {
+        let local = self.clock.taken(when) as u32;
+        let address = usize::from(r::RECEIVE_TIME.of_port(port).0);
+        self.memory.put(address, &local.to_le_bytes());
+    }
+}

@@ -1,0 +1,159 @@
+//! What is behind the controller of a described device.
+
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::sii::{Direction, Identity, SyncManagerKind};
+
+use super::DescribedType;
+use super::channel::{Driven, Taken};
+use super::objects;
+use super::signals::{Layout, Point};
+use crate::device::application::Channel;
+use crate::device::emulated::{DigitalArea, Emulated, WordArea};
+use crate::device::firmware::{Firmware, NoFirmware};
+use crate::device::processor::{Description, ProcessBuffer, Processor, ResponseTimes};
+use crate::device::signal::SignalId;
+
+/// SII byte 0: nothing is connected to the controller.
+const NO_PDI: u8 = 0x00;
+/// SII byte 0: digital inputs and outputs.
+const DIGITAL_IO: u8 = 0x04;
+/// A pin that leads nowhere: a bit of padding.
+const NOWHERE: SignalId = SignalId(u32::MAX);
+
+/// What sort of firmware it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Kind {
+    /// The controller answers requests for a state itself (register 0x0141, bit 0).
+    Emulated,
+    /// A processor does.
+    Processor,
+    /// Nobody does: neither device emulation nor an interface for a processor.
+    Nothing,
+}
+
+pub(super) fn kind(described: &DescribedType) -> Kind {
+    let configuration = &described.image.configuration;
+    if configuration.device_emulation() {
+        Kind::Emulated
+    } else if matches!(configuration.pdi_control, NO_PDI | DIGITAL_IO) {
+        Kind::Nothing
+    } else {
+        Kind::Processor
+    }
+}
+
+pub(super) fn build(
+    described: &DescribedType,
+    identity: Identity,
+    layout: &Layout,
+    outputs: &[SignalId],
+    inputs: &[SignalId],
+) -> Box<dyn Firmware> {
+    match kind(described) {
+        Kind::Nothing => Box::new(NoFirmware),
+        Kind::Emulated => Box::new(emulated(described, layout, outputs, inputs)),
+        Kind::Processor => Box::new(processor(described, identity, layout, outputs, inputs)),
+    }
+}
+
+/// SyncManagers for process data, in order.
+pub(super) fn buffers(described: &DescribedType) -> Vec<ProcessBuffer> {
+    let records = (0u8..).zip(described.image.sync_managers());
+    let buffers = records.filter_map(|(sync_manager, record)| {
+        let direction = match record.kind {
+            SyncManagerKind::Outputs => Direction::Outputs,
+            SyncManagerKind::Inputs => Direction::Inputs,
+            SyncManagerKind::Unused
+            | SyncManagerKind::MailboxOut
+            | SyncManagerKind::MailboxIn
+            | SyncManagerKind::Other(_) => return None,
+        };
+        (!record.enable.is_virtual()).then_some(ProcessBuffer { sync_manager, direction })
+    });
+    buffers.collect()
+}
+
+fn processor(
+    described: &DescribedType,
+    identity: Identity,
+    layout: &Layout,
+    outputs: &[SignalId],
+    inputs: &[SignalId],
+) -> Processor {
+    let dictionary = objects::dictionary(described, identity);
+    let (mut driven, mut taken) = (Driven::default(), Taken::default());
+    for point in &layout.points {
+        let range = point.first..point.first + point.count;
+        match point.direction {
+            Direction::Outputs => {
+                let signals = outputs.get(range).unwrap_or(&[]);
+                driven.push(&dictionary, point.address, point.bits, signals);
+            }
+            Direction::Inputs => {
+                let signals = inputs.get(range).unwrap_or(&[]);
+                taken.push(&dictionary, point.address, point.bits, signals);
+            }
+        }
+    }
+    let channels: Vec<Box<dyn Channel>> = vec![Box::new(driven), Box::new(taken)];
+    let bootstrap = described.image.bootstrap_mailbox;
+    Processor::new(Description {
+        dictionary,
+        channels,
+        buffers: buffers(described),
+        mailbox: described.image.standard_mailbox,
+        bootstrap: bootstrap.is_present().then_some(bootstrap),
+        times: ResponseTimes::TERMINAL,
+    })
+}
+
+/// Pins that the controller drives and takes itself.
+fn emulated(
+    described: &DescribedType,
+    layout: &Layout,
+    outputs: &[SignalId],
+    inputs: &[SignalId],
+) -> Emulated {
+    let mut areas = [Vec::new(), Vec::new()];
+    let mut words = Vec::new();
+    for buffer in buffers(described) {
+        let manager = usize::from(buffer.sync_manager);
+        let Some(record) = described.image.sync_managers().get(manager) else { continue };
+        let (signals, into) = match buffer.direction {
+            Direction::Outputs => (outputs, 0),
+            Direction::Inputs => (inputs, 1),
+        };
+        let points: Vec<&Point> = layout
+            .points
+            .iter()
+            .filter(|point| point.sync_manager == Some(buffer.sync_manager))
+            .filter(|point| point.direction == buffer.direction)
+            .collect();
+        let mut pins = Vec::new();
+        for point in points {
+            let mine = signals.get(point.first..point.first + point.count).unwrap_or(&[]);
+            if point.count < point.bits && point.at.is_multiple_of(8) {
+                let at = RegisterAddress(record.start.0.saturating_add((point.at / 8) as u16));
+                words.extend(mine.iter().map(|signal| WordArea {
+                    sync_manager: buffer.sync_manager,
+                    at,
+                    signal: *signal,
+                }));
+                continue;
+            }
+            pins.resize((point.at + point.bits).max(pins.len()), NOWHERE);
+            for (pin, signal) in pins.iter_mut().skip(point.at).zip(mine) {
+                *pin = *signal;
+            }
+        }
+        if !pins.is_empty() {
+            areas[into].push(DigitalArea {
+                sync_manager: buffer.sync_manager,
+                at: record.start,
+                signals: pins,
+            });
+        }
+    }
+    let [outputs, inputs] = areas;
+    Emulated::new(outputs, inputs).with_words(words)
+}

@@ -1,0 +1,98 @@
+//! Which electrical signals a described device has: what it drives, and what it takes.
+//!
+//! A device with a processor has one signal for each object that a PDO maps, in the order of the
+//! PDOs; a value of more than 32 bits has one for each 32 bits, lowest first. A controller that
+//! works without a processor has one for each bit, and one for each word that fills a SyncManager by
+//! itself, such as a coding switch.
+
+use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::sii::Direction;
+
+use super::firmware::Kind;
+use super::pdo::DescribedPdo;
+
+/// A value of the process data with its signals.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    pub(super) direction: Direction,
+    /// The SyncManager it is in after power-on.
+    pub(super) sync_manager: Option<u8>,
+    /// Its place in that SyncManager's data, in bits.
+    pub(super) at: usize,
+    pub(super) bits: usize,
+    pub(super) address: ObjectAddress,
+    /// Its first signal, among those of its direction.
+    pub(super) first: usize,
+    /// How many signals it has.
+    pub(super) count: usize,
+}
+
+/// All values and signals.
+#[derive(Clone, Default, Debug)]
+pub(super) struct Layout {
+    /// Signals that are driven.
+    pub(super) outputs: usize,
+    /// Signals that are taken.
+    pub(super) inputs: usize,
+    pub(super) points: Vec<Point>,
+}
+
+impl Layout {
+    pub(super) fn of(pdos: &[DescribedPdo], kind: Kind) -> Self {
+        let mut layout = Self::default();
+        let mut lengths = [0usize; 256];
+        for pdo in pdos {
+            let here = pdo.sync_manager.map(usize::from);
+            for entry in &pdo.entries {
+                let bits = usize::from(entry.bits);
+                let at = here.map_or(0, |manager| lengths[manager]);
+                if let Some(manager) = here {
+                    lengths[manager] += bits;
+                }
+                let address = ObjectAddress::new(entry.index, entry.subindex);
+                if !entry.is_padding() && bits > 0 {
+                    layout.add(pdo, address, at, bits, kind);
+                }
+            }
+        }
+        layout
+    }
+
+    fn add(
+        &mut self,
+        pdo: &DescribedPdo,
+        address: ObjectAddress,
+        at: usize,
+        bits: usize,
+        kind: Kind,
+    ) {
+        let (direction, sync_manager) = (pdo.direction, pdo.sync_manager);
+        let count = match kind {
+            Kind::Nothing => return,
+            // What is not assigned has no place among the pins.
+            Kind::Emulated if sync_manager.is_none() => return,
+            Kind::Emulated if is_word(pdo, bits) => 1,
+            Kind::Emulated => bits,
+            Kind::Processor => {
+                let known =
+                    |point: &Point| point.address == address && point.direction == direction;
+                if self.points.iter().any(known) {
+                    return;
+                }
+                bits.div_ceil(32)
+            }
+        };
+        let signals = match direction {
+            Direction::Outputs => &mut self.outputs,
+            Direction::Inputs => &mut self.inputs,
+        };
+        let first = *signals;
+        *signals += count;
+        self.points.push(Point { direction, sync_manager, at, bits, address, first, count });
+    }
+}
+
+/// Whether an entry is all that its PDO takes in, a word.
+fn is_word(pdo: &DescribedPdo, bits: usize) -> bool {
+    pdo.direction == Direction::Inputs && pdo.entries.len() == 1 && bits == 16
+}

@@ -1,0 +1,118 @@
+//! Messages that wait to be fetched.
+//!
+//! Reference: ETG.1000.4, mailbox: the counter of the sender goes from 1 to 7 and on with 1; of
+//! messages that wait, those of higher priority leave first.
+
+use std::collections::VecDeque;
+
+use linesman_proto::address::StationAddress;
+use linesman_proto::mailbox::{BufferTooSmall, Counter, Header, MailboxType};
+
+use super::ANSWERS;
+use crate::controller::Pdi;
+
+/// Whom a message is for, and how urgent it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Envelope {
+    /// The address that came with the request; 0 for the MainDevice itself.
+    pub(super) address: StationAddress,
+    /// 0 to 3, 3 first.
+    pub(super) priority: u8,
+}
+
+impl Envelope {
+    /// To the MainDevice, unasked.
+    pub(super) const UNASKED: Self = Self { address: StationAddress(0), priority: 0 };
+
+    /// Back to who sent a message.
+    pub(super) const fn answering(header: &Header) -> Self {
+        Self { address: header.address, priority: header.priority }
+    }
+}
+
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct Waiting {
+    envelope: Envelope,
+    kind: MailboxType,
+    body: Vec<u8>,
+}
+
+/// The queue of messages to the MainDevice.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub(super) struct Outbox {
+    waiting: VecDeque<Waiting>,
+    sent: Counter,
+    /// The last message in SyncManager 1, in case it is lost.
+    last: Vec<u8>,
+}
+
+impl Outbox {
+    pub(super) fn len(&self) -> usize {
+        self.waiting.len()
+    }
+
+    /// Queues a message behind all of its own and of higher priority.
+    pub(super) fn push(&mut self, kind: MailboxType, envelope: Envelope, body: Vec<u8>) {
+        let before = |waiting: &Waiting| waiting.envelope.priority >= envelope.priority;
+        let at = self.waiting.iter().rposition(before).map_or(0, |at| at + 1);
+        self.waiting.insert(at, Waiting { envelope, kind, body });
+    }
+
+    /// Puts the next message into SyncManager 1, if that is empty. One that does not fit into it is
+    /// not sent.
+    pub(super) fn deliver(&mut self, pdi: &mut Pdi<'_>) {
+        while let Some(waiting) = self.waiting.front() {
+            let counter = self.sent.next();
+            let header = Header {
+                address: waiting.envelope.address,
+                priority: waiting.envelope.priority,
+                ..Header::new(waiting.kind, counter, 0)
+            };
+            let mut message = vec![0; super::answer_room(pdi)];
+            match header.write_message(&mut message, |slot| copy(&waiting.body, slot)) {
+                Ok(len) => message.truncate(len),
+                Err(BufferTooSmall { .. }) => {
+                    self.waiting.pop_front();
+                    continue;
+                }
+            }
+            if pdi.write_sync_manager(ANSWERS, &message) {
+                self.waiting.pop_front();
+                self.sent = counter;
+                self.last = message;
+            }
+            return;
+        }
+    }
+
+    /// Puts the last message in again: the MainDevice did not get it.
+    pub(super) fn repeat(&self, pdi: &mut Pdi<'_>) {
+        if !pdi.mailbox_full(ANSWERS) && !self.last.is_empty() {
+            pdi.write_sync_manager(ANSWERS, &self.last);
+        }
+    }
+}
+
+/// Writes a body that is ready.
+fn copy(body: &[u8], buffer: &mut [u8]) -> Result<usize, BufferTooSmall> {
+    let (needed, available) = (body.len(), buffer.len());
+    let slot = buffer.get_mut(..needed).ok_or(BufferTooSmall { needed, available })?;
+    slot.copy_from_slice(body);
+    Ok(needed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn higher_priority_leaves_first_and_the_same_in_order() {
+        let mut outbox = Outbox::default();
+        for (priority, body) in [(0, 1), (2, 2), (0, 3), (3, 4), (2, 5), (0, 6)] {
+            let envelope = Envelope { priority, ..Envelope::UNASKED };
+            outbox.push(MailboxType::Coe, envelope, vec![body]);
+        }
+        let order: Vec<u8> = outbox.waiting.iter().map(|waiting| waiting.body[0]).collect();
+        assert_eq!(order, [4, 2, 5, 1, 3, 6]);
+    }
+}

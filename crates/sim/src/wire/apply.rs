@@ -1,0 +1,123 @@
+//! Each change of the world, made at its instant.
+//!
+//! One arm a change. What takes more than a few lines is a method in the file of its concept.
+
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::Instant;
+use linesman_proto::topology::End;
+
+use super::change::{Change, Line};
+use super::link::{Ambush, Hit};
+use super::node::{Act, Glitch};
+use super::world::World;
+use crate::controller::{CountKind, PortEvent};
+use crate::device::Refusal;
+use crate::truth::{Cause, Effect, FaultId, Place};
+
+impl World {
+    pub(super) fn apply(&mut self, at: Instant, fault: FaultId, change: Change) {
+        match change {
+            Change::Hit { line, flip } => self.hit(at, fault, line, flip),
+            Change::FrameHit { line, part, flip } => {
+                let ambush = Ambush { from: at, part, flip, fault };
+                self.links[line.link].noise[usize::from(line.downstream)].push_ambush(ambush);
+                self.is_noisy(line.link);
+            }
+            Change::Open { link } => {
+                self.way_changes(at);
+                let was_whole = self.links[link].contact.is_whole();
+                self.links[link].contact.break_at(at, fault);
+                if was_whole {
+                    self.signal_changed(link, at);
+                }
+            }
+            Change::Close { link } => {
+                self.way_changes(at);
+                self.links[link].contact.mend_at(at, fault);
+                if self.links[link].contact.is_whole() {
+                    self.signal_changed(link, at);
+                }
+            }
+            Change::Off { node } => {
+                self.way_changes(at);
+                let was_on = self.nodes[node].power.is_whole();
+                self.nodes[node].power.break_at(at, fault);
+                let place = Place::Device(self.id(node));
+                self.truth.effect(at, Some(fault), place, Effect::PowerLost);
+                if was_on {
+                    self.nodes[node].act_at(at, Act::Off);
+                    self.supply_changed(node, at);
+                }
+            }
+            Change::On { node } => {
+                self.way_changes(at);
+                self.nodes[node].power.mend_at(at, fault);
+                if self.nodes[node].power.is_whole() {
+                    let place = Place::Device(self.id(node));
+                    self.truth.effect(at, Some(fault), place, Effect::PowerBack);
+                    self.nodes[node].act_at(at, Act::On);
+                    self.supply_changed(node, at);
+                }
+            }
+            Change::Glitch { node, part, flip } => {
+                self.nodes[node].glitches.push_back(Glitch { from: at, part, flip, fault });
+            }
+            Change::Silence { path, until } => self.silence(at, fault, path, until),
+            Change::Watchdog { node, time } => self.set_watchdog(at, fault, node, time),
+            Change::Software { node, change } => self.change_software(at, fault, node, change),
+            Change::Refuse { node, refusal } => {
+                self.nodes[node].refused_by = refusal.map(|_| fault);
+                self.nodes[node].act_at(at, Act::Refuse(refusal));
+                if let Some(Refusal { code, .. }) = refusal {
+                    let place = Place::Device(self.id(node));
+                    let effect = Effect::StateRefused { code: code.0 };
+                    self.truth.effect(at, Some(fault), place, effect);
+                }
+            }
+        }
+    }
+
+    fn supply_changed(&mut self, node: usize, at: Instant) {
+        let links = self.nodes[node].leaving.0;
+        for line in links.into_iter().flatten() {
+            self.signal_changed(line.link, at);
+        }
+    }
+
+    /// A symbol is destroyed. Without a signal there is none to destroy.
+    fn hit(&mut self, at: Instant, fault: FaultId, line: Line, flip: u8) {
+        let link = &mut self.links[line.link];
+        if !link.signal {
+            return;
+        }
+        link.noise[usize::from(line.downstream)].push_hit(Hit { at, flip, fault });
+        self.is_noisy(line.link);
+        self.symbol_error(at, Cause::Fault(fault), line);
+    }
+
+    /// The receiver of a line sees a symbol that it cannot decode.
+    pub(super) fn symbol_error(&mut self, at: Instant, cause: Cause, line: Line) {
+        self.truth.effect(at, cause.fault(), self.line_place(line), Effect::SymbolError);
+        let (_, to) = self.links[line.link].from_to(line.downstream);
+        if let End::Controller(node, port) = to {
+            self.post(node, at, cause, PortEvent::Count { port, kind: CountKind::SymbolError });
+        }
+    }
+
+    /// Tells a controller, and the log what may move because of it.
+    pub(super) fn post(&mut self, node: usize, at: Instant, cause: Cause, event: PortEvent) {
+        self.nodes[node].controller.post(at, event);
+        let counter = match event {
+            PortEvent::Link { up: true, .. } => return,
+            PortEvent::Link { port, up: false } => ErrorCounter::LostLink(port),
+            PortEvent::Count { port, kind } => match kind {
+                CountKind::SymbolError => ErrorCounter::PhysicalLayer(port),
+                CountKind::InvalidFrame => ErrorCounter::InvalidFrame(port),
+                CountKind::ForwardedError => ErrorCounter::Forwarded(port),
+                CountKind::ProcessingUnitError => ErrorCounter::ProcessingUnit,
+                CountKind::LostLink => ErrorCounter::LostLink(port),
+            },
+        };
+        self.truth.may_move(self.id(node), counter, cause);
+    }
+}

@@ -1,0 +1,43 @@
+//! Outputs that do not come, or not often enough: cards that are silent, watchdogs that are short.
+
+use linesman_proto::address::Path;
+use linesman_proto::register::WatchdogTime;
+use linesman_proto::time::Instant;
+
+use super::node::Act;
+use super::world::World;
+use crate::truth::{Effect, FaultId, Place};
+
+impl World {
+    /// A card sends nothing for a while.
+    pub(super) fn silence(&mut self, at: Instant, fault: FaultId, path: Path, until: Instant) {
+        self.cards[path.index()].hush(at, until, fault);
+        self.truth.effect(at, Some(fault), Place::Host(path), Effect::CardSilent);
+    }
+
+    /// The watchdog of a controller gets another time, or the former one.
+    pub(super) fn set_watchdog(
+        &mut self,
+        at: Instant,
+        fault: FaultId,
+        node: usize,
+        time: Option<WatchdogTime>,
+    ) {
+        self.nodes[node].watchdog_by = time.map(|_| fault);
+        self.nodes[node].act_at(at, Act::Watchdog(time));
+        let place = Place::Device(self.id(node));
+        self.truth.effect(at, Some(fault), place, Effect::WatchdogSet { time });
+    }
+
+    /// A fault is over: cards send again, watchdogs have their time again.
+    pub(super) fn release_starved(&mut self, at: Instant, fault: FaultId) {
+        for card in &mut self.cards {
+            card.speak(at, fault);
+        }
+        for node in 0..self.nodes.len() {
+            if self.nodes[node].watchdog_by == Some(fault) {
+                self.set_watchdog(at, fault, node, None);
+            }
+        }
+    }
+}
