@@ -2,13 +2,14 @@
 //!
 //! [`lab`] joins the three; [`story`] plays what Markdown tells, [`swarm`] what chance draws,
 //! [`demo`] what people want to see. [`verdict`] holds what was said against what was done,
-//! [`choice`] draws faults, [`drawing`] shows the line.
+//! [`choice`] draws faults, [`drawing`] shows the line; [`replay`] plays real traffic against a segment.
 
 pub mod choice;
 pub mod demo;
 pub mod drawing;
 pub mod lab;
 pub mod options;
+pub mod replay;
 pub mod story;
 pub mod swarm;
 pub mod verdict;

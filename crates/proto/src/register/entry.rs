@@ -86,11 +86,10 @@ impl Register {
     /// What the EtherCAT side may do with the byte at `offset` from the start of a register.
     #[must_use]
     pub fn ecat_access(&self, offset: u16) -> Access {
-        self.fields
-            .iter()
-            .find(|field| field.touches_byte(offset) && field.ecat.is_some())
-            .and_then(|field| field.ecat)
-            .unwrap_or(self.ecat)
+        let own =
+            || self.fields.iter().filter(|field| field.touches_byte(offset)).filter_map(|f| f.ecat);
+        // A byte can be written when one of its fields can.
+        own().find(|access| access.writes()).or_else(|| own().next()).unwrap_or(self.ecat)
     }
 
     /// The field with this name, in either case.

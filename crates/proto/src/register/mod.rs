@@ -17,6 +17,7 @@ pub mod error_counters;
 pub mod event;
 pub mod fmmu;
 pub mod information;
+pub mod phy_control;
 pub mod sii_control;
 pub mod sync_manager;
 pub mod table;
@@ -32,6 +33,7 @@ pub use error_counters::{ClearGroup, ErrorCounter, ErrorCounters, RxErrors};
 pub use event::{AlEvents, EcatEvents};
 pub use fmmu::{FmmuConfig, FmmuOverlap};
 pub use information::{ControllerType, EscInformation, Features, PortDescriptor, PortType};
+pub use phy_control::{PhyCommand, PhyControl};
 pub use sii_control::{SiiCommand, SiiControl};
 pub use sync_manager::{
     SmActivate, SmControl, SmDirection, SmMode, SmPdiControl, SmStatus, SyncManagerConfig,

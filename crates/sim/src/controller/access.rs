@@ -151,8 +151,10 @@ impl Core {
             !super::sync_manager::config(index, &self.memory).activate.enable()
         } else if CLOCK.contains(&address) {
             self.clock_is_for_ecat(address)
-        } else {
+        } else if address < super::phy::CONTROL {
             self.sii.is_free(&self.memory)
+        } else {
+            self.phys.is_free(&self.memory)
         }
     }
 

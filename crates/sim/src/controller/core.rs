@@ -18,6 +18,7 @@ use super::implemented::ClockUnits;
 use super::kind::ControllerKind;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
+use super::phy::Phys;
 use super::posted::Queue;
 use super::shadow::Shadow;
 use super::sii::Sii;
@@ -37,6 +38,11 @@ pub(super) struct Core {
     pub(super) fmmus: Fmmus,
     pub(super) sync_managers: SyncManagers,
     pub(super) sii: Sii,
+    pub(super) phys: Phys,
+    /// The controller keeps reasons of receive errors (0x0320).
+    pub(super) keeps_reasons: bool,
+    /// For those that do: when the last frame of a port ends.
+    pub(super) frame_until: PortMap<Instant>,
     pub(super) shadow: Shadow,
     /// A copy of data that commands which read and write need, kept for its memory.
     pub(super) scratch: Vec<u8>,
@@ -112,8 +118,11 @@ impl Core {
             loops: Loops::new(&hardware),
             queue: Queue::default(),
             fmmus: Fmmus::new(),
-            sync_managers: SyncManagers::new(),
+            sync_managers: SyncManagers::new(Features(hardware.features).sequential_mode()),
             sii: Sii::new(sii, &hardware),
+            phys: Phys::new(&hardware),
+            keeps_reasons: super::implemented::keeps_reasons(&hardware),
+            frame_until: PortMap([Instant::ZERO; 4]),
             shadow: Shadow::default(),
             scratch: Vec::new(),
             clock: RunningClock::new(quartz, Instant::ZERO),
@@ -172,6 +181,8 @@ impl Core {
         }
         self.configure_fmmus();
         self.sii.power_on(now, &mut self.memory);
+        self.start_phys();
+        self.refresh_leds();
         let status = self.dl_status();
         self.memory.set_u16(&r::DL_STATUS, status.0);
     }
@@ -269,17 +280,29 @@ impl Core {
 
     /// A byte of the reset sequence was written: `R`, `E`, `S` in three frames.
     pub(super) fn reset_written(&mut self, value: u8, end: Instant) {
+        let another_frame = self.reset_frame != self.passing.number;
+        self.reset_frame = self.passing.number;
+        self.reset_step(&r::ESC_RESET_ECAT, value, another_frame, end);
+    }
+
+    /// A byte of the reset sequence came to one of its two registers. `fresh` says that it came by
+    /// an access of its own.
+    pub(super) fn reset_step(
+        &mut self,
+        register: &r::Register,
+        value: u8,
+        fresh: bool,
+        when: Instant,
+    ) {
         const SEQUENCE: [u8; 3] = *b"RES";
-        let progress = usize::from(self.memory.u8(&r::ESC_RESET_ECAT));
-        let another_frame = progress == 0 || self.reset_frame != self.passing.number;
+        let progress = usize::from(self.memory.u8(register));
         let step = match SEQUENCE.get(progress) {
-            Some(expected) if *expected == value && another_frame => progress + 1,
+            Some(expected) if *expected == value && (fresh || progress == 0) => progress + 1,
             _ => usize::from(value == SEQUENCE[0]),
         };
-        self.reset_frame = self.passing.number;
-        self.memory.set_u8(&r::ESC_RESET_ECAT, step as u8);
+        self.memory.set_u8(register, step as u8);
         if step == SEQUENCE.len() {
-            self.reset_at = Some(end);
+            self.reset_at = Some(when);
         }
     }
 }

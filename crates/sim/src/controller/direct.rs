@@ -6,7 +6,7 @@
 
 use linesman_proto::port::Port;
 use linesman_proto::register::{self as r, DlControl, FmmuConfig};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::esc::Controller;
 use super::pdi::Pdi;
@@ -73,6 +73,7 @@ impl Controller {
             open: if self.powered { core.loops.open_bits() } else { 0 },
             meddles: core.loops.port_zero_closes_ring()
                 || core.loops.waits_for_any_frame()
+                || core.phys.has_acts()
                 || Port::ALL.into_iter().any(waits_for_time)
                 || core.fmmus.active().any(writes_registers),
             marks_source: control.destroys_foreign_frames(),
@@ -112,8 +113,17 @@ impl Controller {
 
     /// A frame that did not walk came in at a port.
     #[inline]
-    pub(crate) fn note_entry(&mut self, port: Port, number: u64, at: Instant) {
+    pub(crate) fn note_entry(&mut self, port: Port, number: u64, at: Instant, duration: Span) {
         self.core.entered[port] = (number, at);
+        if self.core.keeps_reasons {
+            self.core.frame_until[port] = at + duration;
+        }
+    }
+
+    /// Whether anything is to happen at its ports.
+    #[inline]
+    pub(crate) fn has_port_events(&self) -> bool {
+        self.core.queue.next_at().is_some()
     }
 
     // ---- sampling ----

@@ -17,11 +17,12 @@ use super::direct::Sampling;
 use super::kind::ControllerKind;
 use super::memory::at;
 use super::pdi::Pdi;
+use super::phy::PhyAct;
 use super::posted::{Happening, PortEvent};
 use super::sii::Outcome;
 use crate::device::{Firmware, Refusal, Signals, Trouble};
 use crate::frame::WireFrame;
-use crate::hardware::Hardware;
+use crate::hardware::{Hardware, PortKind};
 
 /// A wake-up is at least this much later than the call that asked for it.
 const SHORTEST_NAP: Span = Span::us(1);
@@ -63,6 +64,7 @@ enum Due {
     Loops,
     LoopsReturn,
     Sii,
+    Phy,
     ProcessDataWatchdog,
     PdiWatchdog,
     Reset,
@@ -81,8 +83,10 @@ impl Controller {
         firmware: Box<dyn Firmware>,
         sii: Vec<u8>,
     ) -> Self {
+        let mut core = Core::new(id, hardware.into(), clock, sii);
+        core.sii.emulate(firmware.emulates_sii());
         Self {
-            core: Core::new(id, hardware.into(), clock, sii),
+            core,
             firmware,
             powered: false,
             going_dark: false,
@@ -190,6 +194,7 @@ impl Controller {
         consider(core.loops_change_at, Due::Loops);
         consider(core.loops_return.map(|(at, _)| at), Due::LoopsReturn);
         consider(core.sii.done_at(), Due::Sii);
+        consider(core.phys.done_at(), Due::Phy);
         consider(core.process_data_watchdog.expires(), Due::ProcessDataWatchdog);
         consider(core.pdi_watchdog.expires(), Due::PdiWatchdog);
         consider(core.reset_at, Due::Reset);
@@ -213,6 +218,7 @@ impl Controller {
             Due::Loops => core.change_loops(),
             Due::LoopsReturn => core.return_loops(),
             Due::Sii => self.finish_sii(at, signals),
+            Due::Phy => core.finish_phy(),
             Due::ProcessDataWatchdog => core.expire_process_data_watchdog(at),
             Due::PdiWatchdog => core.expire_pdi_watchdog(),
             Due::Reset => {
@@ -334,6 +340,24 @@ impl Controller {
         let verdict = self.core.process(at, frame);
         self.passed();
         verdict
+    }
+
+    /// Whether PHYs are going to do something to their links.
+    #[inline]
+    pub(crate) fn has_phy_acts(&self) -> bool {
+        self.core.phys.has_acts()
+    }
+
+    /// What PHYs were told to do to their links, and when they do it; each is told once.
+    pub(crate) fn take_phy_acts(&mut self) -> Vec<(Instant, Port, PhyAct)> {
+        self.core.phys.take_acts()
+    }
+
+    /// Whether the controller itself closes a port that sees too many bad symbols: enhanced link
+    /// detection (0x0141, bits 1 and 4 to 7), on ports with a PHY.
+    #[must_use]
+    pub fn has_enhanced_link_detection(&self, port: Port) -> bool {
+        self.core.detects_links(port) && self.core.hardware.ports[port] == PortKind::Mii
     }
 
     // ---- for the segment, faults and tests ----

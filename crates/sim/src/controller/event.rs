@@ -95,6 +95,7 @@ impl Core {
     pub(super) fn set_al_status(&mut self, status: AlStatus) {
         if self.memory.u16(&r::AL_STATUS) != status.0 {
             self.memory.set_u16(&r::AL_STATUS, status.0);
+            self.refresh_leds();
             self.raise_ecat_events(EcatEvents::AL_STATUS);
         }
     }

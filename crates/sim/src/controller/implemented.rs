@@ -111,6 +111,10 @@ const LIVE: &[Register] = &[
     r::SII_CONTROL_STATUS,
     r::RECEIVE_TIME,
     r::SYSTEM_TIME,
+    r::PHY_CONTROL_STATUS,
+    r::PHY_ACCESS_ECAT,
+    r::PHY_ACCESS_PDI,
+    r::PHY_PORT_STATUS,
 ];
 
 /// Where the moment decides whether a write is taken. The other registers marked `r/(w)` in the
@@ -120,6 +124,10 @@ const CONDITIONAL: &[Register] = &[
     r::SII_CONTROL_STATUS,
     r::SII_ADDRESS,
     r::SII_DATA,
+    r::PHY_CONTROL_STATUS,
+    r::PHY_ADDRESS,
+    r::PHY_REGISTER_ADDRESS,
+    r::PHY_DATA,
     r::SYNC_MANAGER,
     r::SYNC_ACTIVATION,
     r::START_TIME,
@@ -175,6 +183,16 @@ pub(super) fn fill(hardware: &Hardware, units: ClockUnits, rights: &mut [u8]) {
     if has_configuration_a5(hardware) {
         add(&r::ESC_CONFIGURATION_A5, hardware, rights);
     }
+    if hardware.ports.0.contains(&PortKind::Mii) {
+        for register in PHY_ACCESS {
+            add(register, hardware, rights);
+        }
+    }
+    for (since, registers) in LATER {
+        for register in registers.iter().filter(|_| is_since(hardware, *since)) {
+            add(register, hardware, rights);
+        }
+    }
     if Features(hardware.features).distributed_clocks() {
         add(&r::RECEIVE_TIME, hardware, rights);
         let parts = [
@@ -196,6 +214,39 @@ pub(super) fn fill(hardware: &Hardware, units: ClockUnits, rights: &mut [u8]) {
             add(&r::SYNC_ACTIVATION_STATUS, hardware, rights);
         }
     }
+}
+
+/// What controllers with Ethernet PHYs have.
+const PHY_ACCESS: &[Register] =
+    &[r::PHY_CONTROL_STATUS, r::PHY_ADDRESS, r::PHY_REGISTER_ADDRESS, r::PHY_DATA];
+
+/// Registers that came later: since which version of the IP core, and in the ET1150.
+const LATER: &[((u8, u8), &[Register])] = &[
+    ((2, 0), &[r::PHY_ACCESS_ECAT, r::PHY_ACCESS_PDI, r::PHY_PORT_STATUS]),
+    ((2, 2), &[r::ESC_RESET_PDI]),
+    ((2, 3), &[r::RUN_LED_OVERRIDE, r::ERR_LED_OVERRIDE, r::PDI_ERROR_CODE]),
+    ((4, 0), &[r::EXTENDED_RX_ERROR_COUNTER, r::RX_ERROR_CODE]),
+];
+
+/// Whether the hardware is an ET1150, or an IP core of at least this version. An IP core tells its
+/// version as revision (0x0001) and the high half of the build's low byte (S2 2.1.2, 2.1.3).
+fn is_since(hardware: &Hardware, version: (u8, u8)) -> bool {
+    const ET1150_REVISION: u8 = 0x50;
+    match ControllerType(hardware.controller_type) {
+        ControllerType::ET1100 => hardware.revision == ET1150_REVISION,
+        ControllerType::IP_CORE => (hardware.revision, (hardware.build as u8) >> 4) >= version,
+        _ => false,
+    }
+}
+
+/// Whether the controller has extended receive error counters and codes (0x0314, 0x0320).
+pub(super) fn keeps_reasons(hardware: &Hardware) -> bool {
+    is_since(hardware, (4, 0))
+}
+
+/// Whether the controller reads the link from its PHYs' registers, and shows it at 0x0518.
+pub(super) fn watches_links_by_phy(hardware: &Hardware) -> bool {
+    is_since(hardware, (2, 0)) && hardware.ports.0.contains(&PortKind::Mii)
 }
 
 /// Whether SII word 5 goes to 0x0142.
@@ -269,7 +320,8 @@ mod tests {
         assert_eq!(right(&full, 0x0010), Rights::READ | Rights::WRITE);
         assert_eq!(right(&full, 0x0300), Rights::READ | Rights::WRITE | Rights::LIVE);
         assert_eq!(right(&full, 0x000A), 0, "reserved");
-        assert_eq!(right(&full, 0x0510), 0, "PHY management is not done");
+        assert_ne!(right(&full, 0x0510), 0);
+        assert_eq!(right(&full, 0x0518), 0, "an ET1100");
         assert_eq!(right(&full, 0x092C), Rights::READ, "the difference cannot be written");
         assert_eq!(right(&full, 0x0984), 0, "not in an ET1100");
         assert_eq!(right(&full, 0x0936), 0, "an ET1200 has it");
@@ -280,12 +332,13 @@ mod tests {
 
         let mut small = full.clone();
         small.counting.forwarded = false;
+        small.ports.0[0] = PortKind::Ebus;
         small.ports.0[2] = PortKind::Absent;
         small.ports.0[3] = PortKind::Absent;
         small.fmmus = 3;
         small.sync_managers = 4;
         small.features = 0;
-        for gone in [0x0308, 0x0304, 0x0307, 0x0312, 0x0630, 0x0820, 0x0900, 0x0910] {
+        for gone in [0x0510, 0x0308, 0x0304, 0x0307, 0x0312, 0x0630, 0x0820, 0x0900, 0x0910] {
             assert_ne!(right(&full, gone), 0, "0x{gone:04X}");
             assert_eq!(right(&small, gone), 0, "0x{gone:04X}");
         }

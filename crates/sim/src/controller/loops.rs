@@ -112,6 +112,11 @@ impl Loops {
         }
     }
 
+    /// Where there is a link.
+    pub(super) const fn links(&self) -> PortMap<bool> {
+        self.link
+    }
+
     /// DL status with the ports filled in: their true state, not that of port 0 as a way out.
     pub(super) fn status(&self, base: DlStatus) -> DlStatus {
         Port::ALL.into_iter().fold(base, |status, port| {

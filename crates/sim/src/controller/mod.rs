@@ -17,16 +17,22 @@ mod event;
 mod fmmu;
 mod implemented;
 mod kind;
+mod led;
 mod loops;
 mod memory;
 pub mod pdi;
+mod pdi_register;
+mod phy;
 mod plain_read;
 mod port;
 mod posted;
+mod preset;
 mod processing_unit;
 mod register_write;
+mod rx_code;
 mod shadow;
 mod sii;
+mod sii_emulation;
 mod sync_manager;
 mod watchdog;
 
@@ -35,10 +41,12 @@ pub(crate) use direct::Manner;
 pub use esc::{Controller, Verdict};
 pub use kind::{ControllerKind, ControllerKinds};
 pub use pdi::Pdi;
+pub use phy::{PHY_ACCESS_TIME, PhyAct};
 pub(crate) use plain_read::{Answer, PlainRead};
 pub use posted::{CountKind, PortEvent};
 pub(crate) use processing_unit::Header;
 pub use sii::{LOAD_TIME, PROGRAMMING_TIME, READ_TIME, STARTUP_DELAY, WRITE_TIME};
+pub use sii_emulation::SiiRequest;
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -4,7 +4,7 @@
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::Port;
-use linesman_proto::register::{self as r, DlControl, DlStatus, ErrorCounter};
+use linesman_proto::register::{self as r, DlControl, DlStatus, ErrorCounter, Features};
 use linesman_proto::time::{Instant, Span};
 
 use super::core::Core;
@@ -12,6 +12,7 @@ use super::loops::Loops;
 use super::memory::Rights;
 use super::posted::{CountKind, Happening, PortEvent};
 use crate::frame::WireFrame;
+use crate::hardware::PortKind;
 
 /// How long loop modes hold that were set for temporary use ("approximately one second", S2 2.4.1).
 const TEMPORARY_LOOPS: Span = Span::s(1);
@@ -23,8 +24,10 @@ impl Core {
             Happening::Posted(PortEvent::Link { port, up }) => {
                 if !up {
                     self.count(port, CountKind::LostLink, when);
+                    self.phys.link_lost(port);
                 }
                 self.loops.apply(happening);
+                self.refresh_phy_status();
                 self.refresh_dl_status();
             }
             Happening::GoodFrame(_) => {
@@ -37,6 +40,7 @@ impl Core {
     /// Moves a counter, if the rules let it move.
     pub(super) fn count(&mut self, port: Port, kind: CountKind, when: Instant) {
         let counts = self.loops.is_open(port) || self.hardware.counting.counts_when_closed;
+        self.note_rx_error(port, kind, when);
         let (counter, counts) = match kind {
             CountKind::SymbolError => (ErrorCounter::PhysicalLayer(port), counts),
             CountKind::InvalidFrame => (ErrorCounter::InvalidFrame(port), counts),
@@ -127,11 +131,22 @@ impl Core {
         loops
     }
 
+    /// Whether enhanced link detection is on for a port: wanted by the SII (0x0141, bit 1 for all
+    /// ports, bits 4 to 7 for each) and there for its kind of port (0x0008, bits 5 and 6).
+    pub(super) fn detects_links(&self, port: Port) -> bool {
+        let wanted = self.memory.u8(&r::ESC_CONFIGURATION_A0);
+        let features = Features(self.hardware.features);
+        let there = match self.hardware.ports[port] {
+            PortKind::Absent => false,
+            PortKind::Ebus => features.enhanced_link_ebus(),
+            PortKind::Mii => features.enhanced_link_mii(),
+        };
+        there && wanted & (1 << 1 | 1 << (4 + port.index())) != 0
+    }
+
     /// DL status as it is now.
     pub(super) fn dl_status(&self) -> DlStatus {
-        /// Bits of 0x0141 for enhanced link detection: all ports, each port.
-        const LINK_DETECTION: u8 = 0b1111_0010;
-        let detection = self.memory.u8(&r::ESC_CONFIGURATION_A0) & LINK_DETECTION != 0;
+        let detection = Port::ALL.into_iter().any(|port| self.detects_links(port));
         let base = DlStatus::default()
             .with_pdi(self.loaded, self.pdi_watchdog_ok)
             .with_enhanced_link_detection(detection);
@@ -150,6 +165,9 @@ impl Core {
     /// The first bit of a frame comes in.
     pub(super) fn enters(&mut self, when: Instant, port: Port, frame: &WireFrame) {
         self.entered[port] = (frame.number, when);
+        if self.keeps_reasons {
+            self.frame_until[port] = when + frame.duration();
+        }
         self.latch_entry(port, frame.number, when);
         if self.loops.waits_for_frame(port) && frame.damage.is_intact() {
             self.queue.push(when + frame.duration(), Happening::GoodFrame(port));

@@ -14,6 +14,7 @@ use linesman_proto::time::Instant;
 use super::core::{Core, Passing};
 use super::esc::Verdict;
 use super::posted::CountKind;
+use super::rx_code::UnitError;
 use crate::frame::WireFrame;
 
 /// Bit of a datagram's second length byte: it has come round a ring (S1 3.5).
@@ -78,6 +79,7 @@ impl Core {
         let closes_ring = self.loops.port_zero_closes_ring();
         if closes_ring && frame.bytes.get(first_at + 7).is_some_and(|byte| byte & CIRCULATED != 0) {
             self.count(Port::A, CountKind::ProcessingUnitError, when);
+            self.note_unit_error(Port::A, UnitError::Circulating);
             return Verdict::Destroy;
         }
         self.begin(when, frame.number);
@@ -99,6 +101,7 @@ impl Core {
         // Of a damaged frame nobody can say what it was; the wire has counted it.
         if frame.damage.is_intact() {
             self.count(Port::A, CountKind::ProcessingUnitError, Instant::ZERO);
+            self.note_unit_error(Port::A, UnitError::Foreign);
         }
         Verdict::Destroy
     }
@@ -325,6 +328,7 @@ impl Core {
         if intact && !whole {
             // The unit finds out that the frame ends too early, and marks it as bad (S1 14.1).
             self.count(Port::A, CountKind::ProcessingUnitError, when);
+            self.note_unit_error(Port::A, UnitError::Short);
             frame.damage.fcs_bad = true;
             frame.damage.marked = true;
         }

@@ -25,6 +25,7 @@ impl Core {
         shadow.clear();
         self.shadow = shadow;
         self.sii.end_frame();
+        self.phys.end_frame();
     }
 
     fn commit_write(&mut self, write: Write, data: &[u8], end: Instant) {
@@ -67,6 +68,9 @@ impl Core {
     }
 
     fn control_written(&mut self, range: &Range<usize>, before: DlControl, end: Instant) {
+        if touches(range, &r::RUN_LED_OVERRIDE) || touches(range, &r::ERR_LED_OVERRIDE) {
+            self.refresh_leds();
+        }
         if range.contains(&(at(&r::DL_CONTROL) + 1)) {
             self.loops_written(before, end);
         }
@@ -77,9 +81,14 @@ impl Core {
 
     fn clear_error_counters(&mut self, range: &Range<usize>) {
         let groups: [&[&r::Register]; 4] = [
-            &[&r::RX_ERROR_COUNTER, &r::FORWARDED_RX_ERROR_COUNTER],
+            &[
+                &r::RX_ERROR_COUNTER,
+                &r::FORWARDED_RX_ERROR_COUNTER,
+                &r::EXTENDED_RX_ERROR_COUNTER,
+                &r::RX_ERROR_CODE,
+            ],
             &[&r::PROCESSING_UNIT_ERROR_COUNTER],
-            &[&r::PDI_ERROR_COUNTER],
+            &[&r::PDI_ERROR_COUNTER, &r::PDI_ERROR_CODE],
             &[&r::LOST_LINK_COUNTER],
         ];
         for group in groups {
@@ -117,6 +126,25 @@ impl Core {
             let low = byte_for(range, data, control);
             let high = byte_for(range, data, control + 1);
             self.sii.control(low, high, end, &mut self.memory);
+            self.ask_sii_emulation(end);
+        }
+        self.phy_area_written(range, data, end);
+    }
+
+    fn phy_area_written(&mut self, range: &Range<usize>, data: &[u8], end: Instant) {
+        if let Some(value) = byte_for(range, data, at(&r::PHY_ACCESS_ECAT)) {
+            self.phy_reserved(value);
+        }
+        if let Some(value) = byte_for(range, data, at(&r::PHY_ACCESS_PDI)) {
+            self.phy_released(value);
+        }
+        if touches(range, &r::PHY_PORT_STATUS) {
+            self.phy_status_written();
+        }
+        if touches(range, &r::PHY_CONTROL_STATUS) {
+            let control = super::phy::CONTROL;
+            let (low, high) = (byte_for(range, data, control), byte_for(range, data, control + 1));
+            self.phy_written(low, high, end);
         }
     }
 

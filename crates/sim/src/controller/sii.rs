@@ -4,6 +4,8 @@
 //! table "SII EEPROM timing characteristics" (an EEPROM of up to 16 Kbit; larger ones take 60 µs
 //! more for their second address byte).
 
+use std::collections::VecDeque;
+
 use linesman_proto::register::{self as r, ControllerType, SiiCommand, SiiControl};
 use linesman_proto::time::{Instant, Span};
 
@@ -48,6 +50,12 @@ pub(super) struct Sii {
     write_enabled: bool,
     /// Alias and link detection are taken over at the first load only.
     loaded_once: bool,
+    /// The first generation takes the alias over at each load (S2 2.2.2).
+    alias_each_load: bool,
+    /// The SubDevice's processor plays the EEPROM.
+    pub(super) emulated: bool,
+    /// How long the next commands take, where that is known.
+    expected: VecDeque<Span>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -92,11 +100,24 @@ impl Sii {
             programming_until: Instant::ZERO,
             write_enabled: false,
             loaded_once: false,
+            alias_each_load: ControllerType(hardware.controller_type) == ControllerType::ESC20,
+            emulated: false,
+            expected: VecDeque::new(),
         }
     }
 
     pub(super) fn image(&self) -> &[u8] {
         &self.image
+    }
+
+    /// From now on the SubDevice's processor plays the EEPROM, or does not.
+    pub(super) fn emulate(&mut self, emulated: bool) {
+        self.emulated = emulated;
+    }
+
+    /// The next commands take these times.
+    pub(super) fn expect(&mut self, times: impl IntoIterator<Item = Span>) {
+        self.expected.extend(times);
     }
 
     /// The supply came: the configuration area will be loaded.
@@ -106,6 +127,8 @@ impl Sii {
         let control = SiiControl::default()
             .with_reads_eight_bytes(self.reads_eight)
             .with_two_address_bytes(self.capacity > SMALL)
+            .with_emulated(self.emulated)
+            .with_eeprom_missing(self.image.is_empty())
             .with_not_loaded(true);
         put(control, memory);
         self.run(at + STARTUP_DELAY, self.load_time(), Operation::Load { retries: 1 }, memory);
@@ -123,7 +146,7 @@ impl Sii {
     /// Whether the EtherCAT side may write to the interface now.
     pub(super) fn is_free(&self, memory: &Memory) -> bool {
         let to_ecat = memory.u8(&r::SII_ACCESS_ECAT) & 1 == 0;
-        to_ecat && memory.u8(&r::SII_ACCESS_PDI) & 1 == 0 && self.running.is_none()
+        to_ecat && memory.u8(&r::SII_ACCESS_PDI) & 1 == 0 && !read(memory).busy()
     }
 
     /// 0x0500 was written.
@@ -146,7 +169,7 @@ impl Sii {
             self.write_enabled = SiiControl(u16::from(low)).write_enable();
         }
         let Some(high) = high else { return };
-        if self.running.is_some() {
+        if read(memory).busy() {
             return;
         }
         let control = read(memory).with_acknowledge_error(false).with_write_enable_error(false);
@@ -156,15 +179,18 @@ impl Sii {
         match SiiCommand::from_bits(high) {
             SiiCommand::None => {}
             SiiCommand::Read => {
-                self.run(at, self.read_time(), Operation::Read { word }, memory);
+                let time = self.expected.pop_front().unwrap_or_else(|| self.read_time());
+                self.run(at, time, Operation::Read { word }, memory);
             }
             SiiCommand::Write if self.write_enabled => {
                 let time = WRITE_TIME + self.second_address_byte();
+                let time = self.expected.pop_front().unwrap_or(time);
                 self.run(at, time, Operation::Write { word, value }, memory);
             }
             SiiCommand::Write => put(control.with_write_enable_error(true), memory),
             SiiCommand::Reload => {
-                self.run(at, self.load_time(), Operation::Load { retries: 1 }, memory);
+                let time = self.expected.pop_front().unwrap_or_else(|| self.load_time());
+                self.run(at, time, Operation::Load { retries: 1 }, memory);
             }
             SiiCommand::Reserved(_) => put(control.with_acknowledge_error(true), memory),
         }
@@ -210,6 +236,11 @@ impl Sii {
             Operation::Write { .. } => SiiCommand::Write,
             Operation::Unanswered => SiiCommand::None,
         };
+        if self.emulated && !matches!(operation, Operation::Load { .. } if !self.loaded_once) {
+            // The processor hears of it and answers; until then the interface is busy.
+            put(read(memory).with_busy(true).with_command(command), memory);
+            return;
+        }
         let answers = !self.image.is_empty() && from >= self.programming_until;
         let running = match operation {
             // A load has its own way to fail.
@@ -256,7 +287,8 @@ impl Sii {
         memory.set_u8(&r::SYNC_LATCH_CONFIGURATION, area[3]);
         memory.set_u16(&r::SYNC_PULSE_LENGTH, u16::from_le_bytes([area[4], area[5]]));
         memory.set_u16(&r::PDI_CONFIGURATION_EXTENDED, u16::from_le_bytes([area[6], area[7]]));
-        if !self.loaded_once {
+        // With emulation the alias comes from the processor (S1 11.2.4).
+        if (!self.loaded_once || self.alias_each_load) && !self.emulated {
             memory.set_u16(&r::STATION_ALIAS, u16::from_le_bytes([area[8], area[9]]));
         }
         if self.takes_a5 {
@@ -292,11 +324,11 @@ impl Sii {
     }
 }
 
-fn read(memory: &Memory) -> SiiControl {
+pub(super) fn read(memory: &Memory) -> SiiControl {
     SiiControl(memory.u16(&r::SII_CONTROL_STATUS))
 }
 
-fn put(control: SiiControl, memory: &mut Memory) {
+pub(super) fn put(control: SiiControl, memory: &mut Memory) {
     memory.set_u16(&r::SII_CONTROL_STATUS, control.0);
 }
 

@@ -23,6 +23,8 @@ pub(super) struct SyncManagers {
     /// Those that guard something, lowest first.
     guards: [u8; MAX],
     guard_count: usize,
+    /// The controller knows sequential mode.
+    sequential: bool,
 }
 
 /// What a SyncManager says to an access.
@@ -69,6 +71,11 @@ struct SyncManager {
     reading: u8,
     /// An access from the EtherCAT side has begun and not ended.
     open: bool,
+    /// Only in order, in sequential mode: where the next access of a session must begin.
+    in_order: bool,
+    next: usize,
+    /// The last session was not written in order.
+    violated: bool,
     passing: Passing,
 }
 
@@ -77,8 +84,10 @@ struct SyncManager {
 struct Passing {
     touched: bool,
     open_before: bool,
+    next_before: usize,
     started: bool,
     done: bool,
+    violated: bool,
 }
 
 /// What the end of a frame brought about.
@@ -91,8 +100,8 @@ pub(super) struct Settled {
 }
 
 impl SyncManagers {
-    pub(super) fn new() -> Self {
-        Self { all: [SyncManager::default(); MAX], guards: [0; MAX], guard_count: 0 }
+    pub(super) fn new(sequential: bool) -> Self {
+        Self { all: [SyncManager::default(); MAX], guards: [0; MAX], guard_count: 0, sequential }
     }
 
     /// Takes over what the registers of SyncManager `index` say. One that was switched on or off,
@@ -107,6 +116,7 @@ impl SyncManagers {
         manager.control = config.control;
         manager.enabled = config.activate.enable();
         manager.kind = kind;
+        manager.in_order = self.sequential && config.control.sequential();
         if restarts {
             manager.restart();
         }
@@ -148,6 +158,7 @@ impl SyncManagers {
         let passing = std::mem::take(&mut manager.passing);
         if !good {
             manager.open = passing.open_before;
+            manager.next = passing.next_before;
             return Settled::default();
         }
         let settled = manager.settle(passing);
@@ -287,6 +298,7 @@ impl SyncManager {
 
     fn restart(&mut self) {
         (self.written, self.read, self.full, self.open) = (false, false, false, false);
+        (self.next, self.violated) = (self.start, false);
         (self.last, self.writing, self.reading) = (None, 0, 0);
     }
 
@@ -310,8 +322,12 @@ impl SyncManager {
     fn ask(&mut self, at: usize, end: usize, write: bool) -> (usize, Grant) {
         let until = end.min(self.end());
         if !self.passing.touched {
-            self.passing =
-                Passing { touched: true, open_before: self.open, started: false, done: false };
+            self.passing = Passing {
+                touched: true,
+                open_before: self.open,
+                next_before: self.next,
+                ..Passing::default()
+            };
         }
         match self.kind {
             Kind::Off => (until, Grant::Plain),
@@ -336,6 +352,13 @@ impl SyncManager {
         }
         if !self.open {
             return (until, Grant::Denied);
+        }
+        if self.in_order && write {
+            if at != self.start && at != self.next {
+                self.passing.violated = true;
+                return (until, Grant::Denied);
+            }
+            self.next = until;
         }
         self.passing.started |= at == self.start;
         let mut until = until;
@@ -375,6 +398,7 @@ impl SyncManager {
     }
 
     fn settle(&mut self, passing: Passing) -> Settled {
+        self.violated = passing.violated || (self.violated && !passing.started);
         let written = passing.done && !self.is_read();
         if passing.started {
             if self.is_read() {
@@ -406,6 +430,7 @@ impl SyncManager {
         SmStatus(0)
             .with_written(self.written)
             .with_read(self.read)
+            .with_sequence_violation(self.violated)
             .with_mailbox_full(self.full)
             .with_last_buffer(self.last)
             .with_read_open(self.open && self.is_read())

@@ -56,6 +56,12 @@ pub trait Firmware: Debug + Send {
         SampleAgain::NextFrame
     }
 
+    /// Whether it plays the EEPROM (S1 11.2.4): then it answers
+    /// [`Pdi::sii_request`]. Asked once, when the controller is made.
+    fn emulates_sii(&self) -> bool {
+        false
+    }
+
     /// Whether [`Firmware::sync`] is wanted. Asked once, after [`Firmware::start`].
     fn synchronises(&self) -> bool {
         false

@@ -56,6 +56,15 @@ impl Signals {
         }
     }
 
+    /// Lets go of it: nothing drives it any more.
+    pub fn release(&mut self, signal: SignalId) {
+        if let Some(slot) = self.values.get_mut(signal.0 as usize)
+            && slot.take().is_some()
+        {
+            self.edition += 1;
+        }
+    }
+
     /// A number that changes whenever any signal does.
     #[must_use]
     pub fn edition(&self) -> u64 {
@@ -88,7 +97,10 @@ mod tests {
         assert_eq!((signals.value(added), signals.is_high(added)), (-7, true));
         assert!(!signals.is_high(SignalId(0)));
         assert_eq!((signals.driven(SignalId(0)), signals.driven(added)), (None, Some(-7)));
+        signals.release(added);
+        assert_eq!(signals.driven(added), None);
         signals.set(SignalId(9), 1);
+        signals.release(SignalId(9));
         assert_eq!(signals.value(SignalId(9)), 0, "a signal that leads nowhere reads low");
     }
 }

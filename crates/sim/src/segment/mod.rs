@@ -7,6 +7,7 @@
 mod arrivals;
 mod build;
 pub(crate) mod card;
+mod ready;
 
 use std::collections::BTreeMap;
 
@@ -26,7 +27,7 @@ use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
 use crate::segment_file::{FaultEntry, SegmentFile};
-use crate::truth::{Effect, FaultId, Place, TruthLog, Unexplained};
+use crate::truth::{self, Effect, FaultId, Place, TruthLog, Unexplained};
 use crate::wire::walk::{Outcome, Traveller};
 use crate::wire::world::World;
 
@@ -304,6 +305,11 @@ impl Segment {
     #[must_use]
     pub const fn truth(&self) -> &TruthLog {
         &self.world.truth
+    }
+
+    /// Takes the entries of the log out of it ([`TruthLog::take_entries`]).
+    pub fn take_truth(&mut self) -> Vec<truth::Entry> {
+        self.world.truth.take_entries()
     }
 
     /// Error counters that moved, since the audit before, without a cause in the log.

@@ -101,6 +101,9 @@ impl World {
         let (_, to) = self.links[line.link].from_to(line.downstream);
         if let End::Controller(node, port) = to {
             self.post(node, at, cause, PortEvent::Count { port, kind: CountKind::SymbolError });
+            if self.nodes[node].controller.has_enhanced_link_detection(port) {
+                self.watch_symbols(at, cause, line);
+            }
         }
     }
 

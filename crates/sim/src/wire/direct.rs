@@ -60,6 +60,7 @@ pub(crate) struct Direct {
 struct Passed {
     route: Arc<Route>,
     at: Instant,
+    duration: Span,
     number: u64,
 }
 
@@ -116,24 +117,54 @@ impl World {
     /// Controllers learn when frames came in at their ports that did not walk: some of them latch
     /// the time of a frame other than the one that asks for it.
     fn note_entries(&mut self) {
-        for Passed { route, at, number } in self.direct.unnoted.drain(..) {
+        for Passed { route, at, duration, number } in self.direct.unnoted.drain(..) {
             for (node, port, after) in &route.entries {
                 let controller = &mut self.nodes.quietly(*node as usize).controller;
-                controller.note_entry(*port, number, at + *after);
+                controller.note_entry(*port, number, at + *after, duration);
             }
         }
     }
 
-    fn passed(&mut self, route: Arc<Route>, at: Instant, number: u64) {
+    /// Before ports of these nodes count anything: when the last frame came in there may tell what
+    /// they count.
+    fn note_entries_for(&mut self, due: &[u32]) {
+        let nodes = &self.nodes;
+        if !self.direct.unnoted.is_empty()
+            && due.iter().any(|node| nodes[*node as usize].controller.has_port_events())
+        {
+            self.note_entries();
+        }
+    }
+
+    /// Brings every node to `now` at which something is due.
+    #[inline]
+    pub(super) fn touch_due(&mut self, now: Instant) {
+        let mut due = std::mem::take(&mut self.direct.due);
+        due.clear();
+        self.nodes.due_until(now, &mut due);
+        if !due.is_empty() {
+            self.note_entries_for(&due);
+            // Devices meet in signals: the order is that of the nodes.
+            due.sort_unstable();
+            for node in &due {
+                self.nodes[*node as usize].touch(now, &mut self.signals);
+            }
+        }
+        self.direct.due = due;
+    }
+
+    fn passed(&mut self, route: Arc<Route>, at: Instant, duration: Span, number: u64) {
         if self.direct.unnoted.len() >= MOST_UNNOTED {
             self.note_entries();
         }
         let known = &mut self.direct.unnoted;
         match known.last_mut() {
-            Some(last) if Arc::ptr_eq(&last.route, &route) => (last.at, last.number) = (at, number),
+            Some(last) if Arc::ptr_eq(&last.route, &route) => {
+                (last.at, last.duration, last.number) = (at, duration, number);
+            }
             _ => {
                 known.retain(|passed| !Arc::ptr_eq(&passed.route, &route));
-                known.push(Passed { route, at, number });
+                known.push(Passed { route, at, duration, number });
             }
         }
     }
@@ -164,7 +195,7 @@ impl World {
         self.execute_all(&journey, &mut bytes[first..]);
         self.end_all(&journey);
         let outcome = Outcome::Arrived(route.arrives_at, at + route.takes + duration);
-        self.passed(route, at, number);
+        self.passed(route, at, duration, number);
         Some(outcome)
     }
 
@@ -208,6 +239,7 @@ impl World {
     fn prepare(&mut self, journey: &Journey<'_>) {
         let route = journey.route;
         let due = std::mem::take(&mut self.direct.due);
+        self.note_entries_for(&due);
         let mut places = std::mem::take(&mut self.direct.places);
         places.clear();
         places.extend(due.iter().filter_map(|node| route.place(*node)));
@@ -226,6 +258,9 @@ impl World {
             let (node, at) = journey.at_place(place);
             if touches.next_if_eq(&place).is_some() {
                 self.nodes[node].touch(at, &mut self.signals);
+                if self.nodes[node].controller.has_phy_acts() {
+                    self.take_phy_acts(node);
+                }
             }
             if samplers.next_if_eq(&place).is_some()
                 && self.nodes[node].controller.wants_sample(at, &self.signals)
@@ -479,12 +514,13 @@ fn datagrams(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// Whether a datagram writes what the rest of its frame's way depends on: resets, loops, and
+/// Whether a datagram writes what the rest of its frame's way depends on: resets, loops, PHYs, and
 /// receive times, which are taken on the way back, too.
 fn leads_elsewhere(command: Command, header: &Header) -> bool {
-    const SENSITIVE: [Range<usize>; 3] = [
+    const SENSITIVE: [Range<usize>; 4] = [
         r::ESC_RESET_ECAT.address.0 as usize..r::ESC_RESET_ECAT.address.0 as usize + 2,
         r::DL_CONTROL.address.0 as usize..r::DL_CONTROL.address.0 as usize + 4,
+        r::PHY_CONTROL_STATUS.address.0 as usize..r::PHY_CONTROL_STATUS.address.0 as usize + 16,
         r::RECEIVE_TIME.address.0 as usize..r::RECEIVE_TIME.address.0 as usize + 16,
     ];
     let effect = command.effect();

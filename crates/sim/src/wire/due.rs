@@ -7,7 +7,7 @@ use linesman_proto::topology::End;
 
 use super::link::EndState;
 use super::world::World;
-use crate::controller::PortEvent;
+use crate::controller::{PhyAct, PortEvent};
 use crate::hardware::PortKind;
 use crate::truth::{Effect, Place};
 
@@ -18,6 +18,8 @@ pub(super) enum Due {
     Lost { link: usize, end: usize, epoch: u64 },
     /// Both ends have a link.
     Up { link: usize, epoch: u64 },
+    /// A PHY does something to its link.
+    Phy { link: usize, end: usize, act: PhyAct },
 }
 
 /// What is due, by time; of the same instant in the order in which it was scheduled.
@@ -46,7 +48,8 @@ impl World {
     /// Whether the signal of a link is there in both directions: contact closed, both ends on.
     pub(super) fn has_signal(&self, link: usize) -> bool {
         let link = &self.links[link];
-        link.contact.is_whole() && link.both_ends().into_iter().all(|end| self.is_on(end))
+        let awake = link.asleep == [false; 2];
+        awake && link.contact.is_whole() && link.both_ends().into_iter().all(|end| self.is_on(end))
     }
 
     fn is_on(&self, end: End) -> bool {
@@ -97,6 +100,7 @@ impl World {
                     self.end_lost(link, end, at);
                 }
             }
+            Due::Phy { link, end, act } => self.phy_acts(link, end, act, at),
             Due::Up { link, epoch } => {
                 if self.links[link].epoch == epoch {
                     self.link_up(link, at);
@@ -105,16 +109,16 @@ impl World {
         }
     }
 
-    fn end_lost(&mut self, index: usize, end: usize, at: Instant) {
+    pub(super) fn end_lost(&mut self, index: usize, end: usize, at: Instant) {
         self.way_changes(at);
         self.links[index].ends[end] = EndState::Down;
         let place = self.links[index].both_ends()[end];
-        let fault = self.blame(index, at);
-        self.truth.effect(at, fault, self.link_place(index), Effect::SignalLost);
+        let cause = self.cause_of_link(index, at);
+        self.truth.effect(at, cause.fault(), self.link_place(index), Effect::SignalLost);
         match place {
             End::MainDevice(path) => self.cards[path.index()].set_carrier(at, false),
             End::Controller(node, port) => {
-                self.post(node, at, fault.into(), PortEvent::Link { port, up: false });
+                self.post(node, at, cause, PortEvent::Link { port, up: false });
             }
         }
     }
@@ -123,7 +127,8 @@ impl World {
     pub(super) fn link_up(&mut self, index: usize, at: Instant) {
         self.way_changes(at);
         self.links[index].ends = [EndState::Up; 2];
-        let fault = self.blame(index, at);
+        let fault = self.cause_of_link(index, at).fault();
+        self.links[index].dropped = None;
         if fault.is_some() {
             self.truth.effect(at, fault, self.link_place(index), Effect::SignalBack);
         }
@@ -137,7 +142,7 @@ impl World {
         }
     }
 
-    fn loss_detection(&self, link: usize, end: End) -> Span {
+    pub(super) fn loss_detection(&self, link: usize, end: End) -> Span {
         match end {
             End::MainDevice(path) => self.cards[path.index()].loss_detection,
             End::Controller(node, _) => {
@@ -150,7 +155,7 @@ impl World {
         }
     }
 
-    fn link_up_time(&self, link: usize) -> Span {
+    pub(super) fn link_up_time(&self, link: usize) -> Span {
         let times = self.links[link].both_ends().map(|end| match end {
             End::MainDevice(path) => self.cards[path.index()].link_up,
             End::Controller(node, _) => {

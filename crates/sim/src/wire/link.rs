@@ -9,7 +9,7 @@ use linesman_proto::topology::End;
 
 use super::history::History;
 use crate::hardware::PortKind;
-use crate::truth::FaultId;
+use crate::truth::{Cause, FaultId};
 
 /// Signal delay of a copper cable.
 pub const CABLE_NS_PER_M: f64 = 5.0;
@@ -119,6 +119,12 @@ pub struct Link {
     pub(super) signal: bool,
     /// Counts changes of the signal, so that what was scheduled before one can be told.
     pub(super) epoch: u64,
+    /// Whether the PHY of an end sleeps, upstream end first.
+    pub(super) asleep: [bool; 2],
+    /// Why a PHY dropped the link that its signal would have allowed.
+    pub(super) dropped: Option<Cause>,
+    /// The last bad symbols of each line, where its receiver looks out for them.
+    pub(super) bad_symbols: [VecDeque<Instant>; 2],
 }
 
 impl Link {
@@ -135,6 +141,9 @@ impl Link {
             ends: [EndState::Down; 2],
             signal: true,
             epoch: 0,
+            asleep: [false; 2],
+            dropped: None,
+            bad_symbols: [VecDeque::new(), VecDeque::new()],
         }
     }
 

@@ -17,6 +17,7 @@ pub mod history;
 pub mod link;
 mod node;
 mod nodes;
+mod phy_link;
 mod route;
 pub mod software;
 mod starve;

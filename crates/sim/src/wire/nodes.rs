@@ -14,7 +14,6 @@ use linesman_proto::time::Instant;
 use super::directory::Directory;
 use super::node::Node;
 use crate::controller::{Controller, Manner};
-use crate::device::Signals;
 
 /// All nodes of a segment, by their index in the tree.
 #[derive(Debug)]
@@ -27,8 +26,6 @@ pub(crate) struct Nodes {
     due: BinaryHeap<Reverse<(Instant, u32)>>,
     /// Who answers to what.
     pub(super) directory: Directory,
-    /// Nodes of one round, kept for their memory.
-    round: Vec<u32>,
 }
 
 /// What the book says of a node.
@@ -59,7 +56,6 @@ impl Nodes {
             woken: Vec::new(),
             due: BinaryHeap::new(),
             directory: Directory::default(),
-            round: Vec::new(),
         };
         nodes.wake_all();
         nodes
@@ -146,25 +142,9 @@ impl Nodes {
     #[inline]
     pub(super) fn due_until(&mut self, until: Instant, due: &mut Vec<u32>) {
         self.settle();
-        self.take_due(until, due);
-    }
-
-    /// Brings every node to `now` at which something is due.
-    #[inline]
-    pub(super) fn touch_due(&mut self, now: Instant, signals: &mut Signals) {
-        self.settle();
-        if self.due.peek().is_none_or(|Reverse((at, _))| *at > now) {
-            return;
+        if self.due.peek().is_some_and(|Reverse((at, _))| *at <= until) {
+            self.take_due(until, due);
         }
-        let mut round = std::mem::take(&mut self.round);
-        round.clear();
-        self.take_due(now, &mut round);
-        // Devices meet in signals: the order is that of the nodes.
-        round.sort_unstable();
-        for index in &round {
-            self.all[*index as usize].touch(now, signals);
-        }
-        self.round = round;
     }
 }
 

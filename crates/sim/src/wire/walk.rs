@@ -308,6 +308,10 @@ impl World {
         let controller = &mut self.nodes[node].controller;
         let before = controller.register(errors);
         let verdict = controller.process(at, &mut traveller.frame, &mut self.signals);
+        if controller.has_phy_acts() {
+            self.take_phy_acts(node);
+        }
+        let controller = &mut self.nodes[node].controller;
         // At 255 the counter stands still, and the frame is marked all the same.
         let marked = intact && !traveller.frame.damage.is_intact();
         if marked || controller.register(errors) > before {

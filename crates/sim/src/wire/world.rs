@@ -177,7 +177,7 @@ impl World {
     /// Brings everything to `now`.
     pub(crate) fn advance(&mut self, now: Instant) {
         self.change_until(now);
-        self.nodes.touch_due(now, &mut self.signals);
+        self.touch_due(now);
     }
 
     /// Makes all changes up to and at an instant.

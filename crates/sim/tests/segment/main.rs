@@ -6,4 +6,5 @@ mod faults;
 mod oracle;
 mod rig;
 mod swarm;
+mod traps;
 mod walk;

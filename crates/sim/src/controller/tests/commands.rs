@@ -105,7 +105,7 @@ fn what_cannot_be_read_or_written_counts_nothing() {
         (0x000E, 4, true, true),   // reserved and station address
         (0x0110, 2, true, false),  // DL status
         (0x0130, 6, true, false),  // AL status and code
-        (0x0510, 6, false, false), // PHY management
+        (0x0518, 4, false, false), // PHY port status
         (0x092C, 4, true, false),  // system time difference
         (0x0984, 1, false, false), // activation status, of other types
         (0x0E00, 8, false, false), // power-on values

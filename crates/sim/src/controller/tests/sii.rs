@@ -146,7 +146,9 @@ fn the_configuration_area_goes_to_its_registers() {
     image[..14].copy_from_slice(&[
         0x08, 0x01, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88, 0x99, 0xAA, 0xBB, 0, 0,
     ]);
-    let mut bench = bench(hardware(), image);
+    let mut hardware = hardware();
+    hardware.features |= 0x0060;
+    let mut bench = bench(hardware, image);
     assert_eq!(bench.read(0x0140, 2).unwrap(), [0x08, 0x01]);
     assert_eq!(bench.read(0x0150, 4).unwrap(), [0x22, 0x33, 0x66, 0x77]);
     assert_eq!(bench.word(0x0012), 0x9988);

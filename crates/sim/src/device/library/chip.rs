@@ -98,6 +98,27 @@ pub(in crate::device) const ESC20: Chip = Chip {
     timing: Timing { forward: Span::ns(150), process: Span::ns(170), ..TIMING },
 };
 
+/// A controller with two ports and a processor interface, from another maker: three FMMUs, four
+/// SyncManagers, distributed clocks of 64 bits.
+const LAN9252: Chip = Chip {
+    controller_type: 0xC0,
+    revision: 2,
+    build: 0,
+    fmmus: 3,
+    sync_managers: 4,
+    ram_kib: 4,
+    features: WITHOUT_EBUS,
+    counting: COUNTING,
+    timing: TIMING,
+};
+
+/// The controllers that devices are made with, with these ports: to find out which of them answers
+/// as a device was seen to answer.
+#[must_use]
+pub fn controllers(ports: PortMap<PortKind>) -> Vec<Hardware> {
+    [&ET1100, &ET1200, &IP_CORE, &ESC20, &LAN9252].map(|chip| chip.with_ports(ports)).into()
+}
+
 impl Chip {
     /// The controller with these ports.
     pub(in crate::device) fn with_ports(&self, ports: PortMap<PortKind>) -> Hardware {

@@ -15,6 +15,7 @@ pub(super) mod object;
 mod smart;
 mod spec;
 
+pub use self::chip::controllers;
 use linesman_proto::port::{Port, PortMap};
 
 use self::object::Individual;

@@ -2,5 +2,6 @@
 //! and one derived.
 
 mod counting;
+mod phy_link;
 mod properties;
 mod rig;

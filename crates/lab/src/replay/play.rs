@@ -1,0 +1,238 @@
+//! Plays the requests of a recording.
+
+use linesman_diagnosis::observe::Fingerprint;
+use linesman_proto::address::{DeviceId, Path, RegisterAddress};
+use linesman_proto::command::{Addressing, Command};
+use linesman_proto::frame::FrameView;
+use linesman_proto::register::{self as r, FmmuConfig, SyncManagerConfig};
+use linesman_proto::time::{Instant, Span};
+use linesman_sim::controller::Controller;
+use linesman_sim::segment::Segment;
+
+use super::compare::{Difference, Outcome, What, compare};
+use super::firmware::input_areas;
+use super::model::Model;
+use super::recording::{Datagram, Recording, Turn, datagrams};
+use super::report::Report;
+
+/// The run begins this long after the supply came.
+const BEFORE: Span = Span::s(1);
+/// The last frames are waited for this long.
+const AFTER: Span = Span::ms(10);
+
+/// A request that has not come back.
+struct Outstanding {
+    turn: usize,
+    print: u64,
+    /// Datagrams of it that fetch a mailbox.
+    mailboxes: Vec<bool>,
+}
+
+/// Plays all requests at their times, and compares what comes back.
+#[must_use]
+pub fn play(recording: &Recording, model: &mut Model) -> Report {
+    let mut report = Report::of(recording, model);
+    let mut outstanding: Vec<Outstanding> = Vec::new();
+    let start = recording.turns.first().map_or(Instant::ZERO, |turn| turn.request.at);
+    let mut now = Instant::ZERO + BEFORE;
+    for (index, turn) in recording.turns.iter().enumerate() {
+        // Time stamps of several cards may run backwards; the segment's time does not.
+        now = now.max(Instant::ZERO + BEFORE + turn.request.at.since(start));
+        model.segment.advance(now);
+        collect(recording, &mut model.segment, &mut outstanding, &mut report);
+        feed(turn, model);
+        let mailboxes = turn
+            .request
+            .datagrams()
+            .iter()
+            .map(|one| fetches_mailbox(one, &model.segment))
+            .collect();
+        let print = lasting(&turn.request.bytes);
+        outstanding.push(Outstanding { turn: index, print, mailboxes });
+        model.segment.handle_frame(now, Path::A, &turn.request.bytes);
+    }
+    model.segment.advance(now + AFTER);
+    collect(recording, &mut model.segment, &mut outstanding, &mut report);
+    for lost in outstanding {
+        missing(&recording.turns[lost.turn], &mut report);
+    }
+    report
+}
+
+fn lasting(frame: &[u8]) -> u64 {
+    FrameView::parse(frame).map_or(0, |view| Fingerprint::of(&view).lasting)
+}
+
+/// Takes what came back.
+fn collect(
+    recording: &Recording,
+    segment: &mut Segment,
+    outstanding: &mut Vec<Outstanding>,
+    report: &mut Report,
+) {
+    let mut buffer = Vec::new();
+    while let Some(arrival) = segment.poll_arrival(&mut buffer) {
+        let print = lasting(&buffer);
+        let Some(at) = outstanding.iter().position(|one| one.print == print) else { continue };
+        let one = outstanding.remove(at);
+        let turn = &recording.turns[one.turn];
+        if !arrival.intact {
+            missing(turn, report);
+            continue;
+        }
+        let Some(reply) = &turn.reply else {
+            report.unanswered += 1;
+            continue;
+        };
+        let ours = datagrams(&buffer);
+        for (number, recorded) in reply.datagrams().iter().enumerate() {
+            let outcome = match ours.get(number) {
+                Some(ours) => {
+                    let is_mailbox = one.mailboxes.get(number).copied().unwrap_or(false);
+                    compare(recorded, ours, is_mailbox)
+                }
+                None => not_there(recorded),
+            };
+            report.add(turn, number, recorded, outcome);
+        }
+    }
+}
+
+fn missing(turn: &Turn, report: &mut Report) {
+    match &turn.reply {
+        None => report.unanswered += 1,
+        Some(reply) => {
+            for (number, recorded) in reply.datagrams().iter().enumerate() {
+                report.add(turn, number, recorded, not_there(recorded));
+            }
+        }
+    }
+}
+
+fn not_there(recorded: &Datagram<'_>) -> Outcome {
+    Outcome::Differs(Difference {
+        what: What::Missing,
+        expected: format!("working counter {}", recorded.wkc),
+        received: "nothing".to_owned(),
+    })
+}
+
+// ---- what the segment's registers say ----
+
+fn controllers(segment: &Segment) -> impl Iterator<Item = (DeviceId, &Controller)> {
+    segment.devices().filter_map(|id| Some((id, segment.controller(id)?)))
+}
+
+fn bytes<const N: usize>(controller: &Controller, at: RegisterAddress) -> [u8; N] {
+    std::array::from_fn(|offset| {
+        controller.register(RegisterAddress(at.0.saturating_add(offset as u16)))
+    })
+}
+
+fn sync_manager(controller: &Controller, index: u8) -> Option<SyncManagerConfig> {
+    let count = controller.hardware().sync_managers;
+    let at = r::SYNC_MANAGER.at(u16::from(index)).filter(|_| index < count)?;
+    Some(SyncManagerConfig::from_bytes(bytes(controller, at)))
+}
+
+/// Which device a datagram is for, in the segment as it is.
+fn addressed(datagram: &Datagram<'_>, segment: &Segment) -> Option<DeviceId> {
+    match datagram.command?.addressing() {
+        Addressing::Position => segment.devices().nth(usize::from(0u16.wrapping_sub(datagram.adp))),
+        Addressing::Station => controllers(segment)
+            .find(|(_, controller)| controller.station_address().0 == datagram.adp)
+            .map(|(id, _)| id),
+        Addressing::Broadcast | Addressing::Logical | Addressing::None => None,
+    }
+}
+
+fn fetches_mailbox(datagram: &Datagram<'_>, segment: &Segment) -> bool {
+    let reads = datagram.command.is_some_and(|command| command.effect().reads);
+    let device = addressed(datagram, segment).filter(|_| reads);
+    let controller = device.and_then(|id| segment.controller(id));
+    let mailbox = controller.and_then(|controller| sync_manager(controller, 1));
+    mailbox.is_some_and(|manager| manager.is_active() && manager.start == datagram.ado)
+}
+
+// ---- the world outside ----
+
+/// The inputs are as the recorded answer shows them: what they are is the world's affair.
+fn feed(turn: &Turn, model: &mut Model) {
+    for (request, reply) in turn.pairs() {
+        if reply.wkc == 0 {
+            continue;
+        }
+        match request.command {
+            Some(Command::Lrd | Command::Lrw) => {
+                for (device, _) in model.inputs.iter().enumerate() {
+                    feed_mapped(device, &reply, model.inputs[device].clone(), &mut model.segment);
+                }
+            }
+            Some(command) if command.effect().reads => feed_direct(&reply, model),
+            Some(_) | None => {}
+        }
+    }
+}
+
+fn feed_mapped(
+    device: usize,
+    reply: &Datagram<'_>,
+    inputs: Vec<linesman_sim::device::SignalId>,
+    segment: &mut Segment,
+) {
+    let mut values: Vec<(usize, u8, bool)> = Vec::new();
+    {
+        let Some(controller) = segment.controller(DeviceId(device as u32)) else { return };
+        let areas = input_areas(|index| sync_manager(controller, index));
+        for index in 0..u16::from(controller.hardware().fmmus) {
+            let Some(at) = r::FMMU.at(index) else { break };
+            let fmmu = FmmuConfig::from_bytes(bytes(controller, at));
+            if !fmmu.active || !fmmu.reads {
+                continue;
+            }
+            let Some(overlap) = fmmu.overlap(reply.logical, reply.data.len() as u16) else {
+                continue;
+            };
+            let from = usize::from(overlap.datagram_offset);
+            for offset in from..from + usize::from(overlap.length) {
+                let logical =
+                    linesman_proto::address::LogicalAddress(reply.logical.0 + offset as u32);
+                for bit in 0..8 {
+                    let Some((place, place_bit)) = fmmu.locate_bit(logical, bit) else { continue };
+                    let area = areas.iter().find(|(_, manager, _)| manager.touches(place, 1));
+                    if let Some((_, manager, first)) = area {
+                        let byte = first + usize::from(place.0 - manager.start.0);
+                        values.push((byte, place_bit, reply.data[offset] >> bit & 1 != 0));
+                    }
+                }
+            }
+        }
+    }
+    for (byte, bit, high) in values {
+        let Some(signal) = inputs.get(byte) else { continue };
+        let signals = segment.signals_mut();
+        let before = signals.value(*signal);
+        signals.set(*signal, before & !(1 << bit) | i32::from(high) << bit);
+    }
+}
+
+fn feed_direct(reply: &Datagram<'_>, model: &mut Model) {
+    let mut request = *reply;
+    if reply.command.is_some_and(|command| command.addressing() == Addressing::Position) {
+        // It came back with the number of all devices added.
+        request.adp = reply.adp.wrapping_sub(model.inputs.len() as u16);
+    }
+    let Some(device) = addressed(&request, &model.segment) else { return };
+    let Some(controller) = model.segment.controller(device) else { return };
+    let areas = input_areas(|index| sync_manager(controller, index));
+    for (offset, value) in reply.data.iter().enumerate() {
+        let place = RegisterAddress(reply.ado.0.wrapping_add(offset as u16));
+        let area = areas.iter().find(|(_, manager, _)| manager.touches(place, 1));
+        if let Some((_, manager, first)) = area {
+            let byte = first + usize::from(place.0 - manager.start.0);
+            if let Some(signal) = model.inputs[device.index()].get(byte) {
+                model.segment.signals_mut().set(*signal, i32::from(*value));
+            }
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! What a replay showed.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::Serialize;
+
+use super::compare::{Outcome, What, register_name};
+use super::model::Model;
+use super::recording::{Datagram, Recording, Turn};
+
+/// Examples that are kept of each kind of difference.
+const EXAMPLES: usize = 3;
+/// Kinds of differences that are listed.
+const KINDS: usize = 40;
+
+/// What a replay showed.
+#[derive(Clone, PartialEq, Eq, Default, Debug, Serialize)]
+pub struct Report {
+    /// Requests that were played.
+    pub requests: u64,
+    /// Requests that nobody answered in the recording: nothing can be said of them.
+    pub unanswered: u64,
+    /// Returns whose request was not recorded.
+    pub returns_alone: u64,
+    /// Frames of the recording that could not be used.
+    pub unusable: u64,
+    /// What each device was taken for, nearest first.
+    pub devices: Vec<String>,
+    /// What had to be assumed.
+    pub notes: Vec<String>,
+    /// Datagrams that were compared.
+    pub compared: u64,
+    /// Of them, those that agree in every byte.
+    pub equal: u64,
+    /// Those that agree but for fields that tell a time or count: by class and register.
+    pub equal_but: Vec<Exempt>,
+    /// Those that differ.
+    pub different: u64,
+    /// In what they differ, the most frequent first.
+    pub differences: Vec<DifferenceKind>,
+}
+
+/// Fields that were not compared.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Exempt {
+    /// Why.
+    pub reason: String,
+    /// Which register.
+    pub register: String,
+    /// In how many datagrams.
+    pub datagrams: u64,
+}
+
+/// Differences of one kind.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct DifferenceKind {
+    /// Of which datagrams, and in what.
+    pub what: String,
+    /// How many.
+    pub datagrams: u64,
+    /// The first of them.
+    pub examples: Vec<Example>,
+}
+
+/// One difference.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Example {
+    /// Number of the request in the recording.
+    pub request: u64,
+    /// Number of the answer.
+    pub reply: u64,
+    /// Which datagram of it, from 0.
+    pub datagram: usize,
+    /// As it was recorded.
+    pub expected: String,
+    /// As the segment gave it.
+    pub received: String,
+}
+
+/// What a replay proves.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Verdict {
+    /// All answers agree.
+    Agrees,
+    /// Some do not.
+    Differs,
+    /// No answer could be compared.
+    NothingJudged,
+}
+
+impl Report {
+    pub(super) fn of(recording: &Recording, model: &Model) -> Self {
+        Self {
+            requests: recording.turns.len() as u64,
+            returns_alone: recording.alone,
+            unusable: recording.unusable,
+            devices: model.devices.clone(),
+            notes: model.notes.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// A recording without a device.
+    #[must_use]
+    pub fn without_devices(recording: &Recording) -> Self {
+        let unanswered = recording.turns.len() as u64;
+        Self {
+            requests: unanswered,
+            unanswered,
+            returns_alone: recording.alone,
+            unusable: recording.unusable,
+            ..Self::default()
+        }
+    }
+
+    /// What it proves.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match (self.compared, self.different) {
+            (0, _) => Verdict::NothingJudged,
+            (_, 0) => Verdict::Agrees,
+            (_, _) => Verdict::Differs,
+        }
+    }
+
+    pub(super) fn add(
+        &mut self,
+        turn: &Turn,
+        number: usize,
+        recorded: &Datagram<'_>,
+        outcome: Outcome,
+    ) {
+        self.compared += 1;
+        match outcome {
+            Outcome::Equal => self.equal += 1,
+            Outcome::EqualBut(class, address) => {
+                let (reason, register) = (class.name().to_owned(), register_name(address));
+                let known = self
+                    .equal_but
+                    .iter_mut()
+                    .find(|one| one.reason == reason && one.register == register);
+                match known {
+                    Some(known) => known.datagrams += 1,
+                    None => self.equal_but.push(Exempt { reason, register, datagrams: 1 }),
+                }
+            }
+            Outcome::Differs(difference) => {
+                self.different += 1;
+                let what = kind(recorded, difference.what);
+                let place = match self.differences.iter().position(|one| one.what == what) {
+                    Some(place) => place,
+                    None if self.differences.len() >= KINDS => return,
+                    None => {
+                        self.differences.push(DifferenceKind {
+                            what,
+                            datagrams: 0,
+                            examples: Vec::new(),
+                        });
+                        self.differences.len() - 1
+                    }
+                };
+                let known = &mut self.differences[place];
+                known.datagrams += 1;
+                if known.examples.len() < EXAMPLES {
+                    known.examples.push(Example {
+                        request: turn.request.number,
+                        reply: turn.reply.as_ref().map_or(0, |reply| reply.number),
+                        datagram: number,
+                        expected: difference.expected,
+                        received: difference.received,
+                    });
+                }
+            }
+        }
+    }
+
+    /// Datagrams that agree but for fields that are not compared.
+    #[must_use]
+    pub fn equal_but_count(&self) -> u64 {
+        self.equal_but.iter().map(|one| one.datagrams).sum()
+    }
+}
+
+/// `FPRD 0x0130 AL status: data`.
+fn kind(recorded: &Datagram<'_>, what: What) -> String {
+    let command = recorded.command.map_or("unknown command", |command| command.name());
+    let logical = recorded
+        .command
+        .is_some_and(|one| one.addressing() == linesman_proto::command::Addressing::Logical);
+    let place = if logical {
+        format!("{command} {}", recorded.logical)
+    } else {
+        format!("{command} {} {}", recorded.ado, register_name(recorded.ado))
+    };
+    match what {
+        What::WorkingCounter => format!("{place}: working counter"),
+        What::Data(address) if address == recorded.ado => format!("{place}: data"),
+        What::Data(address) => format!("{place}: data at {address} {}", register_name(address)),
+        What::ProcessData(_) => format!("{place}: process data"),
+        What::Position => format!("{place}: position"),
+        What::Events => format!("{place}: event field"),
+        What::Missing => format!("{place}: did not come back"),
+    }
+}
+
+/// Counts of one key, the most frequent first.
+fn sorted<T>(list: &[T], count: impl Fn(&T) -> u64) -> Vec<&T> {
+    let mut by_count: BTreeMap<std::cmp::Reverse<u64>, Vec<&T>> = BTreeMap::new();
+    for one in list {
+        by_count.entry(std::cmp::Reverse(count(one))).or_default().push(one);
+    }
+    by_count.into_values().flatten().collect()
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (number, device) in (1..).zip(&self.devices) {
+            writeln!(f, "device {number}: {device}")?;
+        }
+        for note in &self.notes {
+            writeln!(f, "assumed: {note}")?;
+        }
+        writeln!(f, "requests       {:>8}", self.requests)?;
+        for (name, count) in [
+            ("  unanswered", self.unanswered),
+            ("returns alone", self.returns_alone),
+            ("unusable", self.unusable),
+        ] {
+            if count > 0 {
+                writeln!(f, "{name:<14} {count:>8}")?;
+            }
+        }
+        writeln!(f, "datagrams      {:>8}", self.compared)?;
+        writeln!(f, "  equal        {:>8}", self.equal)?;
+        writeln!(f, "  equal but    {:>8}", self.equal_but_count())?;
+        for one in sorted(&self.equal_but, |one| one.datagrams) {
+            writeln!(f, "               {:>8}  {}: {}", one.datagrams, one.reason, one.register)?;
+        }
+        writeln!(f, "  different    {:>8}", self.different)?;
+        for one in sorted(&self.differences, |one| one.datagrams) {
+            writeln!(f, "               {:>8}  {}", one.datagrams, one.what)?;
+            for example in &one.examples {
+                writeln!(
+                    f,
+                    "                         frame {} to {}, datagram {}: expected {}, received {}",
+                    example.request,
+                    example.reply,
+                    example.datagram,
+                    example.expected,
+                    example.received
+                )?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,56 @@
+//! A segment of controllers that were made elsewhere.
+
+use std::collections::BTreeMap;
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::time::Instant;
+use linesman_proto::topology::Tree;
+
+use super::arrivals::Arrivals;
+use super::{DeviceInfo, Segment};
+use crate::controller::Controller;
+use crate::device::Signals;
+use crate::seed::Seed;
+use crate::wire::world::World;
+
+impl Segment {
+    /// A segment of these controllers, which was on before the run began: all links are up, all SII
+    /// are loaded. `controllers` are in the order of the tree's nodes and numbered likewise;
+    /// `cable_m` has the length of each of its links. Each device's signals stay with its maker.
+    #[must_use]
+    pub fn of_controllers(
+        name: &str,
+        tree: Tree,
+        controllers: Vec<Controller>,
+        cable_m: &[f64],
+        signals: Signals,
+    ) -> Self {
+        let count = controllers.len();
+        let names = (1..=count).map(|number| format!("device {number}")).collect();
+        let world = World::new(&tree, controllers, cable_m, signals);
+        let nodes: BTreeMap<DeviceId, usize> =
+            (0..count).map(|node| (world.id(node), node)).collect();
+        let mut segment = Self {
+            ebus_ma: vec![0; count],
+            name: name.to_owned(),
+            tree,
+            world,
+            seed: Seed(0),
+            devices: vec![DeviceInfo { outputs: Vec::new(), inputs: Vec::new() }; count],
+            nodes,
+            names,
+            now: Instant::ZERO,
+            arrivals: Arrivals::default(),
+            spare: Vec::new(),
+            tally: super::FrameTally::default(),
+        };
+        segment.advance(Instant::ZERO);
+        segment
+    }
+
+    /// A controller, to give it a history; `None` for one that is not there.
+    pub fn controller_mut(&mut self, device: DeviceId) -> Option<&mut Controller> {
+        let node = self.node(device)?;
+        Some(&mut self.world.nodes[node].controller)
+    }
+}

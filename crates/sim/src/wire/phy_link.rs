@@ -1,0 +1,99 @@
+//! Links that a PHY drops although their signal is there: because it sees too many bad symbols, or
+//! because the MainDevice told it to.
+//!
+//! Read first: S1, enhanced link detection; facts 3.5: at 32 bad symbols within 10 µs the port is
+//! closed and the negotiation begins anew, so that the partner loses its link, too.
+
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
+
+use super::change::Line;
+use super::due::Due;
+use super::link::EndState;
+use super::world::World;
+use crate::controller::PhyAct;
+use crate::truth::Cause;
+
+/// So many bad symbols ...
+const MOST_BAD_SYMBOLS: usize = 32;
+/// ... within this time are too many.
+const WINDOW: Span = Span::us(10);
+
+impl World {
+    /// A receiver with enhanced link detection saw a bad symbol.
+    pub(super) fn watch_symbols(&mut self, at: Instant, cause: Cause, line: Line) {
+        let link = &mut self.links[line.link];
+        let end = usize::from(line.downstream);
+        let seen = &mut link.bad_symbols[end];
+        seen.push_back(at);
+        if seen.len() > MOST_BAD_SYMBOLS {
+            seen.pop_front();
+        }
+        let too_many = seen.len() == MOST_BAD_SYMBOLS
+            && seen.front().is_some_and(|first| at.since(*first) <= WINDOW);
+        if too_many && link.ends[end] == EndState::Up {
+            seen.clear();
+            self.drop_link(line.link, end, cause, at);
+        }
+    }
+
+    /// What the MainDevice wrote to PHYs of a controller is on its way.
+    pub(super) fn take_phy_acts(&mut self, node: usize) {
+        for (at, port, act) in self.nodes[node].controller.take_phy_acts() {
+            let Some(line) = self.nodes[node].leaving[port] else { continue };
+            // The line leaves by its sender: that is this end.
+            let end = usize::from(!line.downstream);
+            self.agenda.push(at.max(self.horizon), Due::Phy { link: line.link, end, act });
+        }
+    }
+
+    pub(super) fn phy_acts(&mut self, link: usize, end: usize, act: PhyAct, at: Instant) {
+        match act {
+            PhyAct::Restart => self.drop_link(link, end, Cause::Content, at),
+            PhyAct::Sleep => {
+                self.links[link].asleep[end] = true;
+                self.links[link].dropped.get_or_insert(Cause::Content);
+                self.signal_changed(link, at);
+            }
+            PhyAct::Wake => {
+                self.links[link].asleep[end] = false;
+                self.links[link].dropped.get_or_insert(Cause::Content);
+                self.signal_changed(link, at);
+            }
+        }
+    }
+
+    /// One end drops a link and negotiates anew: it has none from now on, the other end finds out.
+    fn drop_link(&mut self, index: usize, end: usize, cause: Cause, at: Instant) {
+        if !self.links[index].signal || self.links[index].ends[end] != EndState::Up {
+            return;
+        }
+        let link = &mut self.links[index];
+        link.dropped = Some(cause);
+        link.epoch += 1;
+        let epoch = link.epoch;
+        self.end_lost(index, end, at);
+        let other = 1 - end;
+        if self.links[index].ends[other] == EndState::Up {
+            self.links[index].ends[other] = EndState::Losing;
+            let place = self.links[index].both_ends()[other];
+            let detection = self.loss_detection(index, place);
+            self.agenda.push(at + detection, Due::Lost { link: index, end: other, epoch });
+        }
+        self.agenda.push(at + self.link_up_time(index), Due::Up { link: index, epoch });
+    }
+
+    /// Why a link is as it is: a PHY dropped it, or somebody broke it.
+    pub(super) fn cause_of_link(&self, index: usize, at: Instant) -> Cause {
+        let link = &self.links[index];
+        let whole = link.contact.is_whole()
+            && link.both_ends().into_iter().all(|end| match end {
+                End::MainDevice(_) => true,
+                End::Controller(node, _) => self.nodes[node].power.is_whole(),
+            });
+        match link.dropped {
+            Some(cause) if whole => cause,
+            Some(_) | None => self.blame(index, at).into(),
+        }
+    }
+}
