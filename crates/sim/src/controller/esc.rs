@@ -402,6 +402,11 @@ impl Controller {
         self.reschedule();
     }
 
+    /// The work of the device in each cycle takes so long from now on; `None` for as long as it needs.
+    pub fn slow_down(&mut self, takes: Option<Span>) {
+        self.firmware.slow_down(takes);
+    }
+
     /// The device sends an emergency at `at`, or as soon as its mailbox works.
     pub fn report(&mut self, at: Instant, emergency: Emergency) {
         self.firmware.report(emergency);
@@ -529,6 +534,12 @@ impl Controller {
     /// The line from the SYNC unit to the processor breaks, or is whole again.
     pub fn cut_sync(&mut self, cut: bool) {
         self.core.sync.cut = cut;
+        if !cut {
+            // A pulse that nobody ended is found on the line, and ended.
+            for signal in SyncSignal::ALL {
+                self.core.acknowledge_sync(signal);
+            }
+        }
     }
 
     fn replan_sync(&mut self, at: Instant) {

@@ -6,7 +6,7 @@
 use std::fmt::Debug;
 
 use linesman_proto::mailbox::coe::Emergency;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
 use super::signal::Signals;
@@ -84,6 +84,11 @@ pub trait Firmware: Debug + Send {
     /// a mailbox cannot. Faults go through
     /// [`Controller::report`](crate::controller::Controller::report).
     fn report(&mut self, _emergency: Emergency) {}
+
+    /// From now on its work in each cycle takes so long, whatever it needs otherwise; `None` ends that.
+    /// It outlives a restart. Faults go through
+    /// [`Controller::slow_down`](crate::controller::Controller::slow_down).
+    fn slow_down(&mut self, _takes: Option<Span>) {}
 
     /// Whether a processor with software is behind the controller, which can fail.
     fn has_processor(&self) -> bool {

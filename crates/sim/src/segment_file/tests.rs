@@ -151,7 +151,13 @@ fn plants_are_whole_and_belong_to_their_seed() {
 
 #[test]
 fn plants_keep_to_their_options() {
-    let options = PlantOptions { min_devices: 25, max_devices: 40, junction: true, ring: true };
+    let options = PlantOptions {
+        min_devices: 25,
+        max_devices: 40,
+        junction: true,
+        ring: true,
+        all_types: true,
+    };
     for seed in 0..50 {
         let file = plant(Seed(seed), &options);
         let tree = file.project().unwrap().tree().unwrap();

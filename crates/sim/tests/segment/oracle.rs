@@ -217,6 +217,7 @@ fn run(seed: u64) -> (u64, u64) {
         max_devices: 8,
         junction: stream.chance(0.2),
         ring: stream.chance(0.2),
+        all_types: stream.chance(0.5),
     };
     let file = plant(Seed(seed), &options);
     let mut pair = Pair::new(&file, seed);
