@@ -248,7 +248,7 @@ fn replace(
     };
     placed[index].revision = replacement.revision;
     let Some(type_name) = &replacement.type_name else { return Ok(()) };
-    let kind = file.kind(type_name).map_err(|source| BuildError::Replacement {
+    let kind = file.kind(type_name, None).map_err(|source| BuildError::Replacement {
         entry: label.to_owned(),
         source: Box::new(source),
     })?;

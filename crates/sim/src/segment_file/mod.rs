@@ -84,7 +84,8 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = 1, max = 65535))]
     pub repeat: Option<u32>,
-    /// Type in the library, such as `EL2004`, or `sii:FILE`: the device whose EEPROM that file holds.
+    /// Type in the library, such as `EL2004`, `esi:FILE#TYPE@REVISION` from a description
+    /// of its maker, or `sii:FILE`: the device whose EEPROM that file holds.
     #[serde(rename = "type")]
     pub type_name: String,
     /// Whose port it hangs on: `maindevice`, `maindevice.B`, or `K1.C`.
@@ -112,6 +113,10 @@ pub struct SegmentDevice {
     /// has it unless said.
     #[serde(default)]
     pub counts_forwarded: Option<bool>,
+    /// The modules in the slots of a modular device, by type, name or ident; `""` leaves a slot empty.
+    /// Those of its description unless said.
+    #[serde(default)]
+    pub slots: Option<Vec<String>>,
     /// Error counters that are not 0 at the start: `A.frame`, `A.physical`, `A.forwarded`,
     /// `A.lost_link` (and B, C, D), `processing_unit`, `pdi`.
     #[serde(default)]

@@ -268,6 +268,7 @@ impl Builder {
             clock_ppm: None,
             clock: None,
             counts_forwarded: None,
+            slots: None,
             counters: std::collections::BTreeMap::new(),
         });
         name

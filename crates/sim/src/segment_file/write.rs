@@ -65,6 +65,10 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     if let Some(counts) = device.counts_forwarded {
         line("counts_forwarded", counts.to_string());
     }
+    if let Some(slots) = &device.slots {
+        let slots: Vec<_> = slots.iter().map(|slot| quoted(slot)).collect();
+        line("slots", format!("[{}]", slots.join(", ")));
+    }
     if !device.counters.is_empty() {
         let counters = device.counters.iter();
         let counters: Vec<_> =
