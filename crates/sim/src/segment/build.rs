@@ -12,7 +12,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
 use super::arrivals::Arrivals;
-use super::{DeviceInfo, Segment};
+use super::{DeviceInfo, Segment, identification};
 use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
@@ -110,11 +110,15 @@ fn assemble(
         if let Some(revision) = one.revision {
             set_revision(&mut built.sii, revision);
         }
+        let id = file.devices[one.planned.device].id.filter(|_| one.planned.part == 0);
+        let identification = identification::set(&mut built, id, &mut signals);
         let clock = clock(file, &one.planned, seed);
         let Built { mut hardware, sii, firmware, outputs, inputs } = built;
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
         hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
-        made.push(Controller::new(one.id, kinds.get(hardware), clock, firmware, sii));
+        let mut controller = Controller::new(one.id, kinds.get(hardware), clock, firmware, sii);
+        identification.finish(&mut controller);
+        made.push(controller);
         devices.push(DeviceInfo { outputs, inputs });
     }
     let cable_m: Vec<f64> = tree

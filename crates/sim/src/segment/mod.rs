@@ -7,6 +7,7 @@
 mod arrivals;
 mod build;
 pub(crate) mod card;
+mod identification;
 mod ready;
 
 use std::collections::BTreeMap;

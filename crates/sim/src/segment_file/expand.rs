@@ -111,9 +111,10 @@ fn behind(
 ) -> Result<Attachment, SegmentFileError> {
     let all = found.ports();
     let kind = all.first().copied().unwrap_or_default()[entry];
+    let inner_links = found.inner_links();
     for (part, ports) in all.into_iter().enumerate() {
         let taken = |port: Port| {
-            let links = found.inner_links().iter();
+            let links = inner_links.iter();
             links.flat_map(|link| [link.from, link.to]).any(|end| end == (part, port))
         };
         let free = |port: &Port| (part, *port) != (0, entry) && !taken(*port);

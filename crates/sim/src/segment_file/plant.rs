@@ -265,6 +265,7 @@ impl Builder {
             entry: None,
             cable_m,
             serial,
+            id: None,
             clock_ppm: None,
             clock: None,
             counts_forwarded: None,
