@@ -4,13 +4,14 @@
 //! at one ([`Segment::poll_arrival`]). Time is an argument and never goes back; nothing happens
 //! between two calls that does not depend on them alone, so the same calls give the same bytes.
 
+mod arrivals;
 mod build;
 pub(crate) mod card;
 mod identification;
 mod ready;
 mod turn;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
@@ -21,6 +22,7 @@ use linesman_proto::topology::Tree;
 pub use build::BuildError;
 pub use card::{FrameTally, HostPort};
 
+use self::arrivals::Arrivals;
 use crate::controller::Controller;
 use crate::device::{SignalId, Signals};
 use crate::fault::{self, FaultError};
@@ -64,8 +66,9 @@ pub struct Segment {
     /// Names of all devices that were planned.
     names: Vec<String>,
     now: Instant,
-    /// By time of arrival, then in the order of sending; whether a stranger's.
-    arrivals: BTreeMap<(Instant, u64), (Path, WireFrame, bool)>,
+    arrivals: Arrivals,
+    /// Numbers of frames among them that strangers sent.
+    strange: BTreeSet<u64>,
     spare: Vec<Vec<u8>>,
     tally: FrameTally,
 }
@@ -120,11 +123,8 @@ impl Segment {
         self.tally.sent += 1;
         let leaves = self.leaves(path, now, &frame);
         let mut traveller = Traveller::new(frame);
-        match self.world.walk(path, leaves, &mut traveller) {
-            Outcome::Arrived(path, at) => {
-                let number = traveller.frame.number;
-                self.arrivals.insert((at, number), (path, traveller.frame, false));
-            }
+        match self.world.carry(path, leaves, &mut traveller) {
+            Outcome::Arrived(path, at) => self.arrivals.push(at, path, traveller.frame),
             Outcome::Vanished => {
                 self.tally.vanished += 1;
                 self.recycle(traveller.frame.bytes);
@@ -141,7 +141,7 @@ impl Segment {
             leaves = now + by;
             card.kept_until = leaves + frame.duration();
             let effect = Effect::FrameDelayed { frame: frame.number };
-            self.world.truth.effect(now, Some(fault), crate::truth::Place::Host(path), effect);
+            self.world.truth.effect(now, Some(fault), Place::Host(path), effect);
         } else {
             leaves = leaves.max(card.kept_until);
         }
@@ -156,7 +156,8 @@ impl Segment {
     /// Frames of strangers arrive as all others do.
     fn fetch_strangers(&mut self) {
         for (at, path, frame) in self.world.take_strangers() {
-            self.arrivals.insert((at, frame.number), (path, frame, true));
+            self.strange.insert(frame.number);
+            self.arrivals.push(at, path, frame);
         }
     }
 
@@ -164,13 +165,9 @@ impl Segment {
     /// [`Segment::handle_frame`]); its bytes replace those in `buffer`.
     pub fn poll_arrival(&mut self, buffer: &mut Vec<u8>) -> Option<Arrival> {
         loop {
-            let due = self.arrivals.first_key_value().is_some_and(|((at, _), _)| *at <= self.now);
-            if !due {
-                return None;
-            }
-            let ((at, number), (path, frame, strange)) = self.arrivals.pop_first()?;
+            let (at, path, frame) = self.arrivals.pop_until(self.now)?;
             let intact = frame.damage.is_intact();
-            let kept = self.receive(at, number, path, &frame, strange);
+            let kept = self.receive(at, path, &frame);
             if kept {
                 buffer.clear();
                 buffer.extend_from_slice(&frame.bytes);
@@ -183,16 +180,9 @@ impl Segment {
     }
 
     /// A card and its host take in what arrived; false if the host loses it.
-    fn receive(
-        &mut self,
-        at: Instant,
-        number: u64,
-        path: Path,
-        frame: &WireFrame,
-        strange: bool,
-    ) -> bool {
+    fn receive(&mut self, at: Instant, path: Path, frame: &WireFrame) -> bool {
         let card = &mut self.world.cards[path.index()];
-        let own = u64::from(!strange);
+        let own = u64::from(self.strange.is_empty() || !self.strange.remove(&frame.number));
         if !frame.damage.is_intact() {
             if frame.bytes.len() < MIN_LEN {
                 card.counts.rx_length_errors += 1;
@@ -205,8 +195,8 @@ impl Segment {
         if let Some(fault) = card.dropped(at) {
             card.counts.rx_dropped += 1;
             self.tally.dropped += own;
-            let effect = Effect::FrameLost { frame: number };
-            self.world.truth.effect(at, Some(fault), crate::truth::Place::Host(path), effect);
+            let effect = Effect::FrameLost { frame: frame.number };
+            self.world.truth.effect(at, Some(fault), Place::Host(path), effect);
             return false;
         }
         card.counts.rx_frames += 1;
@@ -224,8 +214,7 @@ impl Segment {
     /// call at its time: it is made up for, in its order, by the next one.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let arrival = self.arrivals.first_key_value().map(|((at, _), _)| *at);
-        [arrival, self.world.next_stranger()].into_iter().flatten().min()
+        [self.arrivals.next_at(), self.world.next_stranger()].into_iter().flatten().min()
     }
 
     /// Time passes: devices, links and faults up to `now`.
@@ -236,6 +225,19 @@ impl Segment {
         for card in &mut self.world.cards {
             card.settle(self.now);
         }
+    }
+
+    /// Lets every frame walk port by port, or only those that meet more than controllers at rest,
+    /// as is usual. Nothing that can be seen depends on it but the time it takes: this is for those
+    /// who want to see that.
+    pub fn set_walks_always(&mut self, always: bool) {
+        self.world.direct.forbidden = always;
+    }
+
+    /// How many frames needed no walk so far.
+    #[must_use]
+    pub fn frames_without_walk(&self) -> u64 {
+        self.world.direct.frames
     }
 
     // ---- faults ----

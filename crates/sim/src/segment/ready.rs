@@ -1,11 +1,12 @@
 //! A segment of controllers that were made elsewhere.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::Tree;
 
+use super::arrivals::Arrivals;
 use super::{DeviceInfo, Segment};
 use crate::controller::Controller;
 use crate::device::Signals;
@@ -40,7 +41,8 @@ impl Segment {
             nodes,
             names,
             now: Instant::ZERO,
-            arrivals: BTreeMap::new(),
+            arrivals: Arrivals::default(),
+            strange: BTreeSet::new(),
             spare: Vec::new(),
             tally: super::FrameTally::default(),
         };

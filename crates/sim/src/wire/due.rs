@@ -180,6 +180,7 @@ impl World {
                 }
             }
             Due::Carries { link, fault } => {
+                self.way_changes(at);
                 for line in Line::both(link) {
                     self.links[link].passage[usize::from(line.downstream)].mend_at(at, fault);
                 }
@@ -188,6 +189,7 @@ impl World {
     }
 
     pub(super) fn end_lost(&mut self, index: usize, end: usize, at: Instant) {
+        self.way_changes(at);
         self.links[index].ends[end] = EndState::Down;
         let place = self.links[index].both_ends()[end];
         let cause = self.cause_of_link(index, at);
@@ -209,6 +211,7 @@ impl World {
     }
 
     fn end_up(&mut self, index: usize, end: usize, at: Instant) {
+        self.way_changes(at);
         self.links[index].ends[end] = EndState::Up;
         let fault = self.cause_of_link(index, at).fault();
         if fault.is_some() {

@@ -151,6 +151,7 @@ impl World {
             let Some(((at, _), (fault, line, what))) = self.strangers.waiting.pop_first() else {
                 return;
             };
+            self.note_entries();
             self.frames += 1;
             let number = self.frames;
             let frame = WireFrame { bytes: what.bytes(), damage: Damage::default(), number };

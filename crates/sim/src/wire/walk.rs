@@ -82,7 +82,7 @@ enum Crossing {
 }
 
 impl World {
-    /// Sends a frame off by a card at `at`.
+    /// Sends a frame off by a card at `at`, port by port.
     pub(crate) fn walk(&mut self, card: Path, at: Instant, traveller: &mut Traveller) -> Outcome {
         match self.leaving[card.index()] {
             Some(line) => self.walk_from(line, at, traveller),

@@ -15,7 +15,7 @@ use proptest::prelude::*;
 use super::rig::{Bench, PLANT, answer, at, frame};
 
 /// A random fault of any kind that can come and go.
-fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
+pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
     let is_ring = file.ring.is_some();
     let fits = |kind: &&Kind| !kind.is_built_in() && (is_ring || kind.place != PlaceRule::RingLink);
     let kinds: Vec<_> = KINDS.iter().filter(fits).collect();
