@@ -167,7 +167,7 @@ fn assemble(
         names,
         now: Instant::ZERO,
         arrivals: Arrivals::default(),
-            strange: BTreeSet::new(),
+        strange: BTreeSet::new(),
         spare: Vec::new(),
         tally: super::FrameTally::default(),
     };
