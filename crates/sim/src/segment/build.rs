@@ -142,6 +142,7 @@ fn assemble(
         now: Instant::ZERO,
         arrivals: BTreeMap::new(),
         spare: Vec::new(),
+        waiting: super::late::Waiting::default(),
         tally: super::FrameTally::default(),
     };
     if file.old_counters {

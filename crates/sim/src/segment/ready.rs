@@ -41,6 +41,7 @@ impl Segment {
             now: Instant::ZERO,
             arrivals: BTreeMap::new(),
             spare: Vec::new(),
+            waiting: super::late::Waiting::default(),
             tally: super::FrameTally::default(),
         };
         segment.advance(Instant::ZERO);

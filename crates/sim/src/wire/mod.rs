@@ -16,6 +16,7 @@ mod node;
 mod phy_link;
 pub mod software;
 mod starve;
+pub mod timing;
 pub(crate) mod walk;
 pub(crate) mod world;
 
@@ -23,6 +24,7 @@ pub use change::{Change, Line, Source};
 pub use history::History;
 pub use link::{CABLE_NS_PER_M, Link};
 pub use software::SoftwareChange;
+pub use timing::TimingChange;
 
 #[cfg(test)]
 mod tests;

@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
+mod clocks;
 mod faults;
 mod rig;
 mod swarm;
+mod timing;
 mod traps;
 mod walk;
