@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::{SmDirection, SmMode, SyncManagerConfig};
+use linesman_proto::sii::Protocols;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::controller::Pdi;
@@ -66,7 +67,7 @@ impl Learned {
             application_layer: ApplicationLayer::new(true),
             steps,
             step: None,
-            mailbox: Mailbox::new(AT_ONCE),
+            mailbox: Mailbox::new(AT_ONCE, Protocols(Protocols::COE | Protocols::FOE)),
             turns,
             message: None,
             dictionary,

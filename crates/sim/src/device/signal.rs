@@ -4,6 +4,11 @@
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct SignalId(pub u32);
 
+impl SignalId {
+    /// A signal that does not exist: a bit without a channel.
+    pub const NOWHERE: Self = Self(u32::MAX);
+}
+
 /// All signals of a segment with their present values.
 ///
 /// A digital signal is 0 or 1; what the number of an analogue one means (digits, mV, …) is agreed

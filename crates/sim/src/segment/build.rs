@@ -11,7 +11,7 @@ use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
-use super::{DeviceInfo, Segment};
+use super::{DeviceInfo, Segment, identification};
 use crate::controller::{Controller, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
@@ -108,11 +108,15 @@ fn assemble(
         if let Some(revision) = one.revision {
             set_revision(&mut built.sii, revision);
         }
+        let id = file.devices[one.planned.device].id.filter(|_| one.planned.part == 0);
+        let identification = identification::set(&mut built, id, &mut signals);
         let clock = clock(file, &one.planned, seed);
         let Built { mut hardware, sii, firmware, outputs, inputs } = built;
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
         hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
-        made.push(Controller::new(one.id, hardware, clock, firmware, sii));
+        let mut controller = Controller::new(one.id, hardware, clock, firmware, sii);
+        identification.finish(&mut controller);
+        made.push(controller);
         devices.push(DeviceInfo { outputs, inputs });
     }
     let cable_m: Vec<f64> = tree
@@ -247,7 +251,7 @@ fn replace(
     };
     placed[index].revision = replacement.revision;
     let Some(type_name) = &replacement.type_name else { return Ok(()) };
-    let kind = file.kind(type_name).map_err(|source| BuildError::Replacement {
+    let kind = file.kind(type_name, None).map_err(|source| BuildError::Replacement {
         entry: label.to_owned(),
         source: Box::new(source),
     })?;

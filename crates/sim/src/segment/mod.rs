@@ -6,6 +6,7 @@
 
 mod build;
 pub(crate) mod card;
+mod identification;
 mod late;
 mod ready;
 

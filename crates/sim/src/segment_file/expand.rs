@@ -36,9 +36,8 @@ pub(crate) struct Planned {
 pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileError> {
     let mut planned = Vec::with_capacity(file.devices.len());
     for (index, device) in file.devices.iter().enumerate() {
-        let kind = file.kind(&device.type_name).map_err(|source| SegmentFileError::Type {
-            device: device.name.clone(),
-            source: Box::new(source),
+        let kind = file.kind(&device.type_name, device.slots.as_deref()).map_err(|source| {
+            SegmentFileError::Type { device: device.name.clone(), source: Box::new(source) }
         })?;
         let entry = match device.entry.as_deref() {
             None => Port::A,
@@ -68,8 +67,9 @@ fn expand_device(
         0 => device.name.clone(),
         part => format!("{}/{}", device.name, part + 1),
     };
+    let inner_links = kind.inner_links();
     for (part, ports) in kind.ports().into_iter().enumerate() {
-        let inner = kind.inner_links().iter().find(|link| link.to.0 == part);
+        let inner = inner_links.iter().find(|link| link.to.0 == part);
         let (on, entry, cable_m) = match inner {
             Some(link) => {
                 let on = Attachment::Device { name: name(link.from.0), port: link.from.1 };

@@ -31,6 +31,7 @@ type = "EK1101"
 on = "K1.C"
 entry = "A"
 cable_m = 12
+id = 300
 clock_ppm = -3.5
 clock = { ramp_ppm_per_s = 0.25, ramp_s = 40.0, jitter_ns = 12 }
 counts_forwarded = true
@@ -151,7 +152,13 @@ fn plants_are_whole_and_belong_to_their_seed() {
 
 #[test]
 fn plants_keep_to_their_options() {
-    let options = PlantOptions { min_devices: 25, max_devices: 40, junction: true, ring: true };
+    let options = PlantOptions {
+        min_devices: 25,
+        max_devices: 40,
+        junction: true,
+        ring: true,
+        all_types: true,
+    };
     for seed in 0..50 {
         let file = plant(Seed(seed), &options);
         let tree = file.project().unwrap().tree().unwrap();

@@ -46,6 +46,9 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     if let Some(serial) = device.serial {
         line("serial", serial.to_string());
     }
+    if let Some(id) = device.id {
+        line("id", id.to_string());
+    }
     if let Some(ppm) = device.clock_ppm {
         line("clock_ppm", number(ppm));
     }
@@ -61,6 +64,10 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     }
     if let Some(counts) = device.counts_forwarded {
         line("counts_forwarded", counts.to_string());
+    }
+    if let Some(slots) = &device.slots {
+        let slots: Vec<_> = slots.iter().map(|slot| quoted(slot)).collect();
+        line("slots", format!("[{}]", slots.join(", ")));
     }
     if !device.counters.is_empty() {
         let counters = device.counters.iter();

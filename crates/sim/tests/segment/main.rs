@@ -4,6 +4,7 @@
 
 mod clocks;
 mod faults;
+mod identification;
 mod rig;
 mod swarm;
 mod timing;

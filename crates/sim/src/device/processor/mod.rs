@@ -13,7 +13,7 @@ mod update;
 
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::register as r;
-use linesman_proto::sii::{Direction, MailboxPair};
+use linesman_proto::sii::{Direction, MailboxPair, Protocols};
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
 
@@ -88,6 +88,8 @@ pub struct Description {
     pub buffers: Vec<ProcessBuffer>,
     /// The mailbox it likes best; a longer one it does not take. Without a size there is none.
     pub mailbox: MailboxPair,
+    /// What its mailbox speaks.
+    pub protocols: Protocols,
     /// The mailbox in BOOT, for a device that knows BOOT.
     pub bootstrap: Option<MailboxPair>,
     /// How quick it is.
@@ -135,13 +137,10 @@ impl Processor {
     /// A device that has not started yet.
     #[must_use]
     pub fn new(description: Description) -> Self {
-        let mut application_layer = ApplicationLayer::new(description.bootstrap.is_some());
-        // Until somebody sets another number.
-        application_layer.identify(0);
         Self {
-            application_layer,
+            application_layer: ApplicationLayer::new(description.bootstrap.is_some()),
             dictionary: description.dictionary.clone(),
-            mailbox: Mailbox::new(description.times.mailbox),
+            mailbox: Mailbox::new(description.times.mailbox, description.protocols),
             process_data: Areas::default(),
             synchronisation: Synchronisation::new(&description.dictionary),
             step: None,
@@ -165,6 +164,16 @@ impl Processor {
         let now = pdi.now();
         for channel in &mut self.description.channels {
             channel.make_safe(now, &self.dictionary, pdi.signals_mut());
+        }
+        self.hear_channels();
+    }
+
+    /// What channels have to tell of waits for the mailbox.
+    fn hear_channels(&mut self) {
+        for emergency in self.description.channels.iter_mut().filter_map(|one| one.emergency()) {
+            if self.emergencies.len() < UNTOLD {
+                self.emergencies.push(emergency);
+            }
         }
     }
 
@@ -356,6 +365,7 @@ impl Processor {
         for channel in &mut self.description.channels {
             channel.drive(now, &self.dictionary, signals);
         }
+        self.hear_channels();
     }
 
     fn serve_process_data(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
@@ -370,11 +380,14 @@ impl Processor {
 
     fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.next_sample = now + self.description.times.sample;
+        let time = pdi.system_time();
         if !self.troubles.has(Trouble::FrozenApplication) {
             for channel in &mut self.description.channels {
+                channel.tell_time(time);
                 channel.sample(now, &mut self.dictionary, pdi.signals());
             }
         }
+        self.hear_channels();
         self.process_data.put_inputs(pdi, &self.dictionary, &mut self.buffer);
     }
 
