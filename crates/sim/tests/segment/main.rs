@@ -5,6 +5,7 @@
 mod clocks;
 mod faults;
 mod identification;
+mod oracle;
 mod rig;
 mod swarm;
 mod timing;
