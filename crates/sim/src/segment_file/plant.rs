@@ -259,11 +259,13 @@ impl Builder {
         self.controllers += kind.ports().count();
         self.devices.push(SegmentDevice {
             name: name.clone(),
+            repeat: None,
             type_name: kind.name().to_owned(),
             on,
             entry: None,
             cable_m,
             serial,
+            id: None,
             clock_ppm: None,
             clock: None,
             counts_forwarded: None,

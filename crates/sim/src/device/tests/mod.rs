@@ -17,6 +17,8 @@ use super::Signals;
 use super::library::{Built, build};
 use crate::controller::tests::rig::{Bench, logical};
 
+mod files;
+mod history;
 mod hostile;
 mod mailbox;
 mod process_data;
