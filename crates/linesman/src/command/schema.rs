@@ -9,6 +9,7 @@ use schemars::{Schema, schema_for};
 
 use super::diagnose::follow::EventReport;
 use super::interfaces;
+use super::lab::replay::ReplayReport;
 use super::scan::report::Scan;
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
@@ -37,6 +38,8 @@ pub(crate) enum Name {
     Diagnosis,
     /// A line of `diagnose --follow --json`
     Event,
+    /// `lab replay --json`
+    Replay,
     /// `fault --json`
     Faults,
     /// `interfaces --json`
@@ -59,6 +62,7 @@ fn schema(name: Name) -> Schema {
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),
+        Name::Replay => schema_for!(ReplayReport),
         Name::Faults => schema_for!(Answer),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Error => schema_for!(ErrorReport),
