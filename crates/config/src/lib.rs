@@ -2,9 +2,10 @@
 //!
 //! Three nouns: a [`project`] is what the user wrote, an [`inventory`] is what was found, a [`plan`]
 //! is what follows: addresses, FMMUs, frames, expected working counters. Diagnosis compares them.
-//! [`fault`] holds the names that segment, diagnosis and score share.
+//! [`esi`] reads device descriptions of makers. [`fault`] holds the names that segment, diagnosis and score share.
 
 pub mod attachment;
+pub mod esi;
 pub mod fault;
 pub mod identity;
 pub mod inventory;

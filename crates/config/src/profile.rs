@@ -19,6 +19,8 @@ pub struct ProcessSyncManager {
     pub len: u16,
     /// Control byte of register 0x0804 + 8 × index.
     pub control: SmControl,
+    /// There is no such SyncManager: FMMUs map registers of the controller.
+    pub is_virtual: bool,
 }
 
 /// The mailbox and the SyncManagers that serve it.
@@ -93,15 +95,17 @@ fn process_sync_managers(image: &Image) -> Vec<ProcessSyncManager> {
                 | SyncManagerKind::Other(_) => return None,
             };
             let control = SmControl(record.control);
-            // A mailbox-mode SyncManager is never process data, whatever its kind claims.
-            if control.mode() == SmMode::Mailbox {
+            // Where there is a mailbox, a SyncManager of its mode is no process data, whatever its kind
+            // claims. Inputs of a device without one may come through a single buffer.
+            if control.mode() == SmMode::Mailbox && image.mailbox().is_some() {
                 return None;
             }
             let mapped = image.pdo_bits(index, direction).div_ceil(8);
             // Some images bear no PDOs; then the record's own length is all there is.
             let has_pdos = image.pdos(direction).next().is_some();
             let len = if has_pdos { u16::try_from(mapped).ok()? } else { record.length };
-            Some(ProcessSyncManager { index, direction, start: record.start, len, control })
+            let (start, is_virtual) = (record.start, record.enable.is_virtual());
+            Some(ProcessSyncManager { index, direction, start, len, control, is_virtual })
         })
         .collect()
 }

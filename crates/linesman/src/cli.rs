@@ -54,9 +54,9 @@ pub(crate) enum Command {
     Interfaces(interfaces::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
     Explain(explain::Arguments),
-    /// A virtual segment on real interfaces, for any MainDevice
+    /// Virtual segments on real interfaces, for any MainDevice
     Sim(sim::Arguments),
-    /// Break and heal a segment that runs on real interfaces
+    /// Break, heal and watch a segment that runs on real interfaces
     Fault(fault::Arguments),
     /// Stories, swarms and recordings in virtual time
     Lab(lab::Arguments),
@@ -75,9 +75,9 @@ impl Command {
             Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
             Self::Lab(arguments) => arguments.wants_json(),
+            Self::Sim(arguments) => arguments.json,
             Self::Demo(_)
             | Self::Explain(_)
-            | Self::Sim(_)
             | Self::Schema(_)
             | Self::Completion(_) => false,
         }

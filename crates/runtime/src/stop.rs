@@ -1,14 +1,21 @@
 //! The wish to stop: Ctrl-C, or an end that was asked for.
 
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
+use linesman_link::socket::Bell;
 use signal_hook::consts::{SIGINT, SIGTERM};
+
+const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
 
 /// Set once somebody wants the program to stop. Copies are the same wish.
 #[derive(Clone, Debug, Default)]
-pub struct Stop(Arc<AtomicBool>);
+pub struct Stop {
+    wish: Arc<AtomicBool>,
+    bells: Arc<Mutex<Vec<Bell>>>,
+    signals: bool,
+}
 
 impl Stop {
     /// Set by Ctrl-C (SIGINT) and SIGTERM. The second Ctrl-C ends the program at once, as if it
@@ -17,11 +24,11 @@ impl Stop {
     /// # Errors
     /// When the system refuses.
     pub fn on_signals() -> io::Result<Self> {
-        let stop = Self::default();
-        for signal in [SIGINT, SIGTERM] {
+        let stop = Self { signals: true, ..Self::default() };
+        for signal in SIGNALS {
             // In this order: the default of the second signal, then the note of the first.
-            signal_hook::flag::register_conditional_default(signal, Arc::clone(&stop.0))?;
-            signal_hook::flag::register(signal, Arc::clone(&stop.0))?;
+            signal_hook::flag::register_conditional_default(signal, Arc::clone(&stop.wish))?;
+            signal_hook::flag::register(signal, Arc::clone(&stop.wish))?;
         }
         Ok(stop)
     }
@@ -29,11 +36,53 @@ impl Stop {
     /// Whether to stop.
     #[must_use]
     pub fn is_set(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.wish.load(Ordering::Relaxed)
     }
 
     /// Asks to stop.
     pub fn set(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.wish.store(true, Ordering::Relaxed);
+        for bell in self.bells().iter() {
+            bell.ring();
+        }
+    }
+
+    /// Rings this bell when the wish comes, for a thread that waits without end.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn rings(&self, bell: &Bell) -> io::Result<()> {
+        if self.signals {
+            for signal in SIGNALS {
+                signal_hook::low_level::pipe::register(signal, bell.for_signals()?)?;
+            }
+        }
+        self.bells().push(bell.clone());
+        if self.is_set() {
+            bell.ring();
+        }
+        Ok(())
+    }
+
+    fn bells(&self) -> std::sync::MutexGuard<'_, Vec<Bell>> {
+        self.bells.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use linesman_link::socket::Waker;
+
+    use super::*;
+
+    #[test]
+    fn a_wish_rings_those_who_wait() {
+        let (stop, early, late) = (Stop::default(), Waker::new().unwrap(), Waker::new().unwrap());
+        stop.rings(&early.bell()).unwrap();
+        assert!(!early.take() && !stop.is_set());
+        stop.clone().set();
+        assert!(early.take() && stop.is_set());
+        stop.rings(&late.bell()).unwrap();
+        assert!(late.take(), "the wish was there before");
     }
 }

@@ -40,7 +40,10 @@ pub enum Place {
 }
 
 /// What a cause made happen.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+///
+/// Each has a stable name for programs, `<&str>::from(effect)`: `frame-lost`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Effect {
     /// A symbol was destroyed, in or outside of a frame: the receiver's physical-layer error.
     SymbolError,
@@ -99,6 +102,21 @@ pub enum Effect {
     WrongDevice,
     /// A device that was planned is not here.
     MissingDevice,
+}
+
+impl Effect {
+    /// The number of the frame it was about, if it was about one.
+    #[must_use]
+    pub const fn frame(&self) -> Option<u64> {
+        if let Self::FrameSpoiled { frame }
+        | Self::FrameLost { frame }
+        | Self::ContentRefused { frame } = self
+        {
+            Some(*frame)
+        } else {
+            None
+        }
+    }
 }
 
 /// An entry of the log.
@@ -217,6 +235,12 @@ impl TruthLog {
     #[must_use]
     pub const fn left_out(&self) -> u64 {
         self.left_out
+    }
+
+    /// Hands out the entries and forgets them, for whoever keeps them elsewhere. Faults and what
+    /// they did stay known.
+    pub fn take_entries(&mut self) -> Vec<Entry> {
+        std::mem::take(&mut self.entries)
     }
 
     /// Every fault so far, by [`FaultId`].

@@ -110,6 +110,7 @@ fn device(planned: &PlannedDevice, id: u32) -> DevicePlan {
         revision_rule: planned.revision_rule,
         mailbox: planned.profile.mailbox,
         sync_managers: mapped
+            .filter(|manager| !manager.is_virtual)
             .map(|manager| {
                 let ProcessSyncManager { index, start, len, control, .. } = *manager;
                 (index, SyncManagerConfig::enabled(start, len, control))
@@ -331,7 +332,8 @@ mod tests {
 
     fn manager(index: u8, direction: Direction, start: u16, len: u16) -> ProcessSyncManager {
         let control = SmControl(0x20);
-        ProcessSyncManager { index, direction, start: RegisterAddress(start), len, control }
+        let (start, is_virtual) = (RegisterAddress(start), false);
+        ProcessSyncManager { index, direction, start, len, control, is_virtual }
     }
 
     fn planned(process: Vec<ProcessSyncManager>, no_lrw: bool) -> PlannedDevice {

@@ -5,8 +5,8 @@
 
 use std::collections::VecDeque;
 
-use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::{AlEvents, SmDirection, SmMode, SyncManagerConfig};
+use linesman_proto::sii::Protocols;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::controller::Pdi;
@@ -71,7 +71,7 @@ impl Learned {
             step: None,
             asked_at: None,
             looks_at: None,
-            mailbox: Mailbox::new(AT_ONCE),
+            mailbox: Mailbox::new(AT_ONCE, Protocols(Protocols::COE | Protocols::FOE)),
             turns: seen.mailbox.clone(),
             message: None,
             openings: seen.openings.clone(),
@@ -273,9 +273,7 @@ impl Firmware for Learned {
                 self.inputs.get(at).map_or(0, |signal| pdi.signals().value(*signal) as u8)
             }));
             if len == 1 {
-                let RegisterAddress(at) = manager.start;
-                let ram = pdi.ram_mut(at..at.saturating_add(1));
-                ram.copy_from_slice(&self.buffer[..ram.len()]);
+                pdi.put_ram(manager.start, &self.buffer);
             } else {
                 pdi.write_sync_manager(index, &self.buffer);
             }

@@ -1,9 +1,13 @@
 //! The collection of real files.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use linesman_sim::segment_file::DescriptionFiles;
+use linesman_config::esi::Esi;
+use linesman_sim::segment_file::{DescriptionFiles, TypeError};
 
 /// Where the collection is; `None`, and a word about it, when it is not there.
 pub(crate) fn root() -> Option<PathBuf> {
@@ -31,10 +35,29 @@ pub(crate) fn files(folder: &str, ending: &str) -> Option<Vec<String>> {
 }
 
 /// Files of the collection.
-pub(crate) struct Collection(pub(crate) PathBuf);
+pub(crate) struct Collection {
+    root: PathBuf,
+    known: RefCell<BTreeMap<String, Arc<Esi>>>,
+}
+
+impl Collection {
+    pub(crate) fn new(root: PathBuf) -> Self {
+        Self { root, known: RefCell::default() }
+    }
+}
 
 impl DescriptionFiles for Collection {
     fn read(&self, name: &str) -> Result<Vec<u8>, String> {
-        fs::read(self.0.join(name)).map_err(|error| error.to_string())
+        fs::read(self.root.join(name)).map_err(|error| error.to_string())
+    }
+
+    fn descriptions(&self, name: &str) -> Result<Arc<Esi>, TypeError> {
+        if let Some(known) = self.known.borrow().get(name) {
+            return Ok(Arc::clone(known));
+        }
+        let bytes = fs::read(self.root.join(name)).expect("a file of the collection");
+        let esi = Arc::new(Esi::parse(&bytes).unwrap_or_else(|error| panic!("{name}: {error}")));
+        self.known.borrow_mut().insert(name.to_owned(), Arc::clone(&esi));
+        Ok(esi)
     }
 }

@@ -9,7 +9,7 @@ use crate::up::{segment, to_op};
 fn every_image_of_the_collection_becomes_a_device_that_goes_to_op() {
     let (Some(root), Some(mut names)) = (root(), files("sii", ".bin")) else { return };
     names.extend(files("sii/pairs", ".bin").unwrap_or_default());
-    let collection = Collection(root.clone());
+    let collection = Collection::new(root.clone());
     let mut failed = Vec::new();
     for name in &names {
         let result = segment(&format!("sii:{name}"), &collection).and_then(|file| to_op(&file));

@@ -10,5 +10,6 @@
 )]
 
 mod data;
+mod descriptions;
 mod images;
 mod up;

@@ -1,11 +1,20 @@
-//! `linesman fault`: break and heal a virtual segment while it runs on real interfaces.
+//! `linesman fault`: break and heal a virtual segment while it runs on real interfaces, drive its
+//! inputs, and tell what really happened.
 
 use std::path::PathBuf;
 
 use linesman_config::fault::FaultName;
-use linesman_runtime::control::{Answer, FaultState, Request, ask};
+use linesman_runtime::control::message::{
+    FaultState, Faults, Request, SignalDirection, SignalState, SignalTable,
+};
+use linesman_runtime::control::{ask, listen};
+use linesman_runtime::journal::{EventKind, TruthEvent};
+use linesman_runtime::serve::report::Status as SimStatus;
 use linesman_sim::segment_file::FaultEntry;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
+use super::sim::summary;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -18,7 +27,7 @@ pub(crate) struct Arguments {
     socket: PathBuf,
     #[command(subcommand)]
     action: Action,
-    /// JSON, schema linesman.faults/1
+    /// JSON: schema linesman.faults/1, linesman.sim/1, linesman.signals/1 or linesman.truth/1
     #[arg(long, global = true)]
     pub(crate) json: bool,
 }
@@ -49,6 +58,43 @@ enum Action {
     },
     /// Tell which faults there are and were
     List,
+    /// Tell what went over the interfaces, and whether this host kept up
+    Status,
+    /// Tell what really happened: each fault and each of its effects
+    Events {
+        /// Go on with what happens from now on, until the segment ends or Ctrl-C
+        #[arg(long)]
+        follow: bool,
+    },
+    /// Tell the inputs and outputs of all devices
+    Signals,
+    /// Hold an input at a value, whatever it is wired to
+    Set {
+        /// Device and channel from 1, such as I1.3
+        input: String,
+        /// true, false or a number; for an analogue input digits of the nominal range, which ends
+        /// at 32767
+        #[arg(value_parser = level, allow_negative_numbers = true)]
+        value: i32,
+    },
+    /// Give an input back to what it is wired to, or all of them
+    Release {
+        /// Device and channel; all unless said
+        input: Option<String>,
+    },
+}
+
+/// `true`, `off`, `0x7FFF`, `-12`.
+fn level(text: &str) -> Result<i32, String> {
+    let number = match text.to_ascii_lowercase().as_str() {
+        "true" | "on" | "high" => Some(1),
+        "false" | "off" | "low" => Some(0),
+        lower => match lower.strip_prefix("0x") {
+            Some(digits) => i32::from_str_radix(digits, 16).ok(),
+            None => lower.parse().ok(),
+        },
+    };
+    number.ok_or_else(|| format!("`{text}`: expected true, false or a whole number"))
 }
 
 /// `hits_per_s=40`, `to=SAFEOP`, `code=0x001D`, `at_ms=[0,500]`.
@@ -65,59 +111,101 @@ fn parameter(text: &str) -> Result<(String, toml::Value), String> {
 
 /// Asks the segment and tells what it says.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let request = request(&arguments.action)?;
+    match &arguments.action {
+        Action::Inject { kind, at, device, for_ms, parameters } => {
+            let fault = entry(*kind, at, device, parameters)?;
+            faults(arguments, &Request::Inject { fault, for_ms: *for_ms }, output)
+        }
+        Action::Heal { no } => faults(arguments, &Request::Heal { no: *no }, output),
+        Action::List => faults(arguments, &Request::List, output),
+        Action::Status => {
+            let status: SimStatus = asked(arguments, &Request::Status)?;
+            tell(arguments, &status, status.error.as_deref(), output, |_| summary(&status))
+        }
+        Action::Events { follow } => events(arguments, *follow, output),
+        Action::Signals => signals(arguments, &Request::Signals, output),
+        Action::Set { input, value } => {
+            let request = Request::Set { input: input.clone(), value: *value };
+            signals(arguments, &request, output)
+        }
+        Action::Release { input } => {
+            signals(arguments, &Request::Release { input: input.clone() }, output)
+        }
+    }
+}
+
+fn entry(
+    kind: FaultName,
+    at: &[String],
+    device: &[String],
+    parameters: &[(String, toml::Value)],
+) -> Result<FaultEntry, Failure> {
+    let mut entry = toml::Table::new();
+    entry.insert("kind".to_owned(), kind.name().into());
+    let mut places = |one: &str, many: &str, names: &[String]| match names {
+        [] => None,
+        [name] => entry.insert(one.to_owned(), name.as_str().into()),
+        more => entry.insert(many.to_owned(), more.to_vec().into()),
+    };
+    places("at", "at", at);
+    places("device", "devices", device);
+    entry.extend(parameters.iter().cloned());
+    entry.try_into::<FaultEntry>().map_err(|error| {
+        let advice = "see docs/guide/faults.md for what each fault takes";
+        Failure::new(format!("{kind}: {}", error.message()), advice)
+    })
+}
+
+fn asked<T: DeserializeOwned>(arguments: &Arguments, request: &Request) -> Result<T, Failure> {
+    ask(&arguments.socket, request).map_err(|error| unreachable(arguments, &error))
+}
+
+fn unreachable(arguments: &Arguments, error: &std::io::Error) -> Failure {
     let path = arguments.socket.display();
-    let answer = ask(&arguments.socket, &request).map_err(|error| {
-        let advice = "start the segment with `linesman sim SEGMENT.toml --on NIC --control SOCKET`, \
-                      and name the same socket";
-        Failure::new(format!("{path}: asking the segment: {error}"), advice)
-    })?;
-    if let Some(error) = &answer.error {
+    let advice = "start the segment with `linesman sim SEGMENT.toml --on NIC --control SOCKET`, \
+                  and name the same socket";
+    Failure::new(format!("{path}: asking the segment: {error}"), advice)
+}
+
+/// Tells an answer as JSON or as `text`, or why it was refused.
+fn tell<T: Serialize>(
+    arguments: &Arguments,
+    answer: &T,
+    error: Option<&str>,
+    output: &mut Output,
+    text: impl FnOnce(&Output) -> String,
+) -> Result<Status, Failure> {
+    if let Some(error) = error {
+        let path = arguments.socket.display();
         return Err(Failure::new(format!("{path}: {error}"), "see `linesman fault --help`"));
     }
     if arguments.json {
-        output.json(&answer);
+        output.json(answer);
     } else {
-        let text = table(&answer, output);
+        let text = text(output);
         output.text(&text);
     }
     Ok(Status::Good)
 }
 
-fn request(action: &Action) -> Result<Request, Failure> {
-    Ok(match action {
-        Action::Inject { kind, at, device, for_ms, parameters } => {
-            let mut entry = toml::Table::new();
-            entry.insert("kind".to_owned(), kind.name().into());
-            let mut places = |one: &str, many: &str, names: &[String]| match names {
-                [] => None,
-                [name] => entry.insert(one.to_owned(), name.as_str().into()),
-                more => entry.insert(many.to_owned(), more.to_vec().into()),
-            };
-            places("at", "at", at);
-            places("device", "devices", device);
-            entry.extend(parameters.iter().cloned());
-            let fault = entry.try_into::<FaultEntry>().map_err(|error| {
-                let advice = "see docs/guide/faults.md for what each fault takes";
-                Failure::new(format!("{kind}: {}", error.message()), advice)
-            })?;
-            Request::Inject { fault, for_ms: *for_ms }
-        }
-        Action::Heal { no } => Request::Heal { no: *no },
-        Action::List => Request::List,
-    })
+fn faults(
+    arguments: &Arguments,
+    request: &Request,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    let answer: Faults = asked(arguments, request)?;
+    let text = |output: &Output| fault_table(&answer.faults, output);
+    tell(arguments, &answer, answer.error.as_deref(), output, text)
 }
 
-fn table(answer: &Answer, output: &Output) -> String {
-    if answer.faults.is_empty() {
+fn fault_table(faults: &[FaultState], output: &Output) -> String {
+    if faults.is_empty() {
         return "No faults so far.\n".to_owned();
     }
     let headings = ["no", "fault", "at", "began", "ended", "spoiled", "lost"];
     let mut table = Table::new(&headings, output.paint());
     let at = |instant: Option<u64>| instant.map_or_else(|| "-".to_owned(), time);
-    for FaultState { no, name, places, began_ns, ended_ns, frames_spoiled, frames_lost } in
-        &answer.faults
-    {
+    for FaultState { no, name, places, began_ns, ended_ns, frames_spoiled, frames_lost } in faults {
         table.row([
             no.to_string(),
             name.to_string(),
@@ -129,6 +217,73 @@ fn table(answer: &Answer, output: &Output) -> String {
         ]);
     }
     table.render()
+}
+
+fn signals(
+    arguments: &Arguments,
+    request: &Request,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    let answer: SignalTable = asked(arguments, request)?;
+    let text = |output: &Output| signal_table(&answer.signals, output);
+    tell(arguments, &answer, answer.error.as_deref(), output, text)
+}
+
+fn signal_table(signals: &[SignalState], output: &Output) -> String {
+    if signals.is_empty() {
+        return "No device of this segment has inputs or outputs.\n".to_owned();
+    }
+    let mut table = Table::new(&["signal", "direction", "value", "from"], output.paint());
+    for SignalState { name, direction, value, wired_to, held } in signals {
+        let direction = match direction {
+            SignalDirection::Input => "input",
+            SignalDirection::Output => "output",
+        };
+        let from = match (held, wired_to) {
+            (true, _) => "held".to_owned(),
+            (false, Some(output)) => output.clone(),
+            (false, None) => String::new(),
+        };
+        let value = value.map_or_else(|| "open".to_owned(), |value| value.to_string());
+        table.row([name.clone(), direction.to_owned(), value, from]);
+    }
+    table.render()
+}
+
+/// What happened, a line each, as it comes.
+fn events(arguments: &Arguments, follow: bool, output: &mut Output) -> Result<Status, Failure> {
+    let path = &arguments.socket;
+    let lines = listen(path, follow).map_err(|error| unreachable(arguments, &error))?;
+    for line in lines {
+        let line = line.map_err(|error| unreachable(arguments, &error))?;
+        if arguments.json {
+            output.line(&line);
+        } else {
+            let event: TruthEvent = serde_json::from_str(&line)
+                .map_err(|error| unreachable(arguments, &error.into()))?;
+            output.line(&event_line(&event));
+        }
+        if output.is_closed() {
+            break;
+        }
+    }
+    Ok(Status::Good)
+}
+
+fn event_line(event: &TruthEvent) -> String {
+    let TruthEvent { time_ns, event, fault, name, places, effect, .. } = event;
+    let who = match (fault, name) {
+        (Some(no), Some(name)) => format!("fault {no} {name}"),
+        (Some(no), None) => format!("fault {no}"),
+        (None, _) => "no fault".to_owned(),
+    };
+    let what = match (event, effect) {
+        (EventKind::Begin, _) => "begins".to_owned(),
+        (EventKind::End, _) => "ends".to_owned(),
+        (EventKind::Effect, Some(effect)) => effect.text.clone(),
+        (EventKind::Effect, None) => "has an effect".to_owned(),
+    };
+    format!("{:>12}  {who}: {what} at {}", time(*time_ns), places.join(", "))
 }
 
 #[cfg(test)]
@@ -154,17 +309,23 @@ mod tests {
     #[test]
     fn a_schedule_is_taken_with_the_parameters() {
         let parameters = ["hits_per_s=40", "at_ms=[0, 500]", "for_ms=20"];
-        let action = Action::Inject {
-            kind: FaultName::EmcNoise,
-            at: vec!["K1.C-K2.A".to_owned()],
-            device: Vec::new(),
-            for_ms: None,
-            parameters: parameters.iter().map(|text| parameter(text).unwrap()).collect(),
-        };
-        let Ok(Request::Inject { fault, .. }) = request(&action) else { panic!("no request") };
+        let parameters: Vec<_> = parameters.iter().map(|text| parameter(text).unwrap()).collect();
+        let places = ["K1.C-K2.A".to_owned()];
+        let fault = entry(FaultName::EmcNoise, &places, &[], &parameters).unwrap();
         assert_eq!(fault.schedule.at_ms.unwrap().as_slice(), [0.0, 500.0]);
         assert_eq!(fault.schedule.for_ms, Some(20.0));
         let keys: Vec<&String> = fault.parameters.keys().collect();
         assert_eq!(keys, ["hits_per_s"]);
+    }
+
+    #[test]
+    fn levels_are_words_or_numbers() {
+        let rows = [("true", 1), ("OFF", 0), ("-12", -12), ("0x7FFF", 0x7FFF), ("1", 1)];
+        for (text, expected) in rows {
+            assert_eq!(level(text), Ok(expected), "{text}");
+        }
+        for wrong in ["", "yes?", "1.5", "0x", "99999999999"] {
+            assert!(level(wrong).is_err(), "{wrong}");
+        }
     }
 }

@@ -3,7 +3,9 @@
 use linesman_config::project::Project;
 use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
-use linesman_runtime::control::Answer;
+use linesman_runtime::control::message::{Faults, Request, SignalTable};
+use linesman_runtime::journal::TruthEvent;
+use linesman_runtime::serve::report::Status as SimStatus;
 use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
 
@@ -40,8 +42,16 @@ pub(crate) enum Name {
     Event,
     /// `lab replay --json`
     Replay,
-    /// `fault --json`
+    /// `fault … inject|heal|list --json`
     Faults,
+    /// `fault … signals|set|release --json`
+    Signals,
+    /// `fault … status --json`, and a line of `sim --json`
+    Sim,
+    /// A line of `fault … events --json`, and of `sim --log`
+    Truth,
+    /// A line that the control socket of `sim` takes
+    Control,
     /// `interfaces --json`
     Interfaces,
     /// What every command with --json prints when nothing could be judged
@@ -63,7 +73,11 @@ fn schema(name: Name) -> Schema {
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),
         Name::Replay => schema_for!(ReplayReport),
-        Name::Faults => schema_for!(Answer),
+        Name::Faults => schema_for!(Faults),
+        Name::Signals => schema_for!(SignalTable),
+        Name::Sim => schema_for!(SimStatus),
+        Name::Truth => schema_for!(TruthEvent),
+        Name::Control => schema_for!(Request),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Error => schema_for!(ErrorReport),
     }

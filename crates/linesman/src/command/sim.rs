@@ -1,12 +1,18 @@
-//! `linesman sim`: a virtual segment on real interfaces, for any MainDevice.
+//! `linesman sim`: virtual segments on real interfaces, for any MainDevice.
 
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use linesman_lab::drawing;
+use linesman_link::error::LinkError;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::control::Control;
+use linesman_runtime::journal::Journal;
 use linesman_runtime::selector::Selector;
-use linesman_runtime::serve::{Served, Server};
+use linesman_runtime::serve::lateness::LatenessReport;
+use linesman_runtime::serve::report::Status as SimStatus;
+use linesman_runtime::serve::{Beside, Server};
+use linesman_runtime::stop::Stop;
 use linesman_runtime::wiring::Wiring;
 
 use super::driven;
@@ -19,53 +25,199 @@ use crate::text::quantity::{count, time};
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
+#[command(
+    after_help = "Several segments: name each with its card, `linesman sim a.toml --on eth1 \
+                        b.toml --on eth2`; --control and --log then once for each, in the same \
+                        order, or not at all."
+)]
 pub(crate) struct Arguments {
-    /// The segment (TOML)
-    #[arg(value_name = "SEGMENT.toml")]
-    segment: PathBuf,
+    /// The segment (TOML); more than one, each with an --on
+    #[arg(value_name = "SEGMENT.toml", required = true)]
+    segments: Vec<PathBuf>,
     /// The network card whose cable leads to the MainDevice, or two for a ring: eth1, eth1+eth2
-    #[arg(long, value_name = "NIC[+NIC]")]
-    on: String,
+    #[arg(long, value_name = "NIC[+NIC]", required = true)]
+    on: Vec<String>,
     /// End after so many seconds; else Ctrl-C ends it
     #[arg(long, value_name = "N")]
     seconds: Option<f64>,
-    /// Open a socket for `linesman fault`, to break and heal the segment while it runs
+    /// Open a socket for `linesman fault`; it is there once the segment answers
     #[arg(long, value_name = "SOCKET")]
-    control: Option<PathBuf>,
+    control: Vec<PathBuf>,
+    /// Write down what really happens: a line of JSON for each event, in a new file
+    #[arg(long, value_name = "FILE")]
+    log: Vec<PathBuf>,
+    /// At the end one JSON object per segment on a line, schema linesman.sim/1; nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// A segment that is ready to run.
+struct Ready {
+    server: Server,
+    beside: Beside,
 }
 
 /// Answers frames until asked to stop.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let Selector::Cards(names) = arguments.on.parse()? else {
-        let reason = format!("`{}`: expected a network card, or two for a ring", arguments.on);
-        return Err(Failure::new(reason, "say for example `--on eth1`"));
-    };
-    let plant = Plant::open(&arguments.segment)?;
     let until = until(arguments.seconds)?;
+    let cards = cards(arguments)?;
     let stop = driven::stop()?;
-    for row in drawing::draw(plant.segment.tree(), &labels(&plant)) {
-        output.line(&row.text);
+    let mut ready = Vec::new();
+    for (index, (file, names)) in arguments.segments.iter().zip(&cards).enumerate() {
+        let control = arguments.control.get(index).map(PathBuf::as_path);
+        let log = arguments.log.get(index).map(PathBuf::as_path);
+        let shown = (!arguments.json).then_some(&mut *output);
+        ready.push(prepare(file, names, control, log, &stop, shown)?);
     }
-    let count_text = count(plant.segment.devices().count() as u64, "SubDevice");
+    if !arguments.json {
+        output.line("Ctrl-C ends it.");
+    }
+    let ended = serve(ready, until, &stop);
+    let mut failure = None;
+    for one in ended {
+        if arguments.json {
+            output.json_line(&one.status);
+        } else {
+            output.text(&summary(&one.status));
+        }
+        failure = failure.or(one.failure);
+    }
+    failure.map_or(Ok(Status::Good), Err)
+}
+
+/// The cards of each segment, each card once.
+fn cards(arguments: &Arguments) -> Result<Vec<Vec<String>>, Failure> {
+    let Arguments { segments, on, control, log, .. } = arguments;
+    let refuse = |reason: String| {
+        let advice = "name each segment with its card, `linesman sim a.toml --on eth1 b.toml --on \
+                      eth2`, and --control and --log once for each or not at all";
+        Failure::new(reason, advice)
+    };
+    if segments.len() != on.len() {
+        let (files, cards) = (count(segments.len() as u64, "segment"), on.len());
+        return Err(refuse(format!("{files}, but --on {cards} times: expected as many")));
+    }
+    for (what, paths) in [("--control", control), ("--log", log)] {
+        if !paths.is_empty() && paths.len() != segments.len() {
+            let (files, times) = (count(segments.len() as u64, "segment"), paths.len());
+            return Err(refuse(format!("{files}, but {what} {times} times: expected as many")));
+        }
+        if let Some(twice) = doubled(paths) {
+            return Err(refuse(format!("{what} {}: named twice", twice.display())));
+        }
+    }
+    let mut all = Vec::new();
+    for word in on {
+        let Selector::Cards(names) = word.parse()? else {
+            let reason = format!("`{word}`: expected a network card, or two for a ring");
+            return Err(Failure::new(reason, "say for example `--on eth1`"));
+        };
+        all.push(names);
+    }
+    let names: Vec<&String> = all.iter().flatten().collect();
+    match doubled(&names) {
+        Some(twice) => Err(refuse(format!("{twice}: two segments cannot answer on one card"))),
+        None => Ok(all),
+    }
+}
+
+fn doubled<T: PartialEq>(things: &[T]) -> Option<&T> {
+    things
+        .iter()
+        .enumerate()
+        .find(|(index, one)| things[..*index].contains(one))
+        .map(|(_, one)| one)
+}
+
+/// Builds a segment and opens its cards; then its socket, which tells that it is ready.
+fn prepare(
+    file: &Path,
+    names: &[String],
+    control: Option<&Path>,
+    log: Option<&Path>,
+    stop: &Stop,
+    shown: Option<&mut Output>,
+) -> Result<Ready, Failure> {
+    let plant = Plant::open(file)?;
+    let drawing: Vec<_> = drawing::draw(plant.segment.tree(), &labels(&plant));
     let wiring = Wiring::of(&plant.segment, &plant.project);
+    let said = described(&plant, &wiring, names);
+    let mut beside = Beside::default();
+    if control.is_some() || log.is_some() {
+        let journal = Journal::begin(&plant.segment, log).map_err(|error| {
+            let path = log.map(|path| format!("{}: ", path.display())).unwrap_or_default();
+            let reason = format!("{path}writing down what happens: {error}");
+            Failure::new(reason, "name a file that is not there yet, where you may write")
+        })?;
+        beside.journal = Some(journal);
+    }
+    let server = Server::open(plant.segment, wiring, names)?;
+    stop.rings(&server.bell())
+        .map_err(|error| Failure::new(format!("listening for Ctrl-C: {error}"), ""))?;
+    if let Some(output) = shown {
+        for row in drawing {
+            output.line(&row.text);
+        }
+        output.line(&said);
+    }
+    if let (Some(path), Some(journal)) = (control, &beside.journal) {
+        beside.control = Some(open_control(path, &server, journal)?);
+    }
+    Ok(Ready { server, beside })
+}
+
+fn open_control(path: &Path, server: &Server, journal: &Journal) -> Result<Control, Failure> {
+    Control::open(path, server.bell(), journal.reading()).map_err(|error| {
+        let reason = format!("{}: opening the control socket: {error}", path.display());
+        Failure::new(reason, "name another path, in a directory where you may write")
+    })
+}
+
+/// What is on which card, in a line.
+fn described(plant: &Plant, wiring: &Wiring, names: &[String]) -> String {
+    let devices = count(plant.segment.devices().count() as u64, "SubDevice");
     let wires = match wiring.len() {
         0 => String::new(),
         wires => format!(" {} wired to inputs.", count(wires as u64, "output")),
     };
-    let control = arguments.control.as_deref().map(open_control).transpose()?;
-    let mut server = Server::open(plant.segment, wiring, &names)?;
-    output.line(&format!("\n{count_text} on {}.{wires} Ctrl-C ends it.", names.join("+")));
-    let result = server.run(until, &stop, control.as_ref());
-    output.line(&summary(&server.served(), server.clock().now()));
-    result?;
-    Ok(Status::Good)
+    format!("\n{devices} on {}.{wires}", names.join("+"))
 }
 
-fn open_control(path: &Path) -> Result<Control, Failure> {
-    Control::open(path).map_err(|error| {
-        let reason = format!("{}: opening the control socket: {error}", path.display());
-        Failure::new(reason, "name another path, in a directory where you may write")
+/// How a segment ended.
+struct Ended {
+    status: SimStatus,
+    failure: Option<Failure>,
+}
+
+/// Runs all segments, each in a thread of its own, to their end. When one cannot go on, all end:
+/// the MainDevices would not learn of it otherwise.
+fn serve(ready: Vec<Ready>, until: Instant, stop: &Stop) -> Vec<Ended> {
+    let one = |Ready { mut server, mut beside }: Ready| {
+        let result = server.run(until, stop, &mut beside);
+        if result.is_err() {
+            stop.set();
+        }
+        let status = server.status();
+        drop(beside.control);
+        let written = beside.journal.map_or(Ok(()), Journal::finish);
+        let unwritten = |error| {
+            let reason = format!("writing down what happened: {error}: the log is not complete");
+            Failure::new(reason, "check the free space")
+        };
+        let failure = result.map_err(from_link).err().or(written.map_err(unwritten).err());
+        Ended { status, failure }
+    };
+    thread::scope(|scope| {
+        let threads: Vec<_> = ready.into_iter().map(|ready| scope.spawn(|| one(ready))).collect();
+        let joined = threads
+            .into_iter()
+            .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        joined.collect()
     })
+}
+
+fn from_link(error: LinkError) -> Failure {
+    error.into()
 }
 
 /// The end of a run that lasts so many seconds.
@@ -78,20 +230,54 @@ pub(crate) fn until(seconds: Option<f64>) -> Result<Instant, Failure> {
     Ok(Instant::ZERO + Span::ns((seconds * 1e9) as u64))
 }
 
-fn summary(served: &Served, ran: Instant) -> String {
+/// What went over the interfaces, and whether the host kept up: two lines and what is notable.
+pub(crate) fn summary(status: &SimStatus) -> String {
+    let SimStatus { name, interfaces, time_ns, frames, host, .. } = status;
     let mut parts = vec![
-        format!("{} received", count(served.received, "frame")),
-        format!("{} answered", served.sent),
+        format!("{} received", count(frames.received, "frame")),
+        format!("{} answered", frames.answered),
     ];
-    if served.damaged > 0 {
-        parts.push(format!("{} came back damaged and were dropped", served.damaged));
+    for (number, what) in [
+        (frames.damaged, "came back damaged and were dropped"),
+        (frames.outstanding, "vanished or are on their way"),
+        (frames.refused, "could not be sent"),
+    ] {
+        if number > 0 {
+            parts.push(format!("{number} {what}"));
+        }
     }
-    if served.refused > 0 {
-        parts.push(format!("{} could not be sent", served.refused));
-    }
-    if served.downs > 0 {
+    if host.downs > 0 {
         parts.push("the interface was switched off for a while".to_owned());
     }
-    parts.push(format!("answers at most {} late", time(served.latest.as_nanos())));
-    format!("Ran for {}: {}.", time(ran.as_nanos()), parts.join(", "))
+    let title = if name.is_empty() { interfaces.join("+") } else { name.clone() };
+    let ran = time(*time_ns);
+    let mut text = format!("{title} ran for {ran}: {}.\n", parts.join(", "));
+    let busy = 100.0 * host.busy_share;
+    text.push_str(&format!("This host: busy {busy:.1} % of the time"));
+    if frames.received > 0 {
+        text.push_str(&format!("; it saw frames {} after they came", late(&host.pickup)));
+    }
+    if host.answer.frames > 0 {
+        text.push_str(&format!(
+            ", and sent answers {} after the model had them back, {} of them more than 100 µs and {} \
+             more than 1 ms late",
+            late(&host.answer), host.answer.over_100us, host.answer.over_1ms
+        ));
+    }
+    text.push_str(".\n");
+    if host.dropped > 0 {
+        let lost = count(host.dropped, "frame");
+        text.push_str(&format!("{lost} were lost because this host did not fetch them in time.\n"));
+    }
+    if !host.real_time {
+        text.push_str(
+            "It had no real-time priority: give it CAP_SYS_NICE, or start it with sudo.\n",
+        );
+    }
+    text
+}
+
+fn late(report: &LatenessReport) -> String {
+    let LatenessReport { p50_ns, p99_ns, max_ns, .. } = *report;
+    format!("{} (99 %: {}, at most {})", time(p50_ns), time(p99_ns), time(max_ns))
 }

@@ -105,7 +105,7 @@ impl Listener {
 
 impl wait::sealed::Pollable for Listener {
     fn polled(&self) -> wait::sealed::Polled<'_> {
-        wait::sealed::Polled(&self.receiver)
+        wait::sealed::Polled::new(self.receiver.socket(), self.receiver.name())
     }
 }
 

@@ -11,9 +11,11 @@ mod packet;
 mod raw;
 mod receiver;
 mod wait;
+mod wake;
 
 pub use batch::{Batch, ReceivedFrame, StampSource};
 pub use listener::{ListenFilter, Listener};
 pub use raw::{RawSocket, Sent, SocketOptions};
 pub use receiver::SocketCounters;
 pub use wait::{Ready, Waitable, wait_any};
+pub use wake::{Bell, Waker};

@@ -256,7 +256,7 @@ impl RawSocket {
 
 impl wait::sealed::Pollable for RawSocket {
     fn polled(&self) -> wait::sealed::Polled<'_> {
-        wait::sealed::Polled(&self.receiver)
+        wait::sealed::Polled::new(self.receiver.socket(), self.receiver.name())
     }
 }
 

@@ -21,10 +21,19 @@ pub enum Ready {
 }
 
 pub(super) mod sealed {
-    use super::super::receiver::Receiver;
+    use std::os::fd::BorrowedFd;
 
     /// What to wait for. Its content is known to this room only: sockets are never handed out.
-    pub struct Polled<'a>(pub(in super::super) &'a Receiver);
+    pub struct Polled<'a> {
+        pub(in super::super) socket: BorrowedFd<'a>,
+        pub(in super::super) name: &'a str,
+    }
+
+    impl<'a> Polled<'a> {
+        pub(in super::super) const fn new(socket: BorrowedFd<'a>, name: &'a str) -> Self {
+            Self { socket, name }
+        }
+    }
 
     /// Gives what to wait for.
     pub trait Pollable {
@@ -49,9 +58,10 @@ pub fn wait_any<const N: usize>(
     clock: &HostClock,
     deadline: Instant,
 ) -> Result<Ready, LinkError> {
-    let receivers = sockets.map(|socket| socket.polled().0);
-    let mut polled =
-        receivers.map(|receiver| PollFd::from_borrowed_fd(receiver.socket(), PollFlags::IN));
+    let waited = sockets.map(|socket| socket.polled());
+    let mut polled = std::array::from_fn::<_, N, _>(|index| {
+        PollFd::from_borrowed_fd(waited[index].socket, PollFlags::IN)
+    });
     let left = timespec(deadline.since(clock.now()).as_nanos());
     let timeout = (deadline != Instant::MAX).then_some(&left);
     match poll(&mut polled, timeout) {
@@ -59,7 +69,7 @@ pub fn wait_any<const N: usize>(
         Ok(_) => Ok(Ready::Readable),
         Err(Errno::INTR) => Ok(Ready::Interrupted),
         Err(error) => {
-            let names = receivers.map(|receiver| receiver.name()).join("+");
+            let names = waited.map(|one| one.name).join("+");
             Err(LinkError::system(&names, "waiting for frames", error))
         }
     }

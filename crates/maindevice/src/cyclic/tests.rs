@@ -21,6 +21,7 @@ fn device() -> PlannedDevice {
         start: RegisterAddress(start),
         len: 1,
         control: SmControl::OUTPUTS,
+        is_virtual: false,
     };
     PlannedDevice {
         name: "both ways".to_owned(),

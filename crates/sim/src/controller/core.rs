@@ -2,7 +2,9 @@
 //!
 //! Reference: S2 chapter 2 (identity), the reset values in each register's chapter.
 
-use linesman_proto::address::DeviceId;
+use std::sync::Arc;
+
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
     self as r, AlControl, AlStatus, DlControl, EscInformation, Features, FmmuConfig,
@@ -13,6 +15,7 @@ use linesman_proto::time::Instant;
 use super::clock::{LocalClock, RunningClock, SyncUnit, TimeLoop};
 use super::fmmu::Fmmus;
 use super::implemented::ClockUnits;
+use super::kind::ControllerKind;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
 use super::phy::Phys;
@@ -21,15 +24,15 @@ use super::shadow::Shadow;
 use super::sii::Sii;
 use super::sync_manager::{self, SyncManagers};
 use super::watchdog::Watchdog;
-use crate::hardware::{Hardware, PortKind};
+use crate::hardware::PortKind;
 
 /// All that a MainDevice sees.
 #[derive(Debug)]
 pub(super) struct Core {
     pub(super) id: DeviceId,
-    pub(super) hardware: Hardware,
+    pub(super) hardware: ControllerKind,
     pub(super) memory: Memory,
-    pub(super) rights: Rights,
+    pub(super) rights: Arc<Rights>,
     pub(super) loops: Loops,
     pub(super) queue: Queue,
     pub(super) fmmus: Fmmus,
@@ -61,6 +64,8 @@ pub(super) struct Core {
     pub(super) pdi_watchdog_ok: bool,
     /// The processor behind the controller has stopped serving it.
     pub(super) processor_stuck: bool,
+    /// Where a coding switch is read, and what it says.
+    pub(super) coding_switch: Option<(RegisterAddress, u16)>,
     /// AL status does not copy AL control although device emulation is on: a fault.
     pub(super) emulation_suspended: bool,
     /// When written loop modes take effect: at the end of the frame that wrote them.
@@ -95,16 +100,23 @@ pub(super) struct Passing {
     pub(super) read_latches: u8,
     pub(super) enables_registers: bool,
     pub(super) enables_all: bool,
+    /// Something was written, be it at once or at the frame's end.
+    pub(super) wrote: bool,
     /// SyncManagers that were touched, one bit each.
     pub(super) touched: u16,
 }
 
 impl Core {
-    pub(super) fn new(id: DeviceId, hardware: Hardware, quartz: LocalClock, sii: Vec<u8>) -> Self {
+    pub(super) fn new(
+        id: DeviceId,
+        hardware: ControllerKind,
+        quartz: LocalClock,
+        sii: Vec<u8>,
+    ) -> Self {
         Self {
             id,
             memory: Memory::new(&hardware),
-            rights: Rights::of(&hardware, ClockUnits::default()),
+            rights: hardware.rights(ClockUnits::default()),
             loops: Loops::new(&hardware),
             queue: Queue::default(),
             fmmus: Fmmus::new(),
@@ -113,7 +125,7 @@ impl Core {
             phys: Phys::new(&hardware),
             keeps_reasons: super::implemented::keeps_reasons(&hardware),
             frame_until: PortMap([Instant::ZERO; 4]),
-            shadow: Shadow::with_room(),
+            shadow: Shadow::default(),
             scratch: Vec::new(),
             clock: RunningClock::new(quartz, Instant::ZERO),
             quartz,
@@ -128,6 +140,7 @@ impl Core {
             pdi_watchdog: Watchdog::default(),
             pdi_watchdog_ok: true,
             processor_stuck: false,
+            coding_switch: None,
             emulation_suspended: false,
             loops_change_at: None,
             loops_return: None,
@@ -150,7 +163,7 @@ impl Core {
         self.clock = RunningClock::new(self.quartz, now);
         self.powered_at = now;
         self.loaded = false;
-        self.rights = Rights::of(&self.hardware, ClockUnits::default());
+        self.rights = self.hardware.rights(ClockUnits::default());
         self.time_loop = TimeLoop::default();
         self.sync = self.sync.restarted();
         self.started = false;
@@ -166,6 +179,7 @@ impl Core {
         self.shadow.clear();
         self.identify();
         self.put_reset_values();
+        self.put_coding_switch();
         for index in 0..usize::from(self.hardware.sync_managers).min(sync_manager::MAX) {
             self.sync_managers.configure(index, &mut self.memory);
         }
@@ -178,7 +192,7 @@ impl Core {
     }
 
     fn identify(&mut self) {
-        let hardware = &self.hardware;
+        let hardware = &*self.hardware;
         let ports = Port::ALL.into_iter().fold(PortDescriptor::default(), |ports, port| {
             let kind = match hardware.ports[port] {
                 PortKind::Absent => PortType::NotImplemented,
@@ -227,6 +241,15 @@ impl Core {
         }
     }
 
+    /// What stands in memory because a switch is wired there.
+    pub(super) fn put_coding_switch(&mut self) {
+        if let Some((at, value)) = self.coding_switch
+            && usize::from(at.0) + 2 <= self.memory.len()
+        {
+            self.memory.put(usize::from(at.0), &value.to_le_bytes());
+        }
+    }
+
     pub(super) fn power_off(&mut self) {
         self.sii.power_off();
         self.loops = Loops::new(&self.hardware);
@@ -246,7 +269,7 @@ impl Core {
         let a0 = self.memory.u8(&r::ESC_CONFIGURATION_A0);
         let a5 = self.memory.u16(&r::ESC_CONFIGURATION_A5);
         let units = ClockUnits::configured(&self.hardware, a0, a5);
-        self.rights = Rights::of(&self.hardware, units);
+        self.rights = self.hardware.rights(units);
         // Without an interface nobody triggers its watchdog, as the EK1100 shows.
         self.pdi_watchdog_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
     }

@@ -166,7 +166,9 @@ impl ClockUnits {
         const SYNC_UNIT: u8 = 1 << 2;
         const LATCH_UNIT: u8 = 1 << 3;
         const TIME_LOOP_UNIT: u16 = 1 << 8;
-        let (sync, latch) = (a0 & SYNC_UNIT != 0, a0 & LATCH_UNIT != 0);
+        // The first generation has no such bits: its units are always on.
+        let always = ControllerType(hardware.controller_type) == ControllerType::ESC20;
+        let (sync, latch) = (always || a0 & SYNC_UNIT != 0, always || a0 & LATCH_UNIT != 0);
         let wanted = sync || latch || a5 & TIME_LOOP_UNIT != 0;
         Self { time_loop: wanted || !has_configuration_a5(hardware), sync, latch }
     }

@@ -6,12 +6,23 @@
 use std::fmt::Debug;
 
 use linesman_proto::mailbox::coe::Emergency;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
 use super::signal::Signals;
 use super::trouble::Trouble;
 use crate::controller::{Pdi, SyncSignal};
+
+/// When inputs are to be sampled again.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SampleAgain {
+    /// With each frame.
+    NextFrame,
+    /// With the first frame from this instant on.
+    From(Instant),
+    /// Once any signal has another value.
+    OnceSignalsChange,
+}
 
 /// What is behind a controller: a processor with its software, or plain inputs and outputs.
 pub trait Firmware: Debug + Send {
@@ -37,6 +48,13 @@ pub trait Firmware: Debug + Send {
     /// A frame begins: controllers that drive inputs themselves latch them now (S1, digital I/O,
     /// input sampling at start of frame). Called only where [`Firmware::samples`] asks for it.
     fn sample(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// When [`Firmware::sample`] will do something again that it would not do now. Asked after each
+    /// [`Firmware::sample`]; what a frame writes and every [`Firmware::run`] ask for the next frame
+    /// anew. Who does not know says "with the next frame".
+    fn sample_again(&self, _pdi: &Pdi<'_>) -> SampleAgain {
+        SampleAgain::NextFrame
+    }
 
     /// Whether it plays the EEPROM (S1 11.2.4): then it answers
     /// [`Pdi::sii_request`]. Asked once, when the controller is made.
@@ -66,6 +84,11 @@ pub trait Firmware: Debug + Send {
     /// a mailbox cannot. Faults go through
     /// [`Controller::report`](crate::controller::Controller::report).
     fn report(&mut self, _emergency: Emergency) {}
+
+    /// From now on its work in each cycle takes so long, whatever it needs otherwise; `None` ends that.
+    /// It outlives a restart. Faults go through
+    /// [`Controller::slow_down`](crate::controller::Controller::slow_down).
+    fn slow_down(&mut self, _takes: Option<Span>) {}
 
     /// Whether a processor with software is behind the controller, which can fail.
     fn has_processor(&self) -> bool {

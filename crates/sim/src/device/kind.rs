@@ -54,16 +54,18 @@ impl DeviceKind {
     pub fn ports(&self) -> Vec<PortMap<PortKind>> {
         match self {
             Self::Library(library) => library.ports().collect(),
-            Self::Described(described) => vec![described.ports()],
+            Self::Described(described) => {
+                described.controllers().map(DescribedType::ports).collect()
+            }
         }
     }
 
     /// How its controllers hang together.
     #[must_use]
-    pub fn inner_links(&self) -> &'static [InnerLink] {
+    pub fn inner_links(&self) -> Vec<InnerLink> {
         match self {
-            Self::Library(library) => library.inner_links(),
-            Self::Described(_) => &[],
+            Self::Library(library) => library.inner_links().to_vec(),
+            Self::Described(described) => described.inner_links(),
         }
     }
 
@@ -72,7 +74,9 @@ impl DeviceKind {
     pub fn ebus_current_ma(&self) -> i16 {
         match self {
             Self::Library(library) => library.ebus_current_ma(),
-            Self::Described(described) => described.ebus_current_ma(),
+            Self::Described(described) => {
+                described.controllers().map(DescribedType::ebus_current_ma).sum()
+            }
         }
     }
 
@@ -81,7 +85,9 @@ impl DeviceKind {
     pub fn build(&self, serial: u32, signals: &mut Signals) -> Vec<Built> {
         match self {
             Self::Library(library) => library.build(None, serial, signals),
-            Self::Described(described) => vec![described.build(None, serial, signals)],
+            Self::Described(described) => {
+                described.controllers().map(|one| one.build(None, serial, signals)).collect()
+            }
         }
     }
 }

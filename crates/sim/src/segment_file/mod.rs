@@ -78,7 +78,14 @@ pub struct SegmentFile {
 pub struct SegmentDevice {
     /// Unique name.
     pub name: String,
-    /// Type in the library, such as `EL2004`, or `sii:FILE`: the device whose EEPROM that file holds.
+    /// So many of them in a row, 1 to 65,535, called `NAME[1]`, `NAME[2]` and so on; each hangs on the
+    /// one before, by the first port of the kind by which it is entered itself. What the other keys
+    /// say holds for each; a serial number is counted up. What comes behind hangs on the last.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 65535))]
+    pub repeat: Option<u32>,
+    /// Type in the library, such as `EL2004`, `esi:FILE#TYPE@REVISION` from a description
+    /// of its maker, or `sii:FILE`: the device whose EEPROM that file holds.
     #[serde(rename = "type")]
     pub type_name: String,
     /// Whose port it hangs on: `maindevice`, `maindevice.B`, or `K1.C`.
@@ -95,6 +102,10 @@ pub struct SegmentDevice {
     /// Serial number in its SII; its number unless said.
     #[serde(default)]
     pub serial: Option<u32>,
+    /// Its identification, 0 to 65535: what its coding switch says, or what it answers when AL control
+    /// asks for it, whichever its type has; else its station alias.
+    #[serde(default)]
+    pub id: Option<u16>,
     /// How much too fast its clock runs, in ppm, -200 to 200; by chance within 25 unless said.
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]
@@ -106,6 +117,10 @@ pub struct SegmentDevice {
     /// has it unless said.
     #[serde(default)]
     pub counts_forwarded: Option<bool>,
+    /// The modules in the slots of a modular device, by type, name or ident; `""` leaves a slot empty.
+    /// Those of its description unless said.
+    #[serde(default)]
+    pub slots: Option<Vec<String>>,
     /// Error counters that are not 0 at the start: `A.frame`, `A.physical`, `A.forwarded`,
     /// `A.lost_link` (and B, C, D), `processing_unit`, `pdi`.
     #[serde(default)]
@@ -225,6 +240,19 @@ pub enum SegmentFileError {
         port: linesman_proto::port::Port,
         /// The ports it has.
         has: String,
+    },
+    /// A device that cannot be put in a row.
+    #[error(
+        "device `{device}` cannot be repeated: a {type_name} has no second port that is {kind}, for \
+         the next one to hang on"
+    )]
+    NoRepeat {
+        /// Which.
+        device: String,
+        /// Its type.
+        type_name: String,
+        /// What the port would have to be.
+        kind: &'static str,
     },
     /// Two ports of different kinds are wired to each other.
     #[error("{from} is {from_kind}, but {to} is {to_kind}: no cable fits both")]

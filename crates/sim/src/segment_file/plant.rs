@@ -16,6 +16,14 @@ use crate::device::library::{self, LibraryType};
 use crate::hardware::PortKind;
 use crate::seed::{Seed, Stream};
 
+/// What plants are made of, unless they are to have everything.
+const COMMON: &[&str] = &[
+    "EK1100", "EK1101", "EK1110", "EK1122", "EK1521", "CU1123", "CU1124", "CU1128", "EL1004",
+    "EL1008", "EL1014", "EL1018", "EL2004", "EL2008", "EL2024", "EL3004", "EL3102", "EL3104",
+    "EL3154", "EL3162", "EL4004", "EL4102", "EL4112", "EL2014", "EL6601", "EL7041", "EP1008",
+    "EP2308", "EP4174",
+];
+
 /// What kind of plant is wanted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PlantOptions {
@@ -27,11 +35,14 @@ pub struct PlantOptions {
     pub junction: bool,
     /// The end of the line is wired to a second card.
     pub ring: bool,
+    /// Of all types in the library, not of the common ones alone. A seed keeps its plant when the
+    /// library grows only without this.
+    pub all_types: bool,
 }
 
 impl Default for PlantOptions {
     fn default() -> Self {
-        Self { min_devices: 5, max_devices: 60, junction: false, ring: false }
+        Self { min_devices: 5, max_devices: 60, junction: false, ring: false, all_types: false }
     }
 }
 
@@ -42,7 +53,7 @@ pub fn plant(seed: Seed, options: &PlantOptions) -> SegmentFile {
     let low = options.min_devices.max(1) as u64;
     let target = stream.between(low, options.max_devices as u64) as usize;
     let old_counters = stream.chance(0.25);
-    let mut builder = Builder::new(stream, target);
+    let mut builder = Builder::new(stream, target, options.all_types);
     builder.build(options.junction);
     let ring = if options.ring { builder.ring() } else { None };
     let file = SegmentFile {
@@ -77,6 +88,10 @@ enum Use {
 
 fn use_of(library_type: &LibraryType) -> Use {
     let Some(first) = library_type.ports().next() else { return Use::None };
+    if library_type.fast_hot_connect() {
+        // It fits its like only, and never the first cable.
+        return Use::None;
+    }
     let ways = |kind| ports_after(Port::A).into_iter().filter(|port| first[*port] == kind).count();
     let (ebus, cable) = (ways(PortKind::Ebus), ways(PortKind::Mii));
     let single = library_type.inner_links().is_empty();
@@ -112,9 +127,14 @@ struct Builder {
 }
 
 impl Builder {
-    fn new(stream: Stream, target: usize) -> Self {
+    fn new(stream: Stream, target: usize, all_types: bool) -> Self {
+        let types: Vec<&'static LibraryType> = if all_types {
+            library::types().collect()
+        } else {
+            COMMON.iter().filter_map(|name| library::find(name)).collect()
+        };
         let of = |wanted: fn(Use) -> bool| {
-            library::types().filter(|known| wanted(use_of(known))).collect::<Vec<_>>()
+            types.iter().copied().filter(|known| wanted(use_of(known))).collect::<Vec<_>>()
         };
         Self {
             stream,
@@ -239,14 +259,17 @@ impl Builder {
         self.controllers += kind.ports().count();
         self.devices.push(SegmentDevice {
             name: name.clone(),
+            repeat: None,
             type_name: kind.name().to_owned(),
             on,
             entry: None,
             cable_m,
             serial,
+            id: None,
             clock_ppm: None,
             clock: None,
             counts_forwarded: None,
+            slots: None,
             counters: std::collections::BTreeMap::new(),
         });
         name

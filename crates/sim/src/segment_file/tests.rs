@@ -31,6 +31,7 @@ type = "EK1101"
 on = "K1.C"
 entry = "A"
 cable_m = 12
+id = 300
 clock_ppm = -3.5
 clock = { ramp_ppm_per_s = 0.25, ramp_s = 40.0, jitter_ns = 12 }
 counts_forwarded = true
@@ -151,7 +152,13 @@ fn plants_are_whole_and_belong_to_their_seed() {
 
 #[test]
 fn plants_keep_to_their_options() {
-    let options = PlantOptions { min_devices: 25, max_devices: 40, junction: true, ring: true };
+    let options = PlantOptions {
+        min_devices: 25,
+        max_devices: 40,
+        junction: true,
+        ring: true,
+        all_types: true,
+    };
     for seed in 0..50 {
         let file = plant(Seed(seed), &options);
         let tree = file.project().unwrap().tree().unwrap();
@@ -172,4 +179,48 @@ fn the_schema_names_what_can_be_written() {
     {
         assert!(text.contains(word), "{word}");
     }
+}
+
+#[test]
+fn a_device_can_be_repeated() {
+    let text = r#"
+        [[device]]
+        name = "K"
+        type = "EK1100"
+        on = "maindevice"
+        repeat = 2
+        cable_m = 7.0
+
+        [[device]]
+        name = "T"
+        type = "EL1008"
+        on = "K[2].B"
+        repeat = 3
+        serial = 100
+
+        [[device]]
+        name = "E"
+        type = "EK1110"
+        on = "T[3].B"
+    "#;
+    let file = SegmentFile::parse(text).unwrap();
+    let project = file.project().unwrap();
+    let places: Vec<_> =
+        project.devices.iter().map(|it| format!("{} {}", it.name, it.on)).collect();
+    let expected =
+        ["K[1] maindevice", "K[2] K[1].C", "T[1] K[2].B", "T[2] T[1].B", "T[3] T[2].B", "E T[3].B"];
+    assert_eq!(places, expected);
+    let serials: Vec<u32> = expand(&file).unwrap().iter().map(|planned| planned.serial).collect();
+    assert_eq!(serials, [1, 2, 100, 101, 102, 6]);
+    assert_eq!(SegmentFile::parse(&file.to_toml()), Ok(file));
+
+    let error =
+        |from: &str, to: &str| SegmentFile::parse(&text.replace(from, to)).unwrap_err().to_string();
+    assert_eq!(
+        error("T[3].B\"", "T[3].B\"\nrepeat = 2"),
+        "device `E` cannot be repeated: a EK1110 has no second port that is an E-bus contact, for \
+         the next one to hang on"
+    );
+    let error = error("repeat = 3", "repeat = 70000");
+    assert_eq!(error, "device `T`: `repeat` is 70000, expected 1 to 65535");
 }

@@ -35,6 +35,9 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
         let _ = writeln!(text, "{key} = {value}");
     };
     line("\n[[device]]\nname", quoted(&device.name));
+    if let Some(repeat) = device.repeat {
+        line("repeat", repeat.to_string());
+    }
     line("type", quoted(&device.type_name));
     line("on", quoted(&device.on.to_string()));
     if let Some(entry) = &device.entry {
@@ -45,6 +48,9 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     }
     if let Some(serial) = device.serial {
         line("serial", serial.to_string());
+    }
+    if let Some(id) = device.id {
+        line("id", id.to_string());
     }
     if let Some(ppm) = device.clock_ppm {
         line("clock_ppm", number(ppm));
@@ -61,6 +67,10 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     }
     if let Some(counts) = device.counts_forwarded {
         line("counts_forwarded", counts.to_string());
+    }
+    if let Some(slots) = &device.slots {
+        let slots: Vec<_> = slots.iter().map(|slot| quoted(slot)).collect();
+        line("slots", format!("[{}]", slots.join(", ")));
     }
     if !device.counters.is_empty() {
         let counters = device.counters.iter();

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 mod faults;
+mod identification;
+mod oracle;
 mod rig;
 mod swarm;
 mod traps;

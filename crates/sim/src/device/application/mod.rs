@@ -2,11 +2,16 @@
 
 pub mod analog;
 pub mod digital;
+pub mod drive;
+pub(crate) mod motion;
+pub mod oversampling;
+pub mod sercos;
 pub mod stepper;
+pub mod two_times;
 
 use std::fmt::Debug;
 
-use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
 use linesman_proto::time::Instant;
 
 use super::dictionary::{Dictionary, EntryRef};
@@ -26,6 +31,14 @@ pub trait Channel: Debug + Send {
     /// Whether [`Channel::sample`] is wanted.
     fn has_inputs(&self) -> bool {
         false
+    }
+
+    /// What the device's copy of the system time shows, in ns: told before each sample.
+    fn tell_time(&mut self, _system_time_ns: u64) {}
+
+    /// An error to tell the MainDevice of, once. Asked after outputs were driven and inputs sampled.
+    fn emergency(&mut self) -> Option<Emergency> {
+        None
     }
 
     /// Inputs go into their objects.

@@ -17,8 +17,6 @@ use crate::device::signal::SignalId;
 const NO_PDI: u8 = 0x00;
 /// SII byte 0: digital inputs and outputs.
 const DIGITAL_IO: u8 = 0x04;
-/// A pin that leads nowhere: a bit of padding.
-const NOWHERE: SignalId = SignalId(u32::MAX);
 
 /// What sort of firmware it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -102,6 +100,7 @@ fn processor(
         channels,
         buffers: buffers(described),
         mailbox: described.image.standard_mailbox,
+        protocols: described.image.protocols,
         bootstrap: bootstrap.is_present().then_some(bootstrap),
         times: ResponseTimes::TERMINAL,
     })
@@ -141,7 +140,7 @@ fn emulated(
                 }));
                 continue;
             }
-            pins.resize((point.at + point.bits).max(pins.len()), NOWHERE);
+            pins.resize((point.at + point.bits).max(pins.len()), SignalId::NOWHERE);
             for (pin, signal) in pins.iter_mut().skip(point.at).zip(mine) {
                 *pin = *signal;
             }

@@ -5,6 +5,7 @@
 //! memory is as large as it has to be. A processor interface within a chip (SII byte 0: 0x80) is
 //! an IP core in any case.
 
+use linesman_config::esi::device::EsiController;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::{SmControl, SmMode};
 use linesman_proto::sii::{Image, PortKind as SiiPort};
@@ -24,8 +25,18 @@ const MOST_UNITS: usize = 16;
 
 /// The controller for an image.
 pub(super) fn of(image: &Image) -> Result<Hardware, DescribedError> {
+    with(image, &EsiController::default())
+}
+
+/// The same, where it is said what the controller has at least.
+pub(super) fn with(image: &Image, said: &EsiController) -> Result<Hardware, DescribedError> {
     let ports = ports(image);
     let needs = Needs::of(image)?;
+    let needs = Needs {
+        fmmus: needs.fmmus.max(said.fmmus.min(MOST_UNITS as u8)),
+        sync_managers: needs.sync_managers.max(said.sync_managers.min(MOST_UNITS as u8)),
+        ram_kib: needs.ram_kib.max((said.ram_bytes / 1024).min(LARGEST_RAM) as u8),
+    };
     let chips = [&ET1200, &ET1100, &IP_CORE].map(|chip| chip.with_ports(ports));
     let ebus = ports.iter().any(|(_, kind)| *kind == PortKind::Ebus);
     let [small, large, mut logic] = chips;

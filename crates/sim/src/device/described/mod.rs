@@ -10,15 +10,19 @@ pub mod objects;
 pub mod pdo;
 
 mod channel;
+mod esi;
 mod firmware;
+mod modules;
 mod signals;
 
-use linesman_proto::port::PortMap;
+use linesman_config::esi::image::ImageError;
+use linesman_config::esi::{Esi, EsiDevice, EsiError, FindError};
+use linesman_proto::port::{Port, PortMap};
 use linesman_proto::sii::{BuildError, Identity, Image, SiiError};
 
 use self::pdo::DescribedPdo;
 use super::dictionary::Object;
-use super::library::Built;
+use super::library::{Built, InnerLink};
 use super::signal::Signals;
 use crate::hardware::{Hardware, PortKind};
 
@@ -41,6 +45,9 @@ pub struct DescribedType {
     pub pdos: Vec<DescribedPdo>,
     /// Objects that the data describe; those that are missing are made from the rest.
     pub objects: Vec<Object>,
+    /// Further controllers in its housing, in the order in which frames reach them. Each hangs on the
+    /// E-bus of the one before.
+    pub further: Vec<DescribedType>,
 }
 
 /// Why data do not make a device.
@@ -52,6 +59,35 @@ pub enum DescribedError {
     /// The image cannot be made.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// The image has no room for it.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// No device of the file is meant.
+    #[error(transparent)]
+    Find(#[from] FindError),
+    /// The file cannot be read.
+    #[error(transparent)]
+    Esi(#[from] EsiError),
+    /// It is a thing without a controller, such as an end cap.
+    #[error(
+        "it has neither EEPROM nor SyncManagers: a passive part, which no frame ever sees; leave \
+         it out"
+    )]
+    NoController,
+    /// Its dictionary is in another file.
+    #[error("its dictionary is in `{0}`, which is missing")]
+    DictionaryFile(String),
+    /// A controller of its housing is not described.
+    #[error("it has a further controller, product code {0}, which is not in the file")]
+    SubDevice(String),
+    /// A module does not fit.
+    #[error("slot {slot}: {reason}")]
+    Slot {
+        /// Which slot, from 1.
+        slot: usize,
+        /// Why not.
+        reason: String,
+    },
     /// No controller has what the data ask for.
     #[error("{what}: {found}, expected {expected}")]
     Beyond {
@@ -80,13 +116,45 @@ impl DescribedType {
         Ok(Self {
             title: text(image.name()),
             group: text(image.group()),
-            pdos: pdo::of_image(&image),
+            pdos: pdo::complete(&image, pdo::of_image(&image)),
             objects: Vec::new(),
             programmed: Some(bytes.to_vec()),
+            further: Vec::new(),
             name,
             hardware,
             image,
         })
+    }
+
+    /// The device that a description of its maker is about. `slots` names the modules of a modular
+    /// device; those that the description puts there unless said.
+    ///
+    /// # Errors
+    /// [`DescribedError`] when it is a thing without a controller, when parts of its description are
+    /// missing, or when it asks for what no controller has.
+    pub fn from_esi(
+        esi: &Esi,
+        device: &EsiDevice,
+        slots: Option<&[String]>,
+    ) -> Result<Self, DescribedError> {
+        esi::described(esi, device, slots)
+    }
+
+    /// All its controllers, in the order in which frames reach them.
+    pub fn controllers(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.further)
+    }
+
+    /// How its controllers hang together.
+    #[must_use]
+    pub fn inner_links(&self) -> Vec<InnerLink> {
+        let controllers: Vec<&Self> = self.controllers().collect();
+        let links = controllers.windows(2).enumerate().map(|(place, pair)| {
+            let is_on = |port: &Port| pair[0].ports()[*port] == PortKind::Ebus;
+            let from = [Port::D, Port::B, Port::C].into_iter().find(is_on).unwrap_or(Port::C);
+            InnerLink { from: (place, from), to: (place + 1, Port::A) }
+        });
+        links.collect()
     }
 
     /// Who it is, but for its serial number.

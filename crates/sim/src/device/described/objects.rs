@@ -14,8 +14,9 @@ use super::firmware::buffers;
 use super::pdo::{DescribedEntry, DescribedPdo};
 use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY};
 use crate::device::library::object::{
-    IDENTITY, PDO_MAPPING, RECORD, SET_UP, insert, record, subindex_name, synchronisation,
+    IDENTITY, PDO_MAPPING, RECORD, SET_UP, insert, record, subindex_name,
 };
+use crate::device::library::synchronisation::{Clocked, synchronisation};
 use crate::device::processor::ProcessBuffer;
 
 /// Device type of a drive (CiA 402).
@@ -39,9 +40,11 @@ pub(super) fn dictionary(described: &DescribedType, identity: Identity) -> Dicti
     for object in about(described) {
         add(object);
     }
+    let clocked = Clocked::of(described.image.op_modes().map(|mode| mode.assign_activate));
+    let outputs = described.pdos.iter().any(|pdo| pdo.direction == Direction::Outputs);
     for buffer in buffers(described) {
         if matches!(buffer.sync_manager, 2 | 3) {
-            add(synchronisation(buffer.sync_manager));
+            add(synchronisation(buffer.sync_manager, clocked, outputs));
         }
     }
     let mut made = vec![identity_object(identity), sync_manager_types(described)];

@@ -40,14 +40,19 @@ pub struct DescribedEntry {
     pub bits: u16,
 }
 
-/// The PDOs of an SII image. An image that has none in a direction, as those of small firmware kits,
-/// says no more of those process data than how long each SyncManager is: then there is one PDO for
-/// each, of so many bytes, outputs from object 0x7000 on and inputs from object 0x6000 on (ETG.5001).
+/// The PDOs of an SII image.
 pub(super) fn of_image(image: &Image) -> Vec<DescribedPdo> {
     let mut pdos = Vec::new();
     for direction in [Direction::Outputs, Direction::Inputs] {
         pdos.extend(image.pdos(direction).map(|pdo| of_pdo(image, pdo, direction)));
     }
+    pdos
+}
+
+/// The same with what is missing. Data that have no PDO in a direction, as those of small firmware
+/// kits, say no more of those process data than how long each SyncManager is: then there are PDOs of
+/// so many bytes, outputs from object 0x7000 on and inputs from object 0x6000 on (ETG.5001).
+pub(super) fn complete(image: &Image, mut pdos: Vec<DescribedPdo>) -> Vec<DescribedPdo> {
     let described = [Direction::Outputs, Direction::Inputs]
         .map(|direction| image.pdos(direction).next().is_some());
     for (sync_manager, record) in (0u8..).zip(image.sync_managers()) {

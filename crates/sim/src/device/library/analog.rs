@@ -14,16 +14,12 @@ use crate::device::application::analog::Range;
 use crate::device::processor::ResponseTimes;
 
 const fn bit(subindex: u8, name: &'static str) -> EntrySpec {
-    EntrySpec { index: 0x6000, subindex, name, data_type: DataType::BOOL, bits: 1 }
+    EntrySpec::bit(0x6000, subindex, name)
 }
 
 const fn limit(subindex: u8, name: &'static str) -> EntrySpec {
     const BIT2: DataType = DataType(0x0031);
     EntrySpec { index: 0x6000, subindex, name, data_type: BIT2, bits: 2 }
-}
-
-const fn padding(bits: u8) -> EntrySpec {
-    EntrySpec { index: 0, subindex: 0, name: "", data_type: DataType(0), bits }
 }
 
 const INPUT_VALUE: EntrySpec =
@@ -36,8 +32,8 @@ const STATUS_AND_VALUE: &[EntrySpec] = &[
     limit(0x03, "Limit 1"),
     limit(0x05, "Limit 2"),
     bit(0x07, "Error"),
-    padding(1),
-    padding(5),
+    EntrySpec::padding(1),
+    EntrySpec::padding(5),
     bit(0x0E, "Sync error"),
     bit(0x0F, "TxPDO State"),
     bit(0x10, "TxPDO Toggle"),
@@ -92,7 +88,8 @@ const VALUE_AT_11: [EntrySpec; 1] = output_value(0x11);
 /// Process data of four outputs whose value is subindex 0x11.
 pub(super) const FOUR_OUTPUTS_AT_11: &[PdoSpec] = &output_pdos(4, &VALUE_AT_11);
 const TWO_INPUTS: &[PdoSpec] = &input_pdos(2);
-const FOUR_INPUTS: &[PdoSpec] = &input_pdos(4);
+/// Process data of four inputs: status and value, or the value alone.
+pub(super) const FOUR_INPUTS: &[PdoSpec] = &input_pdos(4);
 const TWO_OUTPUTS: &[PdoSpec] = &output_pdos(2, &VALUE_AT_1);
 const FOUR_OUTPUTS: &[PdoSpec] = &output_pdos(4, &VALUE_AT_1);
 
@@ -127,7 +124,8 @@ const INPUT_SETTINGS: &[SettingSpec] = &[
     word(0x15, "Filter settings", Some(10)),
 ];
 
-const OUTPUT_SETTINGS: &[SettingSpec] = &[
+/// Settings of one output.
+pub(super) const OUTPUT_SETTINGS: &[SettingSpec] = &[
     switch(0x01, "Enable user scale", 0),
     word(0x11, "Offset", None),
     GAIN,
@@ -143,7 +141,8 @@ const fn output_settings(channels: u8) -> [SettingsSpec; 1] {
 }
 
 const TWO_INPUT_SETTINGS: &[SettingsSpec] = &input_settings(2);
-const FOUR_INPUT_SETTINGS: &[SettingsSpec] = &input_settings(4);
+/// Settings of four inputs.
+pub(super) const FOUR_INPUT_SETTINGS: &[SettingsSpec] = &input_settings(4);
 const TWO_OUTPUT_SETTINGS: &[SettingsSpec] = &output_settings(2);
 /// Settings of four outputs.
 pub(super) const FOUR_OUTPUT_SETTINGS: &[SettingsSpec] = &output_settings(4);
@@ -158,6 +157,7 @@ const fn input_processor(
         hardware_version: "09",
         software_version: "08",
         settings,
+        variables: &[],
         times: ResponseTimes::TERMINAL,
     }
 }
@@ -172,6 +172,7 @@ const fn output_processor(
         hardware_version: "06",
         software_version: "05",
         settings,
+        variables: &[],
         times: ResponseTimes::TERMINAL,
     }
 }

@@ -27,6 +27,7 @@ const FOUR_ANALOG_OUTPUTS: ProcessorSpec = ProcessorSpec {
     hardware_version: "03",
     software_version: "04",
     settings: FOUR_OUTPUT_SETTINGS,
+    variables: &[],
     times: ResponseTimes::TERMINAL,
 };
 

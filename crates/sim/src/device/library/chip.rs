@@ -61,6 +61,11 @@ pub(in crate::device) const ET1100: Chip = Chip {
     timing: TIMING,
 };
 
+/// The large one with Fast Hot Connect: both ends of a cable have fixed link parameters, so that a
+/// link is there within a few milliseconds instead of one to three seconds (facts, hot connect).
+pub(super) const ET1100_FAST: Chip =
+    Chip { timing: Timing { mii_link_up: Span::ms(5), ..TIMING }, ..ET1100 };
+
 /// The small one: two ports and a third, for simple terminals.
 pub(in crate::device) const ET1200: Chip = Chip {
     controller_type: 0x12,
@@ -101,6 +106,9 @@ pub(in crate::device) const ESC20: Chip = Chip {
     timing: Timing { forward: Span::ns(150), process: Span::ns(170), ..TIMING },
 };
 
+/// The same with clocks of 64 bits. Terminals whose SII switches no clock unit on, and that use them
+/// all the same, must have one like it: its units are always on.
+pub(super) const ESC20_64: Chip = Chip { features: 0x000C, ..ESC20 };
 /// A controller with two ports and a processor interface, from another maker: three FMMUs, four
 /// SyncManagers, distributed clocks of 64 bits.
 const LAN9252: Chip = Chip {
@@ -123,6 +131,11 @@ pub fn controllers(ports: PortMap<PortKind>) -> Vec<Hardware> {
 }
 
 impl Chip {
+    /// Whether its cables have Fast Hot Connect: they fit each other only.
+    pub(super) const fn fast_hot_connect(&self) -> bool {
+        self.timing.mii_link_up.as_nanos() < Span::ms(500).as_nanos()
+    }
+
     /// The controller with these ports.
     pub(in crate::device) fn with_ports(&self, ports: PortMap<PortKind>) -> Hardware {
         Hardware {

@@ -12,12 +12,12 @@ use super::object::{Individual, channel_name};
 use super::spec::{EntrySpec, PdoSpec, Spec, Use};
 use crate::hardware::PortKind;
 
-/// Who makes all types of this library.
-pub(super) const VENDOR: u32 = 2;
 /// PDO flags of channels that are always there: mandatory, fixed.
 const ALWAYS_THERE: PdoFlags = PdoFlags(0x0011);
 /// PDO flags of what can be assigned: fixed.
 const FIXED: PdoFlags = PdoFlags(0x0010);
+/// PDO flag: registers, not memory behind a SyncManager.
+const VIRTUAL: u16 = 0x0020;
 /// General flag: the mailbox repeats lost messages.
 const MAILBOX_REPEATS: u8 = 0x04;
 /// EEPROM of devices with a processor: 32 Kbit.
@@ -60,18 +60,19 @@ fn image(spec: &Spec, individual: Individual) -> Image {
         configuration: Configuration {
             pdi_control: spec.pdi_control,
             esc_configuration: spec.esc_configuration,
+            sync_impulse: spec.sync_impulse,
             pdi_configuration_2: spec.pdi_configuration_2,
             ..Configuration::default()
         },
         identity: Identity {
-            vendor_id: VENDOR,
+            vendor_id: spec.vendor,
             product_code: spec.product,
             revision: individual.revision,
             serial_number: individual.serial,
         },
         bootstrap_mailbox: bootstrap(spec),
         standard_mailbox: spec.mailbox(),
-        protocols: Protocols(if has_mailbox { Protocols::COE | Protocols::FOE } else { 0 }),
+        protocols: Protocols(spec.protocols),
         size: if has_mailbox { LARGE } else { Size::default() },
         categories,
         ..Image::default()
@@ -97,13 +98,14 @@ fn general(spec: &Spec, strings: &mut Strings) -> General {
         name,
         group_again: group,
         coe: spec.coe,
-        foe: u8::from(has_mailbox),
+        foe: u8::from(Protocols(spec.protocols).has(Protocols::FOE)),
         flags: GeneralFlags(in_memory | repeats),
         physical_memory_address: memory.unwrap_or(RegisterAddress(0)),
         ebus_current_ma: spec.ebus_current_ma,
         ports: PortMap(spec.ports.map(|port| match port {
             PortKind::Absent => SiiPort::None,
             PortKind::Ebus => SiiPort::EBus,
+            PortKind::Mii if spec.chip.fast_hot_connect() => SiiPort::FastHotConnect,
             PortKind::Mii => SiiPort::Mii,
         })),
         ..General::default()
@@ -112,8 +114,7 @@ fn general(spec: &Spec, strings: &mut Strings) -> General {
 
 fn op_modes(spec: &Spec, strings: &mut Strings) -> Vec<OpMode> {
     let modes = spec.op_modes.iter().map(|mode| OpMode {
-        // A SYNC0 in each cycle of the MainDevice.
-        sync0_cycle_factor: i16::from(mode.assign_activate != 0),
+        sync0_cycle_factor: mode.sync0_factor,
         assign_activate: mode.assign_activate,
         name: text(strings, mode.name),
         ..OpMode::default()
@@ -130,15 +131,23 @@ pub(super) fn bootstrap(spec: &Spec) -> MailboxPair {
     if spec.mailbox().is_present() { BOOTSTRAP } else { MailboxPair::default() }
 }
 
+/// An FMMU for each stretch of process data, outputs first, and one for the state of the mailbox.
 fn fmmus(spec: &Spec) -> Vec<FmmuUsage> {
-    let mut usages = Vec::new();
-    let exchanges = |kind| spec.sync_manager(kind).is_some_and(|manager| manager.length > 0);
-    if exchanges(Use::Outputs) {
-        usages.push(FmmuUsage::Outputs);
-    }
-    if exchanges(Use::Inputs) {
-        usages.push(FmmuUsage::Inputs);
-    }
+    let stretches = |kind| {
+        let mut end = None;
+        let managers = spec.sync_managers.iter().filter(move |manager| manager.kind == kind);
+        managers
+            .filter(|manager| manager.length > 0 || manager.is_virtual())
+            .filter(move |manager| {
+                // Bytes side by side are one stretch.
+                let joins = end == Some(manager.start);
+                end = Some(manager.start + manager.length);
+                !joins
+            })
+            .count()
+    };
+    let mut usages = vec![FmmuUsage::Outputs; stretches(Use::Outputs)];
+    usages.extend(vec![FmmuUsage::Inputs; stretches(Use::Inputs)]);
     if spec.mailbox().is_present() {
         usages.push(FmmuUsage::MailboxState);
     }
@@ -170,11 +179,17 @@ pub(super) const fn sync_manager_kind(kind: Use) -> SyncManagerKind {
 fn pdos(spec: &Spec, outputs: bool, strings: &mut Strings) -> Vec<Pdo> {
     let mine = spec.pdos.iter().filter(|pdo| pdo.is_output() == outputs);
     mine.flat_map(|pdo| (0..pdo.channels).map(move |channel| (pdo, channel)))
-        .map(|(pdo, channel)| one_pdo(pdo, channel, strings))
+        .map(|(pdo, channel)| one_pdo(spec, pdo, channel, strings))
         .collect()
 }
 
-fn one_pdo(pdo: &PdoSpec, channel: u8, strings: &mut Strings) -> Pdo {
+fn one_pdo(spec: &Spec, pdo: &PdoSpec, channel: u8, strings: &mut Strings) -> Pdo {
+    let manager = pdo.sync_manager.and_then(|index| spec.sync_managers.get(usize::from(index)));
+    let flags = match manager {
+        Some(manager) if manager.is_virtual() => PdoFlags(FIXED.0 | VIRTUAL),
+        Some(_) => ALWAYS_THERE,
+        None => FIXED,
+    };
     let name = channel_name(pdo.name, channel, pdo.channels);
     let entries = pdo.entries.iter().map(|entry| one_entry(entry, channel, strings)).collect();
     Pdo {
@@ -182,7 +197,7 @@ fn one_pdo(pdo: &PdoSpec, channel: u8, strings: &mut Strings) -> Pdo {
         sync_manager: pdo.sync_manager,
         synchronization: 0,
         name: text(strings, &name),
-        flags: if pdo.sync_manager.is_some() { ALWAYS_THERE } else { FIXED },
+        flags,
         entries,
     }
 }

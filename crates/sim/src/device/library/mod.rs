@@ -5,30 +5,34 @@
 //! default process data are those of the products that the types are named after.
 
 mod analog;
+mod assemble;
 mod box_module;
 pub(super) mod chip;
+mod communication;
 mod coupler;
 mod digital;
+mod drive;
+mod feed;
 mod file;
+mod generic;
 mod image;
+mod junction;
 pub(super) mod object;
+mod oversampling;
+mod passive;
 mod smart;
 mod spec;
+pub(in crate::device) mod synchronisation;
 
 pub use self::chip::controllers;
 use linesman_proto::port::{Port, PortMap};
 
+use self::assemble::build_one;
 use self::object::Individual;
-use self::spec::{Behind, Function, ProcessorSpec, Spec, Switching};
-use super::application::Channel;
-use super::application::analog::{AnalogInput, AnalogOutput};
-use super::application::digital::DigitalOutput;
-use super::application::stepper::Stepper;
+pub use self::passive::{Passive, passive, passives};
+use self::spec::Spec;
 pub use super::application_layer::Refusal;
-use super::dictionary::Dictionary;
-use super::emulated::{DigitalArea, Emulated, WordArea};
 use super::firmware::Firmware;
-use super::processor::{Description, ProcessBuffer, Processor};
 use super::signal::{SignalId, Signals};
 use crate::hardware::{Hardware, PortKind};
 
@@ -85,6 +89,12 @@ impl LibraryType {
     /// The ports of each of its controllers.
     pub fn ports(&self) -> impl Iterator<Item = PortMap<PortKind>> {
         self.controllers.iter().map(|spec| PortMap(spec.ports))
+    }
+
+    /// Whether its cables have Fast Hot Connect: such a port fits another such port only.
+    #[must_use]
+    pub fn fast_hot_connect(&self) -> bool {
+        self.controllers.iter().any(|spec| spec.chip.fast_hot_connect())
     }
 
     /// How its controllers hang together; nothing for the usual device with one.
@@ -145,9 +155,21 @@ fn closest(name: &str) -> String {
 
 /// All types, couplers first.
 pub fn types() -> impl Iterator<Item = &'static LibraryType> {
-    [coupler::TYPES, digital::TYPES, analog::TYPES, smart::TYPES, box_module::TYPES]
-        .into_iter()
-        .flatten()
+    [
+        coupler::TYPES,
+        junction::TYPES,
+        digital::TYPES,
+        analog::TYPES,
+        oversampling::TYPES,
+        smart::TYPES,
+        communication::TYPES,
+        feed::TYPES,
+        box_module::TYPES,
+        drive::TYPES,
+        generic::TYPES,
+    ]
+    .into_iter()
+    .flatten()
 }
 
 /// The type with this name, in any case; the variant may be left out ("EP1008" is an EP1008-0001).
@@ -187,104 +209,6 @@ pub fn build_revision(
 ) -> Result<Vec<Built>, UnknownType> {
     let found = find(type_name).ok_or_else(|| UnknownType { name: type_name.to_owned() })?;
     Ok(found.build(revision, serial, signals))
-}
-
-fn build_one(spec: &Spec, individual: Individual, signals: &mut Signals) -> Built {
-    let mut add = |count: usize| (0..count).map(|_| signals.add()).collect::<Vec<_>>();
-    let outputs = add(spec.output_channels());
-    let inputs = add(spec.input_channels());
-    let firmware = match spec.behind {
-        Behind::Plain | Behind::CodingSwitch(_) => emulated(spec, &outputs, &inputs),
-        Behind::Processor(processor) => {
-            with_processor(spec, processor, individual, &outputs, &inputs)
-        }
-    };
-    let sii = image::build(spec, individual);
-    Built { hardware: spec.hardware(), sii, firmware, outputs, inputs }
-}
-
-/// A device with a processor.
-fn with_processor(
-    spec: &Spec,
-    processor: &ProcessorSpec,
-    individual: Individual,
-    outputs: &[SignalId],
-    inputs: &[SignalId],
-) -> Box<dyn Firmware> {
-    let dictionary = object::dictionary(spec, processor, individual);
-    let channels = channels(processor.function, &dictionary, outputs, inputs);
-    let description = Description {
-        dictionary,
-        channels,
-        buffers: ProcessBuffer::BEHIND_MAILBOX.to_vec(),
-        mailbox: spec.mailbox(),
-        bootstrap: Some(image::bootstrap(spec)),
-        times: processor.times,
-    };
-    Box::new(Processor::new(description).with_files(file::files(spec)))
-}
-
-fn channels(
-    function: Function,
-    dictionary: &Dictionary,
-    outputs: &[SignalId],
-    inputs: &[SignalId],
-) -> Vec<Box<dyn Channel>> {
-    let outputs = || (0u8..).zip(outputs.iter().copied());
-    let inputs = || (0u8..).zip(inputs.iter().copied());
-    match function {
-        Function::None => Vec::new(),
-        Function::DigitalOutputs { .. } => outputs()
-            .map(|(channel, signal)| {
-                let index = 0x7000 + 0x10 * u16::from(channel);
-                Box::new(DigitalOutput::new(dictionary, index, 1, signal)) as Box<dyn Channel>
-            })
-            .collect(),
-        Function::AnalogInputs { range, .. } => inputs()
-            .map(|(channel, signal)| {
-                Box::new(AnalogInput::new(dictionary, channel, range, signal)) as Box<dyn Channel>
-            })
-            .collect(),
-        Function::AnalogOutputs { subindex, range, .. } => outputs()
-            .map(|(channel, signal)| {
-                let output = AnalogOutput::new(dictionary, channel, subindex, range, signal);
-                Box::new(output) as Box<dyn Channel>
-            })
-            .collect(),
-        Function::Stepper => {
-            let position = outputs().map(|(_, signal)| signal).next();
-            let mut switches = inputs().map(|(_, signal)| signal);
-            match (position, switches.next(), switches.next()) {
-                (Some(position), Some(first), Some(second)) => {
-                    vec![Box::new(Stepper::new(dictionary, position, [first, second]))]
-                }
-                _ => Vec::new(),
-            }
-        }
-    }
-}
-
-/// A device whose controller drives its channels itself.
-fn emulated(spec: &Spec, outputs: &[SignalId], inputs: &[SignalId]) -> Box<dyn Firmware> {
-    let areas = |channels: &[SignalId], switching: Option<&Switching>| {
-        let Some(switching) = switching else { return Vec::new() };
-        let area = DigitalArea {
-            sync_manager: switching.sync_manager,
-            at: switching.at,
-            signals: channels.to_vec(),
-        };
-        vec![area]
-    };
-    let words = spec.coding_switch().into_iter().zip(inputs).map(|(at, signal)| WordArea {
-        sync_manager: 0,
-        at,
-        signal: *signal,
-    });
-    let emulated = Emulated::new(
-        areas(outputs, spec.switching_outputs().as_ref()),
-        areas(inputs, spec.switching_inputs().as_ref()),
-    );
-    Box::new(emulated.with_words(words.collect()))
 }
 
 #[cfg(test)]

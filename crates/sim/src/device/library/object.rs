@@ -7,13 +7,19 @@ use linesman_proto::mailbox::coe::information::{Access, ObjectCode};
 use linesman_proto::mailbox::coe::{DataType, ObjectIndex};
 use linesman_proto::sii::SyncManagerKind;
 
-use super::image::{VENDOR, sync_manager_kind};
-use super::spec::{EntrySpec, PdoSpec, ProcessorSpec, SettingsSpec, Spec};
+use super::image::sync_manager_kind;
+use super::spec::{
+    COE_WITH_PDO_CONFIGURATION, EntrySpec, PdoSpec, ProcessorSpec, Rights, SettingsSpec, Spec,
+    VariableSpec,
+};
+use super::synchronisation::{Clocked, synchronisation};
 use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE, special};
 use crate::device::history;
 
 /// Device type of modular devices (ETG.5001).
 const MODULAR_DEVICE: u64 = 0x0000_1389;
+/// Device type of servo drives (CiA 402).
+const SERVO_DRIVE: u64 = 0x0002_0192;
 /// How many messages the diagnosis history keeps.
 const HISTORY_ROOM: u8 = 16;
 /// Data type of a PDO mapping.
@@ -41,19 +47,25 @@ pub(super) fn dictionary(
     individual: Individual,
 ) -> Dictionary {
     let mut objects = about(spec, processor, individual);
+    objects.extend(processor.variables.iter().map(variable));
     for pdo in spec.pdos {
         for channel in 0..pdo.channels {
-            objects.push(mapping(pdo, channel));
+            objects.push(mapping(spec, pdo, channel));
             values(pdo, channel, &mut objects);
         }
     }
     objects.push(sync_manager_types(spec));
+    let outputs = spec.pdos.iter().any(PdoSpec::is_output);
     for sync_manager in [2, 3] {
         objects.push(assignment(spec, sync_manager));
-        objects.push(synchronisation(sync_manager));
+        objects.push(synchronisation(sync_manager, clocked(spec), outputs));
     }
     for settings in processor.settings {
         objects.extend((0..settings.channels).map(|channel| setting(settings, channel)));
+    }
+    objects.extend([error_settings(), history::object(HISTORY_ROOM), timestamp(), restore()]);
+    if processor.function.is_drive() {
+        return Dictionary::new(objects, spec.coe.complete_access());
     }
     let profile = vec![
         Entry::number(1, "Index distance", DataType::UINT, 16, READ_ONLY, 0x10),
@@ -62,7 +74,6 @@ pub(super) fn dictionary(
     objects.push(record(0xF000, "Modular device profile", RECORD, profile));
     let code_word = Entry::number(0, "Code word", DataType::UDINT, 32, READ_WRITE, 0);
     objects.push(Object::variable(ObjectIndex(0xF008), code_word));
-    objects.extend([error_settings(), history::object(HISTORY_ROOM), timestamp(), restore()]);
     Dictionary::new(objects, spec.coe.complete_access())
 }
 
@@ -111,11 +122,11 @@ fn about(spec: &Spec, processor: &ProcessorSpec, individual: Individual) -> Vec<
     let number = |subindex, name: &str, value: u32| {
         Entry::number(subindex, name, DataType::UDINT, 32, READ_ONLY, u64::from(value))
     };
-    let device_type =
-        Entry::number(0, "Device type", DataType::UDINT, 32, READ_ONLY, MODULAR_DEVICE);
+    let profile = if processor.function.is_drive() { SERVO_DRIVE } else { MODULAR_DEVICE };
+    let device_type = Entry::number(0, "Device type", DataType::UDINT, 32, READ_ONLY, profile);
     let error_register = Entry::number(0, "Error register", DataType::USINT, 8, READ_ONLY, 0);
     let identity = vec![
-        number(1, "Vendor ID", VENDOR),
+        number(1, "Vendor ID", spec.vendor),
         number(2, "Product code", spec.product),
         number(3, "Revision", individual.revision),
         number(4, "Serial number", individual.serial),
@@ -146,16 +157,42 @@ pub(in crate::device) fn subindex_name(subindex: u8) -> String {
     format!("SubIndex {subindex:03}")
 }
 
-fn mapping(pdo: &PdoSpec, channel: u8) -> Object {
-    let entries = (1..).zip(pdo.entries).map(|(subindex, entry)| {
-        let index = u64::from(entry.index_of(channel));
-        let value = index << 16 | u64::from(entry.subindex) << 8 | u64::from(entry.bits);
-        Entry::number(subindex, &subindex_name(subindex), DataType::UDINT, 32, READ_ONLY, value)
+/// Entries that a PDO has room for where its mapping can be changed.
+const MAPPING_ROOM: usize = 8;
+
+fn mapping(spec: &Spec, pdo: &PdoSpec, channel: u8) -> Object {
+    let changeable = spec.coe == COE_WITH_PDO_CONFIGURATION;
+    let access = if changeable { SET_UP } else { READ_ONLY };
+    let room = if changeable { MAPPING_ROOM } else { 0 }.max(pdo.entries.len());
+    let entries = (1..=u8::MAX).take(room).map(|subindex| {
+        let value = pdo.entries.get(usize::from(subindex) - 1).map_or(0, |entry| {
+            let index = u64::from(entry.index_of(channel));
+            index << 16 | u64::from(entry.subindex) << 8 | u64::from(entry.bits)
+        });
+        Entry::number(subindex, &subindex_name(subindex), DataType::UDINT, 32, access, value)
     });
     let entries = entries.collect();
     let kind = if pdo.is_output() { "RxPDO-Map" } else { "TxPDO-Map" };
     let name = format!("{} {kind}", channel_name(pdo.name, channel, pdo.channels));
-    record(pdo.index_of(channel), &name, PDO_MAPPING, entries)
+    let mut object = record(pdo.index_of(channel), &name, PDO_MAPPING, entries);
+    if let Some(count) = object.entries.first_mut() {
+        count.value = vec![pdo.entries.len() as u8];
+        count.access = access;
+    }
+    object
+}
+
+/// An object with one value.
+fn variable(spec: &VariableSpec) -> Object {
+    let access = match spec.rights {
+        Rights::Read => READ_ONLY,
+        Rights::Input => Access(READ_ONLY.0 | Access::TX_PDO),
+        Rights::Output => Access(READ_WRITE.0 | Access::RX_PDO),
+        Rights::Setting => SETTING,
+    };
+    let (bits, value) = (u16::from(spec.bits), u64::from(spec.default));
+    let entry = Entry::number(0, spec.name, spec.data_type, bits, access, value);
+    Object::variable(ObjectIndex(spec.index), entry)
 }
 
 /// The objects that a PDO maps, added to those that others have mapped already.
@@ -166,6 +203,7 @@ fn values(pdo: &PdoSpec, channel: u8, objects: &mut Vec<Object>) {
         let value = value(entry, Access(READ_ONLY.0 | direction));
         match objects.iter_mut().find(|object| object.index == index) {
             Some(object) => insert(object, value),
+            None if entry.subindex == 0 => objects.push(Object::variable(index, value)),
             None => {
                 let name = channel_name(pdo.name, channel, pdo.channels);
                 objects.push(record(index.0, &name, RECORD, vec![value]));
@@ -182,9 +220,8 @@ fn value(entry: &EntrySpec, access: Access) -> Entry {
 /// Puts an entry where it belongs; one that is there already stays.
 pub(in crate::device) fn insert(object: &mut Object, entry: Entry) {
     let place = object.entries.binary_search_by_key(&entry.subindex, |entry| entry.subindex);
-    if let Err(at) = place {
-        object.entries.insert(at, entry);
-    }
+    let Err(at) = place else { return };
+    object.entries.insert(at, entry);
     let last = object.entries.last().map_or(0, |entry| entry.subindex);
     if let Some(count) = object.entries.first_mut() {
         count.value = vec![last];
@@ -226,33 +263,9 @@ fn assignment(spec: &Spec, sync_manager: u8) -> Object {
     object
 }
 
-/// The synchronisation parameters of outputs (0x1C32) or inputs (0x1C33): free run, or with the
-/// frames.
-pub(in crate::device) fn synchronisation(sync_manager: u8) -> Object {
-    const FREE_RUN_OR_FRAMES: u64 = 0x0003;
-    const SHORTEST_CYCLE_NS: u64 = 100_000;
-    let word = |subindex, name: &str, access, value| {
-        Entry::number(subindex, name, DataType::UINT, 16, access, value)
-    };
-    let double = |subindex, name: &str, value| {
-        Entry::number(subindex, name, DataType::UDINT, 32, READ_ONLY, value)
-    };
-    let mut sync_mode = word(0x01, "Sync mode", SET_UP, 0);
-    sync_mode.maximum = Some(1);
-    let entries = vec![
-        sync_mode,
-        double(0x02, "Cycle time", 0),
-        double(0x03, "Shift time", 0),
-        word(0x04, "Sync modes supported", READ_ONLY, FREE_RUN_OR_FRAMES),
-        double(0x05, "Minimum cycle time", SHORTEST_CYCLE_NS),
-        double(0x06, "Calc and copy time", 0),
-        word(0x0B, "SM event missed counter", READ_ONLY, 0),
-        word(0x0C, "Cycle exceeded counter", READ_ONLY, 0),
-        word(0x0D, "Shift too short counter", READ_ONLY, 0),
-        Entry::number(0x20, "Sync error", DataType::BOOL, 1, READ_ONLY, 0),
-    ];
-    let name = if sync_manager == 2 { "SM output parameter" } else { "SM input parameter" };
-    record(0x1C30 + u16::from(sync_manager), name, RECORD, entries)
+/// Which SYNC signals its operation modes switch on.
+fn clocked(spec: &Spec) -> Clocked {
+    Clocked::of(spec.op_modes.iter().map(|mode| mode.assign_activate))
 }
 
 fn setting(settings: &SettingsSpec, channel: u8) -> Object {

@@ -3,20 +3,21 @@
 
 use linesman_proto::mailbox::coe::DataType;
 use linesman_proto::register::SmControl;
+use linesman_proto::sii::Protocols;
 
 use super::LibraryType;
 use super::chip::ET1100;
 use super::spec::{
-    Behind, COE_WITH_COMPLETE_ACCESS, EntrySpec, Function, OpModeSpec, PdoSpec, ProcessorSpec,
-    SettingSpec, SettingsSpec, Spec, SyncManagerSpec, Use,
+    BECKHOFF, Behind, COE_WITH_COMPLETE_ACCESS, EntrySpec, Function, OpModeSpec, PdoSpec,
+    ProcessorSpec, SettingSpec, SettingsSpec, Spec, SyncManagerSpec, Use,
 };
 use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Ebus};
 
 /// SII byte 0: a processor of 8 bits, asynchronous.
-const PROCESSOR: u8 = 0x08;
+pub(super) const PROCESSOR: u8 = 0x08;
 /// SII byte 1: SYNC and latch unit on, no device emulation.
-const CLOCK_UNITS: u8 = 0x0C;
+pub(super) const CLOCK_UNITS: u8 = 0x0C;
 
 /// Mailbox out of 128 bytes.
 pub(super) const MAILBOX_OUT: SyncManagerSpec = mailbox_out(128);
@@ -28,7 +29,8 @@ pub(super) const NO_OUTPUTS: SyncManagerSpec =
 /// No inputs.
 pub(super) const NO_INPUTS: SyncManagerSpec = SyncManagerSpec { enable: 0, ..inputs(0) };
 
-const fn mailbox_out(length: u16) -> SyncManagerSpec {
+/// Mailbox out at the begin of the RAM.
+pub(super) const fn mailbox_out(length: u16) -> SyncManagerSpec {
     SyncManagerSpec {
         start: 0x1000,
         length,
@@ -38,7 +40,8 @@ const fn mailbox_out(length: u16) -> SyncManagerSpec {
     }
 }
 
-const fn mailbox_in(start: u16, length: u16) -> SyncManagerSpec {
+/// Mailbox in.
+pub(super) const fn mailbox_in(start: u16, length: u16) -> SyncManagerSpec {
     SyncManagerSpec {
         start,
         length,
@@ -71,16 +74,15 @@ pub(super) const fn inputs(length: u16) -> SyncManagerSpec {
 }
 
 /// With the frames, or with SYNC0 and SYNC1.
-pub(super) const SYNCHRONISED: &[OpModeSpec] = &[
-    OpModeSpec { name: "Synchron", assign_activate: 0 },
-    OpModeSpec { name: "DC-Synchron", assign_activate: 0x0700 },
-];
+pub(super) const SYNCHRONISED: &[OpModeSpec] =
+    &[OpModeSpec::free("Synchron"), OpModeSpec::with_clock("DC-Synchron", 0x0700)];
 
 /// A terminal with a processor.
 pub(super) const TERMINAL: Spec = Spec {
     name: "",
     title: "",
     group: "",
+    vendor: BECKHOFF,
     product: 0,
     revision: 0,
     chip: &ET1100,
@@ -88,70 +90,50 @@ pub(super) const TERMINAL: Spec = Spec {
     ebus_current_ma: 0,
     pdi_control: PROCESSOR,
     esc_configuration: CLOCK_UNITS,
+    sync_impulse: 0,
     pdi_configuration_2: 0,
     sync_managers: &[],
     pdos: &[],
+    protocols: Protocols::COE | Protocols::FOE,
     coe: COE_WITH_COMPLETE_ACCESS,
     behind: Behind::Plain,
     op_modes: &[],
 };
 
-const fn bit(index: u16, subindex: u8, name: &'static str) -> EntrySpec {
-    EntrySpec { index, subindex, name, data_type: DataType::BOOL, bits: 1 }
-}
-
-const fn number(
-    index: u16,
-    subindex: u8,
-    name: &'static str,
-    data_type: DataType,
-    bits: u8,
-) -> EntrySpec {
-    EntrySpec { index, subindex, name, data_type, bits }
-}
-
-const fn padding(bits: u8) -> EntrySpec {
-    EntrySpec { index: 0, subindex: 0, name: "", data_type: DataType(0), bits }
-}
-
-const fn pdo(
-    index: u16,
-    name: &'static str,
-    sync_manager: Option<u8>,
-    entries: &'static [EntrySpec],
-) -> PdoSpec {
-    PdoSpec { index, step: 1, channels: 1, name, sync_manager, entries }
-}
-
 /// Four outputs with diagnosis of each, and of the whole terminal.
 const DIAGNOSED_OUTPUTS: &[PdoSpec] = &[
     PdoSpec {
         channels: 4,
-        ..pdo(0x1600, "DIG Outputs Channel", Some(2), &[bit(0x7000, 1, "Output")])
+        ..PdoSpec::single(
+            0x1600,
+            "DIG Outputs Channel",
+            Some(2),
+            &[EntrySpec::bit(0x7000, 1, "Output")],
+        )
     },
     PdoSpec {
         channels: 4,
-        ..pdo(
+        ..PdoSpec::single(
             0x1A00,
             "DIG Inputs Channel",
             Some(3),
             &[
-                bit(0x6001, 1, "Overtemperature"),
-                bit(0x6001, 2, "Open load"),
-                bit(0x6001, 3, "Overvoltage"),
-                bit(0x6001, 4, "Short circuit"),
+                EntrySpec::bit(0x6001, 1, "Overtemperature"),
+                EntrySpec::bit(0x6001, 2, "Open load"),
+                EntrySpec::bit(0x6001, 3, "Overvoltage"),
+                EntrySpec::bit(0x6001, 4, "Short circuit"),
             ],
         )
     },
-    pdo(
+    PdoSpec::single(
         0x1A04,
         "DIG Inputs Device",
         Some(3),
         &[
-            bit(0xF600, 0x11, "Common fault"),
-            bit(0xF600, 0x12, "Undervoltage"),
-            bit(0xF600, 0x13, "Overvoltage"),
-            bit(0xF600, 0x14, "Overtemperature"),
+            EntrySpec::bit(0xF600, 0x11, "Common fault"),
+            EntrySpec::bit(0xF600, 0x12, "Undervoltage"),
+            EntrySpec::bit(0xF600, 0x13, "Overvoltage"),
+            EntrySpec::bit(0xF600, 0x14, "Overtemperature"),
         ],
     ),
 ];
@@ -161,76 +143,82 @@ const DIAGNOSED_OUTPUTS_PROCESSOR: ProcessorSpec = ProcessorSpec {
     hardware_version: "02",
     software_version: "01",
     settings: &[],
+    variables: &[],
     times: ResponseTimes::TERMINAL,
 };
 
 /// Encoder and motor of one axis.
 const AXIS: &[PdoSpec] = &[
-    pdo(
+    PdoSpec::single(
         0x1600,
         "ENC Control compact",
         Some(2),
         &[
-            bit(0x7000, 0x01, "Enable latch C"),
-            bit(0x7000, 0x02, "Enable latch extern on positive edge"),
-            bit(0x7000, 0x03, "Set counter"),
-            bit(0x7000, 0x04, "Enable latch extern on negative edge"),
-            padding(4),
-            padding(8),
-            number(0x7000, 0x11, "Set counter value", DataType::UINT, 16),
+            EntrySpec::bit(0x7000, 0x01, "Enable latch C"),
+            EntrySpec::bit(0x7000, 0x02, "Enable latch extern on positive edge"),
+            EntrySpec::bit(0x7000, 0x03, "Set counter"),
+            EntrySpec::bit(0x7000, 0x04, "Enable latch extern on negative edge"),
+            EntrySpec::padding(4),
+            EntrySpec::padding(8),
+            EntrySpec::number(0x7000, 0x11, "Set counter value", DataType::UINT, 16),
         ],
     ),
-    pdo(
+    PdoSpec::single(
         0x1602,
         "STM Control",
         Some(2),
         &[
-            bit(0x7010, 0x01, "Enable"),
-            bit(0x7010, 0x02, "Reset"),
-            bit(0x7010, 0x03, "Reduce torque"),
-            padding(5),
-            padding(8),
+            EntrySpec::bit(0x7010, 0x01, "Enable"),
+            EntrySpec::bit(0x7010, 0x02, "Reset"),
+            EntrySpec::bit(0x7010, 0x03, "Reduce torque"),
+            EntrySpec::padding(5),
+            EntrySpec::padding(8),
         ],
     ),
-    pdo(0x1604, "STM Velocity", Some(2), &[number(0x7010, 0x21, "Velocity", DataType::INT, 16)]),
-    pdo(
+    PdoSpec::single(
+        0x1604,
+        "STM Velocity",
+        Some(2),
+        &[EntrySpec::number(0x7010, 0x21, "Velocity", DataType::INT, 16)],
+    ),
+    PdoSpec::single(
         0x1A00,
         "ENC Status compact",
         Some(3),
         &[
-            bit(0x6000, 0x01, "Latch C valid"),
-            bit(0x6000, 0x02, "Latch extern valid"),
-            bit(0x6000, 0x03, "Set counter done"),
-            bit(0x6000, 0x04, "Counter underflow"),
-            bit(0x6000, 0x05, "Counter overflow"),
-            padding(3),
-            padding(5),
-            bit(0x6000, 0x0E, "Sync error"),
-            padding(1),
-            bit(0x6000, 0x10, "TxPDO Toggle"),
-            number(0x6000, 0x11, "Counter value", DataType::UINT, 16),
-            number(0x6000, 0x12, "Latch value", DataType::UINT, 16),
+            EntrySpec::bit(0x6000, 0x01, "Latch C valid"),
+            EntrySpec::bit(0x6000, 0x02, "Latch extern valid"),
+            EntrySpec::bit(0x6000, 0x03, "Set counter done"),
+            EntrySpec::bit(0x6000, 0x04, "Counter underflow"),
+            EntrySpec::bit(0x6000, 0x05, "Counter overflow"),
+            EntrySpec::padding(3),
+            EntrySpec::padding(5),
+            EntrySpec::bit(0x6000, 0x0E, "Sync error"),
+            EntrySpec::padding(1),
+            EntrySpec::bit(0x6000, 0x10, "TxPDO Toggle"),
+            EntrySpec::number(0x6000, 0x11, "Counter value", DataType::UINT, 16),
+            EntrySpec::number(0x6000, 0x12, "Latch value", DataType::UINT, 16),
         ],
     ),
-    pdo(
+    PdoSpec::single(
         0x1A03,
         "STM Status",
         Some(3),
         &[
-            bit(0x6010, 0x01, "Ready to enable"),
-            bit(0x6010, 0x02, "Ready"),
-            bit(0x6010, 0x03, "Warning"),
-            bit(0x6010, 0x04, "Error"),
-            bit(0x6010, 0x05, "Moving positive"),
-            bit(0x6010, 0x06, "Moving negative"),
-            bit(0x6010, 0x07, "Torque reduced"),
-            padding(1),
-            padding(3),
-            bit(0x6010, 0x0C, "Digital input 1"),
-            bit(0x6010, 0x0D, "Digital input 2"),
-            bit(0x6010, 0x0E, "Sync error"),
-            padding(1),
-            bit(0x6010, 0x10, "TxPDO Toggle"),
+            EntrySpec::bit(0x6010, 0x01, "Ready to enable"),
+            EntrySpec::bit(0x6010, 0x02, "Ready"),
+            EntrySpec::bit(0x6010, 0x03, "Warning"),
+            EntrySpec::bit(0x6010, 0x04, "Error"),
+            EntrySpec::bit(0x6010, 0x05, "Moving positive"),
+            EntrySpec::bit(0x6010, 0x06, "Moving negative"),
+            EntrySpec::bit(0x6010, 0x07, "Torque reduced"),
+            EntrySpec::padding(1),
+            EntrySpec::padding(3),
+            EntrySpec::bit(0x6010, 0x0C, "Digital input 1"),
+            EntrySpec::bit(0x6010, 0x0D, "Digital input 2"),
+            EntrySpec::bit(0x6010, 0x0E, "Sync error"),
+            EntrySpec::padding(1),
+            EntrySpec::bit(0x6010, 0x10, "TxPDO Toggle"),
         ],
     ),
 ];
@@ -271,15 +259,8 @@ const AXIS_PROCESSOR: ProcessorSpec = ProcessorSpec {
             }],
         },
     ],
+    variables: &[],
     times: ResponseTimes::DRIVE,
-};
-
-const SWITCH_PORT_PROCESSOR: ProcessorSpec = ProcessorSpec {
-    function: Function::None,
-    hardware_version: "10",
-    software_version: "11",
-    settings: &[],
-    times: ResponseTimes::TERMINAL,
 };
 
 const fn single(spec: &'static [Spec; 1]) -> LibraryType {
@@ -301,22 +282,6 @@ pub(super) const TYPES: &[LibraryType] = &[
         ..TERMINAL
     }]),
     single(&[Spec {
-        name: "EL6601",
-        title: "EL6601 1 Port Switch (Ethernet, CoE)",
-        group: "Communication",
-        product: 0x19C9_3052,
-        revision: 0x0015_0000,
-        ebus_current_ma: 260,
-        sync_managers: &[
-            mailbox_out(1_024),
-            mailbox_in(0x1400, 1_024),
-            SyncManagerSpec { start: 0x1800, ..NO_OUTPUTS },
-            SyncManagerSpec { start: 0x1C00, ..NO_INPUTS },
-        ],
-        behind: Behind::Processor(&SWITCH_PORT_PROCESSOR),
-        ..TERMINAL
-    }]),
-    single(&[Spec {
         name: "EL7041",
         title: "EL7041 1Ch. Stepper motor output stage (50V, 5A)",
         group: "DriveAxisTerminals",
@@ -326,10 +291,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(8), inputs(8)],
         pdos: AXIS,
         behind: Behind::Processor(&AXIS_PROCESSOR),
-        op_modes: &[
-            OpModeSpec { name: "Synchron", assign_activate: 0 },
-            OpModeSpec { name: "DC-Synchron", assign_activate: 0x0300 },
-        ],
+        op_modes: &[OpModeSpec::free("Synchron"), OpModeSpec::with_clock("DC-Synchron", 0x0300)],
         ..TERMINAL
     }]),
 ];

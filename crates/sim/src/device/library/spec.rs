@@ -20,6 +20,8 @@ pub(super) struct Spec {
     pub(super) title: &'static str,
     /// The group it is sold under.
     pub(super) group: &'static str,
+    /// Who makes it.
+    pub(super) vendor: u32,
     /// Product code.
     pub(super) product: u32,
     /// Variant in the low word, revision in the high word.
@@ -34,12 +36,16 @@ pub(super) struct Spec {
     pub(super) pdi_control: u8,
     /// SII byte 1: device emulation, clock units.
     pub(super) esc_configuration: u8,
+    /// SII word 2: length of the SYNC pulse in units of 10 ns.
+    pub(super) sync_impulse: u16,
     /// SII word 3.
     pub(super) pdi_configuration_2: u16,
     /// SyncManagers, in order.
     pub(super) sync_managers: &'static [SyncManagerSpec],
     /// Process data.
     pub(super) pdos: &'static [PdoSpec],
+    /// What its mailbox speaks, as [`Protocols`](linesman_proto::sii::Protocols); 0 for a device without.
+    pub(super) protocols: u16,
     /// SII, category General: what its CoE can do; 0 for a device without.
     pub(super) coe: CoeDetails,
     /// What is behind the controller.
@@ -52,8 +58,15 @@ pub(super) struct Spec {
 pub(super) const COE: CoeDetails = CoeDetails(0x07);
 /// The same with complete access.
 pub(super) const COE_WITH_COMPLETE_ACCESS: CoeDetails = CoeDetails(0x27);
+/// Complete access, and PDO mappings can be changed.
+pub(super) const COE_WITH_PDO_CONFIGURATION: CoeDetails = CoeDetails(0x2F);
 /// No CoE.
 pub(super) const NO_COE: CoeDetails = CoeDetails(0x00);
+
+/// Beckhoff, who makes the products that most types are named after.
+pub(super) const BECKHOFF: u32 = 2;
+/// Nobody: the generic devices are no products.
+pub(super) const NOBODY: u32 = 0xFFFF_FFF0;
 
 /// What is behind a controller.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +75,11 @@ pub(super) enum Behind {
     Plain,
     /// A coding switch that can be read at this address.
     CodingSwitch(RegisterAddress),
+    /// Analogue outputs that play several samples in each cycle, one SyncManager each.
+    Oversampling {
+        /// How many.
+        channels: u8,
+    },
     /// A processor.
     Processor(&'static ProcessorSpec),
 }
@@ -77,6 +95,8 @@ pub(super) struct ProcessorSpec {
     pub(super) software_version: &'static str,
     /// Objects with settings.
     pub(super) settings: &'static [SettingsSpec],
+    /// Objects with one value each, beside those that process data bring.
+    pub(super) variables: &'static [VariableSpec],
     /// How quick it is.
     pub(super) times: ResponseTimes,
 }
@@ -107,11 +127,31 @@ pub(super) enum Function {
         /// What they give.
         range: Range,
     },
-    /// One axis.
+    /// Analogue inputs 0x60n0, and analogue outputs 0x70n0 whose channels are counted on.
+    AnalogInputsOutputs {
+        /// How many inputs.
+        inputs: u8,
+        /// How many outputs.
+        outputs: u8,
+        /// What they measure and give.
+        range: Range,
+    },
+    /// One axis of a stepper motor.
     Stepper,
+    /// One axis of a drive of CiA 402.
+    Cia402,
+    /// One axis of a drive that speaks SoE.
+    Sercos,
+    /// Time of this network and of another one.
+    TwoTimes,
 }
 
 impl Function {
+    /// Whether it moves an axis, and has a profile of drives.
+    pub(super) const fn is_drive(self) -> bool {
+        matches!(self, Self::Cia402 | Self::Sercos)
+    }
+
     /// Signals driven and taken.
     const fn signals(self) -> (usize, usize) {
         match self {
@@ -120,13 +160,19 @@ impl Function {
                 (channels as usize, 0)
             }
             Self::AnalogInputs { channels, .. } => (0, channels as usize),
+            Self::AnalogInputsOutputs { inputs, outputs, .. } => {
+                (outputs as usize, inputs as usize)
+            }
             Self::Stepper => (1, 2),
+            Self::Cia402 => (1, 4),
+            Self::Sercos => (1, 1),
+            Self::TwoTimes => (0, 1),
         }
     }
 }
 
 /// A run of objects with settings that differ in their channel only.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct SettingsSpec {
     /// Index of the first; 0x10 more for each further one.
     pub(super) index: u16,
@@ -139,7 +185,7 @@ pub(super) struct SettingsSpec {
 }
 
 /// A setting.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct SettingSpec {
     /// Its subindex.
     pub(super) subindex: u8,
@@ -155,6 +201,36 @@ pub(super) struct SettingSpec {
     pub(super) maximum: Option<u32>,
 }
 
+/// An object with one value, subindex 0.
+#[derive(Debug)]
+pub(super) struct VariableSpec {
+    /// Its index.
+    pub(super) index: u16,
+    /// Its name.
+    pub(super) name: &'static str,
+    /// Its type.
+    pub(super) data_type: DataType,
+    /// Its bits.
+    pub(super) bits: u8,
+    /// Its value after power-on.
+    pub(super) default: u32,
+    /// What can be done with it.
+    pub(super) rights: Rights,
+}
+
+/// What can be done with an object of one value.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Rights {
+    /// It can be read.
+    Read,
+    /// It can be read, and mapped into inputs.
+    Input,
+    /// It can be written, and mapped into outputs.
+    Output,
+    /// It can be written, and is kept.
+    Setting,
+}
+
 /// An operation mode with (or, for `assign_activate` 0, without) distributed clocks.
 #[derive(Debug)]
 pub(super) struct OpModeSpec {
@@ -162,6 +238,20 @@ pub(super) struct OpModeSpec {
     pub(super) name: &'static str,
     /// What is written to 0x0980.
     pub(super) assign_activate: u16,
+    /// Positive: a SYNC0 every n cycles of the MainDevice. Negative: n times within a cycle. 0: none.
+    pub(super) sync0_factor: i16,
+}
+
+impl OpModeSpec {
+    /// With the frames, or as the device likes.
+    pub(super) const fn free(name: &'static str) -> Self {
+        Self { name, assign_activate: 0, sync0_factor: 0 }
+    }
+
+    /// With a SYNC0 in each cycle of the MainDevice.
+    pub(super) const fn with_clock(name: &'static str, assign_activate: u16) -> Self {
+        Self { name, assign_activate, sync0_factor: 1 }
+    }
 }
 
 /// A SyncManager as the SII describes it.
@@ -179,6 +269,27 @@ pub(super) struct SyncManagerSpec {
     pub(super) kind: Use,
 }
 
+impl SyncManagerSpec {
+    /// There is none: FMMUs read registers there.
+    pub(super) const VIRTUAL: u8 = 0x04;
+
+    /// Registers that FMMUs read; no SyncManager of the controller guards them.
+    pub(super) const fn registers(start: u16) -> Self {
+        Self {
+            start,
+            length: 0,
+            control: SmControl::INPUTS_WITHOUT_EVENT,
+            enable: Self::VIRTUAL,
+            kind: Use::Inputs,
+        }
+    }
+
+    /// Whether it stands for registers.
+    pub(super) const fn is_virtual(&self) -> bool {
+        self.enable & Self::VIRTUAL != 0
+    }
+}
+
 /// What a SyncManager is for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Use {
@@ -193,7 +304,7 @@ pub(super) enum Use {
 }
 
 /// A run of PDOs that differ in their channel only.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct PdoSpec {
     /// Index of the first: 0x1600 and up for outputs, 0x1A00 and up for inputs.
     pub(super) index: u16,
@@ -210,9 +321,23 @@ pub(super) struct PdoSpec {
 }
 
 impl PdoSpec {
-    /// Whether it carries outputs.
+    /// A PDO on its own.
+    pub(super) const fn single(
+        index: u16,
+        name: &'static str,
+        sync_manager: Option<u8>,
+        entries: &'static [EntrySpec],
+    ) -> Self {
+        Self { index, step: 1, channels: 1, name, sync_manager, entries }
+    }
+
+    /// Whether it carries outputs. The telegrams of servo drives have numbers of their own: 16 is
+    /// what a drive tells, 24 what it is told.
     pub(super) const fn is_output(&self) -> bool {
-        self.index < 0x1A00
+        match self.index {
+            16 => false,
+            index => index < 0x1A00,
+        }
     }
 
     /// The index of the PDO of a channel.
@@ -222,7 +347,7 @@ impl PdoSpec {
 }
 
 /// A piece of a PDO.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct EntrySpec {
     /// Index of its object for the first channel; 0x10 more for each further one. 0 is padding.
     pub(super) index: u16,
@@ -237,19 +362,31 @@ pub(super) struct EntrySpec {
 }
 
 impl EntrySpec {
+    /// A bit.
+    pub(super) const fn bit(index: u16, subindex: u8, name: &'static str) -> Self {
+        Self { index, subindex, name, data_type: DataType::BOOL, bits: 1 }
+    }
+
+    /// A number.
+    pub(super) const fn number(
+        index: u16,
+        subindex: u8,
+        name: &'static str,
+        data_type: DataType,
+        bits: u8,
+    ) -> Self {
+        Self { index, subindex, name, data_type, bits }
+    }
+
+    /// Bits that mean nothing.
+    pub(super) const fn padding(bits: u8) -> Self {
+        Self { index: 0, subindex: 0, name: "", data_type: DataType(0), bits }
+    }
+
     /// The index of its object for a channel; 0 for padding.
     pub(super) const fn index_of(&self, channel: u8) -> u16 {
         if self.index == 0 { 0 } else { self.index + 0x10 * channel as u16 }
     }
-}
-
-/// Channels that a controller switches without a processor.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Switching {
-    /// The SyncManager that guards them.
-    pub(super) sync_manager: u8,
-    /// Where their bits begin.
-    pub(super) at: RegisterAddress,
 }
 
 impl Spec {
@@ -262,6 +399,7 @@ impl Spec {
     pub(super) fn output_channels(&self) -> usize {
         match self.behind {
             Behind::Processor(processor) => processor.function.signals().0,
+            Behind::Oversampling { channels } => usize::from(channels),
             Behind::Plain | Behind::CodingSwitch(_) => self.channels(true),
         }
     }
@@ -270,20 +408,34 @@ impl Spec {
     pub(super) fn input_channels(&self) -> usize {
         match self.behind {
             Behind::Processor(processor) => processor.function.signals().1,
+            Behind::Oversampling { .. } => 0,
             Behind::Plain | Behind::CodingSwitch(_) => self.channels(false),
         }
     }
 
+    /// Pieces of process data that a controller without a processor has, padding and registers
+    /// aside.
     fn channels(&self, outputs: bool) -> usize {
-        let mine = self.pdos.iter().filter(|pdo| pdo.is_output() == outputs);
-        mine.map(|pdo| usize::from(pdo.channels)).sum()
+        let mine = (0..).zip(self.sync_managers).filter(|(_, manager)| !manager.is_virtual());
+        mine.flat_map(|(index, _)| self.assigned(index))
+            .filter(|pdo| pdo.is_output() == outputs)
+            .map(|pdo| {
+                let entries = pdo.entries.iter().filter(|entry| entry.index != 0).count();
+                entries * usize::from(pdo.channels)
+            })
+            .sum()
+    }
+
+    /// The PDOs that a SyncManager has by default.
+    pub(super) fn assigned(&self, sync_manager: u8) -> impl Iterator<Item = &'static PdoSpec> {
+        self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(sync_manager))
     }
 
     /// Where its coding switch can be read.
     pub(super) const fn coding_switch(&self) -> Option<RegisterAddress> {
         match self.behind {
             Behind::CodingSwitch(at) => Some(at),
-            Behind::Plain | Behind::Processor(_) => None,
+            Behind::Plain | Behind::Processor(_) | Behind::Oversampling { .. } => None,
         }
     }
 
@@ -301,24 +453,5 @@ impl Spec {
             })
         };
         MailboxPair { receive: area(Use::MailboxOut), send: area(Use::MailboxIn) }
-    }
-
-    /// Where the outputs are that the controller switches itself.
-    pub(super) fn switching_outputs(&self) -> Option<Switching> {
-        self.switching(Use::Outputs)
-    }
-
-    /// Where the inputs are that the controller takes itself.
-    pub(super) fn switching_inputs(&self) -> Option<Switching> {
-        self.switching(Use::Inputs).filter(|_| self.coding_switch().is_none())
-    }
-
-    fn switching(&self, kind: Use) -> Option<Switching> {
-        (0..).zip(self.sync_managers).find(|(_, manager)| manager.kind == kind).map(
-            |(sync_manager, manager)| Switching {
-                sync_manager,
-                at: RegisterAddress(manager.start),
-            },
-        )
     }
 }

@@ -3,6 +3,7 @@
 use linesman_config::profile::DeviceProfile;
 use linesman_proto::sii::{Checksum, Direction, Image, SyncManagerKind};
 
+use super::spec::NOBODY;
 use super::{LibraryType, build, build_revision, find, types};
 use crate::device::Signals;
 use crate::device::tests::Device;
@@ -18,7 +19,8 @@ fn every_type_is_found_once_and_bears_a_sound_image() {
         for one in &built {
             let image = Image::parse(&one.sii).unwrap();
             assert_eq!(image.oddities, [], "{name}");
-            assert_eq!(image.identity.vendor_id, 2, "{name}");
+            let vendor = if find(name).unwrap().group() == "Generic" { NOBODY } else { 2 };
+            assert_eq!(image.identity.vendor_id, vendor, "{name}");
             assert_eq!(image.identity.serial_number, 4_711, "{name}");
             assert_eq!(image.checksum, Checksum::Valid, "{name}");
             assert_eq!(image.build().unwrap(), one.sii, "{name}");
@@ -65,34 +67,47 @@ fn profiles_of_digital_terminals() {
 
 #[test]
 fn profiles_of_devices_with_a_processor() {
-    // type, bytes of outputs, bytes of inputs
+    // type, bytes of outputs, bytes of inputs, protocols of the mailbox
     let table = [
-        ("EL2014", 1, 3),
-        ("EL3004", 0, 16),
-        ("EL3102", 0, 8),
-        ("EL3104", 0, 16),
-        ("EL3154", 0, 16),
-        ("EL3162", 0, 8),
-        ("EL4004", 8, 0),
-        ("EL4102", 4, 0),
-        ("EL4112", 4, 0),
-        ("EL6601", 0, 0),
-        ("EL7041", 8, 8),
-        ("EP4174", 8, 0),
+        ("EL2014", 1, 3, 0x0C),
+        ("EL3004", 0, 16, 0x0C),
+        ("EL3102", 0, 8, 0x0C),
+        ("EL3104", 0, 16, 0x0C),
+        ("EL3154", 0, 16, 0x0C),
+        ("EL3162", 0, 8, 0x0C),
+        ("EL4004", 8, 0, 0x0C),
+        ("EL4102", 4, 0, 0x0C),
+        ("EL4112", 4, 0, 0x0C),
+        ("EL6601", 0, 0, 0x0E),
+        ("EL6614", 0, 0, 0x0E),
+        ("EL6688", 0, 22, 0x0E),
+        ("EL6692", 0, 2, 0x2F),
+        ("EL6695", 0, 2, 0x2F),
+        ("EL7041", 8, 8, 0x0C),
+        ("EP4174", 8, 0, 0x0C),
+        ("EK1914", 8, 8, 0x0C),
+        ("AX5103", 6, 6, 0x18),
+        ("CiA402", 12, 14, 0x0C),
+        ("Analog", 8, 16, 0x0C),
     ];
-    for (name, outputs, inputs) in table {
+    for (name, outputs, inputs, protocols) in table {
         let built = build(name, 1, &mut Signals::default()).unwrap();
         let image = Image::parse(&built[0].sii).unwrap();
         let profile = DeviceProfile::from_sii(&image);
         assert_eq!(profile.process_len(Direction::Outputs), outputs, "{name}");
         assert_eq!(profile.process_len(Direction::Inputs), inputs, "{name}");
         let mailbox = profile.mailbox.unwrap();
-        let size = if name == "EL6601" { 1_024 } else { 128 };
-        assert_eq!(mailbox.areas.receive.offset.0, 0x1000, "{name}");
+        let size = match name {
+            "EL6601" | "EL6614" | "EL6688" | "EL6695" => 1_024,
+            "EK1914" | "EL6692" | "CiA402" => 256,
+            _ => 128,
+        };
+        let start = if name == "AX5103" { 0x1800 } else { 0x1000 };
+        assert_eq!(mailbox.areas.receive.offset.0, start, "{name}");
         assert_eq!((mailbox.areas.receive.size, mailbox.areas.send.size), (size, size), "{name}");
-        let old = ["EL3004", "EL3102", "EL3162"].contains(&name);
+        let old = ["EL3004", "EL3102", "EL3162", "EK1914", "AX5103"].contains(&name);
         assert_eq!(mailbox.complete_access, !old, "{name}");
-        assert!(mailbox.protocols.0 == 0x000C, "{name}");
+        assert_eq!(mailbox.protocols.0, protocols, "{name}");
         assert!(!profile.device_emulation, "{name}");
         for manager in &profile.process {
             let record = image.sync_managers()[usize::from(manager.index)];

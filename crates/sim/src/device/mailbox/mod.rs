@@ -8,6 +8,7 @@ mod coe;
 mod foe;
 mod information;
 mod outbox;
+mod soe;
 
 use std::collections::VecDeque;
 
@@ -15,6 +16,7 @@ use linesman_proto::mailbox::coe::{Emergency, Message as CoeMessage};
 use linesman_proto::mailbox::{
     Counter, ErrorReply, ErrorReplyCode, Header, MailboxError, MailboxType, Message,
 };
+use linesman_proto::sii::Protocols;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
@@ -53,6 +55,7 @@ pub struct Served<'a> {
 /// The mailbox.
 #[derive(Clone, Debug)]
 pub struct Mailbox {
+    protocols: Protocols,
     coe: CoeServer,
     foe: FoeServer,
     response_time: Span,
@@ -65,10 +68,11 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// A mailbox that answers after this time.
+    /// A mailbox that speaks these protocols and answers after this time.
     #[must_use]
-    pub fn new(response_time: Span) -> Self {
+    pub fn new(response_time: Span, protocols: Protocols) -> Self {
         Self {
+            protocols,
             coe: CoeServer::default(),
             foe: FoeServer::default(),
             response_time,
@@ -82,7 +86,7 @@ impl Mailbox {
 
     /// INIT is left, or entered: whatever was under way is forgotten.
     pub fn restart(&mut self) {
-        *self = Self::new(self.response_time);
+        *self = Self::new(self.response_time, self.protocols);
     }
 
     /// Tells the MainDevice of an error on the device's own account, as soon as there is room.
@@ -168,13 +172,17 @@ impl Mailbox {
         }
         self.last_received = header.counter;
         let unsupported = || Err(ErrorReplyCode::UnsupportedProtocol);
+        let boots = served.state == AlState::Boot;
         let answers = match header.kind {
-            MailboxType::Coe if served.state != AlState::Boot && !served.dictionary.is_empty() => {
+            MailboxType::Coe if !boots && self.protocols.has(Protocols::COE) => {
                 self.coe.answer(message.data, served, answer_room(pdi))
             }
             MailboxType::Foe if !served.files.is_empty() => {
                 let rooms = foe::Rooms { requests: request_room(pdi), answers: answer_room(pdi) };
                 self.foe.answer(message.data, served.files, served.state, now, rooms)
+            }
+            MailboxType::Soe if !boots && self.protocols.has(Protocols::SOE) => {
+                Ok(soe::answer(message.data).into_iter().collect())
             }
             // Nobody answers an error with an error.
             MailboxType::Error => return,

@@ -5,28 +5,31 @@
 
 mod areas;
 mod check;
+mod in_step;
 mod note;
 mod process_image;
+mod synchronisation;
 mod update;
 
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::register as r;
-use linesman_proto::sii::{Direction, MailboxPair};
+use linesman_proto::sii::{Direction, MailboxPair, Protocols};
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
 
 use self::areas::Areas;
 pub use self::areas::ProcessBuffer;
+use self::synchronisation::Synchronisation;
 use super::application::Channel;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::dictionary::Dictionary;
 use super::files::Files;
-use super::firmware::Firmware;
+use super::firmware::{Firmware, SampleAgain};
 use super::history::History;
 use super::mailbox::{Mailbox, Served};
 use super::signal::Signals;
 use super::trouble::{Trouble, Troubles};
-use crate::controller::Pdi;
+use crate::controller::{Pdi, SyncSignal};
 
 /// Emergencies that wait for a mailbox; further ones are forgotten.
 const UNTOLD: usize = 8;
@@ -85,6 +88,8 @@ pub struct Description {
     pub buffers: Vec<ProcessBuffer>,
     /// The mailbox it likes best; a longer one it does not take. Without a size there is none.
     pub mailbox: MailboxPair,
+    /// What its mailbox speaks.
+    pub protocols: Protocols,
     /// The mailbox in BOOT, for a device that knows BOOT.
     pub bootstrap: Option<MailboxPair>,
     /// How quick it is.
@@ -99,6 +104,7 @@ pub struct Processor {
     dictionary: Dictionary,
     mailbox: Mailbox,
     process_data: Areas,
+    synchronisation: Synchronisation,
     /// The step that is being worked on.
     step: Option<Step>,
     next_sample: Instant,
@@ -131,14 +137,12 @@ impl Processor {
     /// A device that has not started yet.
     #[must_use]
     pub fn new(description: Description) -> Self {
-        let mut application_layer = ApplicationLayer::new(description.bootstrap.is_some());
-        // Until somebody sets another number.
-        application_layer.identify(0);
         Self {
-            application_layer,
+            application_layer: ApplicationLayer::new(description.bootstrap.is_some()),
             dictionary: description.dictionary.clone(),
-            mailbox: Mailbox::new(description.times.mailbox),
+            mailbox: Mailbox::new(description.times.mailbox, description.protocols),
             process_data: Areas::default(),
+            synchronisation: Synchronisation::new(&description.dictionary),
             step: None,
             next_sample: Instant::ZERO,
             files: Files::default(),
@@ -160,6 +164,16 @@ impl Processor {
         let now = pdi.now();
         for channel in &mut self.description.channels {
             channel.make_safe(now, &self.dictionary, pdi.signals_mut());
+        }
+        self.hear_channels();
+    }
+
+    /// What channels have to tell of waits for the mailbox.
+    fn hear_channels(&mut self) {
+        for emergency in self.description.channels.iter_mut().filter_map(|one| one.emergency()) {
+            if self.emergencies.len() < UNTOLD {
+                self.emergencies.push(emergency);
+            }
         }
     }
 
@@ -257,6 +271,8 @@ impl Processor {
         let areas = Areas::of(&self.dictionary, &self.description.buffers)?;
         check::modules(&self.dictionary)?;
         check::process_data(pdi, &areas, self.description.mailbox.is_present())?;
+        let outputs = areas.len(Direction::Outputs) > 0;
+        self.synchronisation.set_up(&mut self.dictionary, outputs, pdi)?;
         self.process_data = areas;
         Ok(())
     }
@@ -281,6 +297,9 @@ impl Processor {
     fn go_operational(&mut self, step: Step, now: Instant, pdi: &mut Pdi<'_>) -> Outcome {
         if let Err(code) = self.check_process_data(pdi) {
             return Outcome::Failed(AlState::PreOp, code);
+        }
+        if let Some(outcome) = self.wait_for_clock(step, now) {
+            return outcome;
         }
         if !self.has_outputs() {
             return Outcome::Entered;
@@ -346,26 +365,29 @@ impl Processor {
         for channel in &mut self.description.channels {
             channel.drive(now, &self.dictionary, signals);
         }
+        self.hear_channels();
     }
 
     fn serve_process_data(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if !ApplicationLayer::is_operational(pdi) || !self.has_outputs() {
-            return;
-        }
-        if self.watchdog_ran_out(pdi) {
+        let operational = ApplicationLayer::is_operational(pdi);
+        if operational && self.has_outputs() && self.watchdog_ran_out(pdi) {
             self.fall(pdi, AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG);
-        } else if self.take_outputs(pdi) {
-            self.drive_outputs(now, pdi.signals_mut());
+        } else if ApplicationLayer::state(pdi).has_inputs() {
+            self.serve_outputs(now, pdi);
         }
+        self.serve_due(now, pdi);
     }
 
     fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.next_sample = now + self.description.times.sample;
+        let time = pdi.system_time();
         if !self.troubles.has(Trouble::FrozenApplication) {
             for channel in &mut self.description.channels {
+                channel.tell_time(time);
                 channel.sample(now, &mut self.dictionary, pdi.signals());
             }
         }
+        self.hear_channels();
         self.process_data.put_inputs(pdi, &self.dictionary, &mut self.buffer);
     }
 
@@ -386,6 +408,7 @@ impl Firmware for Processor {
         self.files.take_broken_update();
         self.start_new_firmware(pdi);
         self.process_data = Areas::default();
+        self.synchronisation.start(&self.description.dictionary, &mut self.dictionary);
         self.step = None;
         self.emergencies.clear();
         self.next_sample = now;
@@ -415,7 +438,8 @@ impl Firmware for Processor {
             None
         };
         let step = self.step.map(|step| if step.due > now { step.due } else { step.deadline });
-        [again, step].into_iter().flatten().min()
+        let due = self.synchronisation.next(ApplicationLayer::is_operational(pdi));
+        [again, step, due].into_iter().flatten().min()
     }
 
     fn refuse(&mut self, refusal: Option<Refusal>) {
@@ -463,9 +487,28 @@ impl Firmware for Processor {
     }
 
     fn sample(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
+        let with_frames = self.synchronisation.samples_with_frames();
+        if with_frames && now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
             self.sample_inputs(now, pdi);
         }
+    }
+
+    fn sample_again(&self, pdi: &Pdi<'_>) -> SampleAgain {
+        let samples =
+            self.synchronisation.samples_with_frames() && ApplicationLayer::state(pdi).has_inputs();
+        SampleAgain::From(if samples { self.next_sample } else { Instant::MAX })
+    }
+
+    fn synchronises(&self) -> bool {
+        true
+    }
+
+    fn sync(&mut self, signal: SyncSignal, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
+        self.keep_step(signal, now, pdi)
+    }
+
+    fn slow_down(&mut self, takes: Option<Span>) {
+        self.synchronisation.set_takes(takes);
     }
 
     fn stop(&mut self, signals: &mut Signals) {

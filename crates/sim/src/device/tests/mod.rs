@@ -17,12 +17,15 @@ use super::Signals;
 use super::library::{Built, build};
 use crate::controller::tests::rig::{Bench, logical};
 
+mod files;
+mod history;
 mod hostile;
 mod mailbox;
 mod process_data;
 mod recorded;
 mod sdo;
 mod state;
+mod synchronisation;
 
 /// Where its process data lie in the logical memory: outputs first.
 const LOGICAL: u32 = 0x0001_0000;
@@ -93,7 +96,9 @@ impl Device {
                 if manager.direction != direction {
                     continue;
                 }
-                self.guard(manager.index, manager.start.0, manager.len, manager.control);
+                if !manager.is_virtual {
+                    self.guard(manager.index, manager.start.0, manager.len, manager.control);
+                }
                 if manager.len > 0 {
                     let read = direction == Direction::Inputs;
                     let map = FmmuConfig {

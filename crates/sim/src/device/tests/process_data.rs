@@ -18,8 +18,12 @@ fn analogue_outputs_follow_in_op_and_fall_back_with_the_watchdog() {
     let values =
         |device: &Device| (device.bench.signals.value(first), device.bench.signals.value(second));
     assert_eq!(values(&device), (0x1234, 0x7FFF));
+    // It works for 100 µs; what comes earlier waits.
     device.exchange(&[0xFF, 0xFF, 0, 0]);
+    assert_eq!(values(&device), (0x1234, 0x7FFF));
+    device.bench.wait(Span::us(100));
     assert_eq!(values(&device), (0, 0), "0 to 10 V has no sign");
+    device.bench.wait(Span::us(100));
     device.exchange(&[0x34, 0x12, 0xFF, 0x7F]);
     device.bench.wait(Span::ms(99));
     assert_eq!(device.status(), (8, 0));

@@ -86,7 +86,7 @@ fn what_cannot_be_done_is_aborted_with_its_code() {
         (0x8000, 0x01, &[2], 0x0609_0031),
         (0x1C13, 1, &[0x00, 0x1A], 0x0601_0003),
         (0x1C13, 0, &[9], 0x0609_0031),
-        (0x1C32, 1, &[2, 0], 0x0609_0031),
+        (0x1C32, 1, &[4, 0], 0x0609_0031),
     ];
     for (index, subindex, data, code) in table {
         let found = device.download(index, subindex, data);

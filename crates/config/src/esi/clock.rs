@@ -1,0 +1,48 @@
+//! Operation modes with distributed clocks: element `Dc` (ETG.2000).
+
+use super::error::EsiError;
+use super::xml::Element;
+
+/// A way to run with (or without) distributed clocks.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub struct EsiOpMode {
+    /// Its name, such as `DcSync`.
+    pub name: String,
+    /// What it does.
+    pub description: String,
+    /// What is written to 0x0980.
+    pub assign_activate: u16,
+    /// Cycle of SYNC0 in ns; 0 is the MainDevice's cycle times the factor.
+    pub sync0_cycle_ns: u32,
+    /// Positive: every n cycles; negative: n times within a cycle.
+    pub sync0_cycle_factor: i16,
+    /// Shift of SYNC0 in ns.
+    pub sync0_shift_ns: i32,
+    /// Cycle of SYNC1, in cycles of SYNC0.
+    pub sync1_cycle_factor: i16,
+    /// Shift of SYNC1 in ns.
+    pub sync1_shift_ns: i32,
+}
+
+/// The modes of an element `Dc`.
+pub(super) fn op_modes(element: &Element) -> Result<Vec<EsiOpMode>, EsiError> {
+    let modes = element.children("OpMode").map(op_mode);
+    modes.map(|mode| mode.map_err(|error| error.within("Dc"))).collect()
+}
+
+fn op_mode(element: &Element) -> Result<EsiOpMode, EsiError> {
+    let factor = |name: &str| match element.child(name) {
+        Some(cycle) => cycle.attribute_number("Factor").map(|factor| factor.unwrap_or(0)),
+        None => Ok(0),
+    };
+    Ok(EsiOpMode {
+        name: element.child_text("Name").to_owned(),
+        description: element.child_text("Desc").to_owned(),
+        assign_activate: element.child_number("AssignActivate")?.unwrap_or(0),
+        sync0_cycle_ns: element.child_number("CycleTimeSync0")?.unwrap_or(0),
+        sync0_cycle_factor: factor("CycleTimeSync0")?,
+        sync0_shift_ns: element.child_number("ShiftTimeSync0")?.unwrap_or(0),
+        sync1_cycle_factor: factor("CycleTimeSync1")?,
+        sync1_shift_ns: element.child_number("ShiftTimeSync1")?.unwrap_or(0),
+    })
+}

@@ -1,0 +1,159 @@
+//! Device descriptions of real makers: every device of every file.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use linesman_config::esi::EsiDevice;
+use linesman_config::esi::image::image;
+use linesman_proto::sii::{Direction, Identity, Image};
+use linesman_sim::segment_file::DescriptionFiles;
+
+use crate::data::{Collection, files, root};
+use crate::up::{segment, to_op};
+
+/// What became of a device.
+#[derive(PartialEq, Eq, PartialOrd, Ord, Clone, Debug)]
+enum Outcome {
+    InOp,
+    /// Refused: a thing without controller.
+    Passive,
+    /// Refused: the file lacks a part of it.
+    Incomplete,
+    Failed(String),
+}
+
+fn type_name(file: &str, device: &EsiDevice) -> String {
+    format!("esi:{file}#{}@0x{:08X}", device.type_name, device.revision)
+}
+
+fn bring_up(file: &str, device: &EsiDevice, collection: &Collection) -> Outcome {
+    let name = type_name(file, device);
+    match segment(&name, collection).and_then(|segment| to_op(&segment)) {
+        Ok(lab) => {
+            let found = lab.inventory().unwrap().devices.last().unwrap().clone();
+            let identity = found.identity.unwrap();
+            let last = device.sub_devices.last().copied();
+            let expected = last.unwrap_or((device.product_code, device.revision));
+            if (identity.product_code, identity.revision) != expected {
+                return Outcome::Failed(format!("found {identity:?}"));
+            }
+            Outcome::InOp
+        }
+        Err(reason) if reason.contains("a passive part") => Outcome::Passive,
+        Err(reason) if reason.contains("which is not in the file") => Outcome::Incomplete,
+        Err(reason) => Outcome::Failed(reason),
+    }
+}
+
+#[test]
+fn every_device_of_every_description_goes_to_op_or_says_why_not() {
+    let (Some(root), Some(mut names)) = (root(), files("esi", ".xml")) else { return };
+    names.extend(files("esi/pairs", ".xml").unwrap_or_default());
+    let only = std::env::var("ESI").ok();
+    names.retain(|name| only.as_ref().is_none_or(|only| name.contains(only.as_str())));
+    let mut table = String::new();
+    let mut failed = Vec::new();
+    let mut total = BTreeMap::new();
+    for name in &names {
+        let collection = Collection::new(root.clone());
+        let esi = collection.descriptions(name).unwrap();
+        let mut counts = [0; 4];
+        for device in &esi.devices {
+            let outcome = match device {
+                Ok(device) => bring_up(name, device, &collection),
+                Err(error) => Outcome::Failed(error.to_string()),
+            };
+            match &outcome {
+                Outcome::InOp => counts[0] += 1,
+                Outcome::Passive => counts[1] += 1,
+                Outcome::Incomplete => counts[2] += 1,
+                Outcome::Failed(reason) => {
+                    counts[3] += 1;
+                    let which = device.as_ref().map_or(name.clone(), |one| type_name(name, one));
+                    failed.push(format!("{which}: {reason}"));
+                }
+            }
+        }
+        let _ = writeln!(
+            table,
+            "{:48} {:5} {:5} {:5} {:5}",
+            name, counts[0], counts[1], counts[2], counts[3]
+        );
+        for (sum, count) in [
+            ("in OP", counts[0]),
+            ("passive", counts[1]),
+            ("incomplete", counts[2]),
+            ("failed", counts[3]),
+        ] {
+            *total.entry(sum).or_insert(0) += count;
+        }
+    }
+    println!("{:48} in OP pass. inc.  fail.\n{table}{total:?}", "file");
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+#[test]
+fn descriptions_and_images_of_one_device_agree() {
+    let (Some(root), Some(names)) = (root(), files("esi/pairs", ".xml")) else { return };
+    let collection = Collection::new(root.clone());
+    for name in names {
+        let stem = name.rsplit('/').next().unwrap().trim_end_matches(".xml");
+        let esi = collection.descriptions(&name).unwrap();
+        let real =
+            Image::parse(&std::fs::read(root.join(format!("sii/pairs/{stem}.bin"))).unwrap());
+        let real = real.unwrap();
+        let device = esi.usable().next().unwrap();
+        let made = image(device, esi.vendor_id, &device.pdos).unwrap();
+        assert_eq!(made.identity, real.identity, "{stem}");
+        assert_eq!(made.ebus_current_ma(), real.ebus_current_ma(), "{stem}");
+        assert_eq!(made.protocols, real.protocols, "{stem}");
+        assert_eq!(made.order(), Some(device.type_name.as_str()), "{stem}");
+        // None of these five EEPROMs has room for PDOs, so there is nothing that could disagree.
+        for direction in [Direction::Outputs, Direction::Inputs] {
+            assert_eq!(real.pdos(direction).count(), 0, "{stem}");
+        }
+        // This project's image was not made from its description: mailbox and configuration differ.
+        if stem == "kickcat-xmc4800-relax" {
+            assert_ne!(made.standard_mailbox, real.standard_mailbox);
+            continue;
+        }
+        assert_eq!(made.configuration, real.configuration, "{stem}");
+        assert_eq!(made.standard_mailbox, real.standard_mailbox, "{stem}");
+        assert_eq!(made.bootstrap_mailbox, real.bootstrap_mailbox, "{stem}");
+        for (made, real) in made.sync_managers().iter().zip(real.sync_managers()) {
+            assert_eq!(
+                (made.start, made.control, made.kind, made.enable),
+                (real.start, real.control, real.kind, real.enable),
+                "{stem}"
+            );
+        }
+    }
+}
+
+/// Single images whose device is described in one of the files: everything that both say agrees.
+#[test]
+fn images_agree_with_the_description_of_their_revision() {
+    let Some(root) = root() else { return };
+    let collection = Collection::new(root.clone());
+    for (stem, file, revision) in
+        [("ec-EK1100", "dls-Beckhoff-EK11xx", 0x0012_0000), ("dls-NI9144-rev1", "dls-NI9144", 1)]
+    {
+        let real = std::fs::read(root.join(format!("sii/{stem}.bin"))).unwrap();
+        let real = Image::parse(&real).unwrap();
+        let esi = collection.descriptions(&format!("esi/{file}.xml")).unwrap();
+        let device = esi.usable().find(|device| {
+            device.product_code == real.identity.product_code && device.revision == revision
+        });
+        let device = device.unwrap();
+        let made = image(device, esi.vendor_id, &device.pdos).unwrap();
+        assert_eq!(made.identity, Identity { serial_number: 0, ..real.identity }, "{stem}");
+        assert_eq!(made.ebus_current_ma(), real.ebus_current_ma(), "{stem}");
+        assert_eq!(made.general().unwrap().ports, real.general().unwrap().ports, "{stem}");
+        assert_eq!(made.configuration, real.configuration, "{stem}");
+        assert_eq!(made.standard_mailbox, real.standard_mailbox, "{stem}");
+        let sizes = |image: &Image| image.process_data().map(|one| one.bits).collect::<Vec<_>>();
+        assert_eq!(sizes(&made), sizes(&real), "{stem}");
+        let records = |image: &Image| image.sync_managers().to_vec();
+        assert_eq!(records(&made), records(&real), "{stem}");
+    }
+}

@@ -1,0 +1,85 @@
+//! A processor in step: what it does at the signals of its clock and in between.
+
+use linesman_proto::register::AlEvents;
+use linesman_proto::sii::Direction;
+use linesman_proto::state::{AlState, AlStatusCode};
+use linesman_proto::time::Instant;
+
+use super::synchronisation::Flow;
+use super::{Outcome, Processor, Step};
+use crate::controller::{Pdi, SyncSignal};
+use crate::device::application_layer::ApplicationLayer;
+
+impl Processor {
+    /// Whether a SyncManager of a direction says that the MainDevice has been there. One that gives
+    /// no events counts as visited.
+    fn was_visited(&self, direction: Direction, pdi: &Pdi<'_>) -> bool {
+        let events = pdi.events();
+        self.process_data.lengths(direction).filter(|(_, len)| *len > 0).all(|(index, _)| {
+            let tells = pdi.sync_manager(index).is_some_and(|manager| manager.control.al_event());
+            !tells || events.contains(AlEvents::sync_manager(u16::from(index)))
+        })
+    }
+
+    /// Takes outputs that came, if any, and drives them if it is time to.
+    pub(super) fn serve_outputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        let fresh = self.has_outputs() && self.was_visited(Direction::Outputs, pdi);
+        if fresh && self.take_outputs(pdi) {
+            let at_once = self.synchronisation.outputs_came(&mut self.dictionary, pdi);
+            if at_once && ApplicationLayer::is_operational(pdi) {
+                self.drive_outputs(now, pdi.signals_mut());
+            }
+        }
+    }
+
+    /// What the synchronisation has put off until now.
+    pub(super) fn serve_due(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        let operational = ApplicationLayer::is_operational(pdi);
+        if operational && self.synchronisation.is_silent(now) {
+            self.fall(pdi, AlState::SafeOp, AlStatusCode::FATAL_SYNC_ERROR);
+        }
+        let (drive, sample) = self.synchronisation.take_due(now);
+        if drive && operational {
+            self.drive_outputs(now, pdi.signals_mut());
+        }
+        if sample && ApplicationLayer::state(pdi).has_inputs() {
+            self.sample_inputs(now, pdi);
+        }
+    }
+
+    /// A signal of the clock comes. Gives when to run next because of it.
+    pub(super) fn keep_step(
+        &mut self,
+        signal: SyncSignal,
+        now: Instant,
+        pdi: &mut Pdi<'_>,
+    ) -> Option<Instant> {
+        pdi.acknowledge_sync(signal);
+        let state = ApplicationLayer::state(pdi);
+        if !state.has_inputs() || !self.synchronisation.follows(signal) {
+            return None;
+        }
+        let flow = Flow {
+            outputs: self.has_outputs(),
+            inputs_fetched: self.was_visited(Direction::Inputs, pdi),
+            operational: state == AlState::Op,
+        };
+        if let Some(code) = self.synchronisation.pulse(now, &mut self.dictionary, flow) {
+            self.fall(pdi, AlState::SafeOp, code);
+        }
+        self.serve_due(now, pdi);
+        if self.step.is_some_and(|step| step.due <= now) {
+            return Some(now);
+        }
+        self.synchronisation.next(ApplicationLayer::is_operational(pdi))
+    }
+
+    /// Whether the clock lets it go to OP.
+    pub(super) fn wait_for_clock(&self, step: Step, now: Instant) -> Option<Outcome> {
+        match self.synchronisation.readiness(self.has_outputs()) {
+            Ok(()) => None,
+            Err(_) if now < step.deadline => Some(Outcome::Waits),
+            Err(code) => Some(Outcome::Failed(AlState::SafeOp, code)),
+        }
+    }
+}

@@ -1,0 +1,482 @@
+//! How a device keeps step: by itself, with the frames, or with the SYNC signals of its clock.
+//!
+//! Read first: ETG.1020, synchronisation; objects 0x1C32 (outputs) and 0x1C33 (inputs). Everything
+//! that a type can and wants stands in those two objects: modes (04), shortest cycle (05), time to
+//! calculate and copy (06), delay (09), shift (03). What goes wrong is counted in them: outputs that
+//! did not come before their SYNC (0B), work that was not done before the next (0C), outputs that
+//! came too shortly before (0D); 20 shows that the last cycle was one of those.
+//!
+//! A miss weighs three times what a good cycle makes up for; beyond the limit in 0x10F1:02 (4 where
+//! there is no such object) the device leaves OP, as public SubDevice stack code does it.
+
+use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
+use linesman_proto::state::AlStatusCode;
+use linesman_proto::time::{Instant, Span};
+
+use crate::controller::{Pdi, SyncSignal};
+use crate::device::dictionary::Dictionary;
+
+const OUTPUTS: u16 = ObjectIndex::OUTPUT_SYNC.0;
+const INPUTS: u16 = ObjectIndex::INPUT_SYNC.0;
+/// Object and subindex of the limit of misses.
+const ERROR_LIMIT: (u16, u8) = (0x10F1, 2);
+const DEFAULT_LIMIT: u64 = 4;
+/// What a miss weighs.
+const MISS: u32 = 3;
+/// Pulses in a row, each in its time, that make a device trust its clock.
+const LOCKED: u32 = 5;
+/// Cycles in a row with their outputs that make it go to OP.
+const STEADY: u32 = 3;
+/// So many cycles without a pulse are too many.
+const SILENT_CYCLES: u64 = 3;
+/// The local timer in free run, where nobody has set one.
+const OWN_CYCLE: Span = Span::ms(1);
+
+/// Subindices of 0x1C32 and 0x1C33.
+mod sub {
+    pub(super) const MODE: u8 = 0x01;
+    pub(super) const CYCLE: u8 = 0x02;
+    pub(super) const SHIFT: u8 = 0x03;
+    pub(super) const SUPPORTED: u8 = 0x04;
+    pub(super) const SHORTEST_CYCLE: u8 = 0x05;
+    pub(super) const CALC_AND_COPY: u8 = 0x06;
+    pub(super) const MEASURE: u8 = 0x08;
+    pub(super) const DELAY: u8 = 0x09;
+    pub(super) const SYNC0_CYCLE: u8 = 0x0A;
+    pub(super) const EVENT_MISSED: u8 = 0x0B;
+    pub(super) const CYCLE_EXCEEDED: u8 = 0x0C;
+    pub(super) const SHIFT_TOO_SHORT: u8 = 0x0D;
+    pub(super) const SYNC_ERROR: u8 = 0x20;
+}
+
+/// Bits of subindex 04.
+const FREE_RUN: u64 = 1 << 0;
+const WITH_FRAMES: u64 = 1 << 1;
+const WITH_CLOCK: u64 = 0b111 << 2;
+const MEASURES: u64 = 1 << 14;
+
+/// What the device keeps step with.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Mode {
+    /// Its own timer.
+    FreeRun,
+    /// The frames that bring outputs or fetch inputs.
+    Frames,
+    /// A signal of its clock.
+    Clock(SyncSignal),
+}
+
+/// What a type needs for its work, in ns.
+#[derive(Clone, Copy, Default, Debug)]
+struct Needs {
+    /// For everything it does in a cycle.
+    cycle: u64,
+    /// For getting outputs ready.
+    calc_and_copy: u64,
+    /// From there to the terminal.
+    delay: u64,
+}
+
+/// What a pulse finds.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Flow {
+    /// There are outputs.
+    pub(super) outputs: bool,
+    /// The inputs of the last cycle were fetched.
+    pub(super) inputs_fetched: bool,
+    /// The device is in OP.
+    pub(super) operational: bool,
+}
+
+/// The state of it.
+#[derive(Debug)]
+pub(super) struct Synchronisation {
+    needs: Needs,
+    mode: Mode,
+    /// From one pulse to the next.
+    cycle: Span,
+    /// What it wrote into the cycle time itself.
+    shown_cycle: u64,
+    last_pulse: Option<Instant>,
+    /// Pulses in their time, in a row.
+    in_time: u32,
+    /// Cycles with their outputs, in a row.
+    steady: u32,
+    /// When outputs came, since the last pulse.
+    arrived: Option<Instant>,
+    /// Outputs have come since the set-up.
+    ever_arrived: bool,
+    busy_until: Instant,
+    misses: u32,
+    /// How long its work takes instead of what it needs: a fault.
+    takes: Option<Span>,
+    drive_at: Option<Instant>,
+    sample_at: Option<Instant>,
+}
+
+fn get(dictionary: &Dictionary, index: u16, subindex: u8) -> u64 {
+    dictionary.number_at(ObjectAddress::new(index, subindex))
+}
+
+fn put(dictionary: &mut Dictionary, index: u16, subindex: u8, value: u64) {
+    if let Some(at) = dictionary.find(ObjectAddress::new(index, subindex)) {
+        dictionary.set_number(at, value);
+    }
+}
+
+/// One more, up to the end of 16 bits.
+fn count(dictionary: &mut Dictionary, index: u16, subindex: u8) {
+    let value = get(dictionary, index, subindex);
+    put(dictionary, index, subindex, (value + 1).min(u64::from(u16::MAX)));
+}
+
+fn has(dictionary: &Dictionary, index: u16) -> bool {
+    dictionary.object(ObjectIndex(index)).is_some()
+}
+
+/// The object that says how the device keeps step: that of the outputs, if there are any.
+fn leading(outputs: bool) -> u16 {
+    if outputs { OUTPUTS } else { INPUTS }
+}
+
+impl Synchronisation {
+    /// That of a device with these objects, as they are after power-on.
+    pub(super) fn new(fresh: &Dictionary) -> Self {
+        let most = |subindex| {
+            get(fresh, OUTPUTS, subindex).max(get(fresh, INPUTS, subindex)).min(1_000_000_000)
+        };
+        let needs = Needs {
+            cycle: most(sub::SHORTEST_CYCLE),
+            calc_and_copy: most(sub::CALC_AND_COPY),
+            delay: most(sub::DELAY),
+        };
+        Self {
+            needs,
+            mode: Mode::Frames,
+            cycle: Span::ZERO,
+            shown_cycle: 0,
+            last_pulse: None,
+            in_time: 0,
+            steady: 0,
+            arrived: None,
+            ever_arrived: false,
+            busy_until: Instant::ZERO,
+            misses: 0,
+            takes: None,
+            drive_at: None,
+            sample_at: None,
+        }
+    }
+
+    /// The device starts: what has to be measured is not known yet.
+    pub(super) fn start(&mut self, fresh: &Dictionary, dictionary: &mut Dictionary) {
+        *self = Self { takes: self.takes, ..Self::new(fresh) };
+        for index in [OUTPUTS, INPUTS] {
+            if get(dictionary, index, sub::SUPPORTED) & MEASURES != 0 {
+                for subindex in [sub::SHORTEST_CYCLE, sub::CALC_AND_COPY, sub::DELAY] {
+                    put(dictionary, index, subindex, 0);
+                }
+            }
+        }
+    }
+
+    /// Its work takes so long from now on; `None` for as long as it needs.
+    pub(super) fn set_takes(&mut self, takes: Option<Span>) {
+        self.takes = takes;
+    }
+
+    fn takes(&self) -> Span {
+        self.takes.unwrap_or(Span::ns(self.needs.cycle))
+    }
+
+    // ---- set-up ----
+
+    /// Finds out what to keep step with, from the objects and from what the MainDevice has switched
+    /// on in the SYNC unit; the code to show when that cannot be.
+    pub(super) fn set_up(
+        &mut self,
+        dictionary: &mut Dictionary,
+        outputs: bool,
+        pdi: &Pdi<'_>,
+    ) -> Result<(), AlStatusCode> {
+        let leads = leading(outputs);
+        let wanted = get(dictionary, leads, sub::MODE);
+        let supported =
+            if has(dictionary, leads) { get(dictionary, leads, sub::SUPPORTED) } else { u64::MAX };
+        let mode = mode(wanted, supported, pdi.sync_activation())?;
+        let cycle = match mode {
+            Mode::FreeRun | Mode::Frames => 0,
+            Mode::Clock(signal) => self.check_cycle(dictionary, leads, signal, pdi)?,
+        };
+        *self = Self {
+            needs: self.needs,
+            takes: self.takes,
+            mode,
+            cycle: Span::ns(cycle),
+            ..Self::new(dictionary)
+        };
+        if let Mode::Clock(signal) = mode {
+            let number = match signal {
+                SyncSignal::Sync0 => 2,
+                SyncSignal::Sync1 => 3,
+            };
+            for index in [OUTPUTS, INPUTS] {
+                put(dictionary, index, sub::MODE, number);
+                put(dictionary, index, sub::CYCLE, cycle);
+                put(
+                    dictionary,
+                    index,
+                    sub::SYNC0_CYCLE,
+                    u64::from(pdi.sync_cycle(SyncSignal::Sync0)),
+                );
+            }
+            self.shown_cycle = cycle;
+        }
+        Ok(())
+    }
+
+    /// The cycle that the SYNC unit is set to, if the device can follow it.
+    fn check_cycle(
+        &self,
+        dictionary: &Dictionary,
+        leads: u16,
+        signal: SyncSignal,
+        pdi: &Pdi<'_>,
+    ) -> Result<u64, AlStatusCode> {
+        let sync0 = u64::from(pdi.sync_cycle(SyncSignal::Sync0));
+        let sync1 = u64::from(pdi.sync_cycle(SyncSignal::Sync1));
+        if sync0 == 0 {
+            return Err(AlStatusCode::DC_INVALID_SYNC_CYCLE_TIME);
+        }
+        let (cycle, too_short) = match signal {
+            SyncSignal::Sync0 => (sync0, AlStatusCode::DC_SYNC0_CYCLE_TIME),
+            SyncSignal::Sync1 => ((sync1 / sync0 + 1) * sync0, AlStatusCode::DC_SYNC1_CYCLE_TIME),
+        };
+        if cycle < self.needs.cycle {
+            return Err(too_short);
+        }
+        let written = get(dictionary, leads, sub::CYCLE);
+        if written != 0 && written != self.shown_cycle && written != cycle {
+            return Err(AlStatusCode::DC_INVALID_SYNC_CYCLE_TIME);
+        }
+        Ok(cycle)
+    }
+
+    // ---- the way to OP ----
+
+    /// Whether the clock can be trusted; if not, the code to show should that not change.
+    pub(super) fn readiness(&self, outputs: bool) -> Result<(), AlStatusCode> {
+        let Mode::Clock(_) = self.mode else { return Ok(()) };
+        if self.in_time < LOCKED {
+            Err(AlStatusCode::NO_SYNC_ERROR)
+        } else if outputs && !self.ever_arrived {
+            Err(AlStatusCode::SYNC_MANAGER_WATCHDOG)
+        } else if outputs && self.steady < STEADY {
+            Err(AlStatusCode::SYNCHRONIZATION_ERROR)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Whether a signal of the clock is what the device keeps step with.
+    pub(super) fn follows(&self, signal: SyncSignal) -> bool {
+        self.mode == Mode::Clock(signal)
+    }
+
+    /// Whether inputs are taken with the frames.
+    pub(super) fn samples_with_frames(&self) -> bool {
+        !matches!(self.mode, Mode::Clock(_))
+    }
+
+    // ---- what happens ----
+
+    /// Fresh outputs came: whether they are to be driven at once.
+    pub(super) fn outputs_came(&mut self, dictionary: &mut Dictionary, pdi: &Pdi<'_>) -> bool {
+        let now = pdi.now();
+        self.ever_arrived = true;
+        match self.mode {
+            Mode::Clock(_) => {
+                self.arrived = Some(now);
+                false
+            }
+            Mode::FreeRun => {
+                let set = get(dictionary, OUTPUTS, sub::CYCLE);
+                let timer = if set == 0 { OWN_CYCLE.as_nanos() } else { set };
+                self.drive_at = Some(now + Span::ns(timer - pdi.local_time() % timer));
+                false
+            }
+            Mode::Frames if now < self.busy_until => {
+                count(dictionary, OUTPUTS, sub::CYCLE_EXCEEDED);
+                self.drive_at = Some(self.busy_until);
+                false
+            }
+            Mode::Frames => {
+                self.busy_until = now + self.takes();
+                self.measure(dictionary);
+                true
+            }
+        }
+    }
+
+    /// The signal that it keeps step with. The code to show when it cannot any more.
+    pub(super) fn pulse(
+        &mut self,
+        now: Instant,
+        dictionary: &mut Dictionary,
+        flow: Flow,
+    ) -> Option<AlStatusCode> {
+        let since = self.last_pulse.replace(now).map(|last| now.since(last).as_nanos());
+        let cycle = self.cycle.as_nanos();
+        let in_time = since.is_some_and(|since| since.abs_diff(cycle) <= cycle / 4);
+        self.in_time = if in_time { self.in_time.saturating_add(1) } else { 0 };
+        let leads = leading(flow.outputs);
+        let mut missed = false;
+        if now < self.busy_until {
+            // It has not heard this one: its outputs wait for the next.
+            for index in [OUTPUTS, INPUTS] {
+                count(dictionary, index, sub::CYCLE_EXCEEDED);
+            }
+            missed = true;
+        } else {
+            let arrived = self.arrived.take();
+            let came = if flow.outputs { arrived.is_some() } else { flow.inputs_fetched };
+            self.steady = if came { self.steady.saturating_add(1) } else { 0 };
+            if !came && flow.operational {
+                count(dictionary, leads, sub::EVENT_MISSED);
+                missed = true;
+            }
+            let short = |arrived: Instant| now.since(arrived).as_nanos() < self.needs.calc_and_copy;
+            if flow.operational && arrived.is_some_and(short) {
+                count(dictionary, leads, sub::SHIFT_TOO_SHORT);
+                missed = true;
+            }
+            self.busy_until = now + self.takes();
+            self.measure(dictionary);
+            let shift = |index| Span::ns(get(dictionary, index, sub::SHIFT).min(cycle));
+            let driven = now + shift(OUTPUTS) + Span::ns(self.needs.delay);
+            self.drive_at = (arrived.is_some() && flow.operational).then_some(driven);
+            self.sample_at = Some(now + shift(INPUTS));
+        }
+        for index in [OUTPUTS, INPUTS] {
+            put(dictionary, index, sub::SYNC_ERROR, u64::from(missed));
+        }
+        self.weigh(dictionary, missed && flow.operational)
+    }
+
+    fn weigh(&mut self, dictionary: &Dictionary, missed: bool) -> Option<AlStatusCode> {
+        if !missed {
+            self.misses = self.misses.saturating_sub(1);
+            return None;
+        }
+        self.misses += MISS;
+        let (index, subindex) = ERROR_LIMIT;
+        let limit =
+            if has(dictionary, index) { get(dictionary, index, subindex) } else { DEFAULT_LIMIT };
+        // 0 switches the watch off.
+        let over = limit != 0 && u64::from(self.misses) > limit * u64::from(MISS);
+        over.then(|| {
+            self.misses = 0;
+            AlStatusCode::SYNCHRONIZATION_ERROR
+        })
+    }
+
+    /// Does what was asked for in subindex 08: shows what the last cycle took.
+    fn measure(&self, dictionary: &mut Dictionary) {
+        for index in [OUTPUTS, INPUTS] {
+            let asked = get(dictionary, index, sub::MEASURE) & 1 != 0;
+            if asked && get(dictionary, index, sub::SUPPORTED) & MEASURES != 0 {
+                put(dictionary, index, sub::SHORTEST_CYCLE, self.takes().as_nanos());
+                put(dictionary, index, sub::CALC_AND_COPY, self.needs.calc_and_copy);
+                put(dictionary, index, sub::DELAY, self.needs.delay);
+                put(dictionary, index, sub::MEASURE, 0);
+            }
+        }
+    }
+
+    /// What is due at `now`: outputs to drive, inputs to sample.
+    pub(super) fn take_due(&mut self, now: Instant) -> (bool, bool) {
+        let take = |at: &mut Option<Instant>| at.take_if(|at| *at <= now).is_some();
+        let drive = take(&mut self.drive_at);
+        if drive && self.mode == Mode::Frames {
+            self.busy_until = now + self.takes();
+        }
+        (drive, take(&mut self.sample_at))
+    }
+
+    /// Whether the clock has fallen silent while the device was in OP.
+    pub(super) fn is_silent(&self, now: Instant) -> bool {
+        self.silent_at().is_some_and(|at| at <= now)
+    }
+
+    fn silent_at(&self) -> Option<Instant> {
+        let Mode::Clock(_) = self.mode else { return None };
+        let patience = self.cycle.as_nanos() * SILENT_CYCLES + self.cycle.as_nanos() / 2;
+        self.last_pulse.map(|last| last + Span::ns(patience))
+    }
+
+    /// When something is due next.
+    pub(super) fn next(&self, operational: bool) -> Option<Instant> {
+        let silent = self.silent_at().filter(|_| operational);
+        [self.drive_at, self.sample_at, silent].into_iter().flatten().min()
+    }
+}
+
+/// The mode that follows from what is wanted (0x1C3x:01), supported (04) and switched on (0x0981).
+fn mode(wanted: u64, supported: u64, activation: u8) -> Result<Mode, AlStatusCode> {
+    const UNIT: u8 = 1 << 0;
+    const SYNC0: u8 = 1 << 1;
+    const SYNC1: u8 = 1 << 2;
+    const WANTS_SYNC1: u64 = 3;
+    if activation & UNIT != 0 {
+        let clock = supported & WITH_CLOCK != 0;
+        if !clock || activation & SYNC0 == 0 {
+            return Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION);
+        }
+        return match (wanted, activation & SYNC1 != 0) {
+            (WANTS_SYNC1, true) => Ok(Mode::Clock(SyncSignal::Sync1)),
+            (WANTS_SYNC1, false) => Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION),
+            _ => Ok(Mode::Clock(SyncSignal::Sync0)),
+        };
+    }
+    match wanted {
+        0 if supported & FREE_RUN == 0 => Err(AlStatusCode::FREE_RUN_NOT_SUPPORTED),
+        0 => Ok(Mode::FreeRun),
+        1 | 0x22 if supported & WITH_FRAMES == 0 => Err(AlStatusCode::SYNC_NOT_SUPPORTED),
+        1 | 0x22 => Ok(Mode::Frames),
+        2 | 3 => Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION),
+        _ => Err(AlStatusCode::SYNC_NOT_SUPPORTED),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // proves: SYN-01 partial: what follows from objects and registers
+    #[test]
+    fn the_mode_follows_from_objects_and_unit() {
+        let all = FREE_RUN | WITH_FRAMES | WITH_CLOCK;
+        let sync0 = Mode::Clock(SyncSignal::Sync0);
+        // wanted, supported, activation, mode or code
+        let table = [
+            (0, all, 0x00, Ok(Mode::FreeRun)),
+            (1, all, 0x00, Ok(Mode::Frames)),
+            (0x22, all, 0x00, Ok(Mode::Frames)),
+            (1, all, 0x03, Ok(sync0)),
+            (2, all, 0x03, Ok(sync0)),
+            (3, all, 0x07, Ok(Mode::Clock(SyncSignal::Sync1))),
+            (2, all, 0x00, Err(0x0030)),
+            (3, all, 0x03, Err(0x0030)),
+            (1, all, 0x01, Err(0x0030)),
+            (1, all, 0x05, Err(0x0030)),
+            (1, FREE_RUN | WITH_FRAMES, 0x03, Err(0x0030)),
+            (0, WITH_FRAMES, 0x00, Err(0x0027)),
+            (1, FREE_RUN, 0x00, Err(0x0028)),
+            (9, all, 0x00, Err(0x0028)),
+        ];
+        for (wanted, supported, activation, expected) in table {
+            let found = mode(wanted, supported, activation).map_err(|code| code.0);
+            assert_eq!(found, expected, "{wanted} of {supported:04X}, 0x0981 {activation:02X}");
+        }
+    }
+}
