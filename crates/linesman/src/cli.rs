@@ -76,10 +76,7 @@ impl Command {
             Self::Interfaces(arguments) => arguments.json,
             Self::Lab(arguments) => arguments.wants_json(),
             Self::Sim(arguments) => arguments.json,
-            Self::Demo(_)
-            | Self::Explain(_)
-            | Self::Schema(_)
-            | Self::Completion(_) => false,
+            Self::Demo(_) | Self::Explain(_) | Self::Schema(_) | Self::Completion(_) => false,
         }
     }
 }
