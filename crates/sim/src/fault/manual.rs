@@ -12,6 +12,8 @@ macro_rules! files {
 const FILES: &[(&str, &str)] = files![
     "brown_out",
     "cable_degraded",
+    "clock_drift",
+    "cycle_too_fast",
     "device_internal",
     "device_missing",
     "device_off",
@@ -25,6 +27,7 @@ const FILES: &[(&str, &str)] = files![
     "host_drops",
     "host_jitter",
     "init_refused",
+    "late_frames",
     "link_flapping",
     "link_open",
     "mailbox_error",
@@ -34,9 +37,11 @@ const FILES: &[(&str, &str)] = files![
     "nic_damaged",
     "ports_swapped",
     "receiver_damaged",
+    "reference_clock_lost",
     "ring_open",
     "second_maindevice",
     "supply_off",
+    "sync_lost",
     "transmitter_damaged",
     "watchdog_starved",
 ];

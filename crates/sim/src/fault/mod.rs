@@ -15,6 +15,8 @@ mod source;
 
 mod brown_out;
 mod cable_degraded;
+mod clock_drift;
+mod cycle_too_fast;
 mod device_internal;
 mod device_missing;
 mod device_off;
@@ -28,6 +30,7 @@ mod foreign_frames;
 mod host_drops;
 mod host_jitter;
 mod init_refused;
+mod late_frames;
 mod link_flapping;
 mod link_open;
 mod mailbox_error;
@@ -37,9 +40,11 @@ mod maindevice_wrong_port;
 mod nic_damaged;
 mod ports_swapped;
 mod receiver_damaged;
+mod reference_clock_lost;
 mod ring_open;
 mod second_maindevice;
 mod supply_off;
+mod sync_lost;
 mod transmitter_damaged;
 mod watchdog_starved;
 
@@ -126,6 +131,11 @@ pub const KINDS: &[Kind] = &[
     emergency::KIND,
     firmware_fault::KIND,
     watchdog_starved::KIND,
+    cycle_too_fast::KIND,
+    late_frames::KIND,
+    reference_clock_lost::KIND,
+    clock_drift::KIND,
+    sync_lost::KIND,
 ];
 
 /// The kind with a name, if a segment can have it.

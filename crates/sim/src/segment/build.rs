@@ -169,6 +169,7 @@ fn assemble(
         arrivals: Arrivals::default(),
         strange: BTreeSet::new(),
         spare: Vec::new(),
+        waiting: super::late::Waiting::default(),
         tally: super::FrameTally::default(),
     };
     if file.old_counters {

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use linesman_proto::time::{Instant, Span};
 
+use super::late::Lateness;
 use crate::truth::FaultId;
 
 /// What a card's driver tells: carrier and counters since the start of the run.
@@ -55,6 +56,8 @@ pub(crate) struct Card {
     pub(crate) counts: HostPort,
     /// When it sends nothing, and whose doing that is.
     silent: Vec<(Instant, Instant, FaultId)>,
+    /// How late its frames leave.
+    pub(super) lateness: Lateness,
     /// Changes of the carrier that are known, in the order of time.
     carrier: Vec<(Instant, bool)>,
     /// Frames that the host keeps back before it sends them, in the order of time.
@@ -75,6 +78,7 @@ impl Default for Card {
             link_up: Span::ms(1_600),
             counts: HostPort::default(),
             silent: Vec::new(),
+            lateness: Lateness::default(),
             carrier: Vec::new(),
             delays: VecDeque::new(),
             drops: VecDeque::new(),

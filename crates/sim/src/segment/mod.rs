@@ -8,6 +8,7 @@ mod arrivals;
 mod build;
 pub(crate) mod card;
 mod identification;
+mod late;
 mod ready;
 mod turn;
 
@@ -70,6 +71,8 @@ pub struct Segment {
     /// Numbers of frames among them that strangers sent.
     strange: BTreeSet<u64>,
     spare: Vec<Vec<u8>>,
+    /// Frames that leave later.
+    waiting: late::Waiting,
     tally: FrameTally,
 }
 
@@ -97,6 +100,14 @@ impl Segment {
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.now = self.now.max(now);
         let now = self.now;
+        self.send_kept_back(now);
+        if !self.keep_back(now, path, frame) {
+            self.send(now, path, frame);
+        }
+    }
+
+    /// A frame leaves its card.
+    fn send(&mut self, now: Instant, path: Path, frame: &[u8]) {
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
         bytes.extend_from_slice(frame);
@@ -140,7 +151,7 @@ impl Segment {
         if let Some((by, fault)) = card.delayed(now) {
             leaves = now + by;
             card.kept_until = leaves + frame.duration();
-            let effect = Effect::FrameDelayed { frame: frame.number };
+            let effect = Effect::FrameHeldBack { by };
             self.world.truth.effect(now, Some(fault), Place::Host(path), effect);
         } else {
             leaves = leaves.max(card.kept_until);
@@ -210,16 +221,19 @@ impl Segment {
         }
     }
 
-    /// When the next frame arrives, of those on their way, or when a stranger sends one. What else happens in the segment needs no
-    /// call at its time: it is made up for, in its order, by the next one.
+    /// When the next frame arrives, of those on their way, when one leaves a card that is late, or
+    /// when a stranger sends one. What else happens in the segment needs no call at its time: it is
+    /// made up for, in its order, by the next one.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        [self.arrivals.next_at(), self.world.next_stranger()].into_iter().flatten().min()
+        let due = [self.arrivals.next_at(), self.next_leaves(), self.world.next_stranger()];
+        due.into_iter().flatten().min()
     }
 
     /// Time passes: devices, links and faults up to `now`.
     pub fn advance(&mut self, now: Instant) {
         self.now = self.now.max(now);
+        self.send_kept_back(self.now);
         self.world.advance(self.now);
         self.fetch_strangers();
         for card in &mut self.world.cards {

@@ -44,6 +44,7 @@ impl Segment {
             arrivals: Arrivals::default(),
             strange: BTreeSet::new(),
             spare: Vec::new(),
+            waiting: super::late::Waiting::default(),
             tally: super::FrameTally::default(),
         };
         segment.advance(Instant::ZERO);

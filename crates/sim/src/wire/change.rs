@@ -9,6 +9,7 @@ use linesman_proto::topology::route::Direction;
 
 use super::software::SoftwareChange;
 use super::stranger::Stranger;
+use super::timing::TimingChange;
 use crate::device::Refusal;
 
 /// One direction of a link: a line that symbols travel along.
@@ -156,6 +157,20 @@ pub enum Change {
         node: usize,
         /// What.
         change: SoftwareChange,
+    },
+    /// Something happens to the clock or the deadlines of a device.
+    Timing {
+        /// Which.
+        node: usize,
+        /// What.
+        change: TimingChange,
+    },
+    /// A card sends its frames later from now on.
+    Late {
+        /// Which.
+        path: Path,
+        /// By how much; nothing for "in time again".
+        by: Span,
     },
 }
 

@@ -23,6 +23,7 @@ mod route;
 pub mod software;
 mod starve;
 pub mod stranger;
+pub mod timing;
 pub(crate) mod walk;
 pub(crate) mod world;
 
@@ -31,6 +32,7 @@ pub use history::History;
 pub use link::{CABLE_NS_PER_M, Link, Medium};
 pub use software::SoftwareChange;
 pub use stranger::Stranger;
+pub use timing::TimingChange;
 
 #[cfg(test)]
 mod tests;
