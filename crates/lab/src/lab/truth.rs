@@ -2,10 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use linesman_config::attachment::Attachment;
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::topology::End;
+use linesman_sim::segment::PlugError;
 use linesman_sim::segment_file::FaultEntry;
 use linesman_sim::truth::{FaultId, Unexplained};
 
@@ -51,6 +53,25 @@ impl Lab {
             }
         }
         blind
+    }
+
+    /// Pulls the cable of a SubDevice.
+    ///
+    /// # Errors
+    /// The segment's, when there is no such SubDevice, or it is out already.
+    pub fn unplug(&mut self, name: &str) -> Result<FaultId, PlugError> {
+        let id = self.segment.unplug(self.now, name)?;
+        let blind = self.blind_ports();
+        self.blind.insert(id, blind);
+        Ok(id)
+    }
+
+    /// Plugs a SubDevice in again, where it was or elsewhere.
+    ///
+    /// # Errors
+    /// The segment's, when it is in, or does not fit there.
+    pub fn plug(&mut self, name: &str, on: Option<&Attachment>) -> Result<(), PlugError> {
+        self.segment.plug(self.now, name, on)
     }
 
     /// Ends a fault.

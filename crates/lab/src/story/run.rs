@@ -187,6 +187,15 @@ impl Stage {
                 Ok(())
             }
             Step::Heal(heal) => self.heal(*heal),
+            Step::Unplug(device) => {
+                self.witness.mark(&self.lab);
+                let id = self.lab.unplug(device).map_err(|error| error.to_string())?;
+                self.faults.push(id);
+                Ok(())
+            }
+            Step::Plug { device, on } => {
+                self.lab.plug(device, on.as_ref()).map_err(|error| error.to_string())
+            }
             Step::Expect { what, within } => self.expect(what, *within),
         }
     }

@@ -6,6 +6,8 @@
 //! [at TIME] inject FAULT at devices NAME, NAME [for TIME] [with …]
 //! [at TIME] inject FAULT at supply NAME [for TIME] [with …]
 //! [at TIME] heal [FAULT]
+//! [at TIME] unplug NAME
+//! [at TIME] plug NAME [on NAME.PORT]
 //! at TIME
 //! [at TIME] expect verdict [on FAULT] [within TIME]
 //! [at TIME] expect finding CODE|FAULT [at PLACE] [within TIME]
@@ -20,6 +22,7 @@
 //! `PLACE` is `K1.C-B3.A` (a link), `K1.C>B3.A` (one direction), `device K1`, `host` or `network`.
 //! `TIME` is a whole number of `us`, `ms` or `s`. Back-quotes are for the reader only.
 
+use linesman_config::attachment::Attachment;
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
 
@@ -52,6 +55,15 @@ pub enum Step {
     },
     /// Faults end.
     Heal(Heal),
+    /// The cable of a SubDevice is pulled.
+    Unplug(String),
+    /// It is plugged in again.
+    Plug {
+        /// Which SubDevice.
+        device: String,
+        /// Where; where it was unless said.
+        on: Option<Attachment>,
+    },
     /// Something must be so.
     Expect {
         /// What.
@@ -122,10 +134,21 @@ pub(crate) fn parse(text: &str) -> Result<(Option<Span>, Step), String> {
             "" | "all" => Step::Heal(Heal::All),
             name => Step::Heal(Heal::Named(fault(name)?)),
         },
+        "unplug" => Step::Unplug(words.next().to_owned()),
+        "plug" => {
+            let device = words.next().to_owned();
+            let on = if words.take("on") {
+                let text = words.next();
+                Some(text.parse().map_err(|_| format!("`{text}` is no port, such as `K1.C`"))?)
+            } else {
+                None
+            };
+            Step::Plug { device, on }
+        }
         "expect" => expect(&mut words)?,
         other => {
             return Err(format!(
-                "`{other}` is no step: expected `inject`, `heal` or `expect`, with or without \
+                "`{other}` is no step: expected `inject`, `heal`, `unplug`, `plug` or `expect`, with or without \
                  `at TIME` before it"
             ));
         }
@@ -375,7 +398,7 @@ mod tests {
     #[test]
     fn what_is_no_step_says_what_was_expected() {
         for (text, expected) in [
-            ("wait a bit", "expected `inject`, `heal` or `expect`"),
+            ("wait a bit", "expected `inject`, `heal`, `unplug`, `plug` or `expect`"),
             ("at 2 inject link-open at a.A-b.A", "write such as `20 ms`"),
             ("inject link-opened at K1.A-K2.A", "the names are: link-open"),
             ("inject link-open", "a fault needs a place"),

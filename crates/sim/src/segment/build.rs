@@ -167,6 +167,7 @@ fn assemble(
         names,
         now: Instant::ZERO,
         arrivals: Arrivals::default(),
+        unplugged: BTreeMap::new(),
         strange: BTreeSet::new(),
         spare: Vec::new(),
         waiting: super::late::Waiting::default(),

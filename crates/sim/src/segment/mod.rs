@@ -9,6 +9,7 @@ mod build;
 pub(crate) mod card;
 mod identification;
 mod late;
+pub mod plug;
 mod ready;
 mod turn;
 
@@ -22,6 +23,7 @@ use linesman_proto::topology::Tree;
 
 pub use build::BuildError;
 pub use card::{FrameTally, HostPort};
+pub use plug::PlugError;
 
 use self::arrivals::Arrivals;
 use crate::controller::Controller;
@@ -68,6 +70,8 @@ pub struct Segment {
     names: Vec<String>,
     now: Instant,
     arrivals: Arrivals,
+    /// Nodes whose cable was pulled, and the open link that this is.
+    unplugged: BTreeMap<usize, FaultId>,
     /// Numbers of frames among them that strangers sent.
     strange: BTreeSet<u64>,
     spare: Vec<Vec<u8>>,

@@ -42,6 +42,7 @@ impl Segment {
             names,
             now: Instant::ZERO,
             arrivals: Arrivals::default(),
+            unplugged: BTreeMap::new(),
             strange: BTreeSet::new(),
             spare: Vec::new(),
             waiting: super::late::Waiting::default(),

@@ -106,7 +106,20 @@ impl World {
                 }
             })
             .unwrap_or(PortKind::Mii);
-        let half = |end: End| match end {
+        let transit = self.ports(wired.upstream, wired.downstream, kind) + cable;
+        self.links.push(Link::new(wired.upstream, wired.downstream, kind, transit));
+        for line in Line::both(index) {
+            let (from, _) = self.links[index].from_to(line.downstream);
+            match from {
+                End::MainDevice(path) => self.leaving[path.index()] = Some(line),
+                End::Controller(node, port) => self.nodes[node].leaving[port] = Some(line),
+            }
+        }
+    }
+
+    /// What both ports of a link add to its transit: half a crossing each.
+    fn ports(&self, one: End, other: End, kind: PortKind) -> Span {
+        let crossing = |end: End| match end {
             End::MainDevice(path) => self.cards[path.index()].crossing,
             End::Controller(node, _) => {
                 let timing = self.nodes[node].controller.hardware().timing;
@@ -116,16 +129,28 @@ impl World {
                 }
             }
         };
-        let ports = half(wired.upstream) + half(wired.downstream);
-        let transit = Span::ns(ports.as_nanos() / 2) + cable;
-        self.links.push(Link::new(wired.upstream, wired.downstream, kind, transit));
-        for line in Line::both(index) {
-            let (from, _) = self.links[index].from_to(line.downstream);
-            match from {
-                End::MainDevice(path) => self.leaving[path.index()] = Some(line),
-                End::Controller(node, port) => self.nodes[node].leaving[port] = Some(line),
-            }
+        Span::ns((crossing(one) + crossing(other)).as_nanos() / 2)
+    }
+
+    /// The upstream end of a link that is open is plugged in elsewhere.
+    pub(crate) fn rewire(&mut self, link: usize, upstream: End) {
+        let (before, downstream) = (self.links[link].upstream, self.links[link].downstream);
+        let kind = self.links[link].kind;
+        let cable =
+            self.links[link].transit.as_nanos() - self.ports(before, downstream, kind).as_nanos();
+        match before {
+            End::MainDevice(path) => self.leaving[path.index()] = None,
+            End::Controller(node, port) => self.nodes[node].leaving[port] = None,
         }
+        let line = Some(Line { link, downstream: true });
+        match upstream {
+            End::MainDevice(path) => self.leaving[path.index()] = line,
+            End::Controller(node, port) => self.nodes[node].leaving[port] = line,
+        }
+        self.links[link].upstream = upstream;
+        self.links[link].transit = self.ports(upstream, downstream, kind) + Span::ns(cable);
+        self.round = self.measure_round();
+        self.way_changes(self.horizon);
     }
 
     fn measure_round(&self) -> Span {
@@ -157,9 +182,22 @@ impl World {
 
     /// Makes all changes that a frame of `frame_time` which enters at `now` can meet.
     pub(crate) fn look_ahead(&mut self, now: Instant, frame_time: Span) {
+        self.strangers_until(now);
         self.change_until(now + self.round + frame_time);
         if !self.noisy.is_empty() {
             self.forget_noise(now - MEMORY);
+        }
+    }
+
+    /// Strangers send what they send until `now`: each frame as if somebody looked at its time, so
+    /// that it is all the same who looks and when.
+    fn strangers_until(&mut self, now: Instant) {
+        /// Longer than the frame of any stranger.
+        const FRAME: Span = Span::us(20);
+        while let Some(at) = self.next_stranger().filter(|at| *at <= now) {
+            self.change_until(at + self.round + FRAME);
+            self.touch_due(at);
+            self.let_strangers_send(at);
         }
     }
 
@@ -183,8 +221,8 @@ impl World {
 
     /// Brings everything to `now`.
     pub(crate) fn advance(&mut self, now: Instant) {
+        self.strangers_until(now);
         self.change_until(now);
-        self.let_strangers_send(now);
         self.touch_due(now);
     }
 

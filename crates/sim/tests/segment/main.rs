@@ -6,6 +6,8 @@ mod clocks;
 mod faults;
 mod identification;
 mod oracle;
+mod plug;
+mod recorded;
 mod rig;
 mod swarm;
 mod timing;
