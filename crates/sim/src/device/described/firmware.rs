@@ -8,6 +8,7 @@ use super::channel::{Driven, Taken};
 use super::objects;
 use super::signals::{Layout, Point};
 use crate::device::application::Channel;
+use crate::device::application::drive::Cia402;
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
 use crate::device::firmware::{Firmware, NoFirmware};
 use crate::device::processor::{Description, ProcessBuffer, Processor, ResponseTimes};
@@ -93,17 +94,39 @@ fn processor(
             }
         }
     }
-    let channels: Vec<Box<dyn Channel>> = vec![Box::new(driven), Box::new(taken)];
+    let mut channels: Vec<Box<dyn Channel>> = vec![Box::new(driven)];
+    if let Some((first_output, first_input)) = layout.axis
+        && let Some(position) = outputs.get(first_output)
+        && let Some(switches) = inputs.get(first_input..).and_then(|mine| mine.first_chunk())
+    {
+        channels.push(Box::new(Cia402::new(&dictionary, *position, *switches)));
+    }
+    // Last, so that what is driven from outside counts.
+    channels.push(Box::new(taken));
     let bootstrap = described.image.bootstrap_mailbox;
     Processor::new(Description {
         dictionary,
         channels,
         buffers: buffers(described),
+        excludes: excludes(described),
         mailbox: described.image.standard_mailbox,
         protocols: described.image.protocols,
         bootstrap: bootstrap.is_present().then_some(bootstrap),
-        times: ResponseTimes::TERMINAL,
+        times: if layout.axis.is_some() { ResponseTimes::DRIVE } else { ResponseTimes::TERMINAL },
     })
+}
+
+/// PDOs that exclude each other. What the description assigns by default is left alone: some exclude
+/// what they assign.
+fn excludes(described: &DescribedType) -> Vec<(u16, u16)> {
+    let assigned = |index: u16| {
+        described.pdos.iter().any(|pdo| pdo.index == index && pdo.sync_manager.is_some())
+    };
+    let pairs = described
+        .pdos
+        .iter()
+        .flat_map(|pdo| pdo.excludes.iter().map(move |other| (pdo.index, *other)));
+    pairs.filter(|(one, other)| !(assigned(*one) && assigned(*other))).collect()
 }
 
 /// Pins that the controller drives and takes itself.
