@@ -5,7 +5,6 @@
 
 use std::collections::VecDeque;
 
-use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::{SmDirection, SmMode, SyncManagerConfig};
 use linesman_proto::sii::Protocols;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
@@ -228,9 +227,7 @@ impl Firmware for Learned {
                 self.inputs.get(at).map_or(0, |signal| pdi.signals().value(*signal) as u8)
             }));
             if len == 1 {
-                let RegisterAddress(at) = manager.start;
-                let ram = pdi.ram_mut(at..at.saturating_add(1));
-                ram.copy_from_slice(&self.buffer[..ram.len()]);
+                pdi.put_ram(manager.start, &self.buffer);
             } else {
                 pdi.write_sync_manager(index, &self.buffer);
             }

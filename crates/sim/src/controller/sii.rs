@@ -24,8 +24,9 @@ pub const LOAD_TIME: Span = Span::us(1_160);
 /// A write of one word, as seen by the controller.
 pub const WRITE_TIME: Span = Span::us(250);
 /// How long the EEPROM itself is busy behind a write: it then acknowledges nothing. Data sheets of
-/// 24Cxx parts say 5 ms at most.
-pub const PROGRAMMING_TIME: Span = Span::ms(5);
+/// 24Cxx parts say 2 ms typically and 5 ms at most; MainDevices that work with real ones try again
+/// for no more than 4 ms.
+pub const PROGRAMMING_TIME: Span = Span::ms(2);
 /// Until it is clear that the EEPROM does not acknowledge: a start condition and a byte.
 const NO_ANSWER_TIME: Span = Span::us(70);
 /// More for the second address byte.

@@ -214,7 +214,7 @@ impl SyncManagers {
             Kind::Mailbox => return None,
         };
         let len = manager.length.min(buffer.len());
-        buffer[..len].copy_from_slice(&memory.bytes()[from..from + len]);
+        memory.copy_out(from, &mut buffer[..len]);
         manager.written = false;
         manager.full = false;
         manager.read = true;
@@ -246,9 +246,8 @@ impl SyncManagers {
                 manager.start
             }
         };
-        let (filled, rest) = memory.bytes_mut()[at..at + manager.length].split_at_mut(data.len());
-        filled.copy_from_slice(data);
-        rest.fill(0);
+        memory.copy_in(at, data);
+        memory.clear_range(at + data.len(), at + manager.length);
         manager.read = false;
         manager.written = true;
         self.put_status(index, memory);

@@ -1,6 +1,6 @@
 //! From a file to a segment.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_config::attachment::Attachment;
 use linesman_config::project::{ProjectError, Ring};
@@ -11,8 +11,9 @@ use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
+use super::arrivals::Arrivals;
 use super::{DeviceInfo, Segment, identification};
-use crate::controller::{Controller, LocalClock};
+use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
 use crate::fault::{self, FaultError};
@@ -100,6 +101,7 @@ fn assemble(
 
     let seed = Seed(file.seed.unwrap_or(0));
     let mut signals = Signals::default();
+    let mut kinds = ControllerKinds::default();
     let mut devices = Vec::with_capacity(placed.len());
     let mut made = Vec::with_capacity(placed.len());
     for one in &placed {
@@ -114,7 +116,7 @@ fn assemble(
         let Built { mut hardware, sii, firmware, outputs, inputs } = built;
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
         hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
-        let mut controller = Controller::new(one.id, hardware, clock, firmware, sii);
+        let mut controller = Controller::new(one.id, kinds.get(hardware), clock, firmware, sii);
         identification.finish(&mut controller);
         made.push(controller);
         devices.push(DeviceInfo { outputs, inputs });
@@ -144,7 +146,7 @@ fn assemble(
         nodes,
         names,
         now: Instant::ZERO,
-        arrivals: BTreeMap::new(),
+        arrivals: Arrivals::default(),
         spare: Vec::new(),
         tally: super::FrameTally::default(),
     };
@@ -260,8 +262,7 @@ fn replace(
         type_name: kind.name().to_owned(),
         why,
     };
-    let device = placed[index].planned.device;
-    let parts = placed.iter().filter(|one| one.planned.device == device).count();
+    let parts = placed.iter().filter(|one| one.planned.is_of(&placed[index].planned)).count();
     let [ports] = kind.ports()[..] else {
         return Err(misfit("devices with several controllers cannot be exchanged".to_owned()));
     };
@@ -294,15 +295,15 @@ fn used_ports(placed: &[Placed], index: usize) -> Vec<Port> {
 /// to its place, the first in the order of frames; the rest is not there either.
 fn remove(placed: &mut Vec<Placed>, device: &str, ring: &mut Option<Ring>) {
     let Some(index) = placed.iter().position(|one| one.planned.name == device) else { return };
-    let file_device = placed[index].planned.device;
+    let gone = placed[index].planned.clone();
     let (on, entry) = (placed[index].planned.on.clone(), placed[index].planned.entry);
     let kind = placed[index].planned.ports[entry];
     let parts: Vec<(String, PortKindMap)> = placed
         .iter()
-        .filter(|one| one.planned.device == file_device)
+        .filter(|one| one.planned.is_of(&gone))
         .map(|one| (one.planned.name.clone(), one.planned.ports))
         .collect();
-    placed.retain(|one| one.planned.device != file_device);
+    placed.retain(|one| !one.planned.is_of(&gone));
     let mut heir = None;
     for (name, ports) in &parts {
         for port in ports_after(entry) {
@@ -330,7 +331,7 @@ type PortKindMap = linesman_proto::port::PortMap<PortKind>;
 /// Takes out what hangs on nothing.
 fn drop_orphans(placed: &mut Vec<Placed>, ring: &mut Option<Ring>) {
     loop {
-        let names: Vec<String> = placed.iter().map(|one| one.planned.name.clone()).collect();
+        let names: BTreeSet<String> = placed.iter().map(|one| one.planned.name.clone()).collect();
         let is_there = |on: &Attachment| match on {
             Attachment::MainDevice(_) => true,
             Attachment::Device { name, .. } => names.contains(name),

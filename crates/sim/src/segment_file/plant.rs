@@ -259,6 +259,7 @@ impl Builder {
         self.controllers += kind.ports().count();
         self.devices.push(SegmentDevice {
             name: name.clone(),
+            repeat: None,
             type_name: kind.name().to_owned(),
             on,
             entry: None,

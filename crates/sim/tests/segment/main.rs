@@ -4,6 +4,7 @@
 
 mod faults;
 mod identification;
+mod oracle;
 mod rig;
 mod swarm;
 mod traps;

@@ -15,7 +15,7 @@ use proptest::prelude::*;
 use super::rig::{Bench, PLANT, answer, at, frame};
 
 /// A random fault of any kind that can come and go.
-fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
+pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
     let built_in = [FaultName::DeviceWrong, FaultName::DeviceMissing];
     let kinds: Vec<_> = KINDS.iter().filter(|kind| !built_in.contains(&kind.name)).collect();
     let kind = stream.pick(&kinds).unwrap();

@@ -24,7 +24,7 @@ use super::application::Channel;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::dictionary::Dictionary;
 use super::files::Files;
-use super::firmware::Firmware;
+use super::firmware::{Firmware, SampleAgain};
 use super::history::History;
 use super::mailbox::{Mailbox, Served};
 use super::signal::Signals;
@@ -491,6 +491,12 @@ impl Firmware for Processor {
         if with_frames && now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
             self.sample_inputs(now, pdi);
         }
+    }
+
+    fn sample_again(&self, pdi: &Pdi<'_>) -> SampleAgain {
+        let samples =
+            self.synchronisation.samples_with_frames() && ApplicationLayer::state(pdi).has_inputs();
+        SampleAgain::From(if samples { self.next_sample } else { Instant::MAX })
     }
 
     fn synchronises(&self) -> bool {
