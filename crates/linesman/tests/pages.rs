@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
+#[path = "support/segment_file_page.rs"]
+mod segment_file_page;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -12,6 +15,8 @@ use linesman_proto::port::Port;
 use linesman_sim::device::library;
 use linesman_sim::fault::{KINDS, PlaceRule, Shape};
 use linesman_sim::hardware::PortKind;
+use linesman_sim::segment::Segment;
+use linesman_sim::segment_file::SegmentFile;
 
 fn docs() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs")
@@ -41,6 +46,7 @@ fn pages() -> BTreeMap<String, String> {
     pages.insert("findings/README.md".to_owned(), index);
     pages.insert("guide/faults.md".to_owned(), faults());
     pages.insert("guide/devices.md".to_owned(), devices());
+    pages.insert("guide/segment-file.md".to_owned(), segment_file_page::page());
     pages
 }
 
@@ -159,4 +165,41 @@ fn the_pages_are_up_to_date() {
         stale.is_empty(),
         "{stale:?}: run `LINESMAN_WRITE_PAGES=1 cargo test -p linesman --test pages`"
     );
+}
+
+/// What stands between "```toml" and "```" in a page of the guide.
+fn examples(page: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(docs().join("guide").join(page)).unwrap();
+    let blocks = text.split("```toml\n").skip(1);
+    blocks.map(|block| block.split("```").next().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn segment_files_of_the_guide_can_be_built() {
+    for page in ["segment-file.md", "virtual-segment.md"] {
+        let examples = examples(page);
+        assert!(!examples.is_empty(), "{page} has no example");
+        for example in examples {
+            let file = SegmentFile::parse(&example)
+                .unwrap_or_else(|error| panic!("{page}: {error}\n{example}"));
+            Segment::build(&file).unwrap_or_else(|error| panic!("{page}: {error}\n{example}"));
+        }
+    }
+}
+
+#[test]
+fn every_key_of_the_segment_file_is_explained() {
+    let page = segment_file_page::page();
+    let schema = serde_json::to_value(schemars::schema_for!(SegmentFile)).unwrap();
+    let mut tables = vec![&schema];
+    tables.extend(schema["$defs"].as_object().unwrap().values());
+    let mut keys = 0;
+    for key in tables.iter().filter_map(|table| table["properties"].as_object()).flatten() {
+        let row = page.lines().find(|line| line.starts_with(&format!("| `{}` |", key.0)));
+        let row = row.unwrap_or_else(|| panic!("`{}` is missing", key.0));
+        let meaning = row.trim_end_matches(" |").rsplit(" | ").next().unwrap();
+        assert!(meaning.len() > 8, "`{}` has no meaning: {row}", key.0);
+        keys += 1;
+    }
+    assert!(keys > 20, "{keys} keys");
 }

@@ -127,6 +127,14 @@ impl Pdi<'_> {
         taken
     }
 
+    /// Begins to write what [`Pdi::write_sync_manager`] will complete. `shown` says whether this type
+    /// of controller shows the buffer as open meanwhile (SyncManager status, bit 7): not all do.
+    pub fn open_sync_manager(&mut self, index: u8, shown: bool) {
+        let Some(index) = self.index(index) else { return };
+        self.core.sync_managers.open_by_pdi(index, shown, &mut self.core.memory);
+        self.core.refresh_sync_manager_events(index, self.now);
+    }
+
     /// Whether a mailbox holds a message, in either direction.
     #[must_use]
     pub fn mailbox_full(&self, index: u8) -> bool {

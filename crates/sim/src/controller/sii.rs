@@ -31,6 +31,8 @@ pub const PROGRAMMING_TIME: Span = Span::ms(2);
 const NO_ANSWER_TIME: Span = Span::us(70);
 /// More for the second address byte.
 const SECOND_ADDRESS_BYTE: Span = Span::us(60);
+/// Bit 4 of the status, where a controller has it.
+const FIRST_OWNER: u16 = 1 << 4;
 /// Largest EEPROM with one address byte, in bytes.
 const SMALL: usize = 2_048;
 /// Largest EEPROM there is: 4 Mbit.
@@ -45,6 +47,9 @@ pub(super) struct Sii {
     capacity: usize,
     reads_eight: bool,
     takes_a5: bool,
+    /// The small controller shows bit 4 of its status until it is in SAFEOP with the SII offered to
+    /// the PDI: so recordings of real terminals have it; the data sheet calls the bit reserved.
+    marks_first_owner: bool,
     running: Option<Running>,
     programming_until: Instant,
     /// Write enable was given in the frame that is ending.
@@ -55,6 +60,7 @@ pub(super) struct Sii {
     alias_each_load: bool,
     /// The SubDevice's processor plays the EEPROM.
     pub(super) emulated: bool,
+    programming_time: Span,
     /// How long the next commands take, where that is known.
     expected: VecDeque<Span>,
 }
@@ -97,12 +103,14 @@ impl Sii {
             capacity,
             reads_eight,
             takes_a5: implemented::has_configuration_a5(hardware),
+            marks_first_owner: ControllerType(hardware.controller_type) == ControllerType::ET1200,
             running: None,
             programming_until: Instant::ZERO,
             write_enabled: false,
             loaded_once: false,
             alias_each_load: ControllerType(hardware.controller_type) == ControllerType::ESC20,
             emulated: false,
+            programming_time: PROGRAMMING_TIME,
             expected: VecDeque::new(),
         }
     }
@@ -114,6 +122,18 @@ impl Sii {
     /// From now on the SubDevice's processor plays the EEPROM, or does not.
     pub(super) fn emulate(&mut self, emulated: bool) {
         self.emulated = emulated;
+    }
+
+    /// How long the EEPROM is busy behind a write.
+    pub(super) fn set_programming_time(&mut self, time: Span) {
+        self.programming_time = time;
+    }
+
+    /// The device exchanges process data while the SII is offered to the PDI.
+    pub(super) fn forget_first_owner(&self, memory: &mut Memory) {
+        if self.marks_first_owner && memory.u8(&r::SII_ACCESS_ECAT) & 1 != 0 {
+            put(SiiControl(read(memory).0 & !FIRST_OWNER), memory);
+        }
     }
 
     /// The next commands take these times.
@@ -131,7 +151,8 @@ impl Sii {
             .with_emulated(self.emulated)
             .with_eeprom_missing(self.image.is_empty())
             .with_not_loaded(true);
-        put(control, memory);
+        let mark = if self.marks_first_owner { FIRST_OWNER } else { 0 };
+        put(SiiControl(control.0 | mark), memory);
         self.run(at + STARTUP_DELAY, self.load_time(), Operation::Load { retries: 1 }, memory);
     }
 
@@ -220,7 +241,7 @@ impl Sii {
             }
             Operation::Write { word, value } => {
                 self.write(word, value);
-                self.programming_until = running.done_at + PROGRAMMING_TIME;
+                self.programming_until = running.done_at + self.programming_time;
                 Outcome::None
             }
             Operation::Unanswered => {

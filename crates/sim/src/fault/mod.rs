@@ -14,6 +14,8 @@ mod source;
 
 mod brown_out;
 mod cable_degraded;
+mod clock_drift;
+mod cycle_too_fast;
 mod device_internal;
 mod device_missing;
 mod device_off;
@@ -22,6 +24,7 @@ mod emc_noise;
 mod emergency;
 mod firmware_fault;
 mod init_refused;
+mod late_frames;
 mod link_flapping;
 mod link_open;
 mod mailbox_error;
@@ -29,7 +32,9 @@ mod mailbox_slow;
 mod mailbox_stuck;
 mod nic_damaged;
 mod receiver_damaged;
+mod reference_clock_lost;
 mod supply_off;
+mod sync_lost;
 mod transmitter_damaged;
 mod watchdog_starved;
 
@@ -88,6 +93,11 @@ pub const KINDS: &[Kind] = &[
     emergency::KIND,
     firmware_fault::KIND,
     watchdog_starved::KIND,
+    cycle_too_fast::KIND,
+    late_frames::KIND,
+    reference_clock_lost::KIND,
+    clock_drift::KIND,
+    sync_lost::KIND,
 ];
 
 /// The kind with a name, if a segment can have it.

@@ -65,6 +65,8 @@ impl World {
             Change::Silence { path, until } => self.silence(at, fault, path, until),
             Change::Watchdog { node, time } => self.set_watchdog(at, fault, node, time),
             Change::Software { node, change } => self.change_software(at, fault, node, change),
+            Change::Timing { node, change } => self.change_timing(at, fault, node, change),
+            Change::Late { path, by } => self.make_late(at, fault, path, by),
             Change::Refuse { node, refusal } => {
                 self.nodes[node].refused_by = refusal.map(|_| fault);
                 self.nodes[node].act_at(at, Act::Refuse(refusal));

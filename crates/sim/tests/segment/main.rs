@@ -2,10 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
+mod clocks;
 mod faults;
 mod identification;
 mod oracle;
 mod rig;
 mod swarm;
+mod timing;
 mod traps;
 mod walk;
