@@ -100,11 +100,8 @@ fn processor(
     let channels: Vec<Box<dyn Channel>> = vec![Box::new(driven), Box::new(taken)];
     let bootstrap = described.image.bootstrap_mailbox;
     let files = if described.image.protocols.has(Protocols::FOE) {
-        let slot = FirmwareSlot {
-            type_name: described.name.clone(),
-            limit: FIRMWARE_LIMIT,
-            password: 0,
-        };
+        let slot =
+            FirmwareSlot { type_name: described.name.clone(), limit: FIRMWARE_LIMIT, password: 0 };
         Files::new(Vec::new(), Some(slot))
     } else {
         Files::default()
