@@ -4,6 +4,7 @@
 //! [at TIME] inject FAULT at PLACE [for TIME] [with KEY = VALUE, …]
 //! [at TIME] inject FAULT at device NAME [for TIME] [with …]
 //! [at TIME] inject FAULT at devices NAME, NAME [for TIME] [with …]
+//! [at TIME] inject FAULT at supply NAME [for TIME] [with …]
 //! [at TIME] heal [FAULT]
 //! at TIME
 //! [at TIME] expect verdict [on FAULT] [within TIME]
@@ -159,6 +160,8 @@ fn inject(words: &mut Words<'_>) -> Result<Step, String> {
     } else if let Some(devices) = place.strip_prefix("devices ") {
         let devices: Vec<&str> = devices.split(',').map(str::trim).collect();
         entry += &format!("devices = {devices:?}\n");
+    } else if let Some(supply) = place.strip_prefix("supply ") {
+        entry += &format!("supply = {:?}\n", supply.trim());
     } else {
         entry += &format!("at = {place:?}\n");
     }

@@ -8,6 +8,7 @@ use super::channel::{Driven, Taken};
 use super::objects;
 use super::signals::{Layout, Point};
 use crate::device::application::Channel;
+use crate::device::application::drive::Cia402;
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
 use crate::device::files::{Files, FirmwareSlot};
 use crate::device::firmware::{Firmware, NoFirmware};
@@ -97,7 +98,15 @@ fn processor(
             }
         }
     }
-    let channels: Vec<Box<dyn Channel>> = vec![Box::new(driven), Box::new(taken)];
+    let mut channels: Vec<Box<dyn Channel>> = vec![Box::new(driven)];
+    if let Some((first_output, first_input)) = layout.axis
+        && let Some(position) = outputs.get(first_output)
+        && let Some(switches) = inputs.get(first_input..).and_then(|mine| mine.first_chunk())
+    {
+        channels.push(Box::new(Cia402::new(&dictionary, *position, *switches)));
+    }
+    // Last, so that what is driven from outside counts.
+    channels.push(Box::new(taken));
     let bootstrap = described.image.bootstrap_mailbox;
     let files = if described.image.protocols.has(Protocols::FOE) {
         let slot =
@@ -114,7 +123,7 @@ fn processor(
         mailbox: described.image.standard_mailbox,
         protocols: described.image.protocols,
         bootstrap: bootstrap.is_present().then_some(bootstrap),
-        times: ResponseTimes::TERMINAL,
+        times: if layout.axis.is_some() { ResponseTimes::DRIVE } else { ResponseTimes::TERMINAL },
     });
     processor.with_files(files)
 }
