@@ -4,6 +4,7 @@
 
 mod faults;
 mod identification;
+mod long_line;
 mod oracle;
 mod rig;
 mod swarm;
