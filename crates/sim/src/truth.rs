@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::register::{ErrorCounter, WatchdogTime};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use crate::device::Trouble;
@@ -57,6 +57,11 @@ pub enum Effect {
         /// Number of the frame in the segment.
         frame: u64,
     },
+    /// Somebody else than the MainDevice sent a frame.
+    StrangerSent {
+        /// Number of the frame in the segment.
+        frame: u64,
+    },
     /// A processing unit counted an undamaged frame for what is in it: foreign, too short,
     /// circulating.
     ContentRefused {
@@ -96,12 +101,41 @@ pub enum Effect {
         /// Its code; 0 takes the one before back.
         code: u16,
     },
+    /// The quartz of a device has another speed from now on.
+    ClockDrifts {
+        /// Parts per thousand million too fast.
+        ppb: i64,
+    },
+    /// The quartz of a device stands.
+    ClockStopped,
+    /// The clock of a device started anew.
+    ClockRestarted,
+    /// The quartz of a device has its own speed again.
+    ClockRestored,
+    /// The SYNC signals of a device do not reach its processor any more.
+    SyncCut,
+    /// They reach it again.
+    SyncBack,
+    /// The work of a device takes so long in each cycle from now on.
+    WorkTakes {
+        /// How long.
+        takes: Span,
+    },
+    /// It takes as long as it needs again.
+    WorkRestored,
+    /// A card kept a frame back.
+    FrameHeldBack {
+        /// How long.
+        by: Span,
+    },
     /// Counters were not 0 at the start: noise at power-on or plugging, old errors.
     OldCounters,
     /// Another type of device than planned sits here.
     WrongDevice,
     /// A device that was planned is not here.
     MissingDevice,
+    /// A cable is plugged into another port than planned.
+    WrongPort,
 }
 
 impl Effect {
@@ -172,6 +206,10 @@ pub struct FaultRecord {
     pub frames_spoiled: u64,
     /// Frames, or rests of frames, that vanished.
     pub frames_lost: u64,
+    /// Frames that it sent itself.
+    pub frames_sent: u64,
+    /// Frames that it kept back.
+    pub frames_delayed: u64,
     /// Ends of links that lost their link.
     pub links_lost: u64,
     /// Controllers that lost their supply.
@@ -193,6 +231,8 @@ impl FaultRecord {
             Effect::FrameLost { .. } => self.frames_lost += 1,
             Effect::SignalLost => self.links_lost += 1,
             Effect::PowerLost => self.supplies_lost += 1,
+            Effect::StrangerSent { .. } => self.frames_sent += 1,
+            Effect::FrameHeldBack { .. } => self.frames_delayed += 1,
             Effect::ContentRefused { .. }
             | Effect::SignalBack
             | Effect::PowerBack
@@ -204,9 +244,18 @@ impl FaultRecord {
             | Effect::EmergencySent { .. }
             | Effect::CardSilent
             | Effect::WatchdogSet { .. }
+            | Effect::ClockDrifts { .. }
+            | Effect::ClockStopped
+            | Effect::ClockRestarted
+            | Effect::ClockRestored
+            | Effect::SyncCut
+            | Effect::SyncBack
+            | Effect::WorkTakes { .. }
+            | Effect::WorkRestored
             | Effect::OldCounters
             | Effect::WrongDevice
-            | Effect::MissingDevice => {}
+            | Effect::MissingDevice
+            | Effect::WrongPort => {}
         }
     }
 }
@@ -273,6 +322,8 @@ impl TruthLog {
             symbol_errors: 0,
             frames_spoiled: 0,
             frames_lost: 0,
+            frames_sent: 0,
+            frames_delayed: 0,
             links_lost: 0,
             supplies_lost: 0,
         });

@@ -269,9 +269,20 @@ impl<'a> Episode<'a> {
                 | Effect::EmergencySent { .. }
                 | Effect::CardSilent
                 | Effect::WatchdogSet { .. }
+                | Effect::ClockDrifts { .. }
+                | Effect::ClockStopped
+                | Effect::ClockRestarted
+                | Effect::ClockRestored
+                | Effect::SyncCut
+                | Effect::SyncBack
+                | Effect::WorkTakes { .. }
+                | Effect::WorkRestored
+                | Effect::FrameHeldBack { .. }
                 | Effect::OldCounters
                 | Effect::WrongDevice
-                | Effect::MissingDevice => false,
+                | Effect::MissingDevice
+                | Effect::StrangerSent { .. }
+                | Effect::WrongPort => false,
             },
             Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => false,
         })

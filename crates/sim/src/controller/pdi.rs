@@ -116,7 +116,7 @@ impl Pdi<'_> {
     }
 
     /// Gives the MainDevice something to read; what `data` lacks to the SyncManager's length is
-    /// filled with 0. False when it cannot be taken: a full mailbox, too much data, a SyncManager
+    /// filled with 0, but in a mailbox, where it stays what it was. False when it cannot be taken: a full mailbox, too much data, a SyncManager
     /// that is off or of the other direction.
     pub fn write_sync_manager(&mut self, index: u8, data: &[u8]) -> bool {
         let Some(index) = self.index(index) else { return false };
@@ -125,6 +125,14 @@ impl Pdi<'_> {
             self.core.refresh_sync_manager_events(index, self.now);
         }
         taken
+    }
+
+    /// Begins to write what [`Pdi::write_sync_manager`] will complete. `shown` says whether this type
+    /// of controller shows the buffer as open meanwhile (SyncManager status, bit 7): not all do.
+    pub fn open_sync_manager(&mut self, index: u8, shown: bool) {
+        let Some(index) = self.index(index) else { return };
+        self.core.sync_managers.open_by_pdi(index, shown, &mut self.core.memory);
+        self.core.refresh_sync_manager_events(index, self.now);
     }
 
     /// Whether a mailbox holds a message, in either direction.

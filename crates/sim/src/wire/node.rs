@@ -5,12 +5,13 @@ use std::collections::VecDeque;
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::WatchdogTime;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::change::Line;
 use super::history::History;
 use super::nodes::Entry;
 use super::software::Held;
+use super::timing::HeldTiming;
 use crate::controller::Controller;
 use crate::device::{Refusal, Signals, Trouble};
 use crate::truth::FaultId;
@@ -26,6 +27,11 @@ pub(super) enum Act {
     Reboot,
     Watchdog(Option<WatchdogTime>),
     Report(Emergency),
+    Drift { ppb: i64, ramp_ppb_per_s: i64, ramp: Span },
+    RestoreDrift,
+    RestartClock,
+    CutSync(bool),
+    SlowDown(Option<Span>),
 }
 
 /// A fault inside that waits for a frame.
@@ -52,6 +58,8 @@ pub(crate) struct Node {
     former_watchdog: Option<WatchdogTime>,
     /// What faults have done to its software.
     pub(super) software: Vec<Held>,
+    /// What faults have done to its clock and deadlines.
+    pub(super) timing: Vec<HeldTiming>,
     /// In the order of time.
     acts: VecDeque<(Instant, Act)>,
     /// What the book of all nodes keeps of it.
@@ -71,6 +79,7 @@ impl Node {
             watchdog_by: None,
             former_watchdog: None,
             software: Vec::new(),
+            timing: Vec::new(),
             acts: VecDeque::new(),
             entry: Entry::default(),
             last_frame: 0,
@@ -97,6 +106,13 @@ impl Node {
                     self.set_watchdog(at, time);
                 }
                 Act::Reboot => self.controller.reboot_processor(at, signals),
+                Act::Drift { ppb, ramp_ppb_per_s, ramp } => {
+                    self.controller.set_drift(at, ppb, ramp_ppb_per_s, ramp);
+                }
+                Act::RestoreDrift => self.controller.restore_drift(at),
+                Act::RestartClock => self.controller.restart_clock(at),
+                Act::CutSync(cut) => self.controller.cut_sync(cut),
+                Act::SlowDown(takes) => self.controller.slow_down(takes),
                 Act::Report(emergency) => self.controller.report(at, emergency),
             }
         }

@@ -11,8 +11,11 @@ mod objects;
 mod stations;
 mod target;
 
+use std::collections::BTreeSet;
+
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::command::{Addressing, Command};
+use linesman_proto::register::{self as r, EcatEvents};
 
 pub use device::{AlStep, DeviceSeen, MailboxTurn};
 use stations::Stations;
@@ -21,6 +24,8 @@ pub use target::Target;
 use super::recording::{Datagram, Recording};
 use linesman_proto::time::Instant;
 
+/// Registers that say what a controller is end here.
+const IDENTITY: usize = 0x000A;
 /// Most devices that a recording is believed to have.
 const MOST_DEVICES: u16 = 4_096;
 
@@ -46,10 +51,63 @@ pub struct Learned {
     pub devices: Vec<DeviceSeen>,
     /// Which accesses were answered by how many.
     pub presence: Vec<Presence>,
+    /// Broadcast reads of what controllers are: from which register on, all ORed, and how many
+    /// answered.
+    pub identities: Vec<(RegisterAddress, Vec<u8>, u16)>,
+    /// ECAT events that stood when the recording began, and those that were masked in.
+    pub events: EventsAtStart,
     /// What had to be assumed, for people.
     pub notes: Vec<String>,
     /// A logical access was answered before any mapping was seen.
     mapped_before: bool,
+}
+
+/// ECAT events when the recording begins.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct EventsAtStart {
+    /// Events that stood.
+    pub request: u16,
+    /// Events that datagrams carried away.
+    pub mask: u16,
+    /// Devices whose DL or AL status was read while an event stood; with none, all had it.
+    pub owners: BTreeSet<usize>,
+    /// The last event went with the read of a device's status.
+    pub ended: bool,
+    begun: bool,
+    /// DL status, AL status were read: their events are gone.
+    served: u16,
+}
+
+impl EventsAtStart {
+    fn take(&mut self, request: &Datagram<'_>, reply: &Datagram<'_>, target: Target) {
+        self.ended |= self.request != 0 && reply.irq == 0;
+        if !std::mem::replace(&mut self.begun, true) {
+            self.mask = reply.irq;
+        }
+        self.request |= reply.irq & !self.served;
+        let end = u32::from(request.ado.0) + request.data.len() as u32;
+        let covers = |register: &r::Register| {
+            u32::from(request.ado.0) < u32::from(register.end().0)
+                && u32::from(register.address.0) < end
+        };
+        let reads = request.command.is_some_and(|command| {
+            command.effect().reads && command.addressing() != Addressing::Logical
+        });
+        if reads && reply.wkc > 0 {
+            let events =
+                [(&r::DL_STATUS, EcatEvents::DL_STATUS), (&r::AL_STATUS, EcatEvents::AL_STATUS)];
+            for (register, event) in events {
+                if covers(register) {
+                    self.served |= event.0;
+                    if let Target::One(device) = target
+                        && !self.ended
+                    {
+                        self.owners.insert(device);
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// Learns from a recording.
@@ -67,6 +125,11 @@ pub fn learn(recording: &Recording) -> Learned {
     }
     for turn in &recording.turns {
         for (request, reply) in turn.pairs() {
+            let count = learned.devices.len();
+            let target = request
+                .command
+                .map_or(Target::Nobody, |command| stations.target(command, &request, count));
+            learned.events.take(&request, &reply, target);
             learned.take(&request, &reply, turn.request.at, &mut stations);
         }
     }
@@ -82,6 +145,8 @@ pub fn learn(recording: &Recording) -> Learned {
     }
     learned.presence.sort_unstable();
     learned.presence.dedup();
+    learned.identities.sort_unstable();
+    learned.identities.dedup();
     learned
 }
 
@@ -97,6 +162,11 @@ impl Learned {
         let target = stations.target(command, request, self.devices.len());
         let effect = command.effect();
         self.note_presence(command, request, reply, target);
+        // All are one.
+        let target = match target {
+            Target::All if self.devices.len() == 1 => Target::One(0),
+            target => target,
+        };
         match target {
             Target::One(device) => {
                 let seen = &mut self.devices[device];
@@ -108,9 +178,7 @@ impl Learned {
                 }
             }
             Target::All if reply.wkc > 0 => {
-                if self.devices.len() == 1 && effect.reads && !effect.writes {
-                    self.devices[0].read(request.ado, reply.data, true, at);
-                } else if effect.reads {
+                if effect.reads {
                     for seen in &mut self.devices {
                         seen.read_by_all(request.ado, reply.data, at);
                     }
@@ -138,6 +206,10 @@ impl Learned {
         target: Target,
     ) {
         let effect = command.effect();
+        let is_identity = usize::from(request.ado.0) + request.data.len() <= IDENTITY;
+        if target == Target::All && effect.reads && !effect.writes && is_identity {
+            self.identities.push((request.ado, reply.data.to_vec(), reply.wkc));
+        }
         if effect.reads == effect.writes || usize::from(request.ado.0) + request.data.len() > 0x0F00
         {
             return;

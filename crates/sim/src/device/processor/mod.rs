@@ -86,6 +86,8 @@ pub struct Description {
     pub channels: Vec<Box<dyn Channel>>,
     /// Its process data.
     pub buffers: Vec<ProcessBuffer>,
+    /// Pairs of PDOs that cannot be assigned together.
+    pub excludes: Vec<(u16, u16)>,
     /// The mailbox it likes best; a longer one it does not take. Without a size there is none.
     pub mailbox: MailboxPair,
     /// What its mailbox speaks.
@@ -268,7 +270,8 @@ impl Processor {
     }
 
     fn set_up_process_data(&mut self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
-        let areas = Areas::of(&self.dictionary, &self.description.buffers)?;
+        let areas =
+            Areas::of(&self.dictionary, &self.description.buffers, &self.description.excludes)?;
         check::modules(&self.dictionary)?;
         check::process_data(pdi, &areas, self.description.mailbox.is_present())?;
         let outputs = areas.len(Direction::Outputs) > 0;
