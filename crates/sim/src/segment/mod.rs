@@ -164,8 +164,9 @@ impl Segment {
         }
     }
 
-    /// When the next frame arrives, of those on their way, or leaves a card that is late. What else happens in the segment needs no
-    /// call at its time: it is made up for, in its order, by the next one.
+    /// When the next frame arrives, of those on their way, or leaves a card that is late. What else
+    /// happens in the segment needs no call at its time: it is made up for, in its order, by the next
+    /// one.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         [self.arrivals.next_at(), self.next_leaves()].into_iter().flatten().min()
@@ -283,8 +284,8 @@ impl Segment {
     }
 
     /// All signals, to drive inputs from outside.
-    pub const fn signals_mut(&mut self) -> &mut Signals {
-        &mut self.world.signals
+    pub fn signals_mut(&mut self) -> &mut Signals {
+        self.world.signals.at(self.now)
     }
 
     /// The signals that a device drives, channel by channel.
