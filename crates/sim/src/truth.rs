@@ -57,6 +57,11 @@ pub enum Effect {
         /// Number of the frame in the segment.
         frame: u64,
     },
+    /// Somebody else than the MainDevice sent a frame.
+    StrangerSent {
+        /// Number of the frame in the segment.
+        frame: u64,
+    },
     /// A processing unit counted an undamaged frame for what is in it: foreign, too short,
     /// circulating.
     ContentRefused {
@@ -129,6 +134,8 @@ pub enum Effect {
     WrongDevice,
     /// A device that was planned is not here.
     MissingDevice,
+    /// A cable is plugged into another port than planned.
+    WrongPort,
 }
 
 impl Effect {
@@ -199,6 +206,10 @@ pub struct FaultRecord {
     pub frames_spoiled: u64,
     /// Frames, or rests of frames, that vanished.
     pub frames_lost: u64,
+    /// Frames that it sent itself.
+    pub frames_sent: u64,
+    /// Frames that it kept back.
+    pub frames_delayed: u64,
     /// Ends of links that lost their link.
     pub links_lost: u64,
     /// Controllers that lost their supply.
@@ -220,6 +231,8 @@ impl FaultRecord {
             Effect::FrameLost { .. } => self.frames_lost += 1,
             Effect::SignalLost => self.links_lost += 1,
             Effect::PowerLost => self.supplies_lost += 1,
+            Effect::StrangerSent { .. } => self.frames_sent += 1,
+            Effect::FrameHeldBack { .. } => self.frames_delayed += 1,
             Effect::ContentRefused { .. }
             | Effect::SignalBack
             | Effect::PowerBack
@@ -239,10 +252,10 @@ impl FaultRecord {
             | Effect::SyncBack
             | Effect::WorkTakes { .. }
             | Effect::WorkRestored
-            | Effect::FrameHeldBack { .. }
             | Effect::OldCounters
             | Effect::WrongDevice
-            | Effect::MissingDevice => {}
+            | Effect::MissingDevice
+            | Effect::WrongPort => {}
         }
     }
 }
@@ -309,6 +322,8 @@ impl TruthLog {
             symbol_errors: 0,
             frames_spoiled: 0,
             frames_lost: 0,
+            frames_sent: 0,
+            frames_delayed: 0,
             links_lost: 0,
             supplies_lost: 0,
         });

@@ -280,7 +280,9 @@ impl<'a> Episode<'a> {
                 | Effect::FrameHeldBack { .. }
                 | Effect::OldCounters
                 | Effect::WrongDevice
-                | Effect::MissingDevice => false,
+                | Effect::MissingDevice
+                | Effect::StrangerSent { .. }
+                | Effect::WrongPort => false,
             },
             Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => false,
         })

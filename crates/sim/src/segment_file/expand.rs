@@ -214,6 +214,11 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
             });
         }
     }
+    if let Some(noise) = file.noise_at_link_up.filter(|mean| !(0.0..=1_000.0).contains(mean)) {
+        return Err(SegmentFileError::Wiring(format!(
+            "`noise_at_link_up` is {noise}, expected 0 to 1000"
+        )));
+    }
     let ring_m = file.ring.as_ref().and_then(|ring| ring.cable_m);
     if let Some(length) = ring_m.filter(|m| !(0.0..=LONGEST_CABLE_M).contains(m)) {
         return Err(SegmentFileError::Range {
@@ -224,7 +229,27 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
         });
     }
     wiring(file, planned).tree().map_err(|error| wiring_error(planned, error))?;
-    check_ports(file, planned)
+    check_ports(file, planned)?;
+    check_supplies(file)
+}
+
+/// Supplies have names of their own and feed devices that are there.
+fn check_supplies(file: &SegmentFile) -> Result<(), SegmentFileError> {
+    for (index, supply) in file.supplies.iter().enumerate() {
+        let wrong = |what: String| SegmentFileError::Supply { supply: supply.name.clone(), what };
+        if file.supplies[..index].iter().any(|other| other.name == supply.name) {
+            return Err(wrong("there are two of this name".to_owned()));
+        }
+        let known = |name: &String| file.devices.iter().any(|device| device.name == *name);
+        match supply.devices.iter().find(|name| !known(name)) {
+            Some(name) => return Err(wrong(format!("no device is called `{name}`"))),
+            None if supply.devices.is_empty() => {
+                return Err(wrong("it feeds nobody: name its `devices`".to_owned()));
+            }
+            None => {}
+        }
+    }
+    Ok(())
 }
 
 /// The same error with names for numbers.

@@ -41,6 +41,8 @@ pub use schedule::{BurstTimes, RandomTimes, Schedule, Times};
 pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
 
+use crate::wire::Medium;
+
 /// A segment, as described.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -58,6 +60,14 @@ pub struct SegmentFile {
     /// each follows its type unless said.
     #[serde(default)]
     pub counts_forwarded: Option<bool>,
+    /// Mean number of symbols that are destroyed on each line of a link when it comes up during the
+    /// run: contacts bounce. None unless said.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub noise_at_link_up: Option<f64>,
+    /// Power supplies that feed several devices, to fail together.
+    #[serde(default, rename = "supply")]
+    pub supplies: Vec<Supply>,
     /// Its devices, in the order of their numbers.
     #[serde(default, rename = "device")]
     pub devices: Vec<SegmentDevice>,
@@ -110,6 +120,14 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]
     pub clock_ppm: Option<f64>,
+    /// What its cable is made of: `direct` (copper, E-bus contacts), `fibre`, or `converters`, a pair
+    /// of media converters; `direct` unless said.
+    #[serde(default)]
+    pub medium: Option<Medium>,
+    /// Whether its controllers make a symbol error anew when they pass a bad frame on, as those in
+    /// programmable logic do; as its type has it unless said.
+    #[serde(default)]
+    pub remakes_symbol_errors: Option<bool>,
     /// How else its clock is off: warming up, jitter, what it shows at power-on.
     #[serde(default)]
     pub clock: Option<SegmentClock>,
@@ -137,6 +155,19 @@ pub struct SegmentRing {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 2000.0))]
     pub cable_m: Option<f64>,
+    /// What it is made of, as for a device.
+    #[serde(default)]
+    pub medium: Option<Medium>,
+}
+
+/// A power supply and the devices that it feeds.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Supply {
+    /// Unique name.
+    pub name: String,
+    /// Names of devices; a coupler feeds its terminals.
+    pub devices: Vec<String>,
 }
 
 /// A fault of a segment: kind, place, times, and the parameters of its kind.
@@ -154,6 +185,9 @@ pub struct FaultEntry {
     /// Several devices that share the fault.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub devices: Option<Vec<String>>,
+    /// A `[[supply]]`: all devices that it feeds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply: Option<String>,
     /// When it begins, in ms since the start of the run; at once unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_ms: Option<f64>,
@@ -277,6 +311,14 @@ pub enum SegmentFileError {
         given: String,
         /// What can be.
         allowed: &'static str,
+    },
+    /// A supply that feeds nobody, or somebody unknown.
+    #[error("supply `{supply}`: {what}")]
+    Supply {
+        /// Which.
+        supply: String,
+        /// What is wrong with it.
+        what: String,
     },
     /// A counter that no controller has.
     #[error("device `{device}`: no counter is called `{given}`; expected {allowed}")]

@@ -6,7 +6,7 @@ use linesman_proto::address::Path;
 use linesman_proto::command::Command;
 use linesman_proto::time::Span;
 use linesman_sim::device::library::{self, LibraryType};
-use linesman_sim::fault::{KINDS, PlaceRule};
+use linesman_sim::fault::{KINDS, Kind, PlaceRule};
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{FaultEntry, PlantOptions, SegmentFile, plant};
@@ -16,8 +16,9 @@ use super::rig::{Bench, PLANT, answer, at, frame};
 
 /// A random fault of any kind that can come and go.
 pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
-    let built_in = [FaultName::DeviceWrong, FaultName::DeviceMissing];
-    let kinds: Vec<_> = KINDS.iter().filter(|kind| !built_in.contains(&kind.name)).collect();
+    let is_ring = file.ring.is_some();
+    let fits = |kind: &&Kind| !kind.is_built_in() && (is_ring || kind.place != PlaceRule::RingLink);
+    let kinds: Vec<_> = KINDS.iter().filter(fits).collect();
     let kind = stream.pick(&kinds).unwrap();
     let needs_software = matches!(kind.place, PlaceRule::Processor | PlaceRule::Mailbox);
     let has_software = |name: &str| library::find(name).is_some_and(LibraryType::has_mailbox);
@@ -37,7 +38,7 @@ pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
         | PlaceRule::Processor
         | PlaceRule::Mailbox
         | PlaceRule::DeviceOrCard => entry.device(&device.name),
-        PlaceRule::Card => entry,
+        PlaceRule::Card | PlaceRule::RingLink | PlaceRule::Entrance => entry,
     }
 }
 
