@@ -266,7 +266,7 @@ fn register(words: &mut Words<'_>) -> Result<Ground, String> {
 }
 
 /// `0x1234`: as many bytes as pairs of digits, lowest first.
-fn value(text: &str) -> Option<Vec<u8>> {
+pub(super) fn value(text: &str) -> Option<Vec<u8>> {
     let digits = text.strip_prefix("0x")?;
     if digits.is_empty() || digits.len() % 2 != 0 || !digits.is_ascii() {
         return None;

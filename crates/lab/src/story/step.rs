@@ -17,6 +17,7 @@
 //! [at TIME] expect all closed [within TIME]
 //! [at TIME] expect line up [within TIME]
 //! [at TIME] expect exit N
+//! [at TIME] expect object …     what comes of reading an object: see `object`
 //! [at TIME] expect …            what is so on the segment: see `ground`
 //! ```
 //! `PLACE` is `K1.C-B3.A` (a link), `K1.C>B3.A` (one direction), `device K1`, `host` or `network`.
@@ -27,6 +28,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
 
 use super::ground::Ground;
+use super::object::Reading;
 
 /// A step and where it stands.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -120,6 +122,8 @@ pub enum Expectation {
     Exit(u8),
     /// Something is so on the segment, whatever the diagnosis says.
     Ground(Ground),
+    /// Something comes of reading an object.
+    Object(Reading),
 }
 
 /// Reads the text of a list item; the error says what was expected.
@@ -249,6 +253,7 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             words.expect("up")?;
             Expectation::LineUp
         }
+        "object" => Expectation::Object(Reading::parse(words)?),
         "exit" => {
             let status = words.next();
             Expectation::Exit(status.parse().map_err(|_| format!("`{status}` is no exit status"))?)
@@ -262,7 +267,7 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
                     "`{other}` cannot be expected: expected `verdict`, `finding`, `no finding`, `N findings`, \
                      `healthy`, `inconclusive`, `all closed`, `line up`, `exit N`, or something of the \
                      segment: `counter`, `no other counter`, `port`, `state`, `lost frames`, \
-                     `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`"
+                     `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`, `object`"
                 )
             })?;
             if !words.take("findings") {
