@@ -79,6 +79,8 @@ fn faults() -> String {
             }
             PlaceRule::Line => "`at`: one direction of a link, `K1.C>B3.A`",
             PlaceRule::Device => "`device`",
+            PlaceRule::Feed => "`device`, one that feeds the E-bus",
+            PlaceRule::Pair => "`devices`, a list of two",
             PlaceRule::Processor => "`device`, one with a processor",
             PlaceRule::Mailbox => "`device`, one with a mailbox",
             PlaceRule::DeviceOrCard => {

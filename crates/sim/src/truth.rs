@@ -102,6 +102,15 @@ pub enum Effect {
     WrongDevice,
     /// A device that was planned is not here.
     MissingDevice,
+    /// A device that was not planned is here.
+    ExtraDevice,
+    /// A device sits in the place of another one, and that one in its.
+    SwappedDevice,
+    /// A device answers to this address, as another one does.
+    SharedAddress {
+        /// The station address or alias.
+        address: u16,
+    },
 }
 
 impl Effect {
@@ -206,7 +215,10 @@ impl FaultRecord {
             | Effect::WatchdogSet { .. }
             | Effect::OldCounters
             | Effect::WrongDevice
-            | Effect::MissingDevice => {}
+            | Effect::MissingDevice
+            | Effect::ExtraDevice
+            | Effect::SwappedDevice
+            | Effect::SharedAddress { .. } => {}
         }
     }
 }

@@ -271,7 +271,10 @@ impl<'a> Episode<'a> {
                 | Effect::WatchdogSet { .. }
                 | Effect::OldCounters
                 | Effect::WrongDevice
-                | Effect::MissingDevice => false,
+                | Effect::MissingDevice
+                | Effect::ExtraDevice
+                | Effect::SwappedDevice
+                | Effect::SharedAddress { .. } => false,
             },
             Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => false,
         })

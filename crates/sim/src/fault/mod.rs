@@ -14,10 +14,15 @@ mod source;
 
 mod brown_out;
 mod cable_degraded;
+mod config_mismatch;
+mod device_extra;
 mod device_internal;
 mod device_missing;
 mod device_off;
 mod device_wrong;
+mod devices_swapped;
+mod duplicate_address;
+mod ebus_overload;
 mod emc_noise;
 mod emergency;
 mod firmware_fault;
@@ -31,6 +36,7 @@ mod nic_damaged;
 mod receiver_damaged;
 mod supply_off;
 mod transmitter_damaged;
+mod twins_swapped;
 mod watchdog_starved;
 
 use linesman_config::fault::FaultName;
@@ -42,8 +48,10 @@ pub use place::PlaceRule;
 pub(crate) use place::Scene;
 pub(crate) use running::{Running, Step};
 
+pub(crate) use device_extra::extra;
 pub(crate) use device_missing::missing_device;
 pub(crate) use device_wrong::{Replacement, replacement};
+pub(crate) use duplicate_address::duplicate_alias;
 
 use crate::seed::{Seed, Stream};
 use crate::segment_file::FaultEntry;
@@ -88,6 +96,31 @@ pub const KINDS: &[Kind] = &[
     emergency::KIND,
     firmware_fault::KIND,
     watchdog_starved::KIND,
+    ebus_overload::KIND,
+    devices_swapped::KIND,
+    twins_swapped::KIND,
+    device_extra::KIND,
+    duplicate_address::KIND,
+    config_mismatch::KIND,
+];
+
+pub(crate) const DEVICES: FaultName = FaultName::DevicesSwapped;
+pub(crate) const TWINS: FaultName = FaultName::TwinsSwapped;
+
+/// Whether an entry puts two devices in each other's place, and whether they are twins.
+pub(crate) fn swaps(entry: &FaultEntry) -> Option<bool> {
+    [(DEVICES, false), (TWINS, true)]
+        .into_iter()
+        .find_map(|(name, twins)| (entry.kind == name.name()).then_some(twins))
+}
+
+/// Kinds that are built in: their faults are there from the start, and cannot come or go.
+pub const BUILT_IN: &[FaultName] = &[
+    FaultName::DeviceWrong,
+    FaultName::DeviceMissing,
+    FaultName::DeviceExtra,
+    FaultName::DevicesSwapped,
+    FaultName::TwinsSwapped,
 ];
 
 /// The kind with a name, if a segment can have it.

@@ -11,7 +11,7 @@ use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
-use super::{DeviceInfo, Segment};
+use super::{DeviceInfo, Segment, exchange};
 use crate::controller::{Controller, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
@@ -57,24 +57,39 @@ pub enum BuildError {
 }
 
 /// What is really put in a place.
-struct Placed {
-    id: DeviceId,
-    planned: Planned,
+pub(super) struct Placed {
+    pub(super) id: DeviceId,
+    pub(super) planned: Planned,
     revision: Option<u32>,
+    /// Alias that a fault has put into its EEPROM.
+    pub(super) alias: Option<u16>,
+    /// The place from which its wiring came along, if from another.
+    pub(super) wiring_of: Option<DeviceId>,
 }
 
 pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
     file.check()?;
+    let file = &exchange::with_extras(file)?;
     let planned = segment_file::expand(file)?;
     let names: Vec<String> = planned.iter().map(|controller| controller.name.clone()).collect();
     let ids = (0u32..).map(DeviceId);
-    let mut placed: Vec<Placed> =
-        ids.zip(planned).map(|(id, planned)| Placed { id, planned, revision: None }).collect();
+    let place = |(id, planned)| Placed {
+        id,
+        planned,
+        revision: None,
+        alias: None,
+        wiring_of: None,
+    };
+    let mut placed: Vec<Placed> = ids.zip(planned).map(place).collect();
     let mut ring = file.ring.as_ref().map(|ring| Ring { closes_at: ring.closes_at.clone() });
     for (index, entry) in file.faults.iter().enumerate() {
         let label = label(index);
         if let Some(replacement) = fault::replacement(&label, entry)? {
             replace(&label, file, &mut placed, &replacement)?;
+        }
+        exchange::swap(&label, &mut placed, entry)?;
+        if let Some((alias, devices)) = fault::duplicate_alias(&label, entry)? {
+            exchange::share_alias(&mut placed, alias, &devices);
         }
         if let Some(device) = fault::missing_device(entry) {
             remove(&mut placed, device, &mut ring);
@@ -83,7 +98,7 @@ pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
     assemble(file, placed, ring, names)
 }
 
-fn label(index: usize) -> String {
+pub(super) fn label(index: usize) -> String {
     format!("fault {}", index + 1)
 }
 
@@ -108,6 +123,10 @@ fn assemble(
         if let Some(revision) = one.revision {
             set_revision(&mut built.sii, revision);
         }
+        let said = file.devices[one.planned.device].alias.filter(|_| one.planned.part == 0);
+        if let Some(alias) = one.alias.or(said) {
+            exchange::set_alias(&mut built.sii, alias);
+        }
         let clock = clock(file, &one.planned, seed);
         let Built { mut hardware, sii, firmware, outputs, inputs } = built;
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
@@ -115,6 +134,7 @@ fn assemble(
         made.push(Controller::new(one.id, hardware, clock, firmware, sii));
         devices.push(DeviceInfo { outputs, inputs });
     }
+    exchange::move_wiring(&placed, &mut devices);
     let cable_m: Vec<f64> = tree
         .links()
         .iter()
@@ -132,6 +152,8 @@ fn assemble(
     let current = |one: &Placed| one.planned.kind.ebus_current_ma();
     let mut segment = Segment {
         ebus_ma: placed.iter().map(current).collect(),
+        fed_anew: placed.iter().map(|one| one.planned.fed_anew).collect(),
+        groups: exchange::groups(file, &placed),
         name: file.name.clone(),
         tree,
         world,
@@ -173,6 +195,12 @@ fn schedule(
         Effect::MissingDevice
     } else if fault::replacement(label, entry)?.is_some() {
         Effect::WrongDevice
+    } else if fault::extra(label, entry)?.is_some() {
+        Effect::ExtraDevice
+    } else if fault::swaps(entry).is_some() {
+        Effect::SwappedDevice
+    } else if let Some((address, _)) = fault::duplicate_alias(label, entry)? {
+        Effect::SharedAddress { address }
     } else {
         return Ok(());
     };
@@ -190,10 +218,12 @@ fn build_one(one: &Placed, signals: &mut Signals) -> Option<Built> {
 
 /// A quartz that is a little off, warms up, and has run for some time.
 fn clock(file: &SegmentFile, planned: &Planned, seed: Seed) -> LocalClock {
-    let mut stream = seed.stream(&format!("clock {}", planned.name));
+    let device = &file.devices[planned.device];
+    // A device keeps its quartz wherever it sits.
+    let name = if planned.part == 0 { &device.name } else { &planned.name };
+    let mut stream = seed.stream(&format!("clock {name}"));
     let start = stream.below(1_000_000_000_000);
     let ppm = stream.fraction() * 50.0 - 25.0;
-    let device = &file.devices[planned.device];
     let mut clock = LocalClock::with_ppm(start, device.clock_ppm.unwrap_or(ppm));
     clock.ramp_ppb_per_s = (stream.fraction() * 40.0 - 20.0).round() as i64;
     clock.ramp = Span::s(stream.between(60, 300));
@@ -277,7 +307,7 @@ fn replace(
 }
 
 /// The ports of a controller that something is plugged into.
-fn used_ports(placed: &[Placed], index: usize) -> Vec<Port> {
+pub(super) fn used_ports(placed: &[Placed], index: usize) -> Vec<Port> {
     let name = &placed[index].planned.name;
     let children = placed.iter().filter_map(|other| match &other.planned.on {
         Attachment::Device { name: on, port } if on == name => Some(*port),

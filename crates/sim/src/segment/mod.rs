@@ -5,6 +5,7 @@
 //! between two calls that does not depend on them alone, so the same calls give the same bytes.
 
 mod build;
+mod exchange;
 pub(crate) mod card;
 mod ready;
 
@@ -55,6 +56,10 @@ pub struct Segment {
     devices: Vec<DeviceInfo>,
     /// Current that each node takes from the E-bus, in mA.
     ebus_ma: Vec<i16>,
+    /// Whether a terminal without a controller feeds the E-bus anew before a node.
+    fed_anew: Vec<bool>,
+    /// Devices by the groups and supplies that the file names: `group:A`, `power:B`.
+    groups: BTreeMap<String, Vec<DeviceId>>,
     /// The node of each device that is there.
     nodes: BTreeMap<DeviceId, usize>,
     /// Names of all devices that were planned.
@@ -200,6 +205,8 @@ impl Segment {
             tree: &self.tree,
             world: &self.world,
             ebus_ma: &self.ebus_ma,
+            fed_anew: &self.fed_anew,
+            groups: &self.groups,
         };
         let number = self.world.truth.faults().len();
         let stream = format!("fault {number} {}", entry.kind);

@@ -31,6 +31,8 @@ impl Segment {
             (0..count).map(|node| (world.id(node), node)).collect();
         let mut segment = Self {
             ebus_ma: vec![0; count],
+            fed_anew: vec![false; count],
+            groups: BTreeMap::new(),
             name: name.to_owned(),
             tree,
             world,

@@ -7,6 +7,8 @@ use linesman_proto::port::{Port, PortMap};
 use linesman_proto::sii::Image;
 use linesman_proto::topology::{End, WiringError};
 
+use super::cable::{Cable, as_copper_m};
+use super::passive::Passives;
 use super::{SegmentFile, SegmentFileError};
 use crate::device::{DeviceKind, Signals};
 use crate::hardware::PortKind;
@@ -27,7 +29,10 @@ pub(crate) struct Planned {
     pub(crate) kind: DeviceKind,
     pub(crate) on: Attachment,
     pub(crate) entry: Port,
+    /// Length of the copper cable that has the delay of the way to it, in metres.
     pub(crate) cable_m: f64,
+    /// A terminal without a controller feeds the E-bus before it anew.
+    pub(crate) fed_anew: bool,
     pub(crate) ports: PortMap<PortKind>,
     pub(crate) serial: u32,
 }
@@ -35,7 +40,12 @@ pub(crate) struct Planned {
 /// All controllers of a file, in the order of their numbers.
 pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileError> {
     let mut planned = Vec::with_capacity(file.devices.len());
+    let passives = Passives::of(file);
     for (index, device) in file.devices.iter().enumerate() {
+        let place = passives.resolve(device)?;
+        if passives.devices().any(|passive| std::ptr::eq(passive, device)) {
+            continue;
+        }
         let kind = file.kind(&device.type_name, device.slots.as_deref()).map_err(|source| {
             SegmentFileError::Type { device: device.name.clone(), source: Box::new(source) }
         })?;
@@ -49,7 +59,7 @@ pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileErro
             })?,
         };
         let serial = device.serial.unwrap_or(planned.len() as u32 + 1);
-        expand_device(file, index, &kind, entry, serial, &mut planned);
+        expand_device(file, index, &kind, entry, serial, place, &mut planned);
     }
     Ok(planned)
 }
@@ -60,6 +70,7 @@ fn expand_device(
     kind: &DeviceKind,
     entry: Port,
     serial: u32,
+    (on_place, fed_anew): (Attachment, bool),
     planned: &mut Vec<Planned>,
 ) {
     let device = &file.devices[index];
@@ -80,7 +91,9 @@ fn expand_device(
                     PortKind::Ebus => 0.0,
                     PortKind::Mii | PortKind::Absent => DEFAULT_CABLE_M,
                 };
-                (device.on.clone(), entry, device.cable_m.unwrap_or(length))
+                let length = device.cable_m.unwrap_or(length);
+                let cable = device.cable.unwrap_or(Cable::Copper);
+                (on_place.clone(), entry, as_copper_m(length, cable, device.via))
             }
         };
         planned.push(Planned {
@@ -91,6 +104,7 @@ fn expand_device(
             on,
             entry,
             cable_m,
+            fed_anew: fed_anew && inner.is_none(),
             ports,
             serial,
         });
@@ -212,9 +226,22 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
             }
         }
     };
+    for passive in Passives::of(file).devices() {
+        let (on, _) = Passives::of(file).resolve(passive)?;
+        let from_kind = kind_at(&on)?;
+        if from_kind != PortKind::Ebus {
+            return Err(SegmentFileError::Kinds {
+                from: on.to_string(),
+                from_kind: kind_name(from_kind),
+                to: format!("{}.A", passive.name),
+                to_kind: kind_name(PortKind::Ebus),
+            });
+        }
+    }
     for controller in planned {
         let from_kind = kind_at(&controller.on)?;
         let to_kind = has_port(controller, controller.entry)?;
+        check_cable(file, planned, controller, to_kind)?;
         if from_kind != to_kind {
             return Err(SegmentFileError::Kinds {
                 from: controller.on.to_string(),
@@ -234,6 +261,39 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
                 to_kind: kind_name(PortKind::Mii),
             });
         }
+    }
+    Ok(())
+}
+
+/// What a device says of the cable to it fits its port, and Fast Hot Connect is at both ends or none.
+fn check_cable(
+    file: &SegmentFile,
+    planned: &[Planned],
+    controller: &Planned,
+    kind: PortKind,
+) -> Result<(), SegmentFileError> {
+    let device = &file.devices[controller.device];
+    let misplaced =
+        |why: String| Err(SegmentFileError::Misplaced { device: controller.name.clone(), why });
+    if controller.part == 0 {
+        if let Some(cable) = device.cable.filter(|cable| !cable.fits(kind)) {
+            let kind = kind_name(kind);
+            return misplaced(format!("`cable` is {}, but its port is {kind}", cable.name()));
+        }
+        if let Some(via) = device.via.filter(|_| kind != PortKind::Mii) {
+            return misplaced(format!("`via` is {}, but no cable leads to it", via.name()));
+        }
+    }
+    let parent = match &controller.on {
+        Attachment::Device { name, .. } => planned.iter().find(|known| known.name == *name),
+        Attachment::MainDevice(_) => None,
+    };
+    let fast = |one: Option<&Planned>| one.is_some_and(|one| one.kind.fast_hot_connect());
+    if kind == PortKind::Mii && fast(parent) != fast(Some(controller)) {
+        return misplaced(format!(
+            "a port with Fast Hot Connect fits another such port only, not `{}`",
+            controller.on
+        ));
     }
     Ok(())
 }

@@ -19,8 +19,10 @@
 //! Unknown keys are errors. The order of devices is the order of their numbers; a device with
 //! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
 
+mod cable;
 mod clock;
 mod expand;
+mod passive;
 mod plant;
 mod schedule;
 mod types;
@@ -33,6 +35,7 @@ use linesman_config::attachment::Attachment;
 use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
+pub use cable::{Cable, Via};
 pub use clock::SegmentClock;
 pub use expand::parse_counter;
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
@@ -93,9 +96,26 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 2000.0))]
     pub cable_m: Option<f64>,
+    /// What the way to it is made of: `copper`, `fibre`, or `ebus` for a neighbour on the terminal
+    /// bus; as its port is unless said.
+    #[serde(default)]
+    pub cable: Option<Cable>,
+    /// What stands in the middle of that cable and passes frames on: `media-converter` (a pair of
+    /// them, with fibre in between) or `switch`.
+    #[serde(default)]
+    pub via: Option<Via>,
+    /// The hot connect group it belongs to; faults can name all of it as `group:NAME`.
+    #[serde(default)]
+    pub group: Option<String>,
+    /// The supply that feeds it; faults can name all devices on it as `power:NAME`.
+    #[serde(default)]
+    pub power: Option<String>,
     /// Serial number in its SII; its number unless said.
     #[serde(default)]
     pub serial: Option<u32>,
+    /// Station alias in its SII; none unless said.
+    #[serde(default)]
+    pub alias: Option<u16>,
     /// How much too fast its clock runs, in ppm, -200 to 200; by chance within 25 unless said.
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]
@@ -243,6 +263,14 @@ pub enum SegmentFileError {
         /// What it is.
         to_kind: &'static str,
     },
+    /// Something that does not go where it is put.
+    #[error("device `{device}`: {why}")]
+    Misplaced {
+        /// Whose.
+        device: String,
+        /// What is wrong, and what to do.
+        why: String,
+    },
     /// A number out of its range.
     #[error("device `{device}`: `{key}` is {given}, expected {allowed}")]
     Range {
@@ -265,6 +293,32 @@ pub enum SegmentFileError {
         /// What can be.
         allowed: &'static str,
     },
+}
+
+impl SegmentDevice {
+    /// A device of which no more is said than it must.
+    #[must_use]
+    pub fn new(name: impl Into<String>, type_name: impl Into<String>, on: Attachment) -> Self {
+        Self {
+            name: name.into(),
+            type_name: type_name.into(),
+            on,
+            entry: None,
+            cable_m: None,
+            cable: None,
+            via: None,
+            group: None,
+            power: None,
+            serial: None,
+            alias: None,
+            id: None,
+            clock_ppm: None,
+            clock: None,
+            counts_forwarded: None,
+            slots: None,
+            counters: BTreeMap::new(),
+        }
+    }
 }
 
 impl SegmentFile {

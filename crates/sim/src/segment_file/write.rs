@@ -43,8 +43,22 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     if let Some(cable_m) = device.cable_m {
         line("cable_m", number(cable_m));
     }
-    if let Some(serial) = device.serial {
-        line("serial", serial.to_string());
+    let words = [
+        ("cable", device.cable.map(|cable| cable.name())),
+        ("via", device.via.map(|via| via.name())),
+        ("group", device.group.as_deref()),
+        ("power", device.power.as_deref()),
+    ];
+    for (key, word) in words {
+        if let Some(word) = word {
+            line(key, quoted(word));
+        }
+    }
+    let numbers = [("serial", device.serial), ("alias", device.alias.map(u32::from))];
+    for (key, number) in numbers {
+        if let Some(number) = number {
+            line(key, number.to_string());
+        }
     }
     if let Some(ppm) = device.clock_ppm {
         line("clock_ppm", number(ppm));

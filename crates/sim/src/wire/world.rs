@@ -226,6 +226,7 @@ impl World {
             }
         }
         self.release_starved(at, fault);
+        self.release_addresses(at, fault);
         self.release_software(at, fault);
         self.truth.end(at, fault);
     }

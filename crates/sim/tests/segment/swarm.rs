@@ -6,7 +6,7 @@ use linesman_proto::address::Path;
 use linesman_proto::command::Command;
 use linesman_proto::time::Span;
 use linesman_sim::device::library::{self, LibraryType};
-use linesman_sim::fault::{KINDS, PlaceRule};
+use linesman_sim::fault::{BUILT_IN, KINDS, Kind, PlaceRule};
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{FaultEntry, PlantOptions, SegmentFile, plant};
@@ -16,8 +16,10 @@ use super::rig::{Bench, PLANT, answer, at, frame};
 
 /// A random fault of any kind that can come and go.
 fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
-    let built_in = [FaultName::DeviceWrong, FaultName::DeviceMissing];
-    let kinds: Vec<_> = KINDS.iter().filter(|kind| !built_in.contains(&kind.name)).collect();
+    let fits_anywhere = |kind: &&Kind| {
+        !BUILT_IN.contains(&kind.name) && !matches!(kind.place, PlaceRule::Feed | PlaceRule::Pair)
+    };
+    let kinds: Vec<_> = KINDS.iter().filter(fits_anywhere).collect();
     let kind = stream.pick(&kinds).unwrap();
     let needs_software = matches!(kind.place, PlaceRule::Processor | PlaceRule::Mailbox);
     let has_software = |name: &str| library::find(name).is_some_and(LibraryType::has_mailbox);
@@ -34,6 +36,8 @@ fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
         PlaceRule::Line => entry.at(format!("{far}>{near}")),
         PlaceRule::Device
         | PlaceRule::Devices
+        | PlaceRule::Feed
+        | PlaceRule::Pair
         | PlaceRule::Processor
         | PlaceRule::Mailbox
         | PlaceRule::DeviceOrCard => entry.device(&device.name),
