@@ -7,7 +7,7 @@ use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
-const PLANT: &str = r#"
+pub(crate) const PLANT: &str = r#"
 name = "smart"
 [[device]]
 name = "K1"
@@ -23,11 +23,16 @@ type = "EL7041"
 on = "A1.B"
 "#;
 
-fn upload(bench: &mut Bench, name: &str, index: u16, subindex: u8) -> Result<Vec<u8>, SdoError> {
+pub(crate) fn upload(
+    bench: &mut Bench,
+    name: &str,
+    index: u16,
+    subindex: u8,
+) -> Result<Vec<u8>, SdoError> {
     get(bench, name, ObjectAddress::new(index, subindex), false)
 }
 
-fn get(
+pub(crate) fn get(
     bench: &mut Bench,
     name: &str,
     object: ObjectAddress,
@@ -45,7 +50,7 @@ fn get(
     }
 }
 
-fn put(
+pub(crate) fn put(
     bench: &mut Bench,
     name: &str,
     index: u16,

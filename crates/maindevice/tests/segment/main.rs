@@ -7,3 +7,4 @@ mod robust;
 mod run;
 mod scan;
 mod soak;
+mod software;

@@ -2,7 +2,7 @@
 //!
 //! Reference: S2 chapter 2 (identity), the reset values in each register's chapter.
 
-use linesman_proto::address::DeviceId;
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
     self as r, AlControl, AlStatus, DlControl, EscInformation, Features, FmmuConfig,
@@ -61,6 +61,8 @@ pub(super) struct Core {
     pub(super) pdi_watchdog_ok: bool,
     /// The processor behind the controller has stopped serving it.
     pub(super) processor_stuck: bool,
+    /// Where a coding switch is read, and what it says.
+    pub(super) coding_switch: Option<(RegisterAddress, u16)>,
     /// AL status does not copy AL control although device emulation is on: a fault.
     pub(super) emulation_suspended: bool,
     /// When written loop modes take effect: at the end of the frame that wrote them.
@@ -128,6 +130,7 @@ impl Core {
             pdi_watchdog: Watchdog::default(),
             pdi_watchdog_ok: true,
             processor_stuck: false,
+            coding_switch: None,
             emulation_suspended: false,
             loops_change_at: None,
             loops_return: None,
@@ -166,6 +169,7 @@ impl Core {
         self.shadow.clear();
         self.identify();
         self.put_reset_values();
+        self.put_coding_switch();
         for index in 0..usize::from(self.hardware.sync_managers).min(sync_manager::MAX) {
             self.sync_managers.configure(index, &mut self.memory);
         }
@@ -224,6 +228,15 @@ impl Core {
         ] {
             let value = register.reset.unwrap_or(0).to_le_bytes();
             memory.put(at(register), &value[..usize::from(register.len)]);
+        }
+    }
+
+    /// What stands in memory because a switch is wired there.
+    pub(super) fn put_coding_switch(&mut self) {
+        if let Some((at, value)) = self.coding_switch
+            && usize::from(at.0) + 2 <= self.memory.len()
+        {
+            self.memory.put(usize::from(at.0), &value.to_le_bytes());
         }
     }
 

@@ -411,6 +411,12 @@ impl Controller {
         self.reschedule();
     }
 
+    /// A coding switch is wired to the controller: its value stands at `address` from every start on.
+    pub fn set_coding_switch(&mut self, address: RegisterAddress, value: u16) {
+        self.core.coding_switch = Some((address, value));
+        self.core.put_coding_switch();
+    }
+
     /// Somebody sets the time of the process data watchdog, 0x0420, at `at`. Gives the former one.
     pub fn set_watchdog_time(&mut self, at: Instant, time: r::WatchdogTime) -> r::WatchdogTime {
         let former = r::WatchdogTime(self.core.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA));

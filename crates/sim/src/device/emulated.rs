@@ -48,6 +48,8 @@ pub struct Emulated {
     outputs: Vec<DigitalArea>,
     inputs: Vec<DigitalArea>,
     words: Vec<WordArea>,
+    /// The word of them that tells its identification.
+    coding_switch: Option<SignalId>,
     application_layer: ApplicationLayer,
     /// The bytes of one area, kept for its memory.
     bytes: Vec<u8>,
@@ -65,6 +67,12 @@ impl Emulated {
     #[must_use]
     pub fn with_words(self, words: Vec<WordArea>) -> Self {
         Self { words, ..self }
+    }
+
+    /// The same device with a switch that sets its identification: one of its words.
+    #[must_use]
+    pub fn with_coding_switch(self, word: SignalId) -> Self {
+        Self { coding_switch: Some(word), ..self }
     }
 
     fn drive_outputs(&mut self, pdi: &mut Pdi<'_>) {
@@ -120,10 +128,10 @@ impl Firmware for Emulated {
     }
 
     fn identify(&mut self, id: u16, signals: &mut Signals) -> bool {
-        for word in &self.words {
-            signals.set(word.signal, i32::from(id));
+        if let Some(signal) = self.coding_switch {
+            signals.set(signal, i32::from(id));
         }
-        !self.words.is_empty()
+        self.coding_switch.is_some()
     }
 
     fn stop(&mut self, signals: &mut Signals) {

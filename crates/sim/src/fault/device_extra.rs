@@ -13,7 +13,11 @@ pub(super) const KIND: Kind = Kind {
     name: FaultName::DeviceExtra,
     place: PlaceRule::Device,
     parameters: &[
-        Parameter { key: "type", meaning: "Its type; `device` is what it is called.", shape: Shape::Text },
+        Parameter {
+            key: "type",
+            meaning: "Its type; `device` is what it is called.",
+            shape: Shape::Text,
+        },
         Parameter {
             key: "on",
             meaning: "Whose port it hangs on, such as `K1.B`; what was there hangs behind it.",
@@ -40,7 +44,9 @@ pub(crate) fn extra(label: &str, entry: &FaultEntry) -> Result<Option<Extra>, Fa
     let missing = |key: &str| FaultError::Combination {
         entry: label.to_owned(),
         kind: KIND.name,
-        what: format!("give `{key}`: what the device is called, its `type`, and `on` which port it hangs"),
+        what: format!(
+            "give `{key}`: what the device is called, its `type`, and `on` which port it hangs"
+        ),
     };
     let name = entry.device.clone().ok_or_else(|| missing("device"))?;
     let type_name = values.text("type").ok_or_else(|| missing("type"))?.to_owned();

@@ -23,7 +23,7 @@ pub(super) const KIND: Kind = Kind {
             shape: Shape::Whole { low: 1, high: 0xFFFF, default: Some(0x001E) },
         },
         Parameter {
-            key: "times",
+            key: "refusals",
             meaning: "How many requests it refuses before it takes one; 0 for all.",
             shape: Shape::Whole { low: 0, high: 1_000_000, default: Some(0) },
         },
@@ -32,7 +32,7 @@ pub(super) const KIND: Kind = Kind {
         let to = start.values.text("to").and_then(AlState::from_name);
         let transition_to = to.unwrap_or(AlState::SafeOp);
         let code = AlStatusCode(start.values.whole("code").unwrap_or(0x001E) as u16);
-        let times = start.values.whole("times").filter(|times| *times > 0);
+        let times = start.values.whole("refusals").filter(|times| *times > 0);
         let refusal = Some(Refusal { transition_to, code, times });
         let from = start.from;
         // Of a device with several controllers it is the first.

@@ -304,6 +304,7 @@ impl Finder<'_> {
             cards: vec![path],
             links: vec![link],
             nodes: Vec::new(),
+            ..Target::default()
         })
     }
 

@@ -11,7 +11,7 @@ use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
-use super::{DeviceInfo, Segment, exchange};
+use super::{DeviceInfo, Segment, exchange, identification};
 use crate::controller::{Controller, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
@@ -73,13 +73,8 @@ pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
     let planned = segment_file::expand(file)?;
     let names: Vec<String> = planned.iter().map(|controller| controller.name.clone()).collect();
     let ids = (0u32..).map(DeviceId);
-    let place = |(id, planned)| Placed {
-        id,
-        planned,
-        revision: None,
-        alias: None,
-        wiring_of: None,
-    };
+    let place =
+        |(id, planned)| Placed { id, planned, revision: None, alias: None, wiring_of: None };
     let mut placed: Vec<Placed> = ids.zip(planned).map(place).collect();
     let mut ring = file.ring.as_ref().map(|ring| Ring { closes_at: ring.closes_at.clone() });
     for (index, entry) in file.faults.iter().enumerate() {
@@ -123,15 +118,19 @@ fn assemble(
         if let Some(revision) = one.revision {
             set_revision(&mut built.sii, revision);
         }
+        let id = file.devices[one.planned.device].id.filter(|_| one.planned.part == 0);
+        let identification = identification::set(&mut built, id, &mut signals);
         let said = file.devices[one.planned.device].alias.filter(|_| one.planned.part == 0);
         if let Some(alias) = one.alias.or(said) {
-            exchange::set_alias(&mut built.sii, alias);
+            identification::set_alias(&mut built.sii, alias);
         }
         let clock = clock(file, &one.planned, seed);
         let Built { mut hardware, sii, firmware, outputs, inputs } = built;
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
         hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
-        made.push(Controller::new(one.id, hardware, clock, firmware, sii));
+        let mut controller = Controller::new(one.id, hardware, clock, firmware, sii);
+        identification.finish(&mut controller);
+        made.push(controller);
         devices.push(DeviceInfo { outputs, inputs });
     }
     exchange::move_wiring(&placed, &mut devices);

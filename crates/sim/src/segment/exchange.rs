@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use linesman_config::attachment::Attachment;
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
-use linesman_proto::sii::{checksum, word};
 use linesman_proto::topology::wiring::ports_after;
 
 use super::DeviceInfo;
@@ -20,8 +19,9 @@ pub(super) fn with_extras(file: &SegmentFile) -> Result<SegmentFile, BuildError>
     for (index, entry) in file.faults.clone().iter().enumerate() {
         let label = label(index);
         let Some(extra) = fault::extra(&label, entry)? else { continue };
-        let kind = file.kind(&extra.type_name, None).map_err(|source| {
-            BuildError::Replacement { entry: label.clone(), source: Box::new(source) }
+        let kind = file.kind(&extra.type_name, None).map_err(|source| BuildError::Replacement {
+            entry: label.clone(),
+            source: Box::new(source),
         })?;
         let misfit = |why: &str| BuildError::Misfit {
             entry: label.clone(),
@@ -119,20 +119,6 @@ pub(super) fn swap(
 pub(super) fn share_alias(placed: &mut [Placed], alias: u16, devices: &[String]) {
     for one in placed.iter_mut().filter(|one| devices.contains(&one.planned.name)) {
         one.alias = Some(alias);
-    }
-}
-
-/// Puts an alias into an image, and the checksum that goes with it.
-pub(super) fn set_alias(sii: &mut [u8], alias: u16) {
-    let at = word::STATION_ALIAS.byte();
-    if let Some(slot) = sii.get_mut(at..at + 2) {
-        slot.copy_from_slice(&alias.to_le_bytes());
-    }
-    if let Some(guarded) = sii.first_chunk::<14>() {
-        let sum = checksum(guarded);
-        if let Some(slot) = sii.get_mut(14) {
-            *slot = sum;
-        }
     }
 }
 

@@ -5,8 +5,9 @@
 //! between two calls that does not depend on them alone, so the same calls give the same bytes.
 
 mod build;
-mod exchange;
 pub(crate) mod card;
+mod exchange;
+mod identification;
 mod ready;
 
 use std::collections::BTreeMap;

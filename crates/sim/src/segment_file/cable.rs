@@ -10,9 +10,7 @@ use crate::wire::CABLE_NS_PER_M;
 const FIBRE_NS_PER_M: f64 = 4.9;
 
 /// What a link is made of.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cable {
     /// Twisted pairs of copper, 5 ns a metre.
@@ -52,9 +50,7 @@ impl Cable {
 }
 
 /// What stands in the middle of a cable. Delays are typical ones; a switch is one that cuts through.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Via {
     /// A pair of converters with fibre between them.

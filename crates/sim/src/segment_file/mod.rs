@@ -116,6 +116,10 @@ pub struct SegmentDevice {
     /// Station alias in its SII; none unless said.
     #[serde(default)]
     pub alias: Option<u16>,
+    /// Its identification, 0 to 65535: what its coding switch says, or what it answers when AL control
+    /// asks for it, whichever its type has; else its station alias.
+    #[serde(default)]
+    pub id: Option<u16>,
     /// How much too fast its clock runs, in ppm, -200 to 200; by chance within 25 unless said.
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]

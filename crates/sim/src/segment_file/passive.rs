@@ -31,9 +31,8 @@ impl<'a> Passives<'a> {
         &self,
         device: &SegmentDevice,
     ) -> Result<(Attachment, bool), SegmentFileError> {
-        let misplaced = |why: String| {
-            Err(SegmentFileError::Misplaced { device: device.name.clone(), why })
-        };
+        let misplaced =
+            |why: String| Err(SegmentFileError::Misplaced { device: device.name.clone(), why });
         let (mut on, mut fed) = (device.on.clone(), false);
         // Each passive terminal is passed once at most.
         for _ in 0..=self.0.len() {

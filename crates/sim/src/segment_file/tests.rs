@@ -31,6 +31,7 @@ type = "EK1101"
 on = "K1.C"
 entry = "A"
 cable_m = 12
+id = 300
 clock_ppm = -3.5
 clock = { ramp_ppm_per_s = 0.25, ramp_s = 40.0, jitter_ns = 12 }
 counts_forwarded = true

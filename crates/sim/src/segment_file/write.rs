@@ -60,6 +60,9 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
             line(key, number.to_string());
         }
     }
+    if let Some(id) = device.id {
+        line("id", id.to_string());
+    }
     if let Some(ppm) = device.clock_ppm {
         line("clock_ppm", number(ppm));
     }

@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
+mod exchange;
 mod faults;
+mod identification;
 mod rig;
 mod swarm;
 mod traps;

@@ -33,7 +33,11 @@ pub(super) fn build_one(spec: &Spec, individual: Individual, signals: &mut Signa
         Behind::CodingSwitch(at) => {
             let word =
                 inputs.iter().map(|signal| WordArea { sync_manager: 0, at, signal: *signal });
-            Box::new(Emulated::default().with_words(word.collect()))
+            let device = Emulated::default().with_words(word.collect());
+            match inputs.first() {
+                Some(switch) => Box::new(device.with_coding_switch(*switch)),
+                None => Box::new(device),
+            }
         }
         Behind::Oversampling { .. } => {
             let channels = (0..).zip(outputs.iter());

@@ -140,11 +140,8 @@ impl Processor {
     /// A device that has not started yet.
     #[must_use]
     pub fn new(description: Description) -> Self {
-        let mut application_layer = ApplicationLayer::new(description.bootstrap.is_some());
-        // Until somebody sets another number.
-        application_layer.identify(0);
         Self {
-            application_layer,
+            application_layer: ApplicationLayer::new(description.bootstrap.is_some()),
             dictionary: description.dictionary.clone(),
             mailbox: Mailbox::new(description.times.mailbox, description.protocols),
             process_data: Areas::default(),
