@@ -7,8 +7,11 @@ process number, so that runs side by side do not meet; they are removed at the e
 import json
 import os
 import pathlib
+import socket
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -24,6 +27,9 @@ class Bench:
         self.near = f"linesman-near-{os.getpid()}"
         self.far = f"linesman-far-{os.getpid()}"
         self.running = []
+        self.folder = tempfile.TemporaryDirectory(prefix="linesman-interop-")
+        self.work = pathlib.Path(self.folder.name)
+        self.number = 0
         try:
             for name in (self.near, self.far):
                 ip("netns", "add", name)
@@ -45,6 +51,12 @@ class Bench:
             end(process)
         for name in (self.near, self.far):
             subprocess.run(["ip", "netns", "del", name], capture_output=True)
+        self.folder.cleanup()
+
+    def path(self, name):
+        """A new file of this run."""
+        self.number += 1
+        return self.work / f"{self.number}-{name}"
 
     def start(self, namespace, *command):
         """Starts a command that runs on beside what follows."""
@@ -86,24 +98,115 @@ class Segment:
     def __init__(self, bench, linesman, file, on=FAR):
         self.bench, self.linesman, self.file, self.on = bench, linesman, file, on
         self.near = NEAR if on == FAR else f"{NEAR}+{NEAR_B}"
+        self.socket = bench.path("control")
 
     def __enter__(self):
-        self.process = self.bench.start(self.bench.far, self.linesman, "sim", self.file, "--on", self.on)
-        end_at = time.monotonic() + 10
+        self.process = self.bench.start(
+            self.bench.far, self.linesman, "sim", self.file, "--on", self.on, "--control", self.socket,
+        )
+        end_at = time.monotonic() + 20
         while time.monotonic() < end_at:
             if self.process.poll() is not None:
                 _, out, err = self.bench.finish(self.process)
                 raise RuntimeError(f"the segment did not start: {err or out}")
-            status, out, _ = self.bench.python(self.bench.near, "probe.py", self.near)
-            if status == 0:
+            # The socket is there once the segment answers.
+            if self.socket.exists():
+                status, out, _ = self.bench.python(self.bench.near, "probe.py", self.near)
+                assert status == 0, "the segment does not answer"
                 self.present = int(out)
                 return self
-        raise RuntimeError("the segment does not answer")
+            time.sleep(0.01)
+        raise RuntimeError("the segment does not start")
+
+    def ask(self, **request):
+        """Asks the segment as `linesman fault` does; any program may."""
+        with socket.socket(socket.AF_UNIX) as line:
+            line.settimeout(10)
+            line.connect(str(self.socket))
+            line.sendall(json.dumps(request).encode() + b"\n")
+            answer = json.loads(line.makefile().readline())
+        assert answer["error"] is None, answer["error"]
+        return answer
+
+    def wires(self):
+        """Which output each input is wired to."""
+        signals = self.ask(do="signals")["signals"]
+        return {one["name"]: one["wired_to"] for one in signals if one["wired_to"]}
 
     def __exit__(self, *_):
         if self.process in self.bench.running:
             end(self.process)
             self.bench.running.remove(self.process)
+
+
+class Watch:
+    """Looks at the outputs of a segment again and again while others write them; use it in `with`."""
+
+    def __init__(self, segment):
+        self.segment, self.seen, self.done = segment, [], False
+
+    def __enter__(self):
+        self.thread = threading.Thread(target=self.look)
+        self.thread.start()
+        return self
+
+    def look(self):
+        while not self.done:
+            signals = self.segment.ask(do="signals")["signals"]
+            values = {one["name"]: one["value"] for one in signals if one["direction"] == "output"}
+            if not self.seen or self.seen[-1] != values:
+                self.seen.append(values)
+            time.sleep(0.02)
+
+    def saw(self, wanted):
+        """Whether all these outputs had these values at one time."""
+        return any(all(values.get(name) == value for name, value in wanted.items()) for values in self.seen)
+
+    def __exit__(self, *_):
+        self.done = True
+        self.thread.join()
+
+
+class Capture:
+    """What goes over the cables, kept by tcpdump and judged by tshark; use it in `with`."""
+
+    def __init__(self, bench):
+        self.bench = bench
+
+    def __enter__(self):
+        self.files, self.processes = [], []
+        for interface in (NEAR, NEAR_B):
+            file = self.bench.path(f"{interface}.pcap")
+            process = self.bench.start(
+                self.bench.near, "tcpdump", "-i", interface, "-B", 16384, "-Z", "root", "-w", file, "ether proto 0x88a4",
+            )
+            # It says so once it listens.
+            while (line := process.stderr.readline()) and "listening on" not in line:
+                pass
+            self.files.append(file)
+            self.processes.append(process)
+        return self
+
+    def __exit__(self, *_):
+        time.sleep(0.1)
+        for process in self.processes:
+            end(process)
+            self.bench.running.remove(process)
+
+    def malformed(self):
+        """How many packets were kept, and which of them tshark cannot read."""
+        count, bad = 0, []
+        for file in self.files:
+            command = ["tshark", "-r", file, "-T", "fields", "-e", "frame.number", "-e", "_ws.malformed"]
+            done = subprocess.run(command, capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr[-300:]
+            for line in done.stdout.splitlines():
+                count += 1
+                number, _, mark = line.partition("\t")
+                if mark.strip():
+                    bad.append(f"{file.name} packet {number}")
+            file.unlink()
+        return count, bad
 
 
 def end(process):

@@ -9,26 +9,27 @@ import peer
 
 
 def main():
-    interfaces, cycles, cycle_s = peer.arguments()
+    interfaces, cycles, cycle_s, rounds = peer.arguments()
     link = kickcat.create_link(interfaces[0], interfaces[1] if len(interfaces) > 1 else "")
-    link.set_timeout(timedelta(milliseconds=20))
+    # Of the host, not of the line: it may be busy.
+    link.set_timeout(timedelta(milliseconds=50))
     bus = kickcat.Bus(link)
-    bus.init(timedelta(milliseconds=500))
+    bus.init(timedelta(seconds=3))
     bus.create_mapping(4096)
     slaves = bus.slaves()
     request(bus, kickcat.State.SAFE_OP)
-    write(slaves, peer.PATTERNS[0])
+    write(slaves, rounds[0])
     bus.process_data_no_check()
     bus.request_state(kickcat.State.OPERATIONAL)
     bus.wait_for_state(
-        kickcat.State.OPERATIONAL, timedelta(seconds=2), lambda: bus.process_data_no_check()
+        kickcat.State.OPERATIONAL, timedelta(seconds=5), lambda: bus.process_data_no_check()
     )
     complete = 0
-    inputs = {}
+    inputs = []
     due = time.monotonic()
-    for pattern in peer.PATTERNS:
-        write(slaves, pattern)
-        for _ in range(cycles // 2):
+    for values in rounds:
+        write(slaves, values)
+        for _ in range(cycles // len(rounds)):
             try:
                 bus.process_data()
                 complete += 1
@@ -36,23 +37,23 @@ def main():
                 pass
             due += cycle_s
             time.sleep(max(0.0, due - time.monotonic()))
-        inputs[f"{pattern:02X}"] = [bytes(slave.input_data).hex() for slave in slaves]
+        inputs.append([bytes(slave.input_data).hex() for slave in slaves])
     reached = all(bus.get_state(slave) == kickcat.State.OPERATIONAL for slave in slaves)
     peer.report(
         devices=len(slaves), state="OP" if reached else "other", cycles=cycles, complete=complete,
-        inputs=inputs,
+        rounds=inputs,
     )
 
 
 def request(bus, state):
     bus.request_state(state)
-    bus.wait_for_state(state, timedelta(seconds=2))
+    bus.wait_for_state(state, timedelta(seconds=5))
 
 
-def write(slaves, pattern):
-    for slave in slaves:
+def write(slaves, values):
+    for position, slave in enumerate(slaves):
         if slave.output_size:
-            slave.set_output_bytes(bytes([pattern]) * slave.output_size)
+            slave.set_output_bytes(peer.outputs(values, position, slave.output_size))
 
 
 if __name__ == "__main__":

@@ -1,24 +1,35 @@
 """What every foreign MainDevice written in Python does with its result.
 
-A peer is run as `PEER.py INTERFACE[+INTERFACE] CYCLES CYCLE_US`. It takes the line to OP, writes the pattern A5 to
-every output for half of the cycles and 5A for the other half, and prints one JSON object:
+A peer is run as `PEER.py INTERFACE[+INTERFACE] CYCLES CYCLE_US ROUNDS.json`. It takes the line to OP, exchanges
+process data for CYCLES cycles, an equal part of them for each round, and prints one JSON object:
 
     devices   what the scan found: [vendor, product, revision] or what this stack can tell
     state     the state reached by all
     cycles    process data exchanges, and `complete`: those with the working counter expected
-    inputs    for A5 and 5A: the input bytes of each SubDevice at the end of that half, in hexadecimal
+    wkc       the working counter of the process data, where this stack tells it
+    rounds    for each round: the input bytes of each SubDevice at its end, in hexadecimal
+
+ROUNDS.json is a list: for each round the output bytes by position, in hexadecimal. Outputs that are not named are 0.
 """
 
 import json
+import pathlib
 import sys
-
-PATTERNS = (0xA5, 0x5A)
 
 
 def arguments():
-    """Interfaces (two for a ring), cycles, cycle in seconds."""
-    _, interfaces, cycles, cycle_us = sys.argv
-    return interfaces.split("+"), int(cycles), int(cycle_us) / 1e6
+    """Interfaces (two for a ring), cycles, cycle in seconds, rounds."""
+    _, interfaces, cycles, cycle_us, rounds = sys.argv
+    rounds = json.loads(pathlib.Path(rounds).read_text())
+    return interfaces.split("+"), int(cycles), int(cycle_us) / 1e6, rounds
+
+
+def outputs(values, position, size):
+    """The output bytes of one SubDevice."""
+    wanted = bytes.fromhex(values.get(str(position), "00" * size))
+    if len(wanted) != size:
+        refuse(f"SubDevice {position + 1} has {size} output bytes, expected {len(wanted)}")
+    return wanted
 
 
 def report(**result):

@@ -30,6 +30,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("segment_file", segment_files()),
         ("observation_file", observation_files()),
         ("frame", frames),
+        ("device_builder", [images()?, descriptions()].concat()),
+        ("esi", descriptions()),
         ("sii", images()?),
         ("mailbox", messages()),
         ("capture", captures),
@@ -266,4 +268,60 @@ fn observation_files() -> Made {
         state = \"ERR PREOP\"\nal_code = 0x001E\n";
     let text = |text: &str| text.as_bytes().to_vec();
     vec![("counters.toml", text(counters)), ("refused.toml", text(refused))]
+}
+
+/// Device descriptions: with and without mailbox, modular, odd.
+fn descriptions() -> Made {
+    let whole = |devices: &str, rest: &str| {
+        format!(
+            "<?xml version=\"1.0\"?><EtherCATInfo><Vendor><Id>#x815</Id><Name>V</Name></Vendor>\
+             <Descriptions><Devices>{devices}</Devices>{rest}</Descriptions></EtherCATInfo>"
+        )
+        .into_bytes()
+    };
+    let lamp = "<Device Physics=\"KK\"><Type ProductCode=\"#x1234\" RevisionNo=\"7\">LAMP</Type>\
+        <Name LcId=\"1033\"><![CDATA[Lamp <1>]]></Name><Info><Electrical><EBusCurrent>070</EBusCurrent>\
+        </Electrical></Info><Fmmu>Outputs</Fmmu><Sm StartAddress=\"#xf00\" ControlByte=\"#x44\" \
+        Enable=\"1\" DefaultSize=\"1\">Outputs</Sm><RxPdo Fixed=\"1\" Sm=\"0\"><Index>#x1600</Index>\
+        <Name>Out &amp; on</Name><Entry><Index>#x7000</Index><SubIndex>1</SubIndex><BitLen>1</BitLen>\
+        <Name>O</Name><DataType>BOOL</DataType></Entry></RxPdo><Eeprom><ByteSize>1024</ByteSize>\
+        <ConfigData>0401000000000100</ConfigData></Eeprom></Device>";
+    let pump = "<Device Physics=\"YY\"><Type ProductCode=\"#x1234\" RevisionNo=\"8\">P-100</Type>\
+        <Name>Pump</Name><Profile><ProfileNo>5001</ProfileNo><Dictionary><DataTypes><DataType>\
+        <Name>ARR</Name><BaseType>UINT</BaseType><BitSize>32</BitSize><ArrayInfo><LBound>1</LBound>\
+        <Elements>2</Elements></ArrayInfo></DataType><DataType><Name>DT8000</Name><BitSize>48</BitSize>\
+        <SubItem><SubIdx>0</SubIdx><Name>N</Name><Type>USINT</Type><BitSize>8</BitSize></SubItem>\
+        <SubItem><Name>E</Name><Type>ARR</Type><BitSize>32</BitSize><Flags>\
+        <Access WriteRestrictions=\"PreOP\">rw</Access><PdoMapping>R</PdoMapping></Flags></SubItem>\
+        </DataType></DataTypes><Objects><Object><Index>#x8000</Index><Name>S</Name><Type>DT8000</Type>\
+        <BitSize>48</BitSize><Info><SubItem><Name>E</Name><Info><DefaultData>0A00</DefaultData></Info>\
+        </SubItem></Info></Object></Objects></Dictionary></Profile><Fmmu>Outputs</Fmmu>\
+        <Fmmu>Inputs</Fmmu><Fmmu>MBoxState</Fmmu>\
+        <Sm DefaultSize=\"128\" StartAddress=\"#x1000\" ControlByte=\"#x26\" Enable=\"1\">MBoxOut</Sm>\
+        <Sm DefaultSize=\"128\" StartAddress=\"#x1080\" ControlByte=\"#x22\" Enable=\"1\">MBoxIn</Sm>\
+        <Sm DefaultSize=\"2\" StartAddress=\"#x1100\" ControlByte=\"#x64\" Enable=\"1\">Outputs</Sm>\
+        <Sm DefaultSize=\"4\" StartAddress=\"#x1180\" ControlByte=\"#x20\" Enable=\"1\">Inputs</Sm>\
+        <RxPdo Sm=\"2\"><Index>#x1600</Index><Name>R</Name><Entry><Index>#x8000</Index>\
+        <SubIndex>1</SubIndex><BitLen>16</BitLen></Entry></RxPdo><TxPdo Sm=\"3\"><Index>#x1A00</Index>\
+        <Name>T</Name><Entry><Index>#x6000</Index><SubIndex>1</SubIndex><BitLen>20</BitLen></Entry>\
+        <Entry><Index>0</Index><BitLen>12</BitLen></Entry></TxPdo><Mailbox><CoE SdoInfo=\"1\" \
+        PdoAssign=\"1\" PdoConfig=\"1\"/><FoE/></Mailbox><Dc><OpMode><Name>DC</Name>\
+        <AssignActivate>#x300</AssignActivate></OpMode></Dc><Eeprom><ByteSize>2048</ByteSize>\
+        <ConfigData>050C</ConfigData><BootStrap>0010f400f410f400</BootStrap></Eeprom></Device>";
+    let slots = "<Slots SlotPdoIncrement=\"16\" SlotIndexIncrement=\"#x800\"><Slot MaxInstances=\"2\">\
+        <Name>Axis</Name><ModuleIdent Default=\"1\">#x10</ModuleIdent></Slot></Slots></Device>";
+    let modular = pump.replace("</Device>", slots);
+    let modules = "<Modules><Module><Type ModuleIdent=\"#x10\">M</Type><Name>M</Name><TxPdo Sm=\"3\">\
+        <Index DependOnSlot=\"1\">#x1A10</Index><Name>P</Name><Entry><Index DependOnSlot=\"1\">#x6010\
+        </Index><SubIndex>1</SubIndex><BitLen>8</BitLen></Entry></TxPdo></Module></Modules>";
+    vec![
+        ("lamp.xml", whole(lamp, "")),
+        ("pump.xml", whole(pump, "")),
+        ("modular.xml", whole(&modular, modules)),
+        ("cut-off.xml", whole(pump, "")[..900].to_vec()),
+        (
+            "doctype.xml",
+            b"<!DOCTYPE a [<!ENTITY x \"&x;\">]><EtherCATInfo><Vendor>&x;</Vendor>".to_vec(),
+        ),
+    ]
 }

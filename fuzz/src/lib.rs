@@ -4,7 +4,9 @@
 //! by an assertion here, such as "what was built reads as what was meant".
 
 mod capture;
+mod device_builder;
 mod diagnosis;
+mod esi;
 mod frame;
 mod mailbox;
 mod observation_file;
@@ -14,7 +16,9 @@ mod series;
 mod sii;
 
 pub use capture::capture;
+pub use device_builder::device_builder;
 pub use diagnosis::diagnosis;
+pub use esi::esi;
 pub use frame::frame;
 pub use mailbox::mailbox;
 pub use observation_file::observation_file;
@@ -28,7 +32,9 @@ pub type Target = (&'static str, fn(&[u8]));
 /// All targets.
 pub const TARGETS: &[Target] = &[
     ("capture", capture),
+    ("device_builder", device_builder),
     ("diagnosis", diagnosis),
+    ("esi", esi),
     ("frame", frame),
     ("mailbox", mailbox),
     ("observation_file", observation_file),

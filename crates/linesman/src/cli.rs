@@ -58,7 +58,7 @@ pub(crate) enum Command {
     Sim(sim::Arguments),
     /// Break, heal and watch a segment that runs on real interfaces
     Fault(fault::Arguments),
-    /// Stories and swarms in virtual time
+    /// Stories, swarms and recordings in virtual time
     Lab(lab::Arguments),
     /// JSON schema of a file or output
     Schema(schema::Arguments),
@@ -74,12 +74,9 @@ impl Command {
             Self::Diagnose(arguments) => arguments.json,
             Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
+            Self::Lab(arguments) => arguments.wants_json(),
             Self::Sim(arguments) => arguments.json,
-            Self::Demo(_)
-            | Self::Explain(_)
-            | Self::Lab(_)
-            | Self::Schema(_)
-            | Self::Completion(_) => false,
+            Self::Demo(_) | Self::Explain(_) | Self::Schema(_) | Self::Completion(_) => false,
         }
     }
 }

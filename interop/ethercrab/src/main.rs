@@ -1,5 +1,7 @@
 //! ethercrab as a foreign MainDevice; what a peer does and prints is said in `interop/peer.py`.
 
+mod services;
+
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
@@ -10,20 +12,31 @@ const FRAMES_MAX: usize = 16;
 const DATA_MAX: usize = PduStorage::element_size(1100);
 const SUBDEVICES_MAX: usize = 64;
 const IMAGE_MAX: usize = 512;
-const PATTERNS: [u8; 2] = [0xA5, 0x5A];
 
 static STORAGE: PduStorage<FRAMES_MAX, DATA_MAX> = PduStorage::new();
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().collect();
-    let [_, interface, cycles, cycle_us] = arguments.as_slice() else {
-        return Err(anyhow!("usage: ethercrab-peer INTERFACE CYCLES CYCLE_US"));
+    if let [_, interface, word] = arguments.as_slice()
+        && word == "services"
+    {
+        return smol::block_on(services::run(interface));
+    }
+    let [_, interface, cycles, cycle_us, rounds] = arguments.as_slice() else {
+        return Err(anyhow!(
+            "usage: ethercrab-peer INTERFACE CYCLES CYCLE_US ROUNDS.json, or INTERFACE services"
+        ));
     };
     let cycle = Duration::from_micros(cycle_us.parse()?);
-    smol::block_on(run(interface, cycles.parse()?, cycle))
+    let rounds: Vec<Round> = serde_json::from_str(&std::fs::read_to_string(rounds)?)?;
+    smol::block_on(run(interface, cycles.parse()?, cycle, &rounds))
 }
 
-async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
+/// The output bytes of a round, in hexadecimal, by position.
+type Round = std::collections::BTreeMap<String, String>;
+
+/// A MainDevice on an interface, whose frames a task of its own sends and receives.
+fn open(interface: &str) -> Result<MainDevice<'static>> {
     let (transmit, receive, pdus) =
         STORAGE.try_split().map_err(|()| anyhow!("the storage is split already"))?;
     // The host is no real-time system, and may be busy: what is tried is the line, not the host.
@@ -37,7 +50,11 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
     };
     let maindevice = MainDevice::new(pdus, timeouts, MainDeviceConfig::default());
     smol::spawn(tx_rx_task(interface, transmit, receive).context(interface.to_owned())?).detach();
+    Ok(maindevice)
+}
 
+async fn run(interface: &str, cycles: u64, cycle: Duration, rounds: &[Round]) -> Result<()> {
+    let maindevice = open(interface)?;
     let group = maindevice
         .init_single_group::<SUBDEVICES_MAX, IMAGE_MAX>(ethercat_now)
         .await
@@ -73,11 +90,19 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
 
     let mut wkc = 0;
     let mut complete = 0_u64;
-    let mut inputs = serde_json::Map::new();
-    for pattern in PATTERNS {
-        for _ in 0..cycles / 2 {
-            for subdevice in group.iter(&maindevice) {
-                subdevice.outputs_raw_mut().fill(pattern);
+    let mut inputs: Vec<Vec<String>> = Vec::new();
+    for round in rounds {
+        for _ in 0..cycles / rounds.len() as u64 {
+            for (position, subdevice) in group.iter(&maindevice).enumerate() {
+                let mut outputs = subdevice.outputs_raw_mut();
+                let Some(wanted) = round.get(&position.to_string()) else { continue };
+                let wanted = bytes(wanted)?;
+                if wanted.len() != outputs.len() {
+                    let (no, has) = (position + 1, outputs.len());
+                    let expected = wanted.len();
+                    return Err(anyhow!("SubDevice {no} has {has} output bytes, expected {expected}"));
+                }
+                outputs.copy_from_slice(&wanted);
             }
             if let Ok(response) = group.tx_rx(&maindevice).await {
                 // This stack expects no number by itself: the highest one seen must be seen always.
@@ -88,17 +113,16 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
             }
             smol::Timer::after(cycle).await;
         }
-        let read: Vec<String> = group.iter(&maindevice).map(|one| hex(&one.inputs_raw())).collect();
-        inputs.insert(format!("{pattern:02X}"), read.into());
+        inputs.push(group.iter(&maindevice).map(|one| hex(&one.inputs_raw())).collect());
     }
     let result = serde_json::json!({
         "devices": devices,
         "names": names,
         "state": "OP",
-        "expected_wkc": wkc,
+        "wkc": wkc,
         "cycles": cycles,
         "complete": complete,
-        "inputs": inputs,
+        "rounds": inputs,
     });
     println!("{result}");
 
@@ -106,6 +130,11 @@ async fn run(interface: &str, cycles: u64, cycle: Duration) -> Result<()> {
     let group = group.into_pre_op(&maindevice).await.map_err(|error| anyhow!("{error:?}"))?;
     group.into_init(&maindevice).await.map_err(|error| anyhow!("{error:?}"))?;
     Ok(())
+}
+
+fn bytes(hex: &str) -> Result<Vec<u8>> {
+    let digits = (0..hex.len()).step_by(2);
+    digits.map(|at| Ok(u8::from_str_radix(hex.get(at..at + 2).unwrap_or("?"), 16)?)).collect()
 }
 
 fn hex(bytes: &[u8]) -> String {

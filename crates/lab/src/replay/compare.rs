@@ -6,7 +6,7 @@
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::command::{Addressing, Command};
-use linesman_proto::mailbox::Header;
+use linesman_proto::mailbox::{Header, MailboxType};
 use linesman_proto::register;
 
 use super::recording::Datagram;
@@ -20,6 +20,8 @@ pub enum Class {
     Counter,
     /// It lies behind the end of a mailbox message.
     BehindMessage,
+    /// It is a byte of an SDO response that carries nothing.
+    Unused,
 }
 
 impl Class {
@@ -30,6 +32,7 @@ impl Class {
             Self::Time => "time",
             Self::Counter => "counter",
             Self::BehindMessage => "behind the message",
+            Self::Unused => "unused byte of an SDO response",
         }
     }
 }
@@ -115,6 +118,7 @@ pub fn compare(recorded: &Datagram<'_>, ours: &Datagram<'_>, is_mailbox: bool) -
     }
     let is_logical = addressing == Some(Addressing::Logical);
     let message_end = if is_mailbox { message_len(recorded.data) } else { usize::MAX };
+    let unused = if is_mailbox { unused(recorded.data) } else { 0..0 };
     let mut but = None;
     let bytes = recorded.data.iter().zip(ours.data).enumerate();
     for (offset, _) in bytes.filter(|(_, (recorded, ours))| recorded != ours) {
@@ -122,6 +126,7 @@ pub fn compare(recorded: &Datagram<'_>, ours: &Datagram<'_>, is_mailbox: bool) -
         let skipped = match is_logical {
             true => None,
             false if offset >= message_end => Some(Class::BehindMessage),
+            false if unused.contains(&offset) => Some(Class::Unused),
             false => class(address),
         };
         match skipped {
@@ -151,6 +156,25 @@ fn message_len(buffer: &[u8]) -> usize {
     /// Length of the header.
     const HEADER: usize = 6;
     Header::parse(buffer).map_or(usize::MAX, |header| HEADER + usize::from(header.length))
+}
+
+/// Bytes of an SDO response that carry nothing (ETG.1000.6 5.6.2): the last four of the answer to a
+/// download, what an expedited upload leaves of its four, what a short segment leaves of its seven.
+fn unused(buffer: &[u8]) -> std::ops::Range<usize> {
+    const COMMAND: usize = 8;
+    const RESPONSE: u8 = 3;
+    let is_coe = Header::parse(buffer).is_ok_and(|header| header.kind == MailboxType::Coe);
+    let is_response = buffer.get(7).is_some_and(|byte| byte >> 4 == RESPONSE);
+    let Some(command) = buffer.get(COMMAND).filter(|_| is_coe && is_response) else { return 0..0 };
+    let end = 16;
+    match command >> 5 {
+        // Upload segment, seven bytes or more.
+        0 => end - usize::from(command >> 1 & 0b111)..end,
+        1 => COMMAND + 1..end,
+        2 if command & 0b10 != 0 && command & 1 != 0 => end - usize::from(command >> 2 & 0b11)..end,
+        3 => 12..end,
+        _ => 0..0,
+    }
 }
 
 /// The first bytes, as people read them.

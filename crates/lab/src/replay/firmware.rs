@@ -5,8 +5,7 @@
 
 use std::collections::VecDeque;
 
-use linesman_proto::address::RegisterAddress;
-use linesman_proto::register::{SmDirection, SmMode, SyncManagerConfig};
+use linesman_proto::register::{AlEvents, SmDirection, SmMode, SyncManagerConfig};
 use linesman_proto::sii::Protocols;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::{Instant, Span};
@@ -14,10 +13,10 @@ use linesman_sim::controller::Pdi;
 use linesman_sim::device::application_layer::{ApplicationLayer, Refusal};
 use linesman_sim::device::dictionary::Dictionary;
 use linesman_sim::device::files::Files;
-use linesman_sim::device::mailbox::{Mailbox, REQUESTS, Served};
+use linesman_sim::device::mailbox::{ANSWERS, Mailbox, REQUESTS, Served};
 use linesman_sim::device::{Firmware, SignalId, Signals, Troubles};
 
-use super::learn::{AlStep, MailboxTurn};
+use super::learn::{AlStep, DeviceSeen, MailboxTurn};
 
 /// A step that the recording does not show takes this long.
 const USUAL_STEP: Span = Span::us(500);
@@ -37,9 +36,17 @@ pub(super) struct Learned {
     application_layer: ApplicationLayer,
     steps: VecDeque<AlStep>,
     step: Option<(Instant, AlStep)>,
+    /// A request waits since, and is looked at then.
+    asked_at: Option<Instant>,
+    looks_at: Option<Instant>,
     mailbox: Mailbox,
     turns: VecDeque<MailboxTurn>,
     message: Option<Message>,
+    /// When the device begins to write behind each fetch, and whether that shows.
+    openings: VecDeque<Option<(Span, bool)>>,
+    opening: Option<(Instant, bool)>,
+    /// The answer is in its mailbox.
+    filled: bool,
     dictionary: Dictionary,
     files: Files,
     troubles: Troubles,
@@ -57,20 +64,20 @@ struct Message {
 }
 
 impl Learned {
-    pub(super) fn new(
-        steps: VecDeque<AlStep>,
-        turns: VecDeque<MailboxTurn>,
-        dictionary: Dictionary,
-        inputs: Vec<SignalId>,
-    ) -> Self {
+    pub(super) fn new(seen: &DeviceSeen, inputs: Vec<SignalId>) -> Self {
         Self {
             application_layer: ApplicationLayer::new(true),
-            steps,
+            steps: seen.steps.clone(),
             step: None,
+            asked_at: None,
+            looks_at: None,
             mailbox: Mailbox::new(AT_ONCE, Protocols(Protocols::COE | Protocols::FOE)),
-            turns,
+            turns: seen.mailbox.clone(),
             message: None,
-            dictionary,
+            openings: seen.openings.clone(),
+            opening: None,
+            filled: false,
+            dictionary: seen.objects.dictionary(),
             files: Files::default(),
             troubles: Troubles::default(),
             inputs,
@@ -78,11 +85,22 @@ impl Learned {
         }
     }
 
+    /// How long the next request for a state is not looked at.
+    fn patience(&self, state: u8) -> Span {
+        let step = self.steps.iter().find(|step| step.requested == state);
+        step.map_or(Span::ZERO, |step| step.taken)
+    }
+
     /// The next step as the recording shows it. Steps it shows beyond what is asked for are left out.
     fn next_step(&mut self, to: AlState) -> AlStep {
         let state = to.bits();
-        let usual =
-            AlStep { requested: state, took: USUAL_STEP, status: u16::from(state), code: 0 };
+        let usual = AlStep {
+            requested: state,
+            taken: Span::ZERO,
+            took: USUAL_STEP,
+            status: u16::from(state),
+            code: 0,
+        };
         match self.steps.iter().position(|step| step.requested == state) {
             Some(at) => self.steps.drain(..=at).next_back().unwrap_or(usual),
             None => usual,
@@ -106,11 +124,21 @@ impl Learned {
                 self.application_layer.enter(pdi, state);
             }
         }
-        if self.step.is_none()
-            && let Some(to) = self.application_layer.take_request(pdi)
-        {
+        if self.step.is_some() || !pdi.events().contains(AlEvents::AL_CONTROL) {
+            return;
+        }
+        // Until it looks, the request stays and no other is taken.
+        let asked_at = *self.asked_at.get_or_insert(now);
+        let requested = pdi.al_control().requested().bits();
+        let looks_at = asked_at + self.patience(requested);
+        if now < looks_at {
+            self.looks_at = Some(looks_at);
+            return;
+        }
+        (self.asked_at, self.looks_at) = (None, None);
+        if let Some(to) = self.application_layer.take_request(pdi) {
             let step = self.next_step(to);
-            self.step = Some((now + step.took, step));
+            self.step = Some((asked_at + step.took, step));
         }
     }
 
@@ -153,6 +181,22 @@ impl Learned {
             }
             None => None,
         }
+    }
+
+    /// The device begins to write the next answer some time behind the fetch of the last.
+    fn serve_opening(&mut self, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
+        let full = pdi.mailbox_full(ANSWERS);
+        if std::mem::replace(&mut self.filled, full) && !full {
+            let opening = self.openings.pop_front().flatten();
+            self.opening = opening.map(|(behind, shown)| (now + behind, shown));
+        }
+        let (at, shown) = self.opening.filter(|_| !full)?;
+        if now < at {
+            return Some(at);
+        }
+        self.opening = None;
+        pdi.open_sync_manager(ANSWERS, shown);
+        None
     }
 
     fn serve(&mut self, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
@@ -209,8 +253,9 @@ impl Firmware for Learned {
             }
         }
         let mailbox = self.serve_mailbox(now, pdi);
+        let opening = self.serve_opening(now, pdi);
         let step = self.step.map(|(due, _)| due);
-        [mailbox, step].into_iter().flatten().min()
+        [mailbox, opening, step, self.looks_at].into_iter().flatten().min()
     }
 
     fn samples(&self) -> bool {
@@ -228,9 +273,7 @@ impl Firmware for Learned {
                 self.inputs.get(at).map_or(0, |signal| pdi.signals().value(*signal) as u8)
             }));
             if len == 1 {
-                let RegisterAddress(at) = manager.start;
-                let ram = pdi.ram_mut(at..at.saturating_add(1));
-                ram.copy_from_slice(&self.buffer[..ram.len()]);
+                pdi.put_ram(manager.start, &self.buffer);
             } else {
                 pdi.write_sync_manager(index, &self.buffer);
             }

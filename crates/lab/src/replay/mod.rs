@@ -18,7 +18,7 @@ pub mod recording;
 pub mod report;
 
 pub use learn::{Learned, learn};
-pub use model::{ModelError, model};
+pub use model::{Model, ModelError, model, on_segment};
 pub use play::play;
 pub use recording::{Recorder, Recording};
 pub use report::Report;

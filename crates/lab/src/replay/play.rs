@@ -7,11 +7,12 @@ use linesman_proto::frame::FrameView;
 use linesman_proto::register::{self as r, FmmuConfig, SyncManagerConfig};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::controller::Controller;
+use linesman_sim::device::Signals;
 use linesman_sim::segment::Segment;
 
 use super::compare::{Difference, Outcome, What, compare};
 use super::firmware::input_areas;
-use super::model::Model;
+use super::model::{Inputs, Model};
 use super::recording::{Datagram, Recording, Turn, datagrams};
 use super::report::Report;
 
@@ -164,8 +165,8 @@ fn feed(turn: &Turn, model: &mut Model) {
         }
         match request.command {
             Some(Command::Lrd | Command::Lrw) => {
-                for (device, _) in model.inputs.iter().enumerate() {
-                    feed_mapped(device, &reply, model.inputs[device].clone(), &mut model.segment);
+                for (device, inputs) in model.inputs.iter().enumerate() {
+                    feed_mapped(device, &reply, inputs, &mut model.segment);
                 }
             }
             Some(command) if command.effect().reads => feed_direct(&reply, model),
@@ -174,12 +175,7 @@ fn feed(turn: &Turn, model: &mut Model) {
     }
 }
 
-fn feed_mapped(
-    device: usize,
-    reply: &Datagram<'_>,
-    inputs: Vec<linesman_sim::device::SignalId>,
-    segment: &mut Segment,
-) {
+fn feed_mapped(device: usize, reply: &Datagram<'_>, inputs: &Inputs, segment: &mut Segment) {
     let mut values: Vec<(usize, u8, bool)> = Vec::new();
     {
         let Some(controller) = segment.controller(DeviceId(device as u32)) else { return };
@@ -209,10 +205,24 @@ fn feed_mapped(
         }
     }
     for (byte, bit, high) in values {
-        let Some(signal) = inputs.get(byte) else { continue };
-        let signals = segment.signals_mut();
-        let before = signals.value(*signal);
-        signals.set(*signal, before & !(1 << bit) | i32::from(high) << bit);
+        set(inputs, byte, bit, high, segment.signals_mut());
+    }
+}
+
+/// A bit of a device's inputs is high or low in the world outside.
+fn set(inputs: &Inputs, byte: usize, bit: u8, high: bool, signals: &mut Signals) {
+    match inputs {
+        Inputs::Bytes(list) => {
+            if let Some(signal) = list.get(byte) {
+                let before = signals.value(*signal);
+                signals.set(*signal, before & !(1 << bit) | i32::from(high) << bit);
+            }
+        }
+        Inputs::Bits(list) => {
+            if let Some(signal) = list.get(byte * 8 + usize::from(bit)) {
+                signals.set(*signal, i32::from(high));
+            }
+        }
     }
 }
 
@@ -230,8 +240,9 @@ fn feed_direct(reply: &Datagram<'_>, model: &mut Model) {
         let area = areas.iter().find(|(_, manager, _)| manager.touches(place, 1));
         if let Some((_, manager, first)) = area {
             let byte = first + usize::from(place.0 - manager.start.0);
-            if let Some(signal) = model.inputs[device.index()].get(byte) {
-                model.segment.signals_mut().set(*signal, i32::from(*value));
+            for bit in 0..8 {
+                let high = value >> bit & 1 != 0;
+                set(&model.inputs[device.index()], byte, bit, high, model.segment.signals_mut());
             }
         }
     }

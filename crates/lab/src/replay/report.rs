@@ -15,7 +15,7 @@ const EXAMPLES: usize = 3;
 const KINDS: usize = 40;
 
 /// What a replay showed.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Default, Debug, Serialize, schemars::JsonSchema)]
 pub struct Report {
     /// Requests that were played.
     pub requests: u64,
@@ -42,7 +42,7 @@ pub struct Report {
 }
 
 /// Fields that were not compared.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
 pub struct Exempt {
     /// Why.
     pub reason: String,
@@ -53,7 +53,7 @@ pub struct Exempt {
 }
 
 /// Differences of one kind.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
 pub struct DifferenceKind {
     /// Of which datagrams, and in what.
     pub what: String,
@@ -64,7 +64,7 @@ pub struct DifferenceKind {
 }
 
 /// One difference.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
 pub struct Example {
     /// Number of the request in the recording.
     pub request: u64,

@@ -1,4 +1,6 @@
-//! `linesman lab`: stories and swarms in virtual time.
+//! `linesman lab`: stories, swarms and recordings in virtual time.
+
+pub(crate) mod replay;
 
 use std::collections::BTreeMap;
 use std::num::NonZero;
@@ -33,6 +35,8 @@ enum Command {
         #[arg(required = true, value_name = "STORY.md")]
         stories: Vec<PathBuf>,
     },
+    /// Play the requests of a recording against a virtual segment, and compare the answers
+    Replay(replay::Arguments),
     /// Run plants and faults drawn by chance, and check what must always hold
     Swarm {
         /// From the first seed up to, not including, the second
@@ -44,10 +48,21 @@ enum Command {
     },
 }
 
+impl Arguments {
+    /// Whether the answer is to be JSON.
+    pub(crate) fn wants_json(&self) -> bool {
+        match &self.command {
+            Command::Replay(arguments) => arguments.json,
+            Command::Run { .. } | Command::Swarm { .. } => false,
+        }
+    }
+}
+
 /// Does it.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     match &arguments.command {
         Command::Run { stories } => run_stories(stories, output),
+        Command::Replay(arguments) => replay::run(arguments, output),
         Command::Swarm { seeds, quiet } => Ok(run_swarm(seeds.clone(), *quiet, output)),
     }
 }

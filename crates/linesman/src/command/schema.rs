@@ -11,6 +11,7 @@ use schemars::{Schema, schema_for};
 
 use super::diagnose::follow::EventReport;
 use super::interfaces;
+use super::lab::replay::ReplayReport;
 use super::scan::report::Scan;
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
@@ -39,6 +40,8 @@ pub(crate) enum Name {
     Diagnosis,
     /// A line of `diagnose --follow --json`
     Event,
+    /// `lab replay --json`
+    Replay,
     /// `fault … inject|heal|list --json`
     Faults,
     /// `fault … signals|set|release --json`
@@ -69,6 +72,7 @@ fn schema(name: Name) -> Schema {
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),
+        Name::Replay => schema_for!(ReplayReport),
         Name::Faults => schema_for!(Faults),
         Name::Signals => schema_for!(SignalTable),
         Name::Sim => schema_for!(SimStatus),

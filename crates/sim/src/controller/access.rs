@@ -87,7 +87,7 @@ impl Core {
         }
         if end > RAM && self.loaded {
             let from = place.max(RAM);
-            copy(&self.memory.bytes()[from..end], &mut out[from - place..], ors);
+            copy(self.memory.ram(from, end), &mut out[from - place..], ors);
             any = true;
         }
         any
@@ -109,6 +109,7 @@ impl Core {
                 any |= self.write_guarded(from, &data[from - start..end - start]);
             }
         }
+        self.passing.wrote |= any;
         any
     }
 
@@ -211,7 +212,7 @@ impl Core {
         }
         if end > RAM && self.loaded {
             let from = place.max(RAM);
-            self.memory.put(from, &data[from - place..]);
+            self.memory.copy_in(from, &data[from - place..]);
             any = true;
         }
         any

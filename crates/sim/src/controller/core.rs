@@ -2,6 +2,8 @@
 //!
 //! Reference: S2 chapter 2 (identity), the reset values in each register's chapter.
 
+use std::sync::Arc;
+
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
@@ -13,6 +15,7 @@ use linesman_proto::time::Instant;
 use super::clock::{LocalClock, RunningClock, SyncUnit, TimeLoop};
 use super::fmmu::Fmmus;
 use super::implemented::ClockUnits;
+use super::kind::ControllerKind;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
 use super::phy::Phys;
@@ -21,15 +24,15 @@ use super::shadow::Shadow;
 use super::sii::Sii;
 use super::sync_manager::{self, SyncManagers};
 use super::watchdog::Watchdog;
-use crate::hardware::{Hardware, PortKind};
+use crate::hardware::PortKind;
 
 /// All that a MainDevice sees.
 #[derive(Debug)]
 pub(super) struct Core {
     pub(super) id: DeviceId,
-    pub(super) hardware: Hardware,
+    pub(super) hardware: ControllerKind,
     pub(super) memory: Memory,
-    pub(super) rights: Rights,
+    pub(super) rights: Arc<Rights>,
     pub(super) loops: Loops,
     pub(super) queue: Queue,
     pub(super) fmmus: Fmmus,
@@ -97,16 +100,23 @@ pub(super) struct Passing {
     pub(super) read_latches: u8,
     pub(super) enables_registers: bool,
     pub(super) enables_all: bool,
+    /// Something was written, be it at once or at the frame's end.
+    pub(super) wrote: bool,
     /// SyncManagers that were touched, one bit each.
     pub(super) touched: u16,
 }
 
 impl Core {
-    pub(super) fn new(id: DeviceId, hardware: Hardware, quartz: LocalClock, sii: Vec<u8>) -> Self {
+    pub(super) fn new(
+        id: DeviceId,
+        hardware: ControllerKind,
+        quartz: LocalClock,
+        sii: Vec<u8>,
+    ) -> Self {
         Self {
             id,
             memory: Memory::new(&hardware),
-            rights: Rights::of(&hardware, ClockUnits::default()),
+            rights: hardware.rights(ClockUnits::default()),
             loops: Loops::new(&hardware),
             queue: Queue::default(),
             fmmus: Fmmus::new(),
@@ -115,7 +125,7 @@ impl Core {
             phys: Phys::new(&hardware),
             keeps_reasons: super::implemented::keeps_reasons(&hardware),
             frame_until: PortMap([Instant::ZERO; 4]),
-            shadow: Shadow::with_room(),
+            shadow: Shadow::default(),
             scratch: Vec::new(),
             clock: RunningClock::new(quartz, Instant::ZERO),
             quartz,
@@ -153,7 +163,7 @@ impl Core {
         self.clock = RunningClock::new(self.quartz, now);
         self.powered_at = now;
         self.loaded = false;
-        self.rights = Rights::of(&self.hardware, ClockUnits::default());
+        self.rights = self.hardware.rights(ClockUnits::default());
         self.time_loop = TimeLoop::default();
         self.sync = self.sync.restarted();
         self.started = false;
@@ -182,7 +192,7 @@ impl Core {
     }
 
     fn identify(&mut self) {
-        let hardware = &self.hardware;
+        let hardware = &*self.hardware;
         let ports = Port::ALL.into_iter().fold(PortDescriptor::default(), |ports, port| {
             let kind = match hardware.ports[port] {
                 PortKind::Absent => PortType::NotImplemented,
@@ -259,7 +269,7 @@ impl Core {
         let a0 = self.memory.u8(&r::ESC_CONFIGURATION_A0);
         let a5 = self.memory.u16(&r::ESC_CONFIGURATION_A5);
         let units = ClockUnits::configured(&self.hardware, a0, a5);
-        self.rights = Rights::of(&self.hardware, units);
+        self.rights = self.hardware.rights(units);
         // Without an interface nobody triggers its watchdog, as the EK1100 shows.
         self.pdi_watchdog_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
     }

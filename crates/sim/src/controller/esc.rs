@@ -13,6 +13,8 @@ use linesman_proto::time::{Instant, Span};
 
 use super::clock::{LocalClock, SyncSignal};
 use super::core::Core;
+use super::direct::Sampling;
+use super::kind::ControllerKind;
 use super::memory::at;
 use super::pdi::Pdi;
 use super::phy::PhyAct;
@@ -45,11 +47,12 @@ pub enum Verdict {
 #[derive(Debug)]
 pub struct Controller {
     pub(super) core: Core,
-    firmware: Box<dyn Firmware>,
-    powered: bool,
+    pub(super) firmware: Box<dyn Firmware>,
+    pub(super) powered: bool,
     /// The supply went and the signals of the device do not know yet.
     going_dark: bool,
-    samples: bool,
+    pub(super) samples: bool,
+    pub(super) sampling: Sampling,
     /// When something is due next; [`Instant::MAX`] for nothing.
     next: Instant,
 }
@@ -75,12 +78,12 @@ impl Controller {
     #[must_use]
     pub fn new(
         id: DeviceId,
-        hardware: Hardware,
+        hardware: impl Into<ControllerKind>,
         clock: LocalClock,
         firmware: Box<dyn Firmware>,
         sii: Vec<u8>,
     ) -> Self {
-        let mut core = Core::new(id, hardware, clock, sii);
+        let mut core = Core::new(id, hardware.into(), clock, sii);
         core.sii.emulate(firmware.emulates_sii());
         Self {
             core,
@@ -88,6 +91,7 @@ impl Controller {
             powered: false,
             going_dark: false,
             samples: false,
+            sampling: Sampling::default(),
             next: Instant::MAX,
         }
     }
@@ -163,6 +167,7 @@ impl Controller {
             }
             self.serve(at, due, signals);
         }
+        self.sampling.renew();
     }
 
     /// When something will happen by itself, if anything will.
@@ -330,13 +335,10 @@ impl Controller {
         }
         self.advance(at, signals);
         if self.samples && !self.core.processor_stuck {
-            self.firmware.sample(at, &mut Pdi { core: &mut self.core, signals, now: at });
-            self.core.rescheduled = true;
+            self.sample(at, signals);
         }
         let verdict = self.core.process(at, frame);
-        if std::mem::take(&mut self.core.rescheduled) {
-            self.reschedule();
-        }
+        self.passed();
         verdict
     }
 
@@ -380,6 +382,7 @@ impl Controller {
 
     /// The device behind it: for faults that make it misbehave.
     pub fn firmware_mut(&mut self) -> &mut dyn Firmware {
+        self.sampling.renew();
         &mut *self.firmware
     }
 
@@ -456,7 +459,19 @@ impl Controller {
     /// A byte of a register, without any effect of reading it; 0 where there is none.
     #[must_use]
     pub fn register(&self, address: RegisterAddress) -> u8 {
-        self.core.memory.bytes().get(usize::from(address.0)).copied().unwrap_or(0)
+        self.core.memory.byte(usize::from(address.0))
+    }
+
+    /// All bytes below the process-data RAM, without any effect of reading them.
+    #[must_use]
+    pub fn registers(&self) -> &[u8] {
+        self.core.memory.bytes()
+    }
+
+    /// The process-data RAM.
+    #[must_use]
+    pub fn ram(&self) -> &[u8] {
+        self.core.memory.ram(super::memory::RAM, self.core.memory.len())
     }
 
     /// DL status, 0x0110.

@@ -5,6 +5,7 @@
 //! request register.
 
 use linesman_proto::register::{self as r, AlEvents, AlStatus, EcatEvents};
+use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
 
 use super::core::Core;
@@ -96,6 +97,9 @@ impl Core {
         if self.memory.u16(&r::AL_STATUS) != status.0 {
             self.memory.set_u16(&r::AL_STATUS, status.0);
             self.refresh_leds();
+            if status.state().state().is_some_and(AlState::has_inputs) {
+                self.sii.forget_first_owner(&mut self.memory);
+            }
             self.raise_ecat_events(EcatEvents::AL_STATUS);
         }
     }

@@ -18,6 +18,8 @@ pub(super) struct Fmmus {
     hull: (u64, u64),
     /// Some reads and some writes share logical bytes.
     crossed: bool,
+    /// Counts what was configured, so that whoever keeps an index of it can tell.
+    edition: u32,
 }
 
 /// An active FMMU.
@@ -30,7 +32,13 @@ pub(super) struct Mapping {
 
 impl Fmmus {
     pub(super) fn new() -> Self {
-        Self { active: [Mapping::default(); MAX], count: 0, hull: (0, 0), crossed: false }
+        Self {
+            active: [Mapping::default(); MAX],
+            count: 0,
+            hull: (0, 0),
+            crossed: false,
+            edition: 0,
+        }
     }
 
     /// Takes over what the registers of all FMMUs say.
@@ -39,6 +47,7 @@ impl Fmmus {
         configs: impl Iterator<Item = FmmuConfig>,
         features: Features,
     ) {
+        self.edition = self.edition.wrapping_add(1);
         self.count = 0;
         self.hull = (u64::MAX, 0);
         self.crossed = false;
@@ -74,6 +83,16 @@ impl Fmmus {
 
     pub(super) fn count(&self) -> usize {
         self.count
+    }
+
+    /// Changes with every new configuration.
+    pub(super) fn edition(&self) -> u32 {
+        self.edition
+    }
+
+    /// Those that are active.
+    pub(super) fn active(&self) -> impl Iterator<Item = &FmmuConfig> {
+        self.active[..self.count].iter().map(|mapping| &mapping.config)
     }
 
     pub(super) fn mapping(&self, index: usize) -> &Mapping {

@@ -67,6 +67,18 @@ impl Loops {
         self.mode[port] == LoopMode::AutoClose && self.link[port] && !self.open[port]
     }
 
+    /// The open ports, one bit each, port A lowest.
+    pub(super) fn open_bits(&self) -> u8 {
+        Port::ALL
+            .into_iter()
+            .fold(0, |bits, port| bits | u8::from(self.is_open(port)) << port.index())
+    }
+
+    /// Whether any port would open with a good frame.
+    pub(super) fn waits_for_any_frame(&self) -> bool {
+        Port::ALL.into_iter().any(|port| self.waits_for_frame(port))
+    }
+
     /// The loop modes were written: ports in mode auto close get a new chance.
     pub(super) fn rewrite(&mut self, control: DlControl) {
         for port in Port::ALL.into_iter().filter(|port| self.present[*port]) {

@@ -14,41 +14,105 @@ use crate::hardware::Hardware;
 /// Where process-data RAM begins.
 pub(super) const RAM: usize = PROCESS_RAM_START.0 as usize;
 
-/// Registers and RAM.
+/// Registers and RAM. The process-data RAM takes memory of the host only once something other than
+/// 0 was written to it: most of a long line never uses it.
 #[derive(Clone)]
 pub(super) struct Memory {
-    bytes: Vec<u8>,
+    registers: Box<[u8; RAM]>,
+    /// Empty, for all zero, or of the whole length.
+    ram: Vec<u8>,
+    ram_len: usize,
 }
+
+/// What RAM reads as that was never written.
+static BLANK: [u8; 0x1_0000 - RAM] = [0; 0x1_0000 - RAM];
 
 impl Memory {
     pub(super) fn new(hardware: &Hardware) -> Self {
-        Self { bytes: vec![0; RAM + usize::from(hardware.ram_kib) * 1024] }
+        let ram_len = (usize::from(hardware.ram_kib) * 1024).min(BLANK.len());
+        Self { registers: Box::new([0; RAM]), ram: Vec::new(), ram_len }
     }
 
     /// All registers and RAM back to 0.
     pub(super) fn clear(&mut self) {
-        self.bytes.fill(0);
+        self.registers.fill(0);
+        self.ram.fill(0);
     }
 
     /// The first address behind the RAM.
     pub(super) fn len(&self) -> usize {
-        self.bytes.len()
+        RAM + self.ram_len
     }
 
+    /// All below the process-data RAM.
     pub(super) fn bytes(&self) -> &[u8] {
-        &self.bytes
+        &self.registers[..]
     }
 
+    /// The same, to change.
     pub(super) fn bytes_mut(&mut self) -> &mut [u8] {
-        &mut self.bytes
+        &mut self.registers[..]
+    }
+
+    /// A byte anywhere; 0 behind the end.
+    pub(super) fn byte(&self, address: usize) -> u8 {
+        match address.checked_sub(RAM) {
+            None => self.registers[address],
+            Some(offset) => self.ram.get(offset).copied().unwrap_or(0),
+        }
+    }
+
+    /// Process-data RAM between two addresses from [`RAM`] up, as far as it reaches.
+    pub(super) fn ram(&self, start: usize, end: usize) -> &[u8] {
+        let from = start.saturating_sub(RAM).min(self.ram_len);
+        let to = end.saturating_sub(RAM).clamp(from, self.ram_len);
+        if self.ram.is_empty() { &BLANK[..to - from] } else { &self.ram[from..to] }
+    }
+
+    /// Takes what lies from `start` on, registers or RAM; behind the end there is nothing.
+    pub(super) fn copy_out(&self, start: usize, out: &mut [u8]) {
+        let registers = out.len().min(RAM.saturating_sub(start));
+        let (low, high) = out.split_at_mut(registers);
+        low.copy_from_slice(&self.registers[start.min(RAM)..][..registers]);
+        let from = start.max(RAM);
+        let ram = self.ram(from, from + high.len());
+        high[..ram.len()].copy_from_slice(ram);
+    }
+
+    /// Puts bytes from `start` on, registers or RAM; behind the end they go nowhere.
+    pub(super) fn copy_in(&mut self, start: usize, data: &[u8]) {
+        let (low, high) = data.split_at(data.len().min(RAM.saturating_sub(start)));
+        if !low.is_empty() {
+            self.registers[start..start + low.len()].copy_from_slice(low);
+        }
+        let from = start.max(RAM) - RAM;
+        let len = high.len().min(self.ram_len.saturating_sub(from));
+        if len == 0 || (self.ram.is_empty() && high[..len].iter().all(|byte| *byte == 0)) {
+            return;
+        }
+        if self.ram.is_empty() {
+            self.ram.resize(self.ram_len, 0);
+        }
+        self.ram[from..from + len].copy_from_slice(&high[..len]);
+    }
+
+    /// Registers or RAM between two addresses back to 0.
+    pub(super) fn clear_range(&mut self, start: usize, end: usize) {
+        if start < RAM {
+            self.registers[start..end.min(RAM)].fill(0);
+        }
+        if !self.ram.is_empty() && end > RAM {
+            let to = (end - RAM).min(self.ram_len);
+            self.ram[start.saturating_sub(RAM).min(to)..to].fill(0);
+        }
     }
 
     pub(super) fn u8(&self, register: &Register) -> u8 {
-        self.bytes[at(register)]
+        self.registers[at(register)]
     }
 
     pub(super) fn set_u8(&mut self, register: &Register, value: u8) {
-        self.bytes[at(register)] = value;
+        self.registers[at(register)] = value;
     }
 
     pub(super) fn u16(&self, register: &Register) -> u16 {
@@ -78,19 +142,20 @@ impl Memory {
     /// `N` bytes from `address`, which must be a register's: those are always there.
     pub(super) fn array<const N: usize>(&self, address: usize) -> [u8; N] {
         let mut array = [0; N];
-        array.copy_from_slice(&self.bytes[address..address + N]);
+        array.copy_from_slice(&self.registers[address..address + N]);
         array
     }
 
+    /// Puts bytes into registers.
     pub(super) fn put(&mut self, address: usize, bytes: &[u8]) {
-        self.bytes[address..address + bytes.len()].copy_from_slice(bytes);
+        self.registers[address..address + bytes.len()].copy_from_slice(bytes);
     }
 }
 
 impl fmt::Debug for Memory {
     /// Its size; the content is read register by register.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Memory({} bytes)", self.bytes.len())
+        write!(f, "Memory({} bytes)", self.len())
     }
 }
 
@@ -100,8 +165,9 @@ pub(super) const fn at(register: &Register) -> usize {
 }
 
 /// What the EtherCAT side may do with each byte below the process-data RAM.
-#[derive(Clone)]
-pub(super) struct Rights(Box<[u8]>);
+///
+/// Controllers of one kind share them.
+pub(super) struct Rights([u8; RAM]);
 
 impl Rights {
     /// The register is there and can be read.
@@ -114,8 +180,8 @@ impl Rights {
     pub(super) const LIVE: u8 = 1 << 3;
 
     pub(super) fn of(hardware: &Hardware, units: ClockUnits) -> Self {
-        let mut rights = vec![0; RAM].into_boxed_slice();
-        implemented::fill(hardware, units, &mut rights);
+        let mut rights = [0; RAM];
+        implemented::fill(hardware, units, &mut rights[..]);
         Self(rights)
     }
 

@@ -11,16 +11,19 @@
 mod access;
 mod clock;
 mod core;
+mod direct;
 mod esc;
 mod event;
 mod fmmu;
 mod implemented;
+mod kind;
 mod led;
 mod loops;
 mod memory;
 pub mod pdi;
 mod pdi_register;
 mod phy;
+mod plain_read;
 mod port;
 mod posted;
 mod preset;
@@ -34,10 +37,14 @@ mod sync_manager;
 mod watchdog;
 
 pub use clock::{Edge, LatchInput, LocalClock, SyncSignal};
+pub(crate) use direct::Manner;
 pub use esc::{Controller, Verdict};
+pub use kind::{ControllerKind, ControllerKinds};
 pub use pdi::Pdi;
 pub use phy::{PHY_ACCESS_TIME, PhyAct};
+pub(crate) use plain_read::{Answer, PlainRead};
 pub use posted::{CountKind, PortEvent};
+pub(crate) use processing_unit::Header;
 pub use sii::{LOAD_TIME, PROGRAMMING_TIME, READ_TIME, STARTUP_DELAY, WRITE_TIME};
 pub use sii_emulation::SiiRequest;
 

@@ -127,6 +127,14 @@ impl Pdi<'_> {
         taken
     }
 
+    /// Begins to write what [`Pdi::write_sync_manager`] will complete. `shown` says whether this type
+    /// of controller shows the buffer as open meanwhile (SyncManager status, bit 7): not all do.
+    pub fn open_sync_manager(&mut self, index: u8, shown: bool) {
+        let Some(index) = self.index(index) else { return };
+        self.core.sync_managers.open_by_pdi(index, shown, &mut self.core.memory);
+        self.core.refresh_sync_manager_events(index, self.now);
+    }
+
     /// Whether a mailbox holds a message, in either direction.
     #[must_use]
     pub fn mailbox_full(&self, index: u8) -> bool {
@@ -180,22 +188,21 @@ impl Pdi<'_> {
     /// exist are cut off.
     #[must_use]
     pub fn ram(&self, range: Range<u16>) -> &[u8] {
-        let len = self.core.memory.len();
-        let start = usize::from(range.start).clamp(RAM, len);
-        &self.core.memory.bytes()[start..usize::from(range.end).clamp(start, len)]
+        self.core.memory.ram(usize::from(range.start).max(RAM), usize::from(range.end))
     }
 
-    /// The same, to change.
-    pub fn ram_mut(&mut self, range: Range<u16>) -> &mut [u8] {
-        let len = self.core.memory.len();
-        let start = usize::from(range.start).clamp(RAM, len);
-        &mut self.core.memory.bytes_mut()[start..usize::from(range.end).clamp(start, len)]
+    /// Puts bytes into process-data RAM from `start` on, as far as it reaches; what would lie below
+    /// it goes nowhere.
+    pub fn put_ram(&mut self, start: RegisterAddress, data: &[u8]) {
+        let start = usize::from(start.0);
+        let skipped = RAM.saturating_sub(start).min(data.len());
+        self.core.memory.copy_in(start + skipped, &data[skipped..]);
     }
 
     /// A byte of a register, without any effect of reading it.
     #[must_use]
     pub fn register(&self, address: RegisterAddress) -> u8 {
-        self.core.memory.bytes().get(usize::from(address.0)).copied().unwrap_or(0)
+        self.core.memory.byte(usize::from(address.0))
     }
 
     /// A register of two bytes.

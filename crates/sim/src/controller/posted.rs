@@ -76,6 +76,15 @@ impl Queue {
         self.0.front().map(|(at, _)| *at)
     }
 
+    /// When the next event comes that can open or close a loop.
+    pub(super) fn next_way_at(&self) -> Option<Instant> {
+        let ways = self.0.iter().find(|(_, happening)| match happening {
+            Happening::Posted(PortEvent::Count { .. }) => false,
+            Happening::Posted(PortEvent::Link { .. }) | Happening::GoodFrame(_) => true,
+        });
+        ways.map(|(at, _)| *at)
+    }
+
     /// The next event, if it is not after `now`.
     pub(super) fn pop_until(&mut self, now: Instant) -> Option<(Instant, Happening)> {
         if self.next_at()? <= now { self.0.pop_front() } else { None }

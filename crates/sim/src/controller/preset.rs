@@ -51,6 +51,11 @@ impl Controller {
         self.reschedule();
     }
 
+    /// How long the EEPROM acknowledges nothing behind a write.
+    pub fn set_sii_programming_time(&mut self, time: Span) {
+        self.core.sii.set_programming_time(time);
+    }
+
     /// The next commands to the SII take these times, one after the other; those behind take what
     /// they take by the data sheet.
     pub fn expect_sii_times(&mut self, times: impl IntoIterator<Item = Span>) {

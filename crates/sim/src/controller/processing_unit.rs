@@ -24,17 +24,17 @@ const MORE: u8 = 0x80;
 
 /// The part of a datagram's header that a controller looks at.
 #[derive(Clone, Copy, Debug)]
-struct Header {
-    command: Option<Command>,
-    adp: u16,
-    ado: u16,
-    len: usize,
-    more: bool,
+pub(crate) struct Header {
+    pub(crate) command: Option<Command>,
+    pub(crate) adp: u16,
+    pub(crate) ado: u16,
+    pub(crate) len: usize,
+    pub(crate) more: bool,
 }
 
 impl Header {
     #[inline]
-    fn read(bytes: &[u8; DATAGRAM_HEADER_LEN]) -> Self {
+    pub(crate) fn read(bytes: &[u8; DATAGRAM_HEADER_LEN]) -> Self {
         let [code, _index, p0, p1, o0, o1, l0, l1, _irq0, _irq1] = *bytes;
         Self {
             command: Command::from_code(code),
@@ -45,7 +45,7 @@ impl Header {
         }
     }
 
-    fn logical(&self) -> LogicalAddress {
+    pub(crate) fn logical(&self) -> LogicalAddress {
         LogicalAddress(u32::from(self.adp) | u32::from(self.ado) << 16)
     }
 }
@@ -71,7 +71,10 @@ impl Core {
             Some(FrameType::NetworkVariables | FrameType::Mailbox | FrameType::Other(_)) => {
                 return Verdict::Forward;
             }
-            None => return self.finish(when, frame, false),
+            None => {
+                self.begin(when, frame.number);
+                return self.finish(when, frame, false);
+            }
         }
         let closes_ring = self.loops.port_zero_closes_ring();
         if closes_ring && frame.bytes.get(first_at + 7).is_some_and(|byte| byte & CIRCULATED != 0) {
@@ -79,9 +82,15 @@ impl Core {
             self.note_unit_error(Port::A, UnitError::Circulating);
             return Verdict::Destroy;
         }
-        self.passing = Passing { began: when, number: frame.number, ..Passing::default() };
+        self.begin(when, frame.number);
         let whole = self.walk(&mut frame.bytes[first_at..], closes_ring);
         self.finish(when, frame, whole)
+    }
+
+    /// A frame with datagrams begins to pass.
+    #[inline]
+    pub(super) fn begin(&mut self, when: Instant, number: u64) {
+        self.passing = Passing { began: when, number, ..Passing::default() };
     }
 
     /// A frame without EtherCAT in it, or a piece of one.
@@ -138,7 +147,7 @@ impl Core {
 
     /// Does what a command asks of this controller and says what to add to the working counter.
     #[inline]
-    fn execute(&mut self, command: Command, header: &Header, data: &mut [u8]) -> u16 {
+    pub(super) fn execute(&mut self, command: Command, header: &Header, data: &mut [u8]) -> u16 {
         let addressed = match command.addressing() {
             Addressing::None => return 0,
             Addressing::Position => header.adp == 0,
@@ -323,15 +332,20 @@ impl Core {
             frame.damage.fcs_bad = true;
             frame.damage.marked = true;
         }
-        let good = intact && whole;
+        self.settle(when + frame.duration(), intact && whole);
+        Verdict::Forward
+    }
+
+    /// The frame that was passing ended at `end`: what it did counts if it was good.
+    pub(super) fn settle(&mut self, end: Instant, good: bool) {
         let passing = self.passing;
         self.rescheduled |= good && (passing.touched != 0 || !self.shadow.is_empty());
         if passing.touched != 0 {
-            self.settle_sync_managers(passing.touched, good, when + frame.duration());
+            self.settle_sync_managers(passing.touched, good, end);
         }
         if !good {
             self.shadow.clear();
-            return Verdict::Forward;
+            return;
         }
         if passing.read_dl_status {
             self.clear_ecat_events(EcatEvents::DL_STATUS);
@@ -343,9 +357,8 @@ impl Core {
             self.end_latch_reads(passing.read_latches);
         }
         if !self.shadow.is_empty() {
-            self.commit(when + frame.duration());
+            self.commit(end);
         }
-        Verdict::Forward
     }
 
     fn settle_sync_managers(&mut self, touched: u16, good: bool, end: Instant) {

@@ -24,11 +24,6 @@ pub(super) struct Write {
 }
 
 impl Shadow {
-    /// Room for what an ordinary frame writes, so that the first ones need no allocation.
-    pub(super) fn with_room() -> Self {
-        Self { writes: Vec::with_capacity(64), data: Vec::with_capacity(2_048) }
-    }
-
     pub(super) fn is_empty(&self) -> bool {
         self.writes.is_empty()
     }

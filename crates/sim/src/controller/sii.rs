@@ -24,12 +24,15 @@ pub const LOAD_TIME: Span = Span::us(1_160);
 /// A write of one word, as seen by the controller.
 pub const WRITE_TIME: Span = Span::us(250);
 /// How long the EEPROM itself is busy behind a write: it then acknowledges nothing. Data sheets of
-/// 24Cxx parts say 5 ms at most.
-pub const PROGRAMMING_TIME: Span = Span::ms(5);
+/// 24Cxx parts say 2 ms typically and 5 ms at most; MainDevices that work with real ones try again
+/// for no more than 4 ms.
+pub const PROGRAMMING_TIME: Span = Span::ms(2);
 /// Until it is clear that the EEPROM does not acknowledge: a start condition and a byte.
 const NO_ANSWER_TIME: Span = Span::us(70);
 /// More for the second address byte.
 const SECOND_ADDRESS_BYTE: Span = Span::us(60);
+/// Bit 4 of the status, where a controller has it.
+const FIRST_OWNER: u16 = 1 << 4;
 /// Largest EEPROM with one address byte, in bytes.
 const SMALL: usize = 2_048;
 /// Largest EEPROM there is: 4 Mbit.
@@ -44,6 +47,9 @@ pub(super) struct Sii {
     capacity: usize,
     reads_eight: bool,
     takes_a5: bool,
+    /// The small controller shows bit 4 of its status until it is in SAFEOP with the SII offered to
+    /// the PDI: so recordings of real terminals have it; the data sheet calls the bit reserved.
+    marks_first_owner: bool,
     running: Option<Running>,
     programming_until: Instant,
     /// Write enable was given in the frame that is ending.
@@ -54,6 +60,7 @@ pub(super) struct Sii {
     alias_each_load: bool,
     /// The SubDevice's processor plays the EEPROM.
     pub(super) emulated: bool,
+    programming_time: Span,
     /// How long the next commands take, where that is known.
     expected: VecDeque<Span>,
 }
@@ -96,12 +103,14 @@ impl Sii {
             capacity,
             reads_eight,
             takes_a5: implemented::has_configuration_a5(hardware),
+            marks_first_owner: ControllerType(hardware.controller_type) == ControllerType::ET1200,
             running: None,
             programming_until: Instant::ZERO,
             write_enabled: false,
             loaded_once: false,
             alias_each_load: ControllerType(hardware.controller_type) == ControllerType::ESC20,
             emulated: false,
+            programming_time: PROGRAMMING_TIME,
             expected: VecDeque::new(),
         }
     }
@@ -113,6 +122,18 @@ impl Sii {
     /// From now on the SubDevice's processor plays the EEPROM, or does not.
     pub(super) fn emulate(&mut self, emulated: bool) {
         self.emulated = emulated;
+    }
+
+    /// How long the EEPROM is busy behind a write.
+    pub(super) fn set_programming_time(&mut self, time: Span) {
+        self.programming_time = time;
+    }
+
+    /// The device exchanges process data while the SII is offered to the PDI.
+    pub(super) fn forget_first_owner(&self, memory: &mut Memory) {
+        if self.marks_first_owner && memory.u8(&r::SII_ACCESS_ECAT) & 1 != 0 {
+            put(SiiControl(read(memory).0 & !FIRST_OWNER), memory);
+        }
     }
 
     /// The next commands take these times.
@@ -130,7 +151,8 @@ impl Sii {
             .with_emulated(self.emulated)
             .with_eeprom_missing(self.image.is_empty())
             .with_not_loaded(true);
-        put(control, memory);
+        let mark = if self.marks_first_owner { FIRST_OWNER } else { 0 };
+        put(SiiControl(control.0 | mark), memory);
         self.run(at + STARTUP_DELAY, self.load_time(), Operation::Load { retries: 1 }, memory);
     }
 
@@ -219,7 +241,7 @@ impl Sii {
             }
             Operation::Write { word, value } => {
                 self.write(word, value);
-                self.programming_until = running.done_at + PROGRAMMING_TIME;
+                self.programming_until = running.done_at + self.programming_time;
                 Outcome::None
             }
             Operation::Unanswered => {

@@ -71,6 +71,8 @@ struct SyncManager {
     reading: u8,
     /// An access from the EtherCAT side has begun and not ended.
     open: bool,
+    /// The SubDevice has begun to write, and the controller shows it.
+    opened_by_pdi: bool,
     /// Only in order, in sequential mode: where the next access of a session must begin.
     in_order: bool,
     next: usize,
@@ -214,7 +216,7 @@ impl SyncManagers {
             Kind::Mailbox => return None,
         };
         let len = manager.length.min(buffer.len());
-        buffer[..len].copy_from_slice(&memory.bytes()[from..from + len]);
+        memory.copy_out(from, &mut buffer[..len]);
         manager.written = false;
         manager.full = false;
         manager.read = true;
@@ -246,13 +248,25 @@ impl SyncManagers {
                 manager.start
             }
         };
-        let (filled, rest) = memory.bytes_mut()[at..at + manager.length].split_at_mut(data.len());
-        filled.copy_from_slice(data);
-        rest.fill(0);
+        memory.copy_in(at, data);
+        memory.clear_range(at + data.len(), at + manager.length);
         manager.read = false;
+        manager.opened_by_pdi = false;
         manager.written = true;
         self.put_status(index, memory);
         true
+    }
+
+    /// The SubDevice touches the first byte of a buffer that it is going to write: whoever waits for
+    /// it to be read has been heard. `shown` says whether the controller shows the buffer as open.
+    pub(super) fn open_by_pdi(&mut self, index: usize, shown: bool, memory: &mut Memory) {
+        let Some(manager) = self.all.get_mut(index) else { return };
+        let is_session = matches!(manager.kind, Kind::Buffered | Kind::Mailbox);
+        if is_session && manager.is_read() && !manager.full {
+            manager.read = false;
+            manager.opened_by_pdi = shown;
+            self.put_status(index, memory);
+        }
     }
 
     /// Whether the mailbox `index` holds a message.
@@ -299,7 +313,7 @@ impl SyncManager {
 
     fn restart(&mut self) {
         (self.written, self.read, self.full, self.open) = (false, false, false, false);
-        (self.next, self.violated) = (self.start, false);
+        (self.next, self.violated, self.opened_by_pdi) = (self.start, false, false);
         (self.last, self.writing, self.reading) = (None, 0, 0);
     }
 
@@ -427,14 +441,22 @@ impl SyncManager {
         Settled { written, watchdog: written && self.control.watchdog() }
     }
 
+    /// A mailbox has one buffer, the first, as real controllers show.
+    fn last_shown(&self) -> Option<u8> {
+        match self.kind {
+            Kind::Mailbox => Some(0),
+            Kind::Off | Kind::Locked | Kind::Transparent | Kind::Buffered => self.last,
+        }
+    }
+
     fn status(&self) -> SmStatus {
         SmStatus(0)
             .with_written(self.written)
             .with_read(self.read)
             .with_sequence_violation(self.violated)
             .with_mailbox_full(self.full)
-            .with_last_buffer(self.last)
+            .with_last_buffer(self.last_shown())
             .with_read_open(self.open && self.is_read())
-            .with_write_open(self.open && !self.is_read())
+            .with_write_open(self.opened_by_pdi || (self.open && !self.is_read()))
     }
 }

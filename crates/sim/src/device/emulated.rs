@@ -10,7 +10,7 @@ use linesman_proto::register::{DIGITAL_OUTPUT, SyncManagerConfig};
 use linesman_proto::time::Instant;
 
 use super::application_layer::{ApplicationLayer, Refusal};
-use super::firmware::Firmware;
+use super::firmware::{Firmware, SampleAgain};
 use super::signal::{SignalId, Signals};
 use crate::controller::Pdi;
 
@@ -127,6 +127,15 @@ impl Firmware for Emulated {
         }
     }
 
+    /// Bytes that are simply put in place are there until a signal changes; a buffer that is written
+    /// takes turns each time.
+    fn sample_again(&self, pdi: &Pdi<'_>) -> SampleAgain {
+        let areas = self.inputs.iter().map(|area| area.sync_manager);
+        let mut guards = areas.chain(self.words.iter().map(|word| word.sync_manager));
+        let buffered = |index| pdi.sync_manager(index).is_some_and(|guard| is_buffered(&guard));
+        if guards.any(buffered) { SampleAgain::NextFrame } else { SampleAgain::OnceSignalsChange }
+    }
+
     fn identify(&mut self, id: u16, signals: &mut Signals) -> bool {
         if let Some(signal) = self.coding_switch {
             signals.set(signal, i32::from(id));
@@ -153,9 +162,7 @@ fn put(sync_manager: u8, at: RegisterAddress, bytes: &[u8], pdi: &mut Pdi<'_>) {
         // Less than a whole buffer is a set-up that does not fit the device.
         pdi.write_sync_manager(sync_manager, bytes);
     } else {
-        let end = at.0.saturating_add(bytes.len() as u16);
-        let ram = pdi.ram_mut(at.0..end);
-        ram.copy_from_slice(&bytes[..ram.len()]);
+        pdi.put_ram(at, bytes);
     }
 }
 

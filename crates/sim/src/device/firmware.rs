@@ -13,6 +13,17 @@ use super::signal::Signals;
 use super::trouble::Trouble;
 use crate::controller::{Pdi, SyncSignal};
 
+/// When inputs are to be sampled again.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SampleAgain {
+    /// With each frame.
+    NextFrame,
+    /// With the first frame from this instant on.
+    From(Instant),
+    /// Once any signal has another value.
+    OnceSignalsChange,
+}
+
 /// What is behind a controller: a processor with its software, or plain inputs and outputs.
 pub trait Firmware: Debug + Send {
     /// The supply is there and the controller has tried to load the SII
@@ -37,6 +48,13 @@ pub trait Firmware: Debug + Send {
     /// A frame begins: controllers that drive inputs themselves latch them now (S1, digital I/O,
     /// input sampling at start of frame). Called only where [`Firmware::samples`] asks for it.
     fn sample(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// When [`Firmware::sample`] will do something again that it would not do now. Asked after each
+    /// [`Firmware::sample`]; what a frame writes and every [`Firmware::run`] ask for the next frame
+    /// anew. Who does not know says "with the next frame".
+    fn sample_again(&self, _pdi: &Pdi<'_>) -> SampleAgain {
+        SampleAgain::NextFrame
+    }
 
     /// Whether it plays the EEPROM (S1 11.2.4): then it answers
     /// [`Pdi::sii_request`]. Asked once, when the controller is made.

@@ -27,7 +27,7 @@ pub use application_layer::Refusal;
 pub use described::DescribedType;
 pub use emulated::{DigitalArea, Emulated, WordArea};
 pub use emulated_sii::{EMULATION_TIME, EmulatedSii};
-pub use firmware::{Firmware, NoFirmware};
+pub use firmware::{Firmware, NoFirmware, SampleAgain};
 pub use kind::DeviceKind;
 pub use signal::{SignalId, Signals};
 pub use trouble::{Mismatch, Trouble, Troubles};

@@ -14,31 +14,35 @@ impl SignalId {
 /// A digital signal is 0 or 1; what the number of an analogue one means (digits, mV, …) is agreed
 /// between the devices that share it.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
-pub struct Signals(Vec<Option<i32>>);
+pub struct Signals {
+    values: Vec<Option<i32>>,
+    /// Counts changes of values.
+    edition: u64,
+}
 
 impl Signals {
     /// `count` signals, all 0 and driven by nothing.
     #[must_use]
     pub fn new(count: usize) -> Self {
-        Self(vec![None; count])
+        Self { values: vec![None; count], edition: 0 }
     }
 
     /// One more signal, 0 at first and driven by nothing.
     pub fn add(&mut self) -> SignalId {
-        self.0.push(None);
-        SignalId((self.0.len() - 1) as u32)
+        self.values.push(None);
+        SignalId((self.values.len() - 1) as u32)
     }
 
     /// How many there are.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.values.len()
     }
 
     /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.values.is_empty()
     }
 
     /// Its value; 0 for a signal that does not exist: an open input reads low.
@@ -49,22 +53,33 @@ impl Signals {
 
     /// Drives it. A signal that does not exist goes nowhere.
     pub fn set(&mut self, signal: SignalId, value: i32) {
-        if let Some(slot) = self.0.get_mut(signal.0 as usize) {
+        if let Some(slot) = self.values.get_mut(signal.0 as usize)
+            && *slot != Some(value)
+        {
             *slot = Some(value);
+            self.edition += 1;
         }
     }
 
     /// Lets go of it: nothing drives it any more.
     pub fn release(&mut self, signal: SignalId) {
-        if let Some(slot) = self.0.get_mut(signal.0 as usize) {
-            *slot = None;
+        if let Some(slot) = self.values.get_mut(signal.0 as usize)
+            && slot.take().is_some()
+        {
+            self.edition += 1;
         }
+    }
+
+    /// A number that changes whenever any signal does.
+    #[must_use]
+    pub fn edition(&self) -> u64 {
+        self.edition
     }
 
     /// Its value, if anything has driven it yet: a wire that nothing is connected to says nothing.
     #[must_use]
     pub fn driven(&self, signal: SignalId) -> Option<i32> {
-        self.0.get(signal.0 as usize).copied().flatten()
+        self.values.get(signal.0 as usize).copied().flatten()
     }
 
     /// Whether a digital signal is high.

@@ -1,6 +1,6 @@
 //! From a file to a segment.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_config::attachment::Attachment;
 use linesman_config::project::{ProjectError, Ring};
@@ -11,8 +11,9 @@ use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
+use super::arrivals::Arrivals;
 use super::{DeviceInfo, Segment, exchange, identification};
-use crate::controller::{Controller, LocalClock};
+use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
 use crate::fault::{self, FaultError};
@@ -110,6 +111,7 @@ fn assemble(
 
     let seed = Seed(file.seed.unwrap_or(0));
     let mut signals = Signals::default();
+    let mut kinds = ControllerKinds::default();
     let mut devices = Vec::with_capacity(placed.len());
     let mut made = Vec::with_capacity(placed.len());
     for one in &placed {
@@ -120,7 +122,8 @@ fn assemble(
         }
         let id = file.devices[one.planned.device].id.filter(|_| one.planned.part == 0);
         let identification = identification::set(&mut built, id, &mut signals);
-        let said = file.devices[one.planned.device].alias.filter(|_| one.planned.part == 0);
+        let first = one.planned.part == 0 && one.planned.copy == 0;
+        let said = file.devices[one.planned.device].alias.filter(|_| first);
         if let Some(alias) = one.alias.or(said) {
             identification::set_alias(&mut built.sii, alias);
         }
@@ -128,7 +131,7 @@ fn assemble(
         let Built { mut hardware, sii, firmware, outputs, inputs } = built;
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
         hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
-        let mut controller = Controller::new(one.id, hardware, clock, firmware, sii);
+        let mut controller = Controller::new(one.id, kinds.get(hardware), clock, firmware, sii);
         identification.finish(&mut controller);
         made.push(controller);
         devices.push(DeviceInfo { outputs, inputs });
@@ -161,7 +164,7 @@ fn assemble(
         nodes,
         names,
         now: Instant::ZERO,
-        arrivals: BTreeMap::new(),
+        arrivals: Arrivals::default(),
         spare: Vec::new(),
         tally: super::FrameTally::default(),
     };
@@ -219,7 +222,8 @@ fn build_one(one: &Placed, signals: &mut Signals) -> Option<Built> {
 fn clock(file: &SegmentFile, planned: &Planned, seed: Seed) -> LocalClock {
     let device = &file.devices[planned.device];
     // A device keeps its quartz wherever it sits.
-    let name = if planned.part == 0 { &device.name } else { &planned.name };
+    let alone = planned.part == 0 && device.repeat.is_none();
+    let name = if alone { &device.name } else { &planned.name };
     let mut stream = seed.stream(&format!("clock {name}"));
     let start = stream.below(1_000_000_000_000);
     let ppm = stream.fraction() * 50.0 - 25.0;
@@ -285,8 +289,7 @@ fn replace(
         type_name: kind.name().to_owned(),
         why,
     };
-    let device = placed[index].planned.device;
-    let parts = placed.iter().filter(|one| one.planned.device == device).count();
+    let parts = placed.iter().filter(|one| one.planned.is_of(&placed[index].planned)).count();
     let [ports] = kind.ports()[..] else {
         return Err(misfit("devices with several controllers cannot be exchanged".to_owned()));
     };
@@ -319,15 +322,15 @@ pub(super) fn used_ports(placed: &[Placed], index: usize) -> Vec<Port> {
 /// to its place, the first in the order of frames; the rest is not there either.
 fn remove(placed: &mut Vec<Placed>, device: &str, ring: &mut Option<Ring>) {
     let Some(index) = placed.iter().position(|one| one.planned.name == device) else { return };
-    let file_device = placed[index].planned.device;
+    let gone = placed[index].planned.clone();
     let (on, entry) = (placed[index].planned.on.clone(), placed[index].planned.entry);
     let kind = placed[index].planned.ports[entry];
     let parts: Vec<(String, PortKindMap)> = placed
         .iter()
-        .filter(|one| one.planned.device == file_device)
+        .filter(|one| one.planned.is_of(&gone))
         .map(|one| (one.planned.name.clone(), one.planned.ports))
         .collect();
-    placed.retain(|one| one.planned.device != file_device);
+    placed.retain(|one| !one.planned.is_of(&gone));
     let mut heir = None;
     for (name, ports) in &parts {
         for port in ports_after(entry) {
@@ -355,7 +358,7 @@ type PortKindMap = linesman_proto::port::PortMap<PortKind>;
 /// Takes out what hangs on nothing.
 fn drop_orphans(placed: &mut Vec<Placed>, ring: &mut Option<Ring>) {
     loop {
-        let names: Vec<String> = placed.iter().map(|one| one.planned.name.clone()).collect();
+        let names: BTreeSet<String> = placed.iter().map(|one| one.planned.name.clone()).collect();
         let is_there = |on: &Attachment| match on {
             Attachment::MainDevice(_) => true,
             Attachment::Device { name, .. } => names.contains(name),

@@ -16,6 +16,7 @@ use crate::segment_file::{FaultEntry, SegmentDevice, SegmentFile};
 /// The file with the devices that nobody planned, behind all others in number.
 pub(super) fn with_extras(file: &SegmentFile) -> Result<SegmentFile, BuildError> {
     let mut file = file.clone();
+    let planned = file.devices.len();
     for (index, entry) in file.faults.clone().iter().enumerate() {
         let label = label(index);
         let Some(extra) = fault::extra(&label, entry)? else { continue };
@@ -51,7 +52,9 @@ pub(super) fn with_extras(file: &SegmentFile) -> Result<SegmentFile, BuildError>
         }
         file.devices.push(SegmentDevice::new(extra.name, extra.type_name, extra.on));
     }
-    file.check()?;
+    if file.devices.len() > planned {
+        file.check()?;
+    }
     Ok(file)
 }
 
@@ -103,7 +106,7 @@ pub(super) fn swap(
     parts.swap(0, 1);
     for (at, from) in [one, other].into_iter().zip(parts) {
         let planned = &mut placed[at].planned;
-        planned.device = from.device;
+        (planned.device, planned.copy) = (from.device, from.copy);
         planned.kind = from.kind;
         planned.ports = from.ports;
         planned.serial = from.serial;
@@ -124,6 +127,9 @@ pub(super) fn share_alias(placed: &mut [Placed], alias: u16, devices: &[String])
 
 /// Devices that were exchanged with what is wired to them keep their wiring.
 pub(super) fn move_wiring(placed: &[Placed], devices: &mut [DeviceInfo]) {
+    if placed.iter().all(|one| one.wiring_of.is_none()) {
+        return;
+    }
     let before = devices.to_vec();
     for (at, one) in placed.iter().enumerate() {
         let from = one.wiring_of.and_then(|id| placed.iter().position(|other| other.id == id));

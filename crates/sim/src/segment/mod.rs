@@ -4,6 +4,7 @@
 //! at one ([`Segment::poll_arrival`]). Time is an argument and never goes back; nothing happens
 //! between two calls that does not depend on them alone, so the same calls give the same bytes.
 
+mod arrivals;
 mod build;
 pub(crate) mod card;
 mod exchange;
@@ -21,6 +22,7 @@ use linesman_proto::topology::Tree;
 pub use build::BuildError;
 pub use card::{FrameTally, HostPort};
 
+use self::arrivals::Arrivals;
 use crate::controller::Controller;
 use crate::device::{SignalId, Signals};
 use crate::fault::{self, FaultError};
@@ -66,8 +68,7 @@ pub struct Segment {
     /// Names of all devices that were planned.
     names: Vec<String>,
     now: Instant,
-    /// By time of arrival, then in the order of sending.
-    arrivals: BTreeMap<(Instant, u64), (Path, WireFrame)>,
+    arrivals: Arrivals,
     spare: Vec<Vec<u8>>,
     tally: FrameTally,
 }
@@ -120,11 +121,8 @@ impl Segment {
         card.counts.tx_frames += 1;
         self.tally.sent += 1;
         let mut traveller = Traveller::new(frame);
-        match self.world.walk(path, now, &mut traveller) {
-            Outcome::Arrived(path, at) => {
-                let number = traveller.frame.number;
-                self.arrivals.insert((at, number), (path, traveller.frame));
-            }
+        match self.world.carry(path, now, &mut traveller) {
+            Outcome::Arrived(path, at) => self.arrivals.push(at, path, traveller.frame),
             Outcome::Vanished => {
                 self.tally.vanished += 1;
                 self.recycle(traveller.frame.bytes);
@@ -135,11 +133,7 @@ impl Segment {
     /// The earliest frame that has arrived by the time last told ([`Segment::advance`],
     /// [`Segment::handle_frame`]); its bytes replace those in `buffer`.
     pub fn poll_arrival(&mut self, buffer: &mut Vec<u8>) -> Option<Arrival> {
-        let due = self.arrivals.first_key_value().is_some_and(|((at, _), _)| *at <= self.now);
-        if !due {
-            return None;
-        }
-        let ((at, _), (path, frame)) = self.arrivals.pop_first()?;
+        let (at, path, frame) = self.arrivals.pop_until(self.now)?;
         let intact = frame.damage.is_intact();
         let card = &mut self.world.cards[path.index()];
         let counts = &mut card.counts;
@@ -168,7 +162,7 @@ impl Segment {
     /// call at its time: it is made up for, in its order, by the next one.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.arrivals.first_key_value().map(|((at, _), _)| *at)
+        self.arrivals.next_at()
     }
 
     /// Time passes: devices, links and faults up to `now`.
@@ -178,6 +172,19 @@ impl Segment {
         for card in &mut self.world.cards {
             card.settle(self.now);
         }
+    }
+
+    /// Lets every frame walk port by port, or only those that meet more than controllers at rest,
+    /// as is usual. Nothing that can be seen depends on it but the time it takes: this is for those
+    /// who want to see that.
+    pub fn set_walks_always(&mut self, always: bool) {
+        self.world.direct.forbidden = always;
+    }
+
+    /// How many frames needed no walk so far.
+    #[must_use]
+    pub fn frames_without_walk(&self) -> u64 {
+        self.world.direct.frames
     }
 
     // ---- faults ----

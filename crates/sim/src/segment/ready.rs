@@ -6,6 +6,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::Tree;
 
+use super::arrivals::Arrivals;
 use super::{DeviceInfo, Segment};
 use crate::controller::Controller;
 use crate::device::Signals;
@@ -41,7 +42,7 @@ impl Segment {
             nodes,
             names,
             now: Instant::ZERO,
-            arrivals: BTreeMap::new(),
+            arrivals: Arrivals::default(),
             spare: Vec::new(),
             tally: super::FrameTally::default(),
         };

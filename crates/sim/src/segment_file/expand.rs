@@ -1,20 +1,26 @@
-//! From devices to controllers: most devices have one, a large junction has three.
+//! From devices to controllers: most devices have one, a large junction has three; a device that is
+//! repeated is there many times.
+
+use std::collections::BTreeMap;
 
 use linesman_config::attachment::Attachment;
 use linesman_config::identity::RevisionRule;
 use linesman_config::project::{Project, ProjectDevice, ProjectError, Ring};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::sii::Image;
+use linesman_proto::topology::wiring::ports_after;
 use linesman_proto::topology::{End, WiringError};
 
 use super::cable::{Cable, as_copper_m};
 use super::passive::Passives;
-use super::{SegmentFile, SegmentFileError};
+use super::{SegmentDevice, SegmentFile, SegmentFileError};
 use crate::device::{DeviceKind, Signals};
 use crate::hardware::PortKind;
 
 /// What a cable is long when nothing is said, in metres.
 pub(crate) const DEFAULT_CABLE_M: f64 = 5.0;
+/// The longest line that a MainDevice can address.
+const MOST_REPEATS: u32 = 65_535;
 /// The longest cable: glass fibre.
 const LONGEST_CABLE_M: f64 = 2_000.0;
 
@@ -23,6 +29,8 @@ const LONGEST_CABLE_M: f64 = 2_000.0;
 pub(crate) struct Planned {
     /// Index of its device in the file.
     pub(crate) device: usize,
+    /// Which of those that a `repeat` makes of it, from 0.
+    pub(crate) copy: usize,
     /// Which controller of the device, from 0.
     pub(crate) part: usize,
     pub(crate) name: String,
@@ -35,6 +43,13 @@ pub(crate) struct Planned {
     pub(crate) fed_anew: bool,
     pub(crate) ports: PortMap<PortKind>,
     pub(crate) serial: u32,
+}
+
+impl Planned {
+    /// Whether both are controllers of one device.
+    pub(crate) fn is_of(&self, other: &Self) -> bool {
+        (self.device, self.copy) == (other.device, other.copy)
+    }
 }
 
 /// All controllers of a file, in the order of their numbers.
@@ -58,26 +73,91 @@ pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileErro
                 allowed: "A, B, C or D",
             })?,
         };
-        let serial = device.serial.unwrap_or(planned.len() as u32 + 1);
-        expand_device(file, index, &kind, entry, serial, place, &mut planned);
+        let Some(repeat) = device.repeat else {
+            let serial = device.serial.unwrap_or(planned.len() as u32 + 1);
+            expand_device(device, (index, 0), &kind, entry, serial, place, &mut planned);
+            continue;
+        };
+        for copy in 0..count_of(device, repeat)? {
+            let no = copy as u32 + 1;
+            let place = match copy {
+                0 => place.clone(),
+                copy => (behind(device, &kind, entry, copy)?, false),
+            };
+            let one = SegmentDevice {
+                name: format!("{}[{no}]", device.name),
+                repeat: None,
+                ..device.clone()
+            };
+            let next = planned.len() as u32 + 1;
+            let serial = device.serial.map_or(next, |first| first.wrapping_add(no - 1));
+            expand_device(&one, (index, copy), &kind, entry, serial, place, &mut planned);
+        }
     }
     Ok(planned)
 }
 
+/// How often a device is there.
+fn count_of(device: &SegmentDevice, repeat: u32) -> Result<usize, SegmentFileError> {
+    if (1..=MOST_REPEATS).contains(&repeat) {
+        return Ok(repeat as usize);
+    }
+    Err(SegmentFileError::Range {
+        device: device.name.clone(),
+        key: "repeat",
+        given: repeat.to_string(),
+        allowed: "1 to 65535",
+    })
+}
+
+/// Where copy number `copy` (from 1) of a device hangs: on the one before, by its first port that is
+/// of the kind by which it is entered itself.
+fn behind(
+    device: &SegmentDevice,
+    found: &DeviceKind,
+    entry: Port,
+    copy: usize,
+) -> Result<Attachment, SegmentFileError> {
+    let all = found.ports();
+    let kind = all.first().copied().unwrap_or_default()[entry];
+    let inner_links = found.inner_links();
+    for (part, ports) in all.into_iter().enumerate() {
+        let taken = |port: Port| {
+            let links = inner_links.iter();
+            links.flat_map(|link| [link.from, link.to]).any(|end| end == (part, port))
+        };
+        let free = |port: &Port| (part, *port) != (0, entry) && !taken(*port);
+        let found = ports_after(entry).into_iter().find(|port| free(port) && ports[*port] == kind);
+        if let Some(port) = found {
+            let name = format!("{}[{copy}]", device.name);
+            return Ok(Attachment::Device { name: part_name(&name, part), port });
+        }
+    }
+    Err(SegmentFileError::NoRepeat {
+        device: device.name.clone(),
+        type_name: found.name().to_owned(),
+        kind: kind_name(kind),
+    })
+}
+
+/// The name of a controller of a device.
+fn part_name(device: &str, part: usize) -> String {
+    match part {
+        0 => device.to_owned(),
+        part => format!("{device}/{}", part + 1),
+    }
+}
+
 fn expand_device(
-    file: &SegmentFile,
-    index: usize,
+    device: &SegmentDevice,
+    (index, copy): (usize, usize),
     kind: &DeviceKind,
     entry: Port,
     serial: u32,
     (on_place, fed_anew): (Attachment, bool),
     planned: &mut Vec<Planned>,
 ) {
-    let device = &file.devices[index];
-    let name = |part: usize| match part {
-        0 => device.name.clone(),
-        part => format!("{}/{}", device.name, part + 1),
-    };
+    let name = |part: usize| part_name(&device.name, part);
     let inner_links = kind.inner_links();
     for (part, ports) in kind.ports().into_iter().enumerate() {
         let inner = inner_links.iter().find(|link| link.to.0 == part);
@@ -98,6 +178,7 @@ fn expand_device(
         };
         planned.push(Planned {
             device: index,
+            copy,
             part,
             name: name(part),
             kind: kind.clone(),
@@ -217,14 +298,14 @@ pub fn parse_counter(key: &str) -> Option<linesman_proto::register::ErrorCounter
 
 /// Every end is a port that is there, and both ends of a link are of one kind.
 fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFileError> {
+    let by_name: BTreeMap<&str, &Planned> =
+        planned.iter().map(|known| (known.name.as_str(), known)).collect();
     let kind_at = |end: &Attachment| match end {
         Attachment::MainDevice(_) => Ok(PortKind::Mii),
-        Attachment::Device { name, port } => {
-            match planned.iter().find(|known| known.name == *name) {
-                Some(known) => has_port(known, *port),
-                None => Ok(PortKind::Mii),
-            }
-        }
+        Attachment::Device { name, port } => match by_name.get(name.as_str()) {
+            Some(known) => has_port(known, *port),
+            None => Ok(PortKind::Mii),
+        },
     };
     for passive in Passives::of(file).devices() {
         let (on, _) = Passives::of(file).resolve(passive)?;
@@ -241,7 +322,11 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
     for controller in planned {
         let from_kind = kind_at(&controller.on)?;
         let to_kind = has_port(controller, controller.entry)?;
-        check_cable(file, planned, controller, to_kind)?;
+        let parent = match &controller.on {
+            Attachment::Device { name, .. } => by_name.get(name.as_str()).copied(),
+            Attachment::MainDevice(_) => None,
+        };
+        check_cable(file, parent, controller, to_kind)?;
         if from_kind != to_kind {
             return Err(SegmentFileError::Kinds {
                 from: controller.on.to_string(),
@@ -268,7 +353,7 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
 /// What a device says of the cable to it fits its port, and Fast Hot Connect is at both ends or none.
 fn check_cable(
     file: &SegmentFile,
-    planned: &[Planned],
+    parent: Option<&Planned>,
     controller: &Planned,
     kind: PortKind,
 ) -> Result<(), SegmentFileError> {
@@ -284,10 +369,6 @@ fn check_cable(
             return misplaced(format!("`via` is {}, but no cable leads to it", via.name()));
         }
     }
-    let parent = match &controller.on {
-        Attachment::Device { name, .. } => planned.iter().find(|known| known.name == *name),
-        Attachment::MainDevice(_) => None,
-    };
     let fast = |one: Option<&Planned>| one.is_some_and(|one| one.kind.fast_hot_connect());
     if kind == PortKind::Mii && fast(parent) != fast(Some(controller)) {
         return misplaced(format!(

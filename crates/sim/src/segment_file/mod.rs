@@ -81,6 +81,12 @@ pub struct SegmentFile {
 pub struct SegmentDevice {
     /// Unique name.
     pub name: String,
+    /// So many of them in a row, 1 to 65,535, called `NAME[1]`, `NAME[2]` and so on; each hangs on the
+    /// one before, by the first port of the kind by which it is entered itself. What the other keys
+    /// say holds for each; a serial number is counted up. What comes behind hangs on the last.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 65535))]
+    pub repeat: Option<u32>,
     /// Type in the library, such as `EL2004`, `esi:FILE#TYPE@REVISION` from a description
     /// of its maker, or `sii:FILE`: the device whose EEPROM that file holds.
     #[serde(rename = "type")]
@@ -255,6 +261,19 @@ pub enum SegmentFileError {
         /// The ports it has.
         has: String,
     },
+    /// A device that cannot be put in a row.
+    #[error(
+        "device `{device}` cannot be repeated: a {type_name} has no second port that is {kind}, for \
+         the next one to hang on"
+    )]
+    NoRepeat {
+        /// Which.
+        device: String,
+        /// Its type.
+        type_name: String,
+        /// What the port would have to be.
+        kind: &'static str,
+    },
     /// Two ports of different kinds are wired to each other.
     #[error("{from} is {from_kind}, but {to} is {to_kind}: no cable fits both")]
     Kinds {
@@ -307,6 +326,7 @@ impl SegmentDevice {
             name: name.into(),
             type_name: type_name.into(),
             on,
+            repeat: None,
             entry: None,
             cable_m: None,
             cable: None,

@@ -88,7 +88,7 @@ fn a_file_reads_and_writes_itself() {
 #[test]
 fn mistakes_are_named() {
     let table = [
-        ("cable_m = 5.0", "cable = 5.0", "unknown field `cable`"),
+        ("cable_m = 5.0", "cabel_m = 5.0", "unknown field `cabel_m`"),
         ("seed = 7", "sead = 7", "line 3"),
         ("\"EL2008\"", "\"EL9999\"", "device `Term 2 (EL2008)`: device type \"EL9999\""),
         ("\"K1.B\"", "\"K9.B\"", "no device is called `K9`"),
@@ -179,4 +179,48 @@ fn the_schema_names_what_can_be_written() {
     {
         assert!(text.contains(word), "{word}");
     }
+}
+
+#[test]
+fn a_device_can_be_repeated() {
+    let text = r#"
+        [[device]]
+        name = "K"
+        type = "EK1100"
+        on = "maindevice"
+        repeat = 2
+        cable_m = 7.0
+
+        [[device]]
+        name = "T"
+        type = "EL1008"
+        on = "K[2].B"
+        repeat = 3
+        serial = 100
+
+        [[device]]
+        name = "E"
+        type = "EK1110"
+        on = "T[3].B"
+    "#;
+    let file = SegmentFile::parse(text).unwrap();
+    let project = file.project().unwrap();
+    let places: Vec<_> =
+        project.devices.iter().map(|it| format!("{} {}", it.name, it.on)).collect();
+    let expected =
+        ["K[1] maindevice", "K[2] K[1].C", "T[1] K[2].B", "T[2] T[1].B", "T[3] T[2].B", "E T[3].B"];
+    assert_eq!(places, expected);
+    let serials: Vec<u32> = expand(&file).unwrap().iter().map(|planned| planned.serial).collect();
+    assert_eq!(serials, [1, 2, 100, 101, 102, 6]);
+    assert_eq!(SegmentFile::parse(&file.to_toml()), Ok(file));
+
+    let error =
+        |from: &str, to: &str| SegmentFile::parse(&text.replace(from, to)).unwrap_err().to_string();
+    assert_eq!(
+        error("T[3].B\"", "T[3].B\"\nrepeat = 2"),
+        "device `E` cannot be repeated: a EK1110 has no second port that is an E-bus contact, for \
+         the next one to hang on"
+    );
+    let error = error("repeat = 3", "repeat = 70000");
+    assert_eq!(error, "device `T`: `repeat` is 70000, expected 1 to 65535");
 }

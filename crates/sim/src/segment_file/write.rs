@@ -35,6 +35,9 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
         let _ = writeln!(text, "{key} = {value}");
     };
     line("\n[[device]]\nname", quoted(&device.name));
+    if let Some(repeat) = device.repeat {
+        line("repeat", repeat.to_string());
+    }
     line("type", quoted(&device.type_name));
     line("on", quoted(&device.on.to_string()));
     if let Some(entry) = &device.entry {

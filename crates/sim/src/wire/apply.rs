@@ -21,8 +21,10 @@ impl World {
             Change::FrameHit { line, part, flip } => {
                 let ambush = Ambush { from: at, part, flip, fault };
                 self.links[line.link].noise[usize::from(line.downstream)].push_ambush(ambush);
+                self.is_noisy(line.link);
             }
             Change::Open { link } => {
+                self.way_changes(at);
                 let was_whole = self.links[link].contact.is_whole();
                 self.links[link].contact.break_at(at, fault);
                 if was_whole {
@@ -30,12 +32,14 @@ impl World {
                 }
             }
             Change::Close { link } => {
+                self.way_changes(at);
                 self.links[link].contact.mend_at(at, fault);
                 if self.links[link].contact.is_whole() {
                     self.signal_changed(link, at);
                 }
             }
             Change::Off { node } => {
+                self.way_changes(at);
                 let was_on = self.nodes[node].power.is_whole();
                 self.nodes[node].power.break_at(at, fault);
                 let place = Place::Device(self.id(node));
@@ -46,6 +50,7 @@ impl World {
                 }
             }
             Change::On { node } => {
+                self.way_changes(at);
                 self.nodes[node].power.mend_at(at, fault);
                 if self.nodes[node].power.is_whole() {
                     let place = Place::Device(self.id(node));
@@ -87,6 +92,7 @@ impl World {
             return;
         }
         link.noise[usize::from(line.downstream)].push_hit(Hit { at, flip, fault });
+        self.is_noisy(line.link);
         self.symbol_error(at, Cause::Fault(fault), line);
     }
 

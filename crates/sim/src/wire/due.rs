@@ -110,6 +110,7 @@ impl World {
     }
 
     pub(super) fn end_lost(&mut self, index: usize, end: usize, at: Instant) {
+        self.way_changes(at);
         self.links[index].ends[end] = EndState::Down;
         let place = self.links[index].both_ends()[end];
         let cause = self.cause_of_link(index, at);
@@ -124,6 +125,7 @@ impl World {
 
     /// Both ends have a link.
     pub(super) fn link_up(&mut self, index: usize, at: Instant) {
+        self.way_changes(at);
         self.links[index].ends = [EndState::Up; 2];
         let fault = self.cause_of_link(index, at).fault();
         self.links[index].dropped = None;

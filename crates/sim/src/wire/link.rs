@@ -55,6 +55,12 @@ impl Noise {
         self.hits.is_empty() && self.ambushes.is_empty()
     }
 
+    /// Whether a frame that is at the receiver from `from` until before `to` meets anything.
+    pub(super) fn strikes(&self, from: Instant, to: Instant) -> bool {
+        let waits = self.ambushes.front().is_some_and(|ambush| ambush.from <= from);
+        waits || self.hits(from, to).next().is_some()
+    }
+
     /// The hits from `from` on and before `to`.
     pub(super) fn hits(&self, from: Instant, to: Instant) -> impl Iterator<Item = Hit> + '_ {
         let first = self.hits.partition_point(|hit| hit.at < from);

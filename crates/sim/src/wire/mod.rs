@@ -3,18 +3,23 @@
 //! `World` is the segment as physics knows it: controllers, cards, links and what
 //! has been done to them. It is a function of time up to its horizon: changes are applied ahead of
 //! every frame, and keep their instants, so that a walk meets the world of each instant.
-//! `walk` carries one frame through it, port by port.
+//! `walk` carries one frame through it, port by port. `direct` does the same for frames that meet
+//! nothing but controllers at rest, without going everywhere.
 //!
 //! Read first: "The physical model" in `ARCHITECTURE.md`; S1 chapters 3, 6 and 14.1.
 
 mod address;
 mod apply;
 pub mod change;
+mod direct;
+mod directory;
 mod due;
 pub mod history;
 pub mod link;
 mod node;
+mod nodes;
 mod phy_link;
+mod route;
 pub mod software;
 mod starve;
 pub(crate) mod walk;

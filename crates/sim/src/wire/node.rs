@@ -10,6 +10,7 @@ use linesman_proto::time::Instant;
 
 use super::change::Line;
 use super::history::History;
+use super::nodes::Entry;
 use super::software::Held;
 use crate::controller::Controller;
 use crate::device::{Refusal, Signals, Trouble};
@@ -59,6 +60,10 @@ pub(crate) struct Node {
     pub(super) software: Vec<Held>,
     /// In the order of time.
     acts: VecDeque<(Instant, Act)>,
+    /// What the book of all nodes keeps of it.
+    pub(super) entry: Entry,
+    /// The last frame that had a datagram for it.
+    pub(super) last_frame: u64,
 }
 
 impl Node {
@@ -75,6 +80,8 @@ impl Node {
             former_address: None,
             software: Vec::new(),
             acts: VecDeque::new(),
+            entry: Entry::default(),
+            last_frame: 0,
         }
     }
 
@@ -115,6 +122,19 @@ impl Node {
         {
             self.controller.set_station_address(former);
         }
+    }
+
+    /// When something happens to it by itself; [`Instant::MAX`] for never.
+    #[inline]
+    pub(super) fn next_event(&self) -> Instant {
+        let act = self.acts.front().map_or(Instant::MAX, |(at, _)| *at);
+        self.controller.next_event().unwrap_or(Instant::MAX).min(act)
+    }
+
+    /// When something happens that can lead frames another way.
+    pub(super) fn next_way_event(&self) -> Instant {
+        let act = self.acts.front().map_or(Instant::MAX, |(at, _)| *at);
+        self.controller.next_way_event().unwrap_or(Instant::MAX).min(act)
     }
 
     /// Sets the time of the watchdog, or back to what it was.

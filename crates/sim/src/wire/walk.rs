@@ -70,7 +70,7 @@ enum Crossing {
 }
 
 impl World {
-    /// Sends a frame off by a card at `at`.
+    /// Sends a frame off by a card at `at`, port by port.
     pub(crate) fn walk(&mut self, card: Path, at: Instant, traveller: &mut Traveller) -> Outcome {
         let Some(mut line) = self.leaving[card.index()] else { return Outcome::Vanished };
         let mut at = at;

@@ -5,9 +5,10 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
 use super::change::{Change, Line};
+use super::direct::Direct;
 use super::due::Agenda;
-use super::link::{CABLE_NS_PER_M, Link};
-use super::node::Node;
+use super::link::{CABLE_NS_PER_M, Link, Noise};
+use super::nodes::Nodes;
 use crate::controller::Controller;
 use crate::device::Signals;
 use crate::fault::Running;
@@ -22,7 +23,7 @@ const MEMORY: Span = Span::ms(2);
 #[derive(Debug)]
 pub(crate) struct World {
     /// By node of the tree.
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Nodes,
     /// In the order of [`Tree::links`].
     pub(crate) links: Vec<Link>,
     pub(crate) cards: [Card; 2],
@@ -37,6 +38,12 @@ pub(crate) struct World {
     /// An upper bound of the time that a frame of no length takes through all of it, twice.
     round: Span,
     pub(crate) frames: u64,
+    /// Links on which something lies in wait.
+    pub(super) noisy: Vec<usize>,
+    /// The last instant, so far as is known, at which a link or a supply changed.
+    pub(super) changed_at: Instant,
+    /// What frames can be spared of the walk.
+    pub(crate) direct: Direct,
 }
 
 impl World {
@@ -50,7 +57,7 @@ impl World {
         signals: Signals,
     ) -> Self {
         let mut world = Self {
-            nodes: controllers.into_iter().map(Node::new).collect(),
+            nodes: Nodes::new(controllers),
             links: Vec::new(),
             cards: [Card::default(), Card::default()],
             signals,
@@ -61,18 +68,21 @@ impl World {
             horizon: Instant::ZERO,
             round: Span::ZERO,
             frames: 0,
+            noisy: Vec::new(),
+            changed_at: Instant::ZERO,
+            direct: Direct::default(),
         };
         for (index, wired) in tree.links().iter().enumerate() {
             world.plug(*wired, index, cable_m.get(index).copied().unwrap_or(0.0));
         }
         world.round = world.measure_round();
-        for node in &mut world.nodes {
+        for node in world.nodes.iter_mut() {
             node.controller.power_on_before(Instant::ZERO, &mut world.signals);
         }
         for link in 0..world.links.len() {
             world.link_up(link, Instant::ZERO);
         }
-        for node in &mut world.nodes {
+        for node in world.nodes.iter_mut() {
             node.touch(Instant::ZERO, &mut world.signals);
         }
         world
@@ -141,20 +151,33 @@ impl World {
     /// Makes all changes that a frame of `frame_time` which enters at `now` can meet.
     pub(crate) fn look_ahead(&mut self, now: Instant, frame_time: Span) {
         self.change_until(now + self.round + frame_time);
-        let forgotten = now - MEMORY;
-        for link in &mut self.links {
-            for noise in &mut link.noise {
-                noise.forget(forgotten);
+        if !self.noisy.is_empty() {
+            self.forget_noise(now - MEMORY);
+        }
+    }
+
+    fn forget_noise(&mut self, before: Instant) {
+        let links = &mut self.links;
+        self.noisy.retain(|link| {
+            let noise = &mut links[*link].noise;
+            for line in &mut *noise {
+                line.forget(before);
             }
+            !noise.iter().all(Noise::is_quiet)
+        });
+    }
+
+    /// Something lies in wait on a link.
+    pub(super) fn is_noisy(&mut self, link: usize) {
+        if !self.noisy.contains(&link) {
+            self.noisy.push(link);
         }
     }
 
     /// Brings everything to `now`.
     pub(crate) fn advance(&mut self, now: Instant) {
         self.change_until(now);
-        for node in &mut self.nodes {
-            node.touch(now, &mut self.signals);
-        }
+        self.touch_due(now);
     }
 
     /// Makes all changes up to and at an instant.
@@ -205,7 +228,7 @@ impl World {
         for noise in self.links.iter_mut().flat_map(|link| &mut link.noise) {
             noise.disarm(fault);
         }
-        for node in &mut self.nodes {
+        for node in self.nodes.iter_mut() {
             node.glitches.retain(|glitch| glitch.fault != fault);
         }
     }
@@ -229,6 +252,12 @@ impl World {
         self.release_addresses(at, fault);
         self.release_software(at, fault);
         self.truth.end(at, fault);
+    }
+
+    /// What lies on the way of frames changes at an instant that may be ahead.
+    pub(super) fn way_changes(&mut self, at: Instant) {
+        self.changed_at = self.changed_at.max(at);
+        self.direct.forget_routes();
     }
 
     // ---- blame ----

@@ -5,6 +5,7 @@
 mod exchange;
 mod faults;
 mod identification;
+mod oracle;
 mod rig;
 mod swarm;
 mod traps;

@@ -15,7 +15,7 @@ use proptest::prelude::*;
 use super::rig::{Bench, PLANT, answer, at, frame};
 
 /// A random fault of any kind that can come and go.
-fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
+pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
     let fits_anywhere = |kind: &&Kind| {
         !BUILT_IN.contains(&kind.name) && !matches!(kind.place, PlaceRule::Feed | PlaceRule::Pair)
     };

@@ -22,6 +22,8 @@ const ERROR: u16 = 1 << 4;
 pub struct AlStep {
     /// The state that was asked for.
     pub requested: u8,
+    /// How long nobody took the request: until then the next write is refused.
+    pub taken: Span,
     /// How long it took.
     pub took: Span,
     /// AL status behind it.
@@ -48,8 +50,13 @@ pub struct DeviceSeen {
     pub sii: BTreeMap<u32, u16>,
     /// How long its SII took for each command.
     pub sii_times: Vec<Span>,
+    /// How long its EEPROM acknowledges nothing behind a write, if that showed.
+    pub programming: Option<Span>,
     /// Steps of its application layer.
     pub steps: VecDeque<AlStep>,
+    /// Behind each answer that was fetched: when the device began to write the next, and whether the
+    /// controller showed it. `None` where it was not seen.
+    pub openings: VecDeque<Option<(Span, bool)>>,
     /// Mailbox requests.
     pub mailbox: VecDeque<MailboxTurn>,
     /// Its dictionary.
@@ -58,9 +65,17 @@ pub struct DeviceSeen {
     current: BTreeMap<u16, u8>,
     sii_written: BTreeSet<u32>,
     sii_waiting: Option<(Waiting, SiiCommand, u32)>,
+    /// When the last command to the SII came, when the last write was done, and when a command
+    /// behind it last failed.
+    sii_commanded_at: Instant,
+    sii_written_at: Option<Instant>,
+    sii_failed_at: Option<Instant>,
+    /// When AL control last refused a write, behind one that it took.
+    al_refused_at: Option<Instant>,
     /// What 0x0508 holds: from which word on, and how many bytes of it.
     last_word: Option<(u32, usize)>,
     al_waiting: Option<(Waiting, u8)>,
+    fetched: Option<Waiting>,
     mailbox_waiting: Option<(Waiting, Option<Span>, Waiting)>,
     /// The first set-up of mappings and buffers that requests brought.
     later: BTreeMap<u16, u8>,
@@ -168,6 +183,7 @@ impl DeviceSeen {
             }
         }
         if let Some(status) = view(SM0 + 8 + SM_STATUS) {
+            self.opening_polled(status, at);
             self.answer_polled(status & FULL != 0, at);
         }
     }
@@ -191,6 +207,10 @@ impl DeviceSeen {
     /// A write to this device, alone or with others.
     pub(super) fn write(&mut self, ado: RegisterAddress, data: &[u8], answered: bool, at: Instant) {
         if !answered {
+            let control = r::AL_CONTROL.address;
+            if ado == control && self.al_waiting.is_some() {
+                self.al_refused_at = Some(at);
+            }
             return;
         }
         let mailbox_out = self.sync_manager(0);
@@ -219,6 +239,7 @@ impl DeviceSeen {
             self.sii_commanded(SiiCommand::from_bits(high), at);
         }
         if let Some(control) = view(r::AL_CONTROL.address.0) {
+            self.al_overtaken(at);
             self.al_waiting = Some((Waiting::since(at), control & 0x0F));
         }
     }
@@ -246,6 +267,7 @@ impl DeviceSeen {
         if command == SiiCommand::Write {
             self.sii_written.insert(word);
         }
+        self.sii_commanded_at = at;
         self.sii_waiting = Some((Waiting::since(at), command, word));
     }
 
@@ -260,6 +282,7 @@ impl DeviceSeen {
                     self.sii_times.push(waiting.done(at));
                     let (command, word) = (*command, *word);
                     self.sii_waiting = None;
+                    self.sii_ended(command, control, at);
                     if command == SiiCommand::Read && !control.command_failed() {
                         self.last_word = Some((word, control.read_len()));
                     }
@@ -283,7 +306,41 @@ impl DeviceSeen {
         }
     }
 
+    /// A command ended: what that says of how long the EEPROM is busy with itself behind a write.
+    fn sii_ended(&mut self, command: SiiCommand, control: SiiControl, at: Instant) {
+        if control.acknowledge_error() {
+            self.sii_failed_at = Some(self.sii_commanded_at);
+            return;
+        }
+        if let (Some(failed), Some(written)) = (self.sii_failed_at.take(), self.sii_written_at) {
+            let mut programming = Waiting::since(written);
+            programming.still(failed);
+            self.programming.get_or_insert(programming.done(self.sii_commanded_at));
+        }
+        self.sii_written_at = (command == SiiCommand::Write).then_some(at);
+    }
+
     // ---- application layer ----
+
+    /// How long the request that waits was not taken: until behind the last refused write.
+    fn al_taken(&mut self, waiting: &Waiting, at: Instant) -> Span {
+        let Some(refused) = self.al_refused_at.take() else { return Span::ZERO };
+        let mut taken = *waiting;
+        taken.still(refused);
+        taken.done(at)
+    }
+
+    /// Another request was taken while one waited.
+    fn al_overtaken(&mut self, at: Instant) {
+        if let Some((waiting, requested)) = self.al_waiting.take() {
+            let taken = self.al_taken(&waiting, at);
+            if taken > Span::ZERO {
+                let status = u16::from(requested);
+                let took = taken;
+                self.steps.push_back(AlStep { requested, taken, took, status, code: 0 });
+            }
+        }
+    }
 
     fn al_read(&mut self, status: u16, at: Instant) {
         let Some((waiting, requested)) = &mut self.al_waiting else { return };
@@ -292,9 +349,11 @@ impl DeviceSeen {
             waiting.still(at);
             return;
         }
-        let step = AlStep { requested: *requested, took: waiting.done(at), status, code: 0 };
+        let (waiting, requested) = (*waiting, *requested);
         self.al_waiting = None;
-        self.steps.push_back(step);
+        let taken = self.al_taken(&waiting, at);
+        let took = waiting.done(at).max(taken);
+        self.steps.push_back(AlStep { requested, taken, took, status, code: 0 });
     }
 
     // ---- mailbox ----
@@ -312,6 +371,27 @@ impl DeviceSeen {
         self.answer_polled(answered, at);
         if answered {
             self.objects.answered(data);
+            if self.fetched.replace(Waiting::since(at)).is_some() {
+                self.openings.push_back(None);
+            }
+        }
+    }
+
+    fn opening_polled(&mut self, status: u8, at: Instant) {
+        /// It was read, and nothing has happened since.
+        const READ: u8 = 1 << 1;
+        /// The buffer is open for writing.
+        const OPEN: u8 = 1 << 7;
+        let Some(waiting) = &mut self.fetched else { return };
+        if status & READ != 0 {
+            waiting.still(at);
+        } else if status & FULL == 0 {
+            let opening = (waiting.done(at), status & OPEN != 0);
+            self.openings.push_back(Some(opening));
+            self.fetched = None;
+        } else {
+            self.openings.push_back(None);
+            self.fetched = None;
         }
     }
 

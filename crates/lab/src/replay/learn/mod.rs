@@ -13,6 +13,7 @@ mod target;
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::command::{Addressing, Command};
+use linesman_proto::register::{self as r, EcatEvents};
 
 pub use device::{AlStep, DeviceSeen, MailboxTurn};
 use stations::Stations;
@@ -21,6 +22,8 @@ pub use target::Target;
 use super::recording::{Datagram, Recording};
 use linesman_proto::time::Instant;
 
+/// Registers that say what a controller is end here.
+const IDENTITY: usize = 0x000A;
 /// Most devices that a recording is believed to have.
 const MOST_DEVICES: u16 = 4_096;
 
@@ -46,10 +49,53 @@ pub struct Learned {
     pub devices: Vec<DeviceSeen>,
     /// Which accesses were answered by how many.
     pub presence: Vec<Presence>,
+    /// Broadcast reads of what controllers are: from which register on, all ORed, and how many
+    /// answered.
+    pub identities: Vec<(RegisterAddress, Vec<u8>, u16)>,
+    /// ECAT events that stood when the recording began, and those that were masked in.
+    pub events: EventsAtStart,
     /// What had to be assumed, for people.
     pub notes: Vec<String>,
     /// A logical access was answered before any mapping was seen.
     mapped_before: bool,
+}
+
+/// ECAT events when the recording begins.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct EventsAtStart {
+    /// Events that stood.
+    pub request: u16,
+    /// Events that datagrams carried away.
+    pub mask: u16,
+    begun: bool,
+    /// DL status, AL status were read: their events are gone.
+    served: u16,
+}
+
+impl EventsAtStart {
+    fn take(&mut self, request: &Datagram<'_>, reply: &Datagram<'_>) {
+        if !std::mem::replace(&mut self.begun, true) {
+            self.mask = reply.irq;
+        }
+        self.request |= reply.irq & !self.served;
+        let end = u32::from(request.ado.0) + request.data.len() as u32;
+        let covers = |register: &r::Register| {
+            u32::from(request.ado.0) < u32::from(register.end().0)
+                && u32::from(register.address.0) < end
+        };
+        let reads = request.command.is_some_and(|command| {
+            command.effect().reads && command.addressing() != Addressing::Logical
+        });
+        if reads && reply.wkc > 0 {
+            let events =
+                [(&r::DL_STATUS, EcatEvents::DL_STATUS), (&r::AL_STATUS, EcatEvents::AL_STATUS)];
+            for (register, event) in events {
+                if covers(register) {
+                    self.served |= event.0;
+                }
+            }
+        }
+    }
 }
 
 /// Learns from a recording.
@@ -67,6 +113,7 @@ pub fn learn(recording: &Recording) -> Learned {
     }
     for turn in &recording.turns {
         for (request, reply) in turn.pairs() {
+            learned.events.take(&request, &reply);
             learned.take(&request, &reply, turn.request.at, &mut stations);
         }
     }
@@ -82,6 +129,8 @@ pub fn learn(recording: &Recording) -> Learned {
     }
     learned.presence.sort_unstable();
     learned.presence.dedup();
+    learned.identities.sort_unstable();
+    learned.identities.dedup();
     learned
 }
 
@@ -97,6 +146,11 @@ impl Learned {
         let target = stations.target(command, request, self.devices.len());
         let effect = command.effect();
         self.note_presence(command, request, reply, target);
+        // All are one.
+        let target = match target {
+            Target::All if self.devices.len() == 1 => Target::One(0),
+            target => target,
+        };
         match target {
             Target::One(device) => {
                 let seen = &mut self.devices[device];
@@ -108,9 +162,7 @@ impl Learned {
                 }
             }
             Target::All if reply.wkc > 0 => {
-                if self.devices.len() == 1 && effect.reads && !effect.writes {
-                    self.devices[0].read(request.ado, reply.data, true, at);
-                } else if effect.reads {
+                if effect.reads {
                     for seen in &mut self.devices {
                         seen.read_by_all(request.ado, reply.data, at);
                     }
@@ -138,6 +190,10 @@ impl Learned {
         target: Target,
     ) {
         let effect = command.effect();
+        let is_identity = usize::from(request.ado.0) + request.data.len() <= IDENTITY;
+        if target == Target::All && effect.reads && !effect.writes && is_identity {
+            self.identities.push((request.ado, reply.data.to_vec(), reply.wkc));
+        }
         if effect.reads == effect.writes || usize::from(request.ado.0) + request.data.len() > 0x0F00
         {
             return;

@@ -6,8 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use linesman_proto::address::DeviceId;
-use linesman_proto::register as r;
+use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::register::{self as r, DlStatus, EscInformation};
 use linesman_proto::sii::word;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::Tree;
@@ -26,16 +26,25 @@ pub(super) struct Candidate {
     pub(super) hardware: Hardware,
     /// Its EEPROM.
     pub(super) sii: Vec<u8>,
+    /// Bytes that the controller said of itself and that others of its type do not say.
+    strange: u64,
+    /// Registers 0x0000 to 0x0009.
+    identity: [u8; EscInformation::LEN],
 }
 
 /// SII byte 0: a processor behind a serial interface.
 const PROCESSOR: u8 = 0x05;
+/// SII byte 0: nothing.
+const NO_INTERFACE: u8 = 0x00;
 /// SII byte 0: digital inputs and outputs.
 const DIGITAL: u8 = 0x04;
 /// SII byte 1: the controller answers requests for a state itself.
 const EMULATION: u8 = 0x01;
 /// SII byte 1: SYNC and latch units are on.
 const CLOCK_UNITS: u8 = 0x0C;
+
+/// How much more an answer of one device alone counts than one of all together.
+const CERTAIN: u64 = 1_000;
 
 /// The best candidate for each device.
 pub(super) fn choose(learned: &Learned, images: &[Vec<u8>], tree: &Tree) -> Vec<Candidate> {
@@ -52,7 +61,7 @@ pub(super) fn choose(learned: &Learned, images: &[Vec<u8>], tree: &Tree) -> Vec<
         .collect();
     let groups = groups(devices, &candidates);
     let mut taken = vec![0; devices.len()];
-    let mut best = misfits(learned, &answers, &taken);
+    let mut best = misfits(learned, &candidates, &answers, &taken);
     loop {
         let before = best;
         for group in &groups {
@@ -60,7 +69,7 @@ pub(super) fn choose(learned: &Learned, images: &[Vec<u8>], tree: &Tree) -> Vec<
             let mut winner = current;
             for other in 0..candidates[group[0]].len() {
                 group.iter().for_each(|device| taken[*device] = other);
-                let misfits = misfits(learned, &answers, &taken);
+                let misfits = misfits(learned, &candidates, &answers, &taken);
                 if misfits < best {
                     (best, winner) = (misfits, other);
                 }
@@ -96,12 +105,22 @@ fn candidates(seen: &DeviceSeen, images: &[Vec<u8>], tree: &Tree, node: usize) -
             .sii
             .get(&word::MAILBOX_PROTOCOLS.value())
             .is_some_and(|word| *word != 0 && *word != 0xFFFF);
-    let choices: Vec<Choice> = [CLOCK_UNITS, 0]
-        .map(|clock| Choice {
-            pdi_control: if has_processor { PROCESSOR } else { DIGITAL },
-            esc_configuration: clock | if has_processor { 0 } else { EMULATION },
-        })
-        .into();
+    // Without an interface there is nobody to trigger its watchdog.
+    let is_watched =
+        seen.word(r::DL_STATUS.address).map(DlStatus).is_none_or(|status| status.pdi_watchdog_ok());
+    let guesses = [CLOCK_UNITS, 0].map(|clock| Choice {
+        pdi_control: match (has_processor, is_watched) {
+            (true, _) => PROCESSOR,
+            (false, true) => DIGITAL,
+            (false, false) => NO_INTERFACE,
+        },
+        esc_configuration: clock | if has_processor { 0 } else { EMULATION },
+    });
+    let as_same =
+        same.and_then(|image| image.first_chunk::<2>()).map(|[pdi_control, configuration]| {
+            Choice { pdi_control: *pdi_control, esc_configuration: *configuration }
+        });
+    let choices: Vec<Choice> = as_same.into_iter().chain(guesses).collect();
     let mut list: Vec<Candidate> = Vec::new();
     for choice in choices {
         let sii = image::compose(seen, same, choice);
@@ -114,10 +133,18 @@ fn candidates(seen: &DeviceSeen, images: &[Vec<u8>], tree: &Tree, node: usize) -
             controllers.retain(|hardware| hardware.controller_type == said);
         }
         for mut hardware in controllers {
+            let usual = identity_of(&hardware);
             correct(&mut hardware, seen);
+            let strange = (0u16..).zip(usual).filter(|(at, byte)| {
+                // Ports differ from device to device.
+                *at != r::PORT_DESCRIPTOR.address.0
+                    && seen.byte(RegisterAddress(*at)).is_some_and(|said| said != *byte)
+            });
+            let strange = strange.count() as u64;
+            let identity = identity_of(&hardware);
             let known = list.iter().any(|one| one.hardware == hardware && one.sii == sii);
             if !known {
-                list.push(Candidate { hardware, sii: sii.clone() });
+                list.push(Candidate { hardware, sii: sii.clone(), strange, identity });
             }
         }
     }
@@ -157,6 +184,21 @@ fn library_image(identity: [Option<u32>; 3]) -> Option<Vec<u8>> {
     })
 }
 
+/// Registers 0x0000 to 0x0009 of a controller, but for its ports.
+fn identity_of(hardware: &Hardware) -> [u8; EscInformation::LEN] {
+    EscInformation {
+        controller: r::ControllerType(hardware.controller_type),
+        revision: hardware.revision,
+        build: hardware.build,
+        fmmus: hardware.fmmus,
+        sync_managers: hardware.sync_managers,
+        ram_kb: hardware.ram_kib,
+        ports: r::PortDescriptor::default(),
+        features: r::Features(hardware.features),
+    }
+    .to_bytes()
+}
+
 fn answers(candidate: &Candidate, learned: &Learned) -> Vec<bool> {
     let mut signals = Signals::default();
     let mut controller = Controller::new(
@@ -172,15 +214,32 @@ fn answers(candidate: &Candidate, learned: &Learned) -> Vec<bool> {
 }
 
 /// How many accesses would be answered by another number than they were.
-fn misfits(learned: &Learned, answers: &[Vec<Vec<bool>>], taken: &[usize]) -> u64 {
+fn misfits(
+    learned: &Learned,
+    candidates: &[Vec<Candidate>],
+    answers: &[Vec<Vec<bool>>],
+    taken: &[usize],
+) -> u64 {
     let does = |device: usize, access: usize| answers[device][taken[device]][access];
-    let mut misfits = 0;
+    let chosen = || taken.iter().zip(candidates).map(|(taken, list)| &list[*taken]);
+    let mut misfits: u64 = chosen().map(|one| one.strange).sum();
+    for (start, data, answered) in &learned.identities {
+        if usize::from(*answered) != taken.len() {
+            continue;
+        }
+        for (at, byte) in (usize::from(start.0)..).zip(data) {
+            let all = chosen().fold(0, |all, one| all | one.identity[at]);
+            misfits += 4 * u64::from((all ^ byte).count_ones());
+        }
+    }
     for (access, presence) in learned.presence.iter().enumerate() {
         let expected = match presence.device {
             Some(device) => u16::from(does(device, access)),
             None => (0..taken.len()).filter(|device| does(*device, access)).count() as u16,
         };
-        misfits += u64::from(expected.abs_diff(presence.answered));
+        // What one device said alone is certain; of what all said it is not known who.
+        let weight = if presence.device.is_some() { CERTAIN } else { 1 };
+        misfits += weight * u64::from(expected.abs_diff(presence.answered));
     }
     misfits
 }

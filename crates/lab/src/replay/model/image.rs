@@ -51,13 +51,12 @@ pub(super) fn compose(seen: &DeviceSeen, same: Option<&[u8]>, choice: Choice) ->
         Some(same) => image[..same.len()].copy_from_slice(same),
         None => {
             image[..GUARDED].fill(0);
-            image[0] = choice.pdi_control;
-            image[1] = choice.esc_configuration;
             // No mailbox, where none was read.
             let fixed = word::BOOTSTRAP_MAILBOX.byte()..word::VENDOR_WORDS.byte();
             image[fixed].fill(0);
         }
     }
+    (image[0], image[1]) = (choice.pdi_control, choice.esc_configuration);
     for (register, byte) in [(r::PDI_CONTROL, 0), (r::ESC_CONFIGURATION_A0, 1)] {
         if let Some(value) = seen.byte(register.address) {
             image[byte] = value;

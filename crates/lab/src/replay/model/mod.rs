@@ -29,12 +29,21 @@ const CABLE_M: f64 = 1.0;
 pub struct Model {
     /// The segment.
     pub segment: Segment,
-    /// For each device its input bytes, in the order of SyncManagers.
-    pub inputs: Vec<Vec<SignalId>>,
+    /// For each device what its inputs come from.
+    pub inputs: Vec<Inputs>,
     /// What each device was taken for, for people.
     pub devices: Vec<String>,
     /// What had to be assumed, for people.
     pub notes: Vec<String>,
+}
+
+/// Where the inputs of a device come from.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Inputs {
+    /// A signal for each byte, in the order of SyncManagers.
+    Bytes(Vec<SignalId>),
+    /// A signal for each bit: digital channels.
+    Bits(Vec<SignalId>),
 }
 
 /// Why no segment can be made.
@@ -71,15 +80,10 @@ pub fn model(learned: &Learned, images: &[Vec<u8>]) -> Result<Model, ModelError>
     let mut controllers = Vec::new();
     for ((seen, candidate), id) in learned.devices.iter().zip(chosen).zip((0..).map(DeviceId)) {
         let mine: Vec<SignalId> = (0..INPUT_BYTES).map(|_| signals.add()).collect();
-        let firmware = LearnedFirmware::new(
-            seen.steps.clone(),
-            seen.mailbox.clone(),
-            seen.objects.dictionary(),
-            mine.clone(),
-        );
+        let firmware = LearnedFirmware::new(seen, mine.clone());
         devices.push(describe(seen, &candidate));
-        inputs.push(mine);
-        let Candidate { hardware, sii } = candidate;
+        inputs.push(Inputs::Bytes(mine));
+        let Candidate { hardware, sii, .. } = candidate;
         let mut controller =
             Controller::new(id, hardware, LocalClock::default(), Box::new(firmware), sii);
         controller.expect_sii_times(seen.sii_times.iter().copied());
@@ -89,14 +93,55 @@ pub fn model(learned: &Learned, images: &[Vec<u8>]) -> Result<Model, ModelError>
     let mut segment = Segment::of_controllers("recording", tree, controllers, &cable_m, signals);
     for (seen, id) in learned.devices.iter().zip((0..).map(DeviceId)) {
         if let Some(controller) = segment.controller_mut(id) {
-            preset(controller, seen);
+            preset(controller, seen, PRESET);
+            preset_events(controller, learned);
+            if let Some(time) = seen.programming {
+                controller.set_sii_programming_time(time);
+            }
         }
     }
     Ok(Model { segment, inputs, devices, notes })
 }
 
+/// A segment that was made elsewhere, such as from a file, with the history that the recording shows:
+/// station addresses, states, counters, and how long the SII took. Digital inputs follow the
+/// recording; those of other devices are what the segment makes them.
+#[must_use]
+pub fn on_segment(mut segment: Segment, learned: &Learned) -> Model {
+    let ids: Vec<DeviceId> = segment.devices().collect();
+    let mut notes = learned.notes.clone();
+    if ids.len() != learned.devices.len() {
+        notes.push(format!(
+            "the segment has {} controllers, the recording shows {}",
+            ids.len(),
+            learned.devices.len()
+        ));
+    }
+    for (seen, id) in learned.devices.iter().zip(&ids) {
+        if let Some(controller) = segment.controller_mut(*id) {
+            controller.expect_sii_times(seen.sii_times.iter().copied());
+            preset(controller, seen, HISTORY);
+            preset_events(controller, learned);
+        }
+    }
+    let inputs = ids.iter().map(|id| Inputs::Bits(segment.inputs(*id).to_vec())).collect();
+    let devices = ids.iter().map(|id| segment.name(*id).to_owned()).collect();
+    Model { segment, inputs, devices, notes }
+}
+
+/// What the history of a device leaves behind, whatever the device is.
+const HISTORY: &[std::ops::Range<u16>] = &[
+    0x0010..0x0012,
+    0x0100..0x0104,
+    0x0120..0x0122,
+    0x0130..0x0136,
+    0x0300..0x0328,
+    0x0442..0x0446,
+];
+
 /// Registers whose values at the start matter and are no consequence of others.
 const PRESET: &[std::ops::Range<u16>] = &[
+    0x0000..0x000A,
     0x0010..0x0014,
     0x0020..0x0032,
     0x0100..0x0104,
@@ -108,7 +153,7 @@ const PRESET: &[std::ops::Range<u16>] = &[
     0x0200..0x0208,
     0x0300..0x0328,
     0x0400..0x0446,
-    0x0500..0x0502,
+    0x0500..0x0503,
     0x0504..0x0510,
     0x0600..0x0700,
     0x0800..0x0880,
@@ -120,8 +165,18 @@ const PRESET: &[std::ops::Range<u16>] = &[
     0x0E00..0x0F04,
 ];
 
-fn preset(controller: &mut Controller, seen: &DeviceSeen) {
-    for range in PRESET {
+/// Events that no datagram carried before they were served did not stand; the mask is that of the
+/// first answer, unless it was read.
+fn preset_events(controller: &mut Controller, learned: &Learned) {
+    let events = learned.events;
+    controller.preset(r::ECAT_EVENT_REQUEST.address, &events.request.to_le_bytes());
+    if events.mask != 0 {
+        controller.preset(r::ECAT_EVENT_MASK.address, &events.mask.to_le_bytes());
+    }
+}
+
+fn preset(controller: &mut Controller, seen: &DeviceSeen, ranges: &[std::ops::Range<u16>]) {
+    for range in ranges {
         let known = seen.initial.range(range.clone());
         let mut run: Option<(u16, Vec<u8>)> = None;
         for (address, byte) in known {

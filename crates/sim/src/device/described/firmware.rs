@@ -99,11 +99,25 @@ fn processor(
         dictionary,
         channels,
         buffers: buffers(described),
+        excludes: excludes(described),
         mailbox: described.image.standard_mailbox,
         protocols: described.image.protocols,
         bootstrap: bootstrap.is_present().then_some(bootstrap),
         times: ResponseTimes::TERMINAL,
     })
+}
+
+/// PDOs that exclude each other. What the description assigns by default is left alone: some exclude
+/// what they assign.
+fn excludes(described: &DescribedType) -> Vec<(u16, u16)> {
+    let assigned = |index: u16| {
+        described.pdos.iter().any(|pdo| pdo.index == index && pdo.sync_manager.is_some())
+    };
+    let pairs = described
+        .pdos
+        .iter()
+        .flat_map(|pdo| pdo.excludes.iter().map(move |other| (pdo.index, *other)));
+    pairs.filter(|(one, other)| !(assigned(*one) && assigned(*other))).collect()
 }
 
 /// Pins that the controller drives and takes itself.

@@ -25,6 +25,8 @@ const DRIVE: u64 = 0x0002_0192;
 const MODULAR_DEVICE: u64 = 0x0000_1389;
 /// The status word of a drive.
 const STATUS_WORD: u16 = 0x6041;
+/// How many entries a PDO has room for at least whose entries can be changed.
+const ROOM: usize = 32;
 /// Most PDOs that one SyncManager can be assigned, as their count is one byte.
 const MOST_PDOS: usize = 255;
 
@@ -32,6 +34,7 @@ const MOST_PDOS: usize = 255;
 pub(super) fn dictionary(described: &DescribedType, identity: Identity) -> Dictionary {
     let coe = described.image.general().map_or(CoeDetails::default(), |general| general.coe);
     let mut objects = described.objects.clone();
+    objects.retain(|object| !names_no_mode(object));
     let mut add = |object: Object| {
         if !objects.iter().any(|known| known.index == object.index) {
             objects.push(object);
@@ -60,6 +63,13 @@ pub(super) fn dictionary(described: &DescribedType, identity: Identity) -> Dicti
         values(pdo, &mut objects);
     }
     Dictionary::new(objects, coe.complete_access())
+}
+
+/// Whether these are synchronisation parameters without any mode: some makers leave all of them 0.
+fn names_no_mode(object: &Object) -> bool {
+    const MODES: u8 = 4;
+    matches!(object.index.0, 0x1C32 | 0x1C33)
+        && object.entry(MODES).is_none_or(|modes| modes.as_number() == 0)
 }
 
 fn about(described: &DescribedType) -> Vec<Object> {
@@ -120,8 +130,9 @@ fn sync_manager_types(described: &DescribedType) -> Object {
 fn mapping(pdo: &DescribedPdo, coe: CoeDetails) -> Object {
     let changeable = !pdo.fixed && coe.pdo_configuration();
     let access = if changeable { SET_UP } else { READ_ONLY };
-    let entries = (1u8..=255).zip(&pdo.entries).map(|(subindex, entry)| {
-        let value = mapped(entry);
+    let room = if changeable { pdo.entries.len().max(ROOM) } else { pdo.entries.len() };
+    let entries = (1u8..=255).take(room).map(|subindex| {
+        let value = pdo.entries.get(usize::from(subindex) - 1).map_or(0, mapped);
         Entry::number(subindex, &subindex_name(subindex), DataType::UDINT, 32, access, value)
     });
     let name = match pdo.direction {
@@ -131,6 +142,7 @@ fn mapping(pdo: &DescribedPdo, coe: CoeDetails) -> Object {
     let mut object = record(pdo.index, name.trim(), PDO_MAPPING, entries.collect());
     if let Some(count) = object.entries.first_mut() {
         count.access = access;
+        count.value = vec![pdo.entries.len().min(255) as u8];
     }
     object
 }
@@ -182,8 +194,14 @@ fn values(pdo: &DescribedPdo, objects: &mut Vec<Object>) {
         let data_type = data_type(entry);
         let value = Entry::number(entry.subindex, &entry.name, data_type, entry.bits, access, 0);
         match objects.iter_mut().find(|object| object.index == index) {
-            Some(object) if object.entry(entry.subindex).is_some() => {}
-            Some(object) => insert(object, value),
+            Some(object) => {
+                let mut entries = object.entries.iter_mut();
+                match entries.find(|known| known.subindex == entry.subindex) {
+                    // What a PDO maps can be mapped, whatever the dictionary says of it.
+                    Some(known) => known.access.0 |= direction,
+                    None => insert(object, value),
+                }
+            }
             None if entry.subindex == 0 => objects.push(Object::variable(index, value)),
             None => objects.push(record(entry.index, &pdo.name, RECORD, vec![value])),
         }

@@ -89,6 +89,7 @@ fn with_processor(
         dictionary,
         channels,
         buffers: ProcessBuffer::BEHIND_MAILBOX.to_vec(),
+        excludes: Vec::new(),
         mailbox: spec.mailbox(),
         protocols: Protocols(spec.protocols),
         bootstrap: Some(image::bootstrap(spec)),

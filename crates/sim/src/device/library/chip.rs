@@ -25,6 +25,8 @@ pub(in crate::device) struct Chip {
 
 /// Distributed clocks of 64 bits, low jitter and enhanced link detection, separate forwarded errors.
 const FULL: u16 = 0x00FC;
+/// The activation register of the SYNC unit has its enhanced bits.
+const ENHANCED_SYNC: u16 = 0x0100;
 /// The same without anything that is about E-bus.
 const WITHOUT_EBUS: u16 = 0x00CC;
 
@@ -67,12 +69,13 @@ pub(super) const ET1100_FAST: Chip =
 /// The small one: two ports and a third, for simple terminals.
 pub(in crate::device) const ET1200: Chip = Chip {
     controller_type: 0x12,
-    revision: 0,
+    // Revision and features are those that recordings of real terminals show.
+    revision: 1,
     build: 1,
     fmmus: 3,
     sync_managers: 4,
     ram_kib: 1,
-    features: FULL,
+    features: FULL | ENHANCED_SYNC,
     counting: COUNTING,
     timing: Timing { forward: Span::ns(125), process: Span::ns(145), ..TIMING },
 };

@@ -6,7 +6,7 @@ use linesman_proto::mailbox::coe::ObjectIndex;
 use linesman_proto::sii::Direction;
 use linesman_proto::state::AlStatusCode;
 
-use super::process_image::ProcessImage;
+use super::process_image::{self, ProcessImage};
 use crate::controller::Pdi;
 use crate::device::dictionary::Dictionary;
 
@@ -44,11 +44,12 @@ struct Area {
 }
 
 impl Areas {
-    /// What the assignment objects come to; the code to show when they map what is not there.
-    /// Inputs are looked at first.
+    /// What the assignment objects come to; the code to show when they map what is not there, or
+    /// assign PDOs that exclude each other. Inputs are looked at first.
     pub(super) fn of(
         dictionary: &Dictionary,
         buffers: &[ProcessBuffer],
+        excludes: &[(u16, u16)],
     ) -> Result<Self, AlStatusCode> {
         let mut areas = Vec::with_capacity(buffers.len());
         for (direction, code) in [
@@ -56,6 +57,9 @@ impl Areas {
             (Direction::Outputs, AlStatusCode::INVALID_OUTPUT_MAPPING),
         ] {
             for buffer in buffers.iter().filter(|buffer| buffer.direction == direction) {
+                if process_image::excluded(dictionary, buffer.assignment(), excludes) {
+                    return Err(code);
+                }
                 let image = ProcessImage::of(dictionary, buffer.assignment()).map_err(|_| code)?;
                 areas.push(Area { buffer: *buffer, image });
             }

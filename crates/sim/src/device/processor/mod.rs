@@ -25,7 +25,7 @@ use super::application::Channel;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::dictionary::Dictionary;
 use super::files::Files;
-use super::firmware::Firmware;
+use super::firmware::{Firmware, SampleAgain};
 use super::history::History;
 use super::mailbox::{Mailbox, Served};
 use super::signal::Signals;
@@ -87,6 +87,8 @@ pub struct Description {
     pub channels: Vec<Box<dyn Channel>>,
     /// Its process data.
     pub buffers: Vec<ProcessBuffer>,
+    /// Pairs of PDOs that cannot be assigned together.
+    pub excludes: Vec<(u16, u16)>,
     /// The mailbox it likes best; a longer one it does not take. Without a size there is none.
     pub mailbox: MailboxPair,
     /// What its mailbox speaks.
@@ -272,7 +274,8 @@ impl Processor {
     }
 
     fn set_up_process_data(&mut self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
-        let areas = Areas::of(&self.dictionary, &self.description.buffers)?;
+        let areas =
+            Areas::of(&self.dictionary, &self.description.buffers, &self.description.excludes)?;
         check::modules(&self.dictionary)?;
         check::process_data(pdi, &areas, self.description.mailbox.is_present())?;
         let outputs = areas.len(Direction::Outputs) > 0;
@@ -498,6 +501,12 @@ impl Firmware for Processor {
         if with_frames && now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
             self.sample_inputs(now, pdi);
         }
+    }
+
+    fn sample_again(&self, pdi: &Pdi<'_>) -> SampleAgain {
+        let samples =
+            self.synchronisation.samples_with_frames() && ApplicationLayer::state(pdi).has_inputs();
+        SampleAgain::From(if samples { self.next_sample } else { Instant::MAX })
     }
 
     fn synchronises(&self) -> bool {

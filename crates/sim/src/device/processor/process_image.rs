@@ -88,6 +88,16 @@ impl ProcessImage {
     }
 }
 
+/// Whether two PDOs are assigned that exclude each other.
+pub(super) fn excluded(
+    dictionary: &Dictionary,
+    assignment: ObjectIndex,
+    excludes: &[(u16, u16)],
+) -> bool {
+    let assigned = |pdo: u16| listed(dictionary, assignment).any(|one| one == u64::from(pdo));
+    excludes.iter().any(|(one, other)| assigned(*one) && assigned(*other))
+}
+
 /// The entries of a list, as many as its subindex 0 says.
 fn listed(dictionary: &Dictionary, index: ObjectIndex) -> impl Iterator<Item = u64> {
     let entries = dictionary.object(index).map_or(&[][..], |object| &object.entries);

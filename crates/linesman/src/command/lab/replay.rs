@@ -1,0 +1,150 @@
+//! `linesman lab replay`: the requests of a recording, played against a segment, and its answers
+//! beside the recorded ones.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use linesman_lab::replay::report::Verdict;
+use linesman_lab::replay::{Model, Recorder, Recording, Report, learn, model, on_segment, play};
+use linesman_runtime::capture::Capture;
+use serde::Serialize;
+
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::files;
+use crate::output::Output;
+use crate::text::quantity::count;
+use crate::version;
+
+/// Longest image that is read, in bytes.
+const MAX_IMAGE: u64 = 1024 * 1024;
+
+/// What can be asked.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Arguments {
+    /// The recording: pcap or pcapng, plain or gzipped
+    #[arg(value_name = "CAPTURE.pcapng")]
+    capture: PathBuf,
+    /// Play against this segment; without it, one is built of what the recording shows
+    #[arg(long, value_name = "SEGMENT.toml")]
+    segment: Option<PathBuf>,
+    /// SII images: words that the recording does not show come from the one of the same product
+    #[arg(long, value_name = "FILE.bin", num_args = 1..)]
+    sii: Vec<PathBuf>,
+    /// JSON, schema linesman.replay/1
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The answer as JSON.
+#[derive(Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ReplayReport {
+    /// `linesman.replay/1`.
+    schema: String,
+    /// Name and version of the program.
+    tool: String,
+    /// The recording.
+    capture: String,
+    /// `agrees`, `differs` or `nothing judged`.
+    verdict: String,
+    /// What it showed.
+    #[serde(flatten)]
+    report: Report,
+}
+
+/// Plays it.
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    let recording = record(&arguments.capture, output)?;
+    let images = images(&arguments.sii)?;
+    let learned = learn(&recording);
+    let mut made: Option<Model> = match &arguments.segment {
+        Some(path) => {
+            let plant = files::Plant::open(path)?;
+            Some(on_segment(plant.segment, &learned))
+        }
+        None if learned.devices.is_empty() => None,
+        None => Some(model(&learned, &images).map_err(|error| {
+            Failure::new(
+                format!("{}: {error}", arguments.capture.display()),
+                "name the segment with --segment",
+            )
+        })?),
+    };
+    let report = match &mut made {
+        Some(model) => play(&recording, model),
+        None => Report::without_devices(&recording),
+    };
+    let (verdict, status) = match report.verdict() {
+        Verdict::Agrees => ("agrees", Status::Good),
+        Verdict::Differs => ("differs", Status::Findings),
+        Verdict::NothingJudged => ("nothing judged", Status::NotJudged),
+    };
+    if arguments.json {
+        output.json(&ReplayReport {
+            schema: "linesman.replay/1".to_owned(),
+            tool: version::tool(),
+            capture: arguments.capture.display().to_string(),
+            verdict: verdict.to_owned(),
+            report,
+        });
+    } else {
+        output.text(&report.to_string());
+        output.line(&conclusion(&report));
+    }
+    Ok(status)
+}
+
+fn conclusion(report: &Report) -> String {
+    match report.verdict() {
+        Verdict::Agrees => {
+            format!("All answers agree: {}.", count(report.compared, "datagram"))
+        }
+        Verdict::Differs => {
+            format!("{} of {} differ.", count(report.different, "datagram"), report.compared)
+        }
+        Verdict::NothingJudged => {
+            "Nothing could be judged: no request of the recording was answered.".to_owned()
+        }
+    }
+}
+
+fn record(path: &Path, output: &mut Output) -> Result<Recording, Failure> {
+    let mut capture = Capture::open(path)?;
+    let mut recorder = Recorder::default();
+    while let Some(frame) = capture.next_frame() {
+        recorder.take(&frame);
+    }
+    if let Some(end) = capture.end().filter(|end| !end.complete()) {
+        output.warn(&format!("{}: {end}", path.display()));
+    }
+    let recording = recorder.finish();
+    if recording.turns.is_empty() && recording.alone == 0 {
+        let reason = format!("{}: no EtherCAT request in it", path.display());
+        let advice = "record on the card that the line is plugged into, while a MainDevice works: \
+                      `tcpdump -i eth0 -w trace.pcap`";
+        return Err(Failure::new(reason, advice));
+    }
+    Ok(recording)
+}
+
+fn images(paths: &[PathBuf]) -> Result<Vec<Vec<u8>>, Failure> {
+    paths
+        .iter()
+        .map(|path| {
+            let refuse = |error: std::io::Error| {
+                let reason = format!("{}: reading an SII image: {error}", path.display());
+                Failure::new(reason, "check the path")
+            };
+            let len = fs::metadata(path).map_err(refuse)?.len();
+            if len > MAX_IMAGE {
+                let reason = format!(
+                    "{}: {len} bytes, expected an SII image of at most {MAX_IMAGE}",
+                    path.display()
+                );
+                return Err(Failure::new(reason, "check the path"));
+            }
+            fs::read(path).map_err(refuse)
+        })
+        .collect()
+}

@@ -1,0 +1,127 @@
+//! Devices made from a device description: what their makers describe is what a MainDevice meets.
+
+use linesman_config::plan::{Plan, PlanOptions};
+use linesman_maindevice::{Event, Options};
+use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
+use linesman_sim::segment_file::{DescriptionFiles, SegmentFile};
+
+use crate::bench::Bench;
+use crate::mailbox::{put, upload};
+
+/// A valve island with mailbox, dictionary and two sorts of inputs that exclude each other; its
+/// outputs can be chosen and changed. Its two slots take counters of 16 or 32 bits.
+const MAKER: &str = r##"<EtherCATInfo><Vendor><Id>#x815</Id><Name>Maker</Name></Vendor><Descriptions><Devices>
+<Device Physics="YY"><Type ProductCode="#x42" RevisionNo="#x30002">ISLE</Type><Name>Island</Name>
+ <Profile><ProfileNo>5001</ProfileNo><Dictionary><DataTypes>
+  <DataType><Name>DT8000</Name><BitSize>64</BitSize>
+   <SubItem><SubIdx>0</SubIdx><Name>Count</Name><Type>USINT</Type><BitSize>8</BitSize><Flags><Access>ro</Access></Flags></SubItem>
+   <SubItem><SubIdx>1</SubIdx><Name>Ramp</Name><Type>UINT</Type><BitSize>16</BitSize><Flags><Access>rw</Access></Flags></SubItem>
+   <SubItem><SubIdx>2</SubIdx><Name>Limit</Name><Type>DINT</Type><BitSize>32</BitSize><Flags><Access WriteRestrictions="PreOP">rw</Access></Flags></SubItem>
+  </DataType></DataTypes><Objects>
+  <Object><Index>#x1008</Index><Name>Name</Name><Type>STRING(6)</Type><BitSize>48</BitSize><Info><DefaultString>Island</DefaultString></Info></Object>
+  <Object><Index>#x8000</Index><Name>Settings</Name><Type>DT8000</Type><BitSize>64</BitSize><Info>
+   <SubItem><Name>Count</Name><Info><DefaultValue>2</DefaultValue></Info></SubItem>
+   <SubItem><Name>Ramp</Name><Info><DefaultData>E803</DefaultData></Info></SubItem>
+   <SubItem><Name>Limit</Name><Info><DefaultValue>-5</DefaultValue></Info></SubItem></Info></Object>
+ </Objects></Dictionary></Profile>
+ <Fmmu>Outputs</Fmmu><Fmmu>Inputs</Fmmu><Fmmu>MBoxState</Fmmu>
+ <Sm DefaultSize="128" StartAddress="#x1000" ControlByte="#x26" Enable="1">MBoxOut</Sm>
+ <Sm DefaultSize="128" StartAddress="#x1080" ControlByte="#x22" Enable="1">MBoxIn</Sm>
+ <Sm StartAddress="#x1100" ControlByte="#x64" Enable="1">Outputs</Sm>
+ <Sm StartAddress="#x1180" ControlByte="#x20" Enable="1">Inputs</Sm>
+ <RxPdo Sm="2"><Index>#x1600</Index><Name>Valves</Name>
+  <Entry><Index>#x7000</Index><SubIndex>1</SubIndex><BitLen>1</BitLen><Name>A</Name><DataType>BOOL</DataType></Entry>
+  <Entry><Index>0</Index><BitLen>7</BitLen></Entry>
+  <Entry><Index>#x7000</Index><SubIndex>2</SubIndex><BitLen>16</BitLen><Name>B</Name><DataType>INT</DataType></Entry></RxPdo>
+ <TxPdo Fixed="1" Sm="3"><Index>#x1A00</Index><Name>Long</Name><Exclude>#x1A01</Exclude>
+  <Entry><Index>#x6000</Index><SubIndex>1</SubIndex><BitLen>40</BitLen><Name>Pressure</Name></Entry></TxPdo>
+ <TxPdo Fixed="1"><Index>#x1A01</Index><Name>Short</Name><Exclude>#x1A00</Exclude>
+  <Entry><Index>#x6000</Index><SubIndex>2</SubIndex><BitLen>16</BitLen><Name>Pressure</Name><DataType>UINT</DataType></Entry></TxPdo>
+ <Mailbox><CoE SdoInfo="1" PdoAssign="1" PdoConfig="1" CompleteAccess="1"/></Mailbox>
+ <Eeprom><ByteSize>2048</ByteSize><ConfigData>0500</ConfigData></Eeprom>
+ <Slots SlotPdoIncrement="#x10" SlotIndexIncrement="#x100"><Slot MaxInstances="2"><Name>Slot</Name>
+  <ModuleIdent>#x10</ModuleIdent><ModuleIdent>#x20</ModuleIdent></Slot></Slots></Device>
+</Devices><Modules>
+<Module><Type ModuleIdent="#x10">C16</Type><Name>Counter</Name><TxPdo Fixed="1" Sm="3"><Index DependOnSlot="1">#x1A40</Index><Name>Count</Name>
+ <Entry><Index DependOnSlot="1">#x6100</Index><SubIndex>1</SubIndex><BitLen>16</BitLen><Name>Count</Name><DataType>UINT</DataType></Entry></TxPdo></Module>
+<Module><Type ModuleIdent="#x20">C32</Type><Name>Counter</Name><TxPdo Fixed="1" Sm="3"><Index DependOnSlot="1">#x1A40</Index><Name>Count</Name>
+ <Entry><Index DependOnSlot="1">#x6100</Index><SubIndex>1</SubIndex><BitLen>32</BitLen><Name>Count</Name><DataType>UDINT</DataType></Entry></TxPdo></Module>
+</Modules></Descriptions></EtherCATInfo>"##;
+
+struct Maker;
+
+impl DescriptionFiles for Maker {
+    fn read(&self, _name: &str) -> Result<Vec<u8>, String> {
+        Ok(MAKER.as_bytes().to_vec())
+    }
+}
+
+fn bench(more: &str) -> Bench {
+    let text = format!(
+        "name = \"isle\"\n[[device]]\nname = \"V\"\ntype = \"esi:m.xml#ISLE\"\non = \"maindevice\"\n{more}"
+    );
+    let file = SegmentFile::parse_with(&text, &Maker).expect("a segment file");
+    Bench::of(&file, Options::default())
+}
+
+#[test]
+fn values_go_both_ways_as_the_description_lays_them_out() {
+    let mut bench = bench("slots = [\"C16\", \"0x20\"]\n");
+    let plan = bench.start(AlState::Op);
+    let id = bench.id("V");
+    let device = &plan.devices[0];
+    assert_eq!((device.outputs.len(), device.inputs.len()), (3, 5 + 2 + 4));
+    let signals = bench.segment.inputs(id).to_vec();
+    // Pressure has 40 bits and so two signals; the one that is not assigned has one, too.
+    assert_eq!((bench.segment.outputs(id).len(), signals.len()), (2, 5));
+    for (signal, value) in signals.iter().zip([0x1122_3344, 0x55, 0x6677, 0x0BAD, -2]) {
+        bench.segment.signals_mut().set(*signal, value);
+    }
+    let outputs = device.outputs.clone();
+    bench.device.outputs_mut()[outputs].copy_from_slice(&[0x81, 0xFE, 0xFF]);
+    bench.run_for(Span::ms(20));
+    let inputs = bench.device.inputs()[device.inputs.clone()].to_vec();
+    assert_eq!(inputs, [0x44, 0x33, 0x22, 0x11, 0x55, 0xAD, 0x0B, 0xFE, 0xFF, 0xFF, 0xFF]);
+    let driven: Vec<i32> =
+        bench.segment.outputs(id).iter().map(|one| bench.segment.signals().value(*one)).collect();
+    assert_eq!(driven, [1, 0xFFFE]);
+    assert_eq!(upload(&mut bench, "V", 0xF050, 2).unwrap(), [0x20, 0, 0, 0]);
+    assert_eq!(upload(&mut bench, "V", 0x6200, 1).unwrap(), [0xFE, 0xFF, 0xFF, 0xFF]);
+}
+
+#[test]
+fn the_dictionary_is_the_described_one_and_what_follows_from_it() {
+    let mut bench = bench("");
+    bench.start(AlState::PreOp);
+    assert_eq!(upload(&mut bench, "V", 0x1008, 0).unwrap(), b"Island");
+    assert_eq!(upload(&mut bench, "V", 0x1018, 3).unwrap(), [2, 0, 3, 0]);
+    assert_eq!(upload(&mut bench, "V", 0x8000, 1).unwrap(), [0xE8, 3]);
+    assert_eq!(upload(&mut bench, "V", 0x8000, 2).unwrap(), (-5i32).to_le_bytes());
+    assert_eq!(upload(&mut bench, "V", 0x1C13, 1).unwrap(), [0x00, 0x1A]);
+    assert_eq!(upload(&mut bench, "V", 0x1600, 3).unwrap(), [16, 2, 0x00, 0x70]);
+    assert_eq!(put(&mut bench, "V", 0x8000, 2, &[1, 0, 0, 0]), Ok(()));
+    assert_eq!(upload(&mut bench, "V", 0x8000, 2).unwrap(), [1, 0, 0, 0]);
+    // A fixed PDO stays as it is, the other takes another order.
+    assert!(put(&mut bench, "V", 0x1A00, 0, &[0]).is_err());
+    assert_eq!(put(&mut bench, "V", 0x1600, 0, &[0]), Ok(()));
+    assert_eq!(put(&mut bench, "V", 0x1600, 1, &[16, 2, 0x00, 0x70]), Ok(()));
+    assert_eq!(put(&mut bench, "V", 0x1600, 0, &[1]), Ok(()));
+}
+
+#[test]
+fn pdos_that_exclude_each_other_are_refused() {
+    let mut bench = bench("");
+    bench.start(AlState::PreOp);
+    assert_eq!(put(&mut bench, "V", 0x1C13, 0, &[0]), Ok(()));
+    assert_eq!(put(&mut bench, "V", 0x1C13, 1, &[0x00, 0x1A]), Ok(()));
+    assert_eq!(put(&mut bench, "V", 0x1C13, 2, &[0x01, 0x1A]), Ok(()));
+    assert_eq!(put(&mut bench, "V", 0x1C13, 0, &[2]), Ok(()));
+    let inventory = bench.scan();
+    let tree = inventory.tree().clone();
+    let planned = inventory.planned(AlState::SafeOp);
+    let plan = Plan::build(&planned, tree, &PlanOptions::default()).expect("a plan");
+    bench.device.start(bench.now, plan);
+    let refused = |event: &Event| matches!(event, Event::Refused { code, .. } if code.0 == 0x0024);
+    assert!(bench.run_until(Span::s(5), refused), "{}: {:#?}", bench.state("V"), bench.events);
+}

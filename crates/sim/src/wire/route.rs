@@ -1,0 +1,135 @@
+//! The way of a frame that meets nothing but controllers at rest: whom it passes, and when.
+
+use linesman_proto::address::Path;
+use linesman_proto::port::Port;
+use linesman_proto::time::Span;
+use linesman_proto::topology::End;
+
+use super::change::Line;
+use super::world::World;
+
+/// No place on a route.
+const NOWHERE: u32 = u32::MAX;
+/// Never.
+const NEVER: u64 = u64::MAX;
+
+/// A processing unit on the way.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Visit {
+    pub(super) node: u32,
+    /// From the first bit's leaving the card to its entering the unit.
+    pub(super) after: Span,
+}
+
+/// The way from a card.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) struct Route {
+    /// Processing units, in the order of the way.
+    pub(super) visits: Vec<Visit>,
+    /// Ports by which it comes in anywhere, in the order of the way.
+    pub(super) entries: Vec<(u32, Port, Span)>,
+    /// Places in `visits` at which a device samples inputs.
+    pub(super) samplers: Vec<u32>,
+    /// The card at which it ends.
+    pub(super) arrives_at: Path,
+    /// From card to card.
+    pub(super) takes: Span,
+    /// Whether any controller sets the bit in the source address.
+    pub(super) marks_source: bool,
+    /// The place of each node in `visits`.
+    places: Vec<u32>,
+    /// When the first bit is at the receiver of each line, in ns behind its leaving the card.
+    crossings: Vec<[u64; 2]>,
+}
+
+impl Route {
+    /// Where a node comes on the way.
+    #[inline]
+    pub(super) fn place(&self, node: u32) -> Option<u32> {
+        self.places.get(node as usize).copied().filter(|place| *place != NOWHERE)
+    }
+
+    /// When the first bit is at the receiver of a line, behind its leaving the card.
+    pub(super) fn crossing(&self, line: Line) -> Option<Span> {
+        let after = self.crossings[line.link][usize::from(line.downstream)];
+        (after != NEVER).then_some(Span::ns(after))
+    }
+}
+
+impl World {
+    /// The way of a frame from a card as links and loops are now; `None` when it does not come to a
+    /// card, or meets a controller that does something with frames of no concern to it.
+    pub(super) fn find_route(&self, card: Path) -> Option<Route> {
+        let mut line = self.leaving[card.index()]?;
+        let mut after = Span::ZERO;
+        let mut route = Route {
+            visits: Vec::with_capacity(self.nodes.len()),
+            entries: Vec::with_capacity(2 * self.nodes.len()),
+            samplers: Vec::new(),
+            arrives_at: card,
+            takes: Span::ZERO,
+            marks_source: false,
+            places: vec![NOWHERE; self.nodes.len()],
+            crossings: vec![[NEVER; 2]; self.links.len()],
+        };
+        // A way that comes by a line again runs in a circle.
+        for _ in 0..2 * self.links.len() {
+            let link = &self.links[line.link];
+            let (_, to) = link.from_to(line.downstream);
+            if !link.contact.is_whole() {
+                return None;
+            }
+            after += link.transit;
+            route.crossings[line.link][usize::from(line.downstream)] = after.as_nanos();
+            let (node, port) = match to {
+                End::Controller(node, port) => (node, port),
+                End::MainDevice(path) => {
+                    (route.arrives_at, route.takes) = (path, after);
+                    return Some(route);
+                }
+            };
+            route.entries.push((node as u32, port, after));
+            (line, after) = self.lead_on(node, port, after, &mut route)?;
+        }
+        None
+    }
+
+    /// Through a controller: by which line it leaves, and when.
+    fn lead_on(
+        &self,
+        node: usize,
+        port: Port,
+        after: Span,
+        route: &mut Route,
+    ) -> Option<(Line, Span)> {
+        let here = &self.nodes[node];
+        let manner = &here.entry.manner;
+        let is_open = |port: Port| manner.open >> port.index() & 1 != 0;
+        if manner.meddles || !here.power.is_whole() || !is_open(port) {
+            return None;
+        }
+        let timing = here.controller.hardware().timing;
+        let mut takes = timing.forward;
+        let mut stop = port;
+        for _ in Port::ALL {
+            if stop == Port::A {
+                let place = route.visits.len() as u32;
+                if route.places[node] != NOWHERE {
+                    return None;
+                }
+                route.places[node] = place;
+                route.visits.push(Visit { node: node as u32, after });
+                route.marks_source |= manner.marks_source;
+                if manner.samples {
+                    route.samplers.push(place);
+                }
+                takes = timing.process;
+            }
+            stop = stop.next();
+            if is_open(stop) {
+                return Some((here.leaving[stop]?, after + takes));
+            }
+        }
+        None
+    }
+}

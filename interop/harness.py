@@ -1,0 +1,129 @@
+"""What the checks share: which there are, how foreign MainDevices are run, what a good run is."""
+
+import importlib.util
+import json
+import os
+import sys
+
+from bench import HERE, NEAR, Segment, Watch, parse
+from plant import VENDOR, Plant
+
+LINESMAN = os.environ.get("LINESMAN", "linesman")
+ETHERCRAB = os.environ.get("ETHERCRAB_PEER", "")
+
+ONE, LINE, TREE = (Plant(HERE / name) for name in ("one.toml", "segment.toml", "tree.toml"))
+
+CYCLES, CYCLE_US, ROUNDS = 400, 2000, 4
+CHECKS = []
+
+
+class Skip(Exception):
+    """Cannot be tried here."""
+
+
+def check(function):
+    CHECKS.append(function)
+    return function
+
+
+class Client:
+    """A foreign MainDevice."""
+
+    def __init__(self, name, tells_identity=True):
+        self.name, self.tells_identity = name, tells_identity
+
+    def command(self, script=None):
+        if self.name == "ethercrab":
+            if not os.access(ETHERCRAB, os.X_OK):
+                raise Skip("ETHERCRAB_PEER is not built")
+            return [ETHERCRAB]
+        module = {"soem": "pysoem", "kickcat": "kickcat"}[self.name]
+        if importlib.util.find_spec(module) is None:
+            raise Skip(f"{module} is not installed")
+        return [sys.executable, HERE / (script or {"soem": "soem.py", "kickcat": "kickcat_peer.py"}[self.name])]
+
+    def run(self, line, *arguments, script=None, seconds=60):
+        """Runs it on the near end; gives the object it prints."""
+        quiet = ("env", "RUST_BACKTRACE=0")
+        status, out, err = line.run(line.near, *quiet, *self.command(script), *arguments, seconds=seconds)
+        assert status == 0, f"status {status}: {err[-600:]}"
+        # Some stacks print words of their own before.
+        return parse(out.strip().splitlines()[-1] if out.strip() else out, err)
+
+    def exchange(self, line, plant, rounds, cycles=CYCLES, on=NEAR):
+        """Takes a plant to OP and writes these rounds of values."""
+        file = line.path("rounds.json")
+        file.write_text(json.dumps([plant.image(values) for values in rounds]))
+        return self.run(line, on, cycles, CYCLE_US, file)
+
+
+SOEM, CRAB = Client("soem"), Client("ethercrab")
+CAT = Client("kickcat", tells_identity=False)
+
+
+def found(result, plant, client):
+    """Every SubDevice was found, by its own identity."""
+    if not client.tells_identity:
+        assert result["devices"] == len(plant), result["devices"]
+        return
+    devices = [tuple(device[:2]) for device in result["devices"]]
+    assert len(devices) == len(plant), f"found {len(devices)} SubDevices, expected {len(plant)}"
+    for position, (device, (name, _, product)) in enumerate(zip(devices, plant.devices)):
+        # Of a junction's inner controllers the data sheet tells no product.
+        expected = (VENDOR, product or device[1])
+        assert device == expected, f"position {position} ({name}): found {device}, expected {expected}"
+
+
+def ran(result, complete=0.95, plant=None):
+    """OP, and nearly every exchange complete: the host is no real-time system, a few may be late."""
+    assert result["state"] == "OP", result["state"]
+    if plant and "wkc" in result:
+        assert result["wkc"] == plant.wkc(), f"working counter {result['wkc']}, expected {plant.wkc()}"
+    assert result["complete"] >= result["cycles"] * complete, (
+        f"{result['complete']} of {result['cycles']} exchanges were complete"
+    )
+
+
+def values_came_back(result, plant, rounds, wires, held=None):
+    """Each input shows the value of the output that it is wired to, or at which it is held. Gives how many values were
+    compared."""
+    compared = 0
+    for number, (values, image) in enumerate(zip(rounds, result["rounds"], strict=True), 1):
+        shown = plant.shown(values)
+        expected = plant.expected({name: shown[source] for name, source in wires.items()} | (held or {}))
+        read = plant.read(image)
+        wrong = {name: (read[name], value) for name, value in expected.items() if read[name] != value}
+        assert not wrong, f"round {number}: (read, expected) {wrong}"
+        compared += len(expected)
+    return compared
+
+
+def to_op(line, plant, client, cycles=CYCLES):
+    """Finds, identifies, configures, runs; process data are right in both directions, value by value."""
+    with Segment(line, LINESMAN, plant.file) as segment:
+        # All ports have opened by themselves: the first frame ever, without any address, meets all.
+        assert segment.present == len(plant), segment.present
+        rounds = plant.draw(ROUNDS)
+        wires = segment.wires()
+        held = {name: number % 2 for number, name in enumerate(open_inputs(plant, wires), 1)}
+        for name, value in held.items():
+            segment.ask(do="set", input=name, value=value)
+        with Watch(segment) as watch:
+            result = client.exchange(line, plant, rounds, cycles)
+        found(result, plant, client)
+        ran(result, plant=plant)
+        for number, values in enumerate(rounds, 1):
+            shown = plant.shown(values)
+            assert watch.saw(shown), f"round {number}: the outputs never were {shown}; last: {watch.seen[-1]}"
+        return values_came_back(result, plant, rounds, wires, held)
+
+
+def open_inputs(plant, wires):
+    """Digital inputs that no output leads to."""
+    for _, name, _, (channels, _, _, bits) in plant.channels("inputs"):
+        if bits == 1:
+            yield from (one for one in (f"{name}.{channel + 1}" for channel in range(channels)) if one not in wires)
+
+
+def names(diagnosis):
+    return [(finding["code"], finding["cause"], finding["place"]) for finding in diagnosis["findings"]]
