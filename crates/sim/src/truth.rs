@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::register::{ErrorCounter, WatchdogTime};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use crate::device::Trouble;
@@ -95,6 +95,33 @@ pub enum Effect {
     EmergencySent {
         /// Its code; 0 takes the one before back.
         code: u16,
+    },
+    /// The quartz of a device has another speed from now on.
+    ClockDrifts {
+        /// Parts per thousand million too fast.
+        ppb: i64,
+    },
+    /// The quartz of a device stands.
+    ClockStopped,
+    /// The clock of a device started anew.
+    ClockRestarted,
+    /// The quartz of a device has its own speed again.
+    ClockRestored,
+    /// The SYNC signals of a device do not reach its processor any more.
+    SyncCut,
+    /// They reach it again.
+    SyncBack,
+    /// The work of a device takes so long in each cycle from now on.
+    WorkTakes {
+        /// How long.
+        takes: Span,
+    },
+    /// It takes as long as it needs again.
+    WorkRestored,
+    /// A card kept a frame back.
+    FrameHeldBack {
+        /// How long.
+        by: Span,
     },
     /// Counters were not 0 at the start: noise at power-on or plugging, old errors.
     OldCounters,
@@ -213,6 +240,15 @@ impl FaultRecord {
             | Effect::EmergencySent { .. }
             | Effect::CardSilent
             | Effect::WatchdogSet { .. }
+            | Effect::ClockDrifts { .. }
+            | Effect::ClockStopped
+            | Effect::ClockRestarted
+            | Effect::ClockRestored
+            | Effect::SyncCut
+            | Effect::SyncBack
+            | Effect::WorkTakes { .. }
+            | Effect::WorkRestored
+            | Effect::FrameHeldBack { .. }
             | Effect::OldCounters
             | Effect::WrongDevice
             | Effect::MissingDevice

@@ -1,5 +1,6 @@
 //! ethercrab as a foreign MainDevice; what a peer does and prints is said in `interop/peer.py`.
 
+mod clocks;
 mod services;
 
 use std::time::Duration;
@@ -22,9 +23,17 @@ fn main() -> Result<()> {
     {
         return smol::block_on(services::run(interface));
     }
+    if let [_, interface, word, cycles, cycle_us, sync0_ns] = arguments.as_slice()
+        && word == "clocks"
+    {
+        let (cycles, cycle) = (cycles.parse()?, Duration::from_micros(cycle_us.parse()?));
+        let sync0 = Duration::from_nanos(sync0_ns.parse()?);
+        return smol::block_on(clocks::run(interface, cycles, cycle, sync0));
+    }
     let [_, interface, cycles, cycle_us, rounds] = arguments.as_slice() else {
         return Err(anyhow!(
-            "usage: ethercrab-peer INTERFACE CYCLES CYCLE_US ROUNDS.json, or INTERFACE services"
+            "usage: ethercrab-peer INTERFACE CYCLES CYCLE_US ROUNDS.json, or INTERFACE services, \
+             or INTERFACE clocks CYCLES CYCLE_US SYNC0_NS"
         ));
     };
     let cycle = Duration::from_micros(cycle_us.parse()?);

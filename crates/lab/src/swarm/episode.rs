@@ -269,6 +269,15 @@ impl<'a> Episode<'a> {
                 | Effect::EmergencySent { .. }
                 | Effect::CardSilent
                 | Effect::WatchdogSet { .. }
+                | Effect::ClockDrifts { .. }
+                | Effect::ClockStopped
+                | Effect::ClockRestarted
+                | Effect::ClockRestored
+                | Effect::SyncCut
+                | Effect::SyncBack
+                | Effect::WorkTakes { .. }
+                | Effect::WorkRestored
+                | Effect::FrameHeldBack { .. }
                 | Effect::OldCounters
                 | Effect::WrongDevice
                 | Effect::MissingDevice

@@ -528,6 +528,12 @@ impl Controller {
         self.core.clock.local(at)
     }
 
+    /// The local copy of the system time, in ns.
+    #[must_use]
+    pub fn system_time(&self, at: Instant) -> u64 {
+        self.core.system_time(at)
+    }
+
     /// Changes the speed of the local clock, without a jump: `ppb` parts per thousand million too
     /// fast, and `ramp_ppb_per_s` more each second for as long as `ramp`.
     pub fn set_drift(&mut self, at: Instant, ppb: i64, ramp_ppb_per_s: i64, ramp: Span) {

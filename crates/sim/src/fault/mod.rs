@@ -14,7 +14,9 @@ mod source;
 
 mod brown_out;
 mod cable_degraded;
+mod clock_drift;
 mod config_mismatch;
+mod cycle_too_fast;
 mod device_extra;
 mod device_internal;
 mod device_missing;
@@ -27,6 +29,7 @@ mod emc_noise;
 mod emergency;
 mod firmware_fault;
 mod init_refused;
+mod late_frames;
 mod link_flapping;
 mod link_open;
 mod mailbox_error;
@@ -34,7 +37,9 @@ mod mailbox_slow;
 mod mailbox_stuck;
 mod nic_damaged;
 mod receiver_damaged;
+mod reference_clock_lost;
 mod supply_off;
+mod sync_lost;
 mod transmitter_damaged;
 mod twins_swapped;
 mod watchdog_starved;
@@ -96,6 +101,11 @@ pub const KINDS: &[Kind] = &[
     emergency::KIND,
     firmware_fault::KIND,
     watchdog_starved::KIND,
+    cycle_too_fast::KIND,
+    late_frames::KIND,
+    reference_clock_lost::KIND,
+    clock_drift::KIND,
+    sync_lost::KIND,
     ebus_overload::KIND,
     devices_swapped::KIND,
     twins_swapped::KIND,

@@ -166,6 +166,7 @@ fn assemble(
         now: Instant::ZERO,
         arrivals: Arrivals::default(),
         spare: Vec::new(),
+        waiting: super::late::Waiting::default(),
         tally: super::FrameTally::default(),
     };
     if file.old_counters {

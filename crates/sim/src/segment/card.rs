@@ -2,6 +2,7 @@
 
 use linesman_proto::time::{Instant, Span};
 
+use super::late::Lateness;
 use crate::truth::FaultId;
 
 /// What a card's driver tells: carrier and counters since the start of the run.
@@ -49,6 +50,8 @@ pub(crate) struct Card {
     pub(crate) counts: HostPort,
     /// When it sends nothing, and whose doing that is.
     silent: Vec<(Instant, Instant, FaultId)>,
+    /// How late its frames leave.
+    pub(super) lateness: Lateness,
     /// Changes of the carrier that are known, in the order of time.
     carrier: Vec<(Instant, bool)>,
 }
@@ -61,6 +64,7 @@ impl Default for Card {
             link_up: Span::ms(1_600),
             counts: HostPort::default(),
             silent: Vec::new(),
+            lateness: Lateness::default(),
             carrier: Vec::new(),
         }
     }

@@ -9,6 +9,7 @@ mod build;
 pub(crate) mod card;
 mod exchange;
 mod identification;
+mod late;
 mod ready;
 
 use std::collections::BTreeMap;
@@ -70,6 +71,8 @@ pub struct Segment {
     now: Instant,
     arrivals: Arrivals,
     spare: Vec<Vec<u8>>,
+    /// Frames that leave later.
+    waiting: late::Waiting,
     tally: FrameTally,
 }
 
@@ -97,6 +100,14 @@ impl Segment {
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.now = self.now.max(now);
         let now = self.now;
+        self.send_kept_back(now);
+        if !self.keep_back(now, path, frame) {
+            self.send(now, path, frame);
+        }
+    }
+
+    /// A frame leaves its card.
+    fn send(&mut self, now: Instant, path: Path, frame: &[u8]) {
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
         bytes.extend_from_slice(frame);
@@ -158,16 +169,17 @@ impl Segment {
         }
     }
 
-    /// When the next frame arrives, of those on their way. What else happens in the segment needs no
+    /// When the next frame arrives, of those on their way, or leaves a card that is late. What else happens in the segment needs no
     /// call at its time: it is made up for, in its order, by the next one.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.arrivals.next_at()
+        [self.arrivals.next_at(), self.next_leaves()].into_iter().flatten().min()
     }
 
     /// Time passes: devices, links and faults up to `now`.
     pub fn advance(&mut self, now: Instant) {
         self.now = self.now.max(now);
+        self.send_kept_back(self.now);
         self.world.advance(self.now);
         for card in &mut self.world.cards {
             card.settle(self.now);

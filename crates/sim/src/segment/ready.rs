@@ -44,6 +44,7 @@ impl Segment {
             now: Instant::ZERO,
             arrivals: Arrivals::default(),
             spare: Vec::new(),
+            waiting: super::late::Waiting::default(),
             tally: super::FrameTally::default(),
         };
         segment.advance(Instant::ZERO);

@@ -66,6 +66,8 @@ impl World {
             Change::Watchdog { node, time } => self.set_watchdog(at, fault, node, time),
             Change::Readdress { node, like } => self.readdress(at, fault, node, like),
             Change::Software { node, change } => self.change_software(at, fault, node, change),
+            Change::Timing { node, change } => self.change_timing(at, fault, node, change),
+            Change::Late { path, by } => self.make_late(at, fault, path, by),
             Change::Refuse { node, refusal } => {
                 self.nodes[node].refused_by = refusal.map(|_| fault);
                 self.nodes[node].act_at(at, Act::Refuse(refusal));

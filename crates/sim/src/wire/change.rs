@@ -4,10 +4,11 @@ use std::fmt::Debug;
 
 use linesman_proto::address::Path;
 use linesman_proto::register::WatchdogTime;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::route::Direction;
 
 use super::software::SoftwareChange;
+use super::timing::TimingChange;
 use crate::device::Refusal;
 
 /// One direction of a link: a line that symbols travel along.
@@ -117,6 +118,20 @@ pub enum Change {
         node: usize,
         /// What.
         change: SoftwareChange,
+    },
+    /// Something happens to the clock or the deadlines of a device.
+    Timing {
+        /// Which.
+        node: usize,
+        /// What.
+        change: TimingChange,
+    },
+    /// A card sends its frames later from now on.
+    Late {
+        /// Which.
+        path: Path,
+        /// By how much; nothing for "in time again".
+        by: Span,
     },
 }
 

@@ -22,6 +22,7 @@ mod phy_link;
 mod route;
 pub mod software;
 mod starve;
+pub mod timing;
 pub(crate) mod walk;
 pub(crate) mod world;
 
@@ -29,6 +30,7 @@ pub use change::{Change, Line, Source};
 pub use history::History;
 pub use link::{CABLE_NS_PER_M, Link};
 pub use software::SoftwareChange;
+pub use timing::TimingChange;
 
 #[cfg(test)]
 mod tests;

@@ -6,12 +6,13 @@ use linesman_proto::address::StationAddress;
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::WatchdogTime;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::change::Line;
 use super::history::History;
 use super::nodes::Entry;
 use super::software::Held;
+use super::timing::HeldTiming;
 use crate::controller::Controller;
 use crate::device::{Refusal, Signals, Trouble};
 use crate::truth::FaultId;
@@ -28,6 +29,11 @@ pub(super) enum Act {
     Watchdog(Option<WatchdogTime>),
     Report(Emergency),
     Address(Option<StationAddress>),
+    Drift { ppb: i64, ramp_ppb_per_s: i64, ramp: Span },
+    RestoreDrift,
+    RestartClock,
+    CutSync(bool),
+    SlowDown(Option<Span>),
 }
 
 /// A fault inside that waits for a frame.
@@ -58,6 +64,8 @@ pub(crate) struct Node {
     former_address: Option<[StationAddress; 2]>,
     /// What faults have done to its software.
     pub(super) software: Vec<Held>,
+    /// What faults have done to its clock and deadlines.
+    pub(super) timing: Vec<HeldTiming>,
     /// In the order of time.
     acts: VecDeque<(Instant, Act)>,
     /// What the book of all nodes keeps of it.
@@ -79,6 +87,7 @@ impl Node {
             address_by: None,
             former_address: None,
             software: Vec::new(),
+            timing: Vec::new(),
             acts: VecDeque::new(),
             entry: Entry::default(),
             last_frame: 0,
@@ -105,6 +114,13 @@ impl Node {
                     self.set_watchdog(at, time);
                 }
                 Act::Reboot => self.controller.reboot_processor(at, signals),
+                Act::Drift { ppb, ramp_ppb_per_s, ramp } => {
+                    self.controller.set_drift(at, ppb, ramp_ppb_per_s, ramp);
+                }
+                Act::RestoreDrift => self.controller.restore_drift(at),
+                Act::RestartClock => self.controller.restart_clock(at),
+                Act::CutSync(cut) => self.controller.cut_sync(cut),
+                Act::SlowDown(takes) => self.controller.slow_down(takes),
                 Act::Report(emergency) => self.controller.report(at, emergency),
                 Act::Address(address) => self.set_address(address),
             }

@@ -2,11 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
+mod clocks;
 mod exchange;
 mod faults;
 mod identification;
 mod oracle;
 mod rig;
 mod swarm;
+mod timing;
 mod traps;
 mod walk;

@@ -1,8 +1,9 @@
 //! The controllers that devices are made with.
 //!
 //! References: data sheets of ET1100 and ET1200 and of the IP core for programmable logic (numbers
-//! of FMMUs and SyncManagers, RAM, features at 0x0008); delays are those that were measured on real
-//! lines: 145 to 155 ns from terminal to terminal, about 500 ns over a short cable.
+//! of FMMUs and SyncManagers, RAM, features at 0x0008). Delays are those from which the walk makes the
+//! receive times that were measured on two real lines: 145 to 155 ns from terminal to terminal, 485 to
+//! 540 ns over a short cable (a test has both lines).
 
 use linesman_proto::port::PortMap;
 use linesman_proto::time::Span;
@@ -31,10 +32,10 @@ const ENHANCED_SYNC: u16 = 0x0100;
 const WITHOUT_EBUS: u16 = 0x00CC;
 
 const TIMING: Timing = Timing {
-    forward: Span::ns(130),
-    process: Span::ns(150),
-    ebus_crossing: Span::ns(20),
-    mii_crossing: Span::ns(400),
+    forward: Span::ns(125),
+    process: Span::ns(145),
+    ebus_crossing: Span::ns(10),
+    mii_crossing: Span::ns(350),
     ebus_loss_detection: Span::us(2),
     mii_loss_detection: Span::us(15),
     ebus_link_up: Span::us(500),
@@ -77,7 +78,7 @@ pub(in crate::device) const ET1200: Chip = Chip {
     ram_kib: 1,
     features: FULL | ENHANCED_SYNC,
     counting: COUNTING,
-    timing: Timing { forward: Span::ns(125), process: Span::ns(145), ..TIMING },
+    timing: TIMING,
 };
 
 /// Programmable logic with the IP core: it makes symbol errors anew when it forwards a bad frame.
