@@ -6,7 +6,7 @@ import os
 import sys
 
 from bench import HERE, NEAR, Segment, Watch, parse
-from plant import VENDOR, Plant
+from plant import Plant
 
 LINESMAN = os.environ.get("LINESMAN", "linesman")
 ETHERCRAB = os.environ.get("ETHERCRAB_PEER", "")
@@ -53,7 +53,7 @@ class Client:
     def exchange(self, line, plant, rounds, cycles=CYCLES, on=NEAR):
         """Takes a plant to OP and writes these rounds of values."""
         file = line.path("rounds.json")
-        file.write_text(json.dumps([plant.image(values) for values in rounds]))
+        file.write_text(json.dumps([plant.image(values, number) for number, values in enumerate(rounds)]))
         return self.run(line, on, cycles, CYCLE_US, file)
 
 
@@ -70,7 +70,7 @@ def found(result, plant, client):
     assert len(devices) == len(plant), f"found {len(devices)} SubDevices, expected {len(plant)}"
     for position, (device, (name, _, product)) in enumerate(zip(devices, plant.devices)):
         # Of a junction's inner controllers the data sheet tells no product.
-        expected = (VENDOR, product or device[1])
+        expected = (plant.vendors[position], product or device[1])
         assert device == expected, f"position {position} ({name}): found {device}, expected {expected}"
 
 
@@ -94,6 +94,8 @@ def values_came_back(result, plant, rounds, wires, held=None):
         read = plant.read(image)
         wrong = {name: (read[name], value) for name, value in expected.items() if read[name] != value}
         assert not wrong, f"round {number}: (read, expected) {wrong}"
+        if len(rounds) == ROUNDS:
+            plant.check_drives(image, number - 1)
         compared += len(expected)
     return compared
 

@@ -2,6 +2,7 @@
 and where in the process data each channel lies. Nothing here is asked of Linesman."""
 
 import random
+import struct
 import tomllib
 
 VENDOR = 2
@@ -23,8 +24,8 @@ class Kind:
     """A type: its products (one for each controller), its channels, what its analogue converters resolve, what it adds
     to the working counter of an LRW: 2 for outputs, 1 for inputs."""
 
-    def __init__(self, *products, outputs=None, inputs=None, low=-0x8000, lost_bits=0, wkc=None):
-        self.products, self.outputs, self.inputs = products, outputs, inputs
+    def __init__(self, *products, vendor=VENDOR, outputs=None, inputs=None, low=-0x8000, lost_bits=0, wkc=None):
+        self.products, self.vendor, self.outputs, self.inputs = products, vendor, outputs, inputs
         self.low, self.lost_bits = low, lost_bits
         self.wkc = 2 * bool(outputs) + bool(inputs) if wkc is None else wkc
 
@@ -53,10 +54,19 @@ KINDS = {
     "EL4102": Kind(0x10063052, outputs=words(2), low=0),
     "EL4112": Kind(0x10103052, outputs=words(2), low=0),
     "EL7041": Kind(0x1B813052, wkc=3),
+    # Its vendor is nobody: it is what all drives of the profile have in common.
+    "CiA402-Drive": Kind(0x402, vendor=0xFFFFFFF0, wkc=3),
     "EP1008-0001": Kind(0x03F04052, inputs=BITS_8),
     "EP2308-0001": Kind(0x09044052, outputs=BITS_4, inputs=BITS_4),
     "EP4174-0002": Kind(0x104E4052, outputs=words(4)),
 }
+
+
+# What a drive is told in one round after the other (controlword, target position), and what it must say then
+# (statusword under the mask 0x6F): ready to switch on, switched on, operation enabled, and on to another position.
+DRIVE_ROUNDS = [(0x06, 0, 0x21), (0x07, 0, 0x23), (0x0F, 0, 0x27), (0x0F, 5000, 0x27)]
+# Mode of operation: cyclic synchronous position.
+CSP = 8
 
 
 class Plant:
@@ -74,11 +84,13 @@ class Plant:
                 hanging[f"{before}.C"] = f"{name}/{part}"
         # (name, type or None for a further controller, product or None)
         self.devices = []
+        self.vendors = []
 
         def walk(controller):
             name, _, part = controller.partition("/")
             kind = kinds[name]
             self.devices.append((controller, None if part else kind, kind.products[int(part or 1) - 1]))
+            self.vendors.append(kind.vendor)
             for port in ORDER[1:]:
                 if f"{controller}.{port}" in hanging:
                     walk(hanging[f"{controller}.{port}"])
@@ -111,9 +123,20 @@ class Plant:
             rounds.append(values)
         return rounds
 
-    def image(self, values):
-        """The output bytes of each position that has channels, in hexadecimal."""
+    def drives(self):
+        """Positions of the drives."""
+        for position, (_, kind, _) in enumerate(self.devices):
+            if kind is KINDS["CiA402-Drive"]:
+                yield position
+
+    def image(self, values, number=0):
+        """The output bytes of each position that has channels, in hexadecimal; `number` is that of the round, from 0."""
         image = {}
+        for position in self.drives():
+            control, target, _ = DRIVE_ROUNDS[min(number, len(DRIVE_ROUNDS) - 1)]
+            # Each to a position of its own.
+            target *= position
+            image[str(position)] = struct.pack("<HbxiI", control, CSP, target, 0).hex()
         for position, name, _, (channels, stride, before, bits) in self.channels("outputs"):
             number = 0
             for channel in range(channels):
@@ -143,6 +166,17 @@ class Plant:
                     value -= 0x10000
                 values[f"{name}.{channel + 1}"] = value
         return values
+
+    def check_drives(self, image, number):
+        """Each drive is in the state that follows, and where it was sent."""
+        for position in self.drives():
+            status, mode, actual, _, error = struct.unpack("<Hbxii H".replace(" ", ""), bytes.fromhex(image[position]))
+            _, target, state = DRIVE_ROUNDS[number]
+            target *= position
+            told = f"round {number + 1}, drive at {position}: status 0x{status:04X}, mode {mode}, at {actual}, error 0x{error:04X}"
+            assert status & 0x6F == state, f"{told}; expected status 0x{state:02X} under 0x6F"
+            assert abs(actual - target) <= 100, f"{told}; expected position {target}"
+            assert state != 0x27 or mode == CSP, told
 
     def expected(self, driven):
         """What the inputs show when these values are at them; an open analogue input is not told."""

@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("device_builder", [images()?, descriptions()].concat()),
         ("esi", descriptions()),
         ("sii", images()?),
-        ("mailbox", messages()),
+        ("mailbox", messages().into_iter().chain(conversations()).collect()),
         ("capture", captures),
     ];
     for (target, inputs) in targets {
@@ -175,6 +175,65 @@ fn messages() -> Made {
         ("object", coe(8, &[0x04, 0, 0, 0, 0x00, 0x10, 7, 0, 0, 7, b'D', b'e', b'v'])),
         ("entry", coe(8, &[0x06, 0, 0, 0, 0x18, 0x10, 1, 0, 7, 0, 32, 0, 0x07, 0, b'V'])),
         ("error-reply", vec![4, 0, 0, 0, 0, 0x10, 1, 0, 2, 0]),
+    ]
+}
+
+/// Conversations with a device, in the form that its target reads: steps with length, flags, pause.
+fn conversations() -> Made {
+    const FETCH: u8 = 0x80;
+    let step = |flags: u8, bytes: &[u8]| {
+        let mut step = (bytes.len() as u16).to_le_bytes().to_vec();
+        step.extend([flags, 4]);
+        step.extend_from_slice(bytes);
+        step
+    };
+    let message = |kind: u8, body: &[u8]| {
+        let len = (body.len() as u16).to_le_bytes();
+        let head = [len[0], len[1], 0, 0, 0, kind];
+        step(FETCH, &[&head[..], body].concat())
+    };
+    let sdo = |body: &[u8]| message(0x03, &[&[0x00, 0x20][..], body].concat());
+    let foe = |body: &[u8]| message(0x04, body);
+    let boot = step(10, &[]);
+    let init = step(9, &[1]);
+    vec![
+        (
+            "device-objects",
+            [
+                sdo(&[0x40, 0x08, 0x10, 0, 0, 0, 0, 0]),
+                sdo(&[0x50, 0x12, 0x1C, 0, 0, 0, 0, 0]),
+                sdo(&[0x2F, 0xF3, 0x10, 3, 0, 0, 0, 0]),
+                sdo(&[0x40, 0xF3, 0x10, 6, 0, 0, 0, 0]),
+                message(0x03, &[0, 0x80, 1, 0, 0, 0, 1, 0]),
+                step(12, &[2]),
+                step(8, &[]),
+            ]
+            .concat(),
+        ),
+        (
+            "device-file",
+            [
+                foe(b"\x01\0\0\0\0\0settings.txt"),
+                foe(b"\x04\0\x01\0\0\0"),
+                foe(b"\x02\0\0\0\0\0settings.txt"),
+                foe(b"\x03\0\x01\0\0\0new"),
+            ]
+            .concat(),
+        ),
+        (
+            "device-firmware",
+            [
+                boot,
+                foe(b"\x02\0\0\0\0\0a.efw"),
+                foe(b"\x03\0\x01\0\0\0Linesman firmware EL6601 12 CBF43926\n123456789"),
+                step(15, &[]),
+                foe(b"\x03\0\x01\0\0\0Linesman firmware EL6601 12 CBF43926\n123456789"),
+                init,
+                step(11, &[]),
+                sdo(&[0x40, 0x0A, 0x10, 0, 0, 0, 0, 0]),
+            ]
+            .concat(),
+        ),
     ]
 }
 

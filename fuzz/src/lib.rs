@@ -4,6 +4,7 @@
 //! by an assertion here, such as "what was built reads as what was meant".
 
 mod capture;
+mod device;
 mod device_builder;
 mod diagnosis;
 mod esi;

@@ -1,16 +1,28 @@
-//! Mailbox messages: header, protocol, answer.
+//! Mailbox messages: header, protocol, answer; and a device that gets them.
 
-use linesman_proto::mailbox::coe::Message as CoeMessage;
+use linesman_proto::mailbox::coe::{DiagnosisMessage, Message as CoeMessage};
 use linesman_proto::mailbox::coe::information::{EntryDescription, ObjectDescription, ObjectList};
+use linesman_proto::mailbox::foe::Message as FoeMessage;
 use linesman_proto::mailbox::{ErrorReply, Message};
 
 /// Any bytes may lie in a mailbox. A CoE message that is read and written again is the same one.
 pub fn mailbox(data: &[u8]) {
+    crate::device::drive(data);
+    codec(data);
+}
+
+fn codec(data: &[u8]) {
     let Ok(message) = Message::parse(data) else { return };
     let _ = ErrorReply::parse(message.data);
     let _ = ObjectDescription::parse(message.data).map(|object| object.name_text().len());
     let _ = EntryDescription::parse(message.data).map(|entry| entry.name_text().len());
     let _ = ObjectList::parse(message.data).map(|list| list.indices().count());
+    if let Ok(file) = FoeMessage::parse(message.data) {
+        let mut buffer = [0_u8; 0x1_0000];
+        let len = file.write(&mut buffer).expect("no longer than it was");
+        assert_eq!(FoeMessage::parse(&buffer[..len]), Ok(file));
+    }
+    let _ = DiagnosisMessage::parse(message.data).map(|note| note.parameters().count());
     let Ok(coe) = CoeMessage::parse(message.data) else { return };
     let mut buffer = [0_u8; 0x1_0000];
     let Ok(len) = coe.write(&mut buffer) else { return };

@@ -1,6 +1,7 @@
 //! The swarm's invariants, on two hundred seeds.
 
-use linesman_lab::swarm::{SwarmOptions, swarm};
+use linesman_lab::swarm::{SwarmOptions, run_physics_seed, swarm};
+use linesman_sim::fault::{KINDS, Kind};
 
 /// Seeds of this test: two hundred, unless `SEEDS=A..B` says others.
 fn seeds() -> std::ops::Range<u64> {
@@ -20,4 +21,31 @@ fn the_first_seeds_are_green() {
     assert!(effective * 2 > all, "{effective} of {all} seeds had a fault with an effect");
     let checked: u64 = report.seeds.iter().map(|seed| seed.counters_checked).sum();
     assert!(checked > 1_000, "only {checked} working counters were checked");
+}
+
+/// Seeds of the physics swarm: three hundred, unless `SEEDS=A..B` says others.
+fn physics_seeds() -> std::ops::Range<u64> {
+    let chosen = seeds();
+    if chosen == (1..201) { 0..300 } else { chosen }
+}
+
+#[test]
+fn the_segment_is_sound_whatever_breaks() {
+    let reports: Vec<_> = physics_seeds().map(run_physics_seed).collect();
+    let failed: Vec<String> =
+        reports.iter().filter(|seed| !seed.is_green()).map(ToString::to_string).collect();
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+    if reports.len() < 300 {
+        return;
+    }
+    // Every kind of the catalogue was drawn, and most of what was drawn did something.
+    let drawn = |kind: &Kind| {
+        let name = kind.name.name();
+        reports.iter().flat_map(|seed| &seed.faults).any(|fault| fault.starts_with(name))
+    };
+    let never: Vec<_> = KINDS.iter().filter(|kind| !drawn(kind)).map(|kind| kind.name).collect();
+    assert!(never.is_empty(), "never drawn: {never:?}");
+    let effective: usize = reports.iter().map(|seed| seed.effective).sum();
+    let all: usize = reports.iter().map(|seed| seed.faults.len()).sum();
+    assert!(effective * 2 > all, "{effective} of {all} faults had an effect");
 }

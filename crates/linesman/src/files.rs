@@ -88,6 +88,24 @@ impl DescriptionFiles for Beside<'_> {
     }
 }
 
+/// The bytes of a file that is not for people, of at most `most` bytes.
+pub(crate) fn bytes(path: &Path, what: &str, most: u64) -> Result<Vec<u8>, Failure> {
+    let refuse = |error: std::io::Error| {
+        Failure::new(format!("{}: reading {what}: {error}", path.display()), "check the path")
+    };
+    let len = fs::metadata(path).map_err(refuse)?.len();
+    if len > most {
+        let reason = format!("{}: {len} bytes, expected {what} of at most {most}", path.display());
+        return Err(Failure::new(reason, "check the path"));
+    }
+    fs::read(path).map_err(refuse)
+}
+
+/// A device description.
+pub(crate) fn description(path: &Path) -> Result<Vec<u8>, Failure> {
+    bytes(path, "a device description", MAX_DESCRIPTION)
+}
+
 /// A project file.
 pub(crate) fn project(path: &Path) -> Result<Project, Failure> {
     let text = text(path, "a project")?;

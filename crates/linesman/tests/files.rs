@@ -89,7 +89,7 @@ fn what_is_wrong_is_told_with_file_and_reason() {
         ("esi:esi/maker.xml#LAMP-5", PUMP, "it has no device \"LAMP-5\"; it has LAMP-4 and 2 more"),
         ("esi:esi/maker.xml#LAMP-4@3", PUMP, "it has no revision 0x00000003 of \"LAMP-4\""),
         ("esi:maker.xml#LAMP-4", PUMP, "maker.xml: No such file"),
-        (no_cap, PUMP, "line 32, END-CAP: it has neither EEPROM nor SyncManagers"),
+        (no_cap, PUMP, "END-CAP: it has neither EEPROM nor SyncManagers"),
         ("sii:blank.bin", PUMP, "SII image is blank"),
         ("esi:blank.bin#X", PUMP, "`blank.bin`: "),
         ("EL9999", PUMP, "a type from a file is written `esi:FILE#TYPE` or `sii:FILE`"),

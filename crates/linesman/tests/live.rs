@@ -3,66 +3,8 @@
 
 mod support;
 
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
-
-use support::{PROGRAM, Run, assert_valid, run};
-use tempfile::TempDir;
-
-const PLANT: &str = r#"
-name = "live"
-seed = 3
-[[device]]
-name = "K1"
-type = "EK1100"
-on = "maindevice"
-[[device]]
-name = "I1"
-type = "EL1008"
-on = "K1.B"
-[[device]]
-name = "O1"
-type = "EL2008"
-on = "I1.B"
-"#;
-
-/// A virtual cable from `near0` to `far0`, with a segment on the far end while the script runs.
-const BENCH: &str = r#"
-set -e
-ip link add near0 type veth peer name far0
-for card in near0 far0; do
-    sysctl -q -w net.ipv6.conf.$card.disable_ipv6=1
-    ip link set $card up
-done
-"$LINESMAN" sim "$PLANT" --on far0 --control "$DIRECTORY/control" > "$DIRECTORY/sim.out" &
-sim=$!
-trap 'kill -INT $sim 2> /dev/null; wait $sim || true' EXIT
-for try in $(seq 100); do
-    grep -q Ctrl-C "$DIRECTORY/sim.out" 2> /dev/null && break
-    sleep 0.05
-done
-set +e
-"#;
-
-/// Runs a script beside a segment; `None`, said aloud, where that cannot be.
-fn beside_segment(script: &str) -> Option<Run> {
-    let in_namespace = |script: &str| {
-        let mut command = Command::new("unshare");
-        command.args(["--net", "bash", "-c", script]).stdin(Stdio::null());
-        command
-    };
-    let probe = "ip link add near0 type veth peer name far0";
-    if !in_namespace(probe).output().is_ok_and(|output| output.status.success()) {
-        eprintln!("SKIPPED: a network namespace with a virtual cable cannot be made here");
-        return None;
-    }
-    let directory = TempDir::new().expect("a temporary directory");
-    let plant: PathBuf = directory.path().join("plant.toml");
-    std::fs::write(&plant, PLANT).expect("a file can be written");
-    let mut command = in_namespace(&format!("{BENCH}{script}"));
-    command.env("LINESMAN", PROGRAM).env("PLANT", &plant).env("DIRECTORY", directory.path());
-    Some(run(&mut command))
-}
+use support::assert_valid;
+use support::bench::beside_segment;
 
 #[test]
 fn a_scan_finds_each_subdevice_and_its_neighbours() {

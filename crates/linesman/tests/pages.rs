@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
+#[path = "support/segment_file_page.rs"]
+mod segment_file_page;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -10,8 +13,10 @@ use std::path::PathBuf;
 use linesman_diagnosis::rule;
 use linesman_proto::port::Port;
 use linesman_sim::device::library;
-use linesman_sim::fault::{KINDS, PlaceRule, Shape};
+use linesman_sim::fault::{KINDS, Shape, manual};
 use linesman_sim::hardware::PortKind;
+use linesman_sim::segment::Segment;
+use linesman_sim::segment_file::SegmentFile;
 
 fn docs() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs")
@@ -41,8 +46,27 @@ fn pages() -> BTreeMap<String, String> {
     pages.insert("findings/README.md".to_owned(), index);
     pages.insert("guide/faults.md".to_owned(), faults());
     pages.insert("guide/devices.md".to_owned(), devices());
+    pages.insert("guide/segment-file.md".to_owned(), segment_file_page::page());
     pages
 }
+
+/// What is said of all faults.
+const FAULTS_HEAD: &str = "# Faults of a virtual segment\n\n\
+Generated from the fault catalogue. A fault is put into a segment file as a `[[fault]]`, or onto a line that runs \
+with `linesman fault SOCKET inject KIND --at PLACE KEY=VALUE …`. Each takes its `kind`, a place, the parameters of \
+its kind, and when it comes:\n\n\
+| key | meaning |\n|---|---|\n\
+| `from_ms` | when it begins, in ms since the start of the run; at once unless said, and always at once with `linesman fault` |\n\
+| `to_ms` | when it is over for good; it lasts unless said |\n\
+| `for_ms` | how long it stays each time |\n\
+| `at_ms` | it comes at this time, or at each of a list, in ms after its begin: `at_ms = [0, 500, 900]` |\n\
+| `every_ms` | it comes again and again, from one begin to the next |\n\
+| `random` | it comes by chance, by the segment's seed: `{ mean_ms = 500.0, for_ms = 20.0 }`, the mean pause and the mean stay |\n\
+| `times` | how often it comes at most |\n\
+| `burst` | each time it comes, it comes several times in quick succession: `{ count = 3, every_ms = 40.0 }` |\n\n\
+At most one of `at_ms`, `every_ms` and `random`; with each of them `for_ms` says how long it stays. A parameter of the \
+same name belongs to the kind. Places are links `K1.C-B3.A` (or one end of them), directions `K1.C>B3.A`, devices by \
+name, and cards. What each fault leaves on the wires is played in `scenarios/physics-*.md`.\n";
 
 /// A word as JSON has it.
 fn word<T: serde::Serialize>(value: &T) -> String {
@@ -65,31 +89,15 @@ fn headed(manual: &str) -> String {
 }
 
 fn faults() -> String {
-    let mut text = String::from(
-        "# Faults of a virtual segment\n\nGenerated from the fault catalogue. Every `[[fault]]` takes \
-         `kind`, a place, `from_ms` (at once unless said), `to_ms` (it lasts unless said), and the \
-         parameters of its kind.\n",
-    );
+    let mut text = String::from(FAULTS_HEAD);
     for kind in KINDS {
-        let place = match kind.place {
-            PlaceRule::Link => "`at`: a link, `K1.C-B3.A`",
-            PlaceRule::Lines => "`at`: a link `K1.C-B3.A`, or one direction of it `K1.C>B3.A`",
-            PlaceRule::ManyLines => {
-                "`at`: a link `K1.C-B3.A`, one direction of it `K1.C>B3.A`, or a list of those"
-            }
-            PlaceRule::Line => "`at`: one direction of a link, `K1.C>B3.A`",
-            PlaceRule::Device => "`device`",
-            PlaceRule::Feed => "`device`, one that feeds the E-bus",
-            PlaceRule::Pair => "`devices`, a list of two",
-            PlaceRule::Processor => "`device`, one with a processor",
-            PlaceRule::Mailbox => "`device`, one with a mailbox",
-            PlaceRule::DeviceOrCard => {
-                "`device`; or `at`: a card, `maindevice` (unless said) or `maindevice.B`"
-            }
-            PlaceRule::Devices => "`device`, or `devices` with a list",
-            PlaceRule::Card => "`at`: a card, `maindevice` (unless said) or `maindevice.B`",
-        };
-        write!(text, "\n## {}\n\n{}\n\nPlace: {place}.\n", kind.name, kind.name.meaning()).unwrap();
+        let place = kind.place.allowed();
+        write!(text, "\n## {}\n\n{}\n\n", kind.name, kind.name.meaning()).unwrap();
+        let page = manual(kind.name);
+        if !page.is_empty() {
+            writeln!(text, "{}\n", page.trim_end()).unwrap();
+        }
+        writeln!(text, "Place: {place}.").unwrap();
         if !kind.parameters.is_empty() {
             text.push_str("\n| parameter | range | unless said | meaning |\n|---|---|---|---|\n");
         }
@@ -161,4 +169,41 @@ fn the_pages_are_up_to_date() {
         stale.is_empty(),
         "{stale:?}: run `LINESMAN_WRITE_PAGES=1 cargo test -p linesman --test pages`"
     );
+}
+
+/// What stands between "```toml" and "```" in a page of the guide.
+fn examples(page: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(docs().join("guide").join(page)).unwrap();
+    let blocks = text.split("```toml\n").skip(1);
+    blocks.map(|block| block.split("```").next().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn segment_files_of_the_guide_can_be_built() {
+    for page in ["segment-file.md", "virtual-segment.md"] {
+        let examples = examples(page);
+        assert!(!examples.is_empty(), "{page} has no example");
+        for example in examples {
+            let file = SegmentFile::parse(&example)
+                .unwrap_or_else(|error| panic!("{page}: {error}\n{example}"));
+            Segment::build(&file).unwrap_or_else(|error| panic!("{page}: {error}\n{example}"));
+        }
+    }
+}
+
+#[test]
+fn every_key_of_the_segment_file_is_explained() {
+    let page = segment_file_page::page();
+    let schema = serde_json::to_value(schemars::schema_for!(SegmentFile)).unwrap();
+    let mut tables = vec![&schema];
+    tables.extend(schema["$defs"].as_object().unwrap().values());
+    let mut keys = 0;
+    for key in tables.iter().filter_map(|table| table["properties"].as_object()).flatten() {
+        let row = page.lines().find(|line| line.starts_with(&format!("| `{}` |", key.0)));
+        let row = row.unwrap_or_else(|| panic!("`{}` is missing", key.0));
+        let meaning = row.trim_end_matches(" |").rsplit(" | ").next().unwrap();
+        assert!(meaning.len() > 8, "`{}` has no meaning: {row}", key.0);
+        keys += 1;
+    }
+    assert!(keys > 20, "{keys} keys");
 }

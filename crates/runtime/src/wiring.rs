@@ -25,8 +25,11 @@ impl Wiring {
     /// Wires a segment; `project` says which types its devices are.
     #[must_use]
     pub fn of(segment: &Segment, project: &Project) -> Self {
-        let group = |type_name: &str| {
-            library::types().find(|one| one.name() == type_name).map_or("", |one| one.group())
+        // A device that is made from a file may be called as one of the library, but has other
+        // channels.
+        let group = |type_name: &str, channels: (usize, usize)| {
+            let named = library::types().find(|one| one.name() == type_name);
+            named.filter(|one| one.channels() == channels).map_or("", |one| one.group())
         };
         let mut wires = Vec::new();
         for (from, to) in PAIRS {
@@ -34,7 +37,8 @@ impl Wiring {
             let mut inputs = Vec::new();
             for device in segment.devices() {
                 let Some(planned) = project.devices.get(device.index()) else { continue };
-                match group(&planned.type_name) {
+                let channels = (segment.outputs(device).len(), segment.inputs(device).len());
+                match group(&planned.type_name, channels) {
                     kind if kind == from => outputs.extend_from_slice(segment.outputs(device)),
                     kind if kind == to => inputs.extend_from_slice(segment.inputs(device)),
                     _ => {}

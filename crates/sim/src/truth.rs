@@ -57,6 +57,11 @@ pub enum Effect {
         /// Number of the frame in the segment.
         frame: u64,
     },
+    /// Somebody else than the MainDevice sent a frame.
+    StrangerSent {
+        /// Number of the frame in the segment.
+        frame: u64,
+    },
     /// A processing unit counted an undamaged frame for what is in it: foreign, too short,
     /// circulating.
     ContentRefused {
@@ -138,6 +143,8 @@ pub enum Effect {
         /// The station address or alias.
         address: u16,
     },
+    /// A cable is plugged into another port than planned.
+    WrongPort,
 }
 
 impl Effect {
@@ -208,6 +215,10 @@ pub struct FaultRecord {
     pub frames_spoiled: u64,
     /// Frames, or rests of frames, that vanished.
     pub frames_lost: u64,
+    /// Frames that it sent itself.
+    pub frames_sent: u64,
+    /// Frames that it kept back.
+    pub frames_delayed: u64,
     /// Ends of links that lost their link.
     pub links_lost: u64,
     /// Controllers that lost their supply.
@@ -229,6 +240,8 @@ impl FaultRecord {
             Effect::FrameLost { .. } => self.frames_lost += 1,
             Effect::SignalLost => self.links_lost += 1,
             Effect::PowerLost => self.supplies_lost += 1,
+            Effect::StrangerSent { .. } => self.frames_sent += 1,
+            Effect::FrameHeldBack { .. } => self.frames_delayed += 1,
             Effect::ContentRefused { .. }
             | Effect::SignalBack
             | Effect::PowerBack
@@ -248,13 +261,13 @@ impl FaultRecord {
             | Effect::SyncBack
             | Effect::WorkTakes { .. }
             | Effect::WorkRestored
-            | Effect::FrameHeldBack { .. }
             | Effect::OldCounters
             | Effect::WrongDevice
             | Effect::MissingDevice
             | Effect::ExtraDevice
             | Effect::SwappedDevice
-            | Effect::SharedAddress { .. } => {}
+            | Effect::SharedAddress { .. }
+            | Effect::WrongPort => {}
         }
     }
 }
@@ -321,6 +334,8 @@ impl TruthLog {
             symbol_errors: 0,
             frames_spoiled: 0,
             frames_lost: 0,
+            frames_sent: 0,
+            frames_delayed: 0,
             links_lost: 0,
             supplies_lost: 0,
         });

@@ -24,7 +24,7 @@ impl Lab {
 
     /// The plan's identity of a SubDevice of the project; the other way round than
     /// [`Lab::of_plan`].
-    fn in_plan(&self, id: DeviceId) -> DeviceId {
+    pub(super) fn in_plan(&self, id: DeviceId) -> DeviceId {
         let at = self.tree.order().iter().position(|node| *node == id.index());
         at.map_or(id, |at| DeviceId(at as u32))
     }

@@ -6,6 +6,7 @@
 
 mod error;
 mod exchange;
+mod object;
 mod truth;
 
 use std::collections::{BTreeMap, VecDeque};

@@ -6,7 +6,7 @@
 //! expect no other counter
 //! expect port NAME.PORT [open|closed] [with link|without link]
 //! expect state NAME STATE [error CODE]
-//! expect lost|damaged|vanished frames AMOUNT
+//! expect lost|damaged|vanished|dropped frames AMOUNT
 //! expect answered | unanswered
 //! expect working counter full|short
 //! expect reached AMOUNT
@@ -66,12 +66,14 @@ pub struct Moved {
 /// What became of frames.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Fate {
-    /// They came back damaged, or not at all.
+    /// They came back damaged or not at all, or the host lost them.
     Lost,
     /// They came back damaged.
     Damaged,
     /// They did not come back.
     Vanished,
+    /// They came back whole, and the host lost them.
+    Dropped,
 }
 
 /// Something that must be so on the segment.
@@ -140,6 +142,7 @@ impl Ground {
             "lost" => frames(Fate::Lost, words)?,
             "damaged" => frames(Fate::Damaged, words)?,
             "vanished" => frames(Fate::Vanished, words)?,
+            "dropped" => frames(Fate::Dropped, words)?,
             "answered" => Self::Answered(true),
             "unanswered" => Self::Answered(false),
             "working" => {
@@ -263,7 +266,7 @@ fn register(words: &mut Words<'_>) -> Result<Ground, String> {
 }
 
 /// `0x1234`: as many bytes as pairs of digits, lowest first.
-fn value(text: &str) -> Option<Vec<u8>> {
+pub(super) fn value(text: &str) -> Option<Vec<u8>> {
     let digits = text.strip_prefix("0x")?;
     if digits.is_empty() || digits.len() % 2 != 0 || !digits.is_ascii() {
         return None;

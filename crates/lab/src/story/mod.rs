@@ -28,6 +28,7 @@
 //! they stand.
 
 pub mod ground;
+pub mod object;
 pub mod parse;
 pub mod run;
 pub mod step;

@@ -215,6 +215,12 @@ impl Stage {
         if let Expectation::Ground(ground) = what {
             self.witness.names(&self.lab, ground);
         }
+        if let Expectation::Object(reading) = what {
+            let id = self.device(&reading.device);
+            let name = &reading.device;
+            let id = id.ok_or_else(|| format!("no SubDevice of this line is called `{name}`"))?;
+            return reading.check(id, &mut self.lab);
+        }
         let what = self.resolve(what)?;
         let held = self
             .lab
@@ -325,6 +331,8 @@ fn holds(resolved: &Resolved<'_>, lab: &Lab, witness: &Witness) -> Result<(), St
             check(found == *status, &format!("exit status {status}, found {found}"))
         }
         Expectation::Ground(ground) => witness.holds(ground, lab),
+        // Reading takes time of its own and is done before.
+        Expectation::Object(_) => Ok(()),
     }
 }
 

@@ -4,6 +4,7 @@
 //! [at TIME] inject FAULT at PLACE [for TIME] [with KEY = VALUE, …]
 //! [at TIME] inject FAULT at device NAME [for TIME] [with …]
 //! [at TIME] inject FAULT at devices NAME, NAME [for TIME] [with …]
+//! [at TIME] inject FAULT at supply NAME [for TIME] [with …]
 //! [at TIME] heal [FAULT]
 //! at TIME
 //! [at TIME] expect verdict [on FAULT] [within TIME]
@@ -14,6 +15,7 @@
 //! [at TIME] expect all closed [within TIME]
 //! [at TIME] expect line up [within TIME]
 //! [at TIME] expect exit N
+//! [at TIME] expect object …     what comes of reading an object: see `object`
 //! [at TIME] expect …            what is so on the segment: see `ground`
 //! ```
 //! `PLACE` is `K1.C-B3.A` (a link), `K1.C>B3.A` (one direction), `device K1`, `host` or `network`.
@@ -23,6 +25,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
 
 use super::ground::Ground;
+use super::object::Reading;
 
 /// A step and where it stands.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -107,6 +110,8 @@ pub enum Expectation {
     Exit(u8),
     /// Something is so on the segment, whatever the diagnosis says.
     Ground(Ground),
+    /// Something comes of reading an object.
+    Object(Reading),
 }
 
 /// Reads the text of a list item; the error says what was expected.
@@ -155,6 +160,8 @@ fn inject(words: &mut Words<'_>) -> Result<Step, String> {
     } else if let Some(devices) = place.strip_prefix("devices ") {
         let devices: Vec<&str> = devices.split(',').map(str::trim).collect();
         entry += &format!("devices = {devices:?}\n");
+    } else if let Some(supply) = place.strip_prefix("supply ") {
+        entry += &format!("supply = {:?}\n", supply.trim());
     } else {
         entry += &format!("at = {place:?}\n");
     }
@@ -223,6 +230,7 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             words.expect("up")?;
             Expectation::LineUp
         }
+        "object" => Expectation::Object(Reading::parse(words)?),
         "exit" => {
             let status = words.next();
             Expectation::Exit(status.parse().map_err(|_| format!("`{status}` is no exit status"))?)
@@ -236,7 +244,7 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
                     "`{other}` cannot be expected: expected `verdict`, `finding`, `no finding`, `N findings`, \
                      `healthy`, `inconclusive`, `all closed`, `line up`, `exit N`, or something of the \
                      segment: `counter`, `no other counter`, `port`, `state`, `lost frames`, \
-                     `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`"
+                     `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`, `object`"
                 )
             })?;
             if !words.take("findings") {

@@ -143,14 +143,17 @@ impl Witness {
                 let (now, then) = (lab.segment().frames(), self.tally);
                 let damaged = now.damaged - then.damaged;
                 let vanished = now.vanished - then.vanished;
+                let dropped = now.dropped - then.dropped;
                 let count = match fate {
-                    Fate::Lost => damaged + vanished,
+                    Fate::Lost => damaged + vanished + dropped,
                     Fate::Damaged => damaged,
                     Fate::Vanished => vanished,
+                    Fate::Dropped => dropped,
                 };
                 check(amount.takes(count), || {
                     format!(
-                        "{amount} such frames: {damaged} came back damaged, {vanished} not at all"
+                        "{amount} such frames: {damaged} came back damaged, {vanished} not at all, \
+                         {dropped} were lost by the host"
                     )
                 })
             }

@@ -283,7 +283,9 @@ impl<'a> Episode<'a> {
                 | Effect::MissingDevice
                 | Effect::ExtraDevice
                 | Effect::SwappedDevice
-                | Effect::SharedAddress { .. } => false,
+                | Effect::SharedAddress { .. }
+                | Effect::StrangerSent { .. }
+                | Effect::WrongPort => false,
             },
             Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => false,
         })

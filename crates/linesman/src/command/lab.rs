@@ -12,6 +12,7 @@ use std::thread;
 
 use linesman_lab::story::Story;
 use linesman_lab::story::run::play;
+use linesman_lab::swarm::physics::{PhysicsReport, run_physics_seed};
 use linesman_lab::swarm::run::{SeedReport, SwarmOptions, SwarmReport, run_seed};
 
 use crate::exit::Status;
@@ -42,6 +43,10 @@ enum Command {
         /// From the first seed up to, not including, the second
         #[arg(long, value_name = "A..B", value_parser = seeds)]
         seeds: Range<u64>,
+        /// The segment alone: any fault of the catalogue and frames of chance, without MainDevice or
+        /// diagnosis
+        #[arg(long)]
+        physics: bool,
         /// Only what did not hold, and the sum
         #[arg(long, short)]
         quiet: bool,
@@ -63,7 +68,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     match &arguments.command {
         Command::Run { stories } => run_stories(stories, output),
         Command::Replay(arguments) => replay::run(arguments, output),
-        Command::Swarm { seeds, quiet } => Ok(run_swarm(seeds.clone(), *quiet, output)),
+        Command::Swarm { seeds, physics: true, quiet } => {
+            Ok(run_physics(seeds.clone(), *quiet, output))
+        }
+        Command::Swarm { seeds, quiet, .. } => Ok(run_swarm(seeds.clone(), *quiet, output)),
     }
 }
 
@@ -124,20 +132,63 @@ fn run_swarm(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {
     if report.is_green() { Status::Good } else { Status::Findings }
 }
 
-/// Runs the seeds on all processors, and shows each report in the order of the seeds.
+fn run_physics(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {
+    let total = seeds.end - seeds.start;
+    let mut progress = Progress::new();
+    let (mut done, mut failed, mut faults, mut effective, mut frames) = (0, 0, 0, 0, 0);
+    on_all_processors(seeds, run_physics_seed, |seed: PhysicsReport| {
+        done += 1;
+        failed += u64::from(!seed.is_green());
+        faults += seed.faults.len() as u64;
+        effective += seed.effective as u64;
+        frames += seed.tally.sent;
+        if !quiet || !seed.is_green() {
+            progress.clear();
+            output.line(&seed.to_string());
+        }
+        progress.show(|| format!("{done} of {}", count(total, "seed")));
+    });
+    progress.clear();
+    output.line(&format!(
+        "{}, {failed} failed: {}, {effective} of them with an effect; {} sent, each seed twice.",
+        count(total, "seed"),
+        count(faults, "fault"),
+        count(frames, "frame"),
+    ));
+    if failed == 0 { Status::Good } else { Status::Findings }
+}
+
+/// Runs the seeds and gives their reports in order.
 fn swarm(seeds: Range<u64>, mut show: impl FnMut(&SeedReport)) -> SwarmReport {
     let options = SwarmOptions::default();
+    let mut report = SwarmReport::default();
+    on_all_processors(
+        seeds,
+        |seed| run_seed(seed, &options),
+        |of_seed| {
+            show(&of_seed);
+            report.seeds.push(of_seed);
+        },
+    );
+    report
+}
+
+/// Runs the seeds on all processors, and hands on each report in the order of the seeds.
+fn on_all_processors<R: Send>(
+    seeds: Range<u64>,
+    run: impl Fn(u64) -> R + Sync,
+    mut hand_on: impl FnMut(R),
+) {
     let threads = thread::available_parallelism().map_or(1, NonZero::get);
     let next = AtomicU64::new(seeds.start);
-    let mut report = SwarmReport::default();
     thread::scope(|scope| {
         let (sender, receiver) = mpsc::channel();
         for _ in 0..threads {
-            let (sender, next, options) = (sender.clone(), &next, &options);
+            let (sender, next, run) = (sender.clone(), &next, &run);
             scope.spawn(move || {
                 loop {
                     let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed >= seeds.end || sender.send(run_seed(seed, options)).is_err() {
+                    if seed >= seeds.end || sender.send((seed, run(seed))).is_err() {
                         return;
                     }
                 }
@@ -146,16 +197,14 @@ fn swarm(seeds: Range<u64>, mut show: impl FnMut(&SeedReport)) -> SwarmReport {
         drop(sender);
         let mut early = BTreeMap::new();
         let mut expected = seeds.start;
-        for of_seed in receiver {
-            early.insert(of_seed.seed, of_seed);
-            while let Some(of_seed) = early.remove(&expected) {
-                show(&of_seed);
-                report.seeds.push(of_seed);
+        for (seed, report) in receiver {
+            early.insert(seed, report);
+            while let Some(report) = early.remove(&expected) {
+                hand_on(report);
                 expected += 1;
             }
         }
     });
-    report
 }
 
 fn sum(report: &SwarmReport) -> String {

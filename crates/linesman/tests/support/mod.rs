@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "no test file uses all of it")]
 
+pub(crate) mod bench;
 pub(crate) mod capture;
 pub(crate) mod schema;
 

@@ -26,11 +26,17 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
     let Some(device) = plan.device(id) else { return };
     let Some(mut multiplexer) = Multiplexer::new(&context, device) else { return };
     let interval = context.options.mailbox_interval;
+    let mut openings = 0;
     loop {
         let job = context.mailboxes.next(id, context.wire.sleep(interval)).await;
-        let open = lock(&context.line).has_mailbox(id);
-        if !open {
+        let (open, now) = {
+            let line = lock(&context.line);
+            (line.has_mailbox(id), line.mailbox_openings(id))
+        };
+        // It may have been closed and opened again between two looks.
+        if !open || openings != now {
             multiplexer.reset();
+            openings = now;
         }
         match job {
             Some(job) if open => work(&context, &mut multiplexer, id, job).await,

@@ -40,6 +40,8 @@ struct Live {
     settled: bool,
     /// It is at its target.
     reached: bool,
+    /// How often its mailbox was opened: each time both ends begin to count anew.
+    openings: u32,
     mailbox: bool,
 }
 
@@ -105,7 +107,7 @@ impl Line {
             Found::Lost => true,
             Found::There { .. } | Found::Unknown => false,
         };
-        *live = Live { found, settled, ..Live::default() };
+        *live = Live { found, settled, openings: live.openings, ..Live::default() };
         before
     }
 
@@ -127,7 +129,9 @@ impl Line {
     fn set(&mut self, id: DeviceId, state: Option<AlState>, settled: bool, reached: bool) {
         let Some(live) = self.live(id) else { return };
         live.served = state.is_some_and(AlState::has_inputs);
-        live.mailbox = state.is_some_and(AlState::has_mailbox);
+        let mailbox = state.is_some_and(AlState::has_mailbox);
+        live.openings += u32::from(mailbox && !live.mailbox);
+        live.mailbox = mailbox;
         (live.settled, live.reached) = (settled, reached);
         self.version += 1;
     }
@@ -135,6 +139,11 @@ impl Line {
     /// Whether the mailbox of a SubDevice can be used.
     pub(crate) fn has_mailbox(&self, id: DeviceId) -> bool {
         self.devices.get(id.index()).is_some_and(|live| live.mailbox)
+    }
+
+    /// How often the mailbox of a SubDevice was opened so far.
+    pub(crate) fn mailbox_openings(&self, id: DeviceId) -> u32 {
+        self.devices.get(id.index()).map_or(0, |live| live.openings)
     }
 
     /// Notes that all have reached their targets; true the first time.

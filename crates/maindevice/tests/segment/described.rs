@@ -125,3 +125,58 @@ fn pdos_that_exclude_each_other_are_refused() {
     let refused = |event: &Event| matches!(event, Event::Refused { code, .. } if code.0 == 0x0024);
     assert!(bench.run_until(Span::s(5), refused), "{}: {:#?}", bench.state("V"), bench.events);
 }
+
+/// A drive whose description has neither limits nor windows.
+const DRIVE: &str = r##"<EtherCATInfo><Vendor><Id>#x815</Id></Vendor><Descriptions><Devices>
+<Device Physics="YY"><Type ProductCode="#x402" RevisionNo="1">AXIS</Type><Name>Axis</Name>
+ <Sm DefaultSize="128" StartAddress="#x1000" ControlByte="#x26" Enable="1">MBoxOut</Sm>
+ <Sm DefaultSize="128" StartAddress="#x1080" ControlByte="#x22" Enable="1">MBoxIn</Sm>
+ <Sm StartAddress="#x1100" ControlByte="#x64" Enable="1">Outputs</Sm>
+ <Sm StartAddress="#x1180" ControlByte="#x20" Enable="1">Inputs</Sm>
+ <RxPdo Fixed="1" Sm="2"><Index>#x1600</Index><Name>Out</Name>
+  <Entry><Index>#x6040</Index><SubIndex>0</SubIndex><BitLen>16</BitLen><Name>Controlword</Name><DataType>UINT</DataType></Entry>
+  <Entry><Index>#x607A</Index><SubIndex>0</SubIndex><BitLen>32</BitLen><Name>Target</Name><DataType>DINT</DataType></Entry></RxPdo>
+ <TxPdo Fixed="1" Sm="3"><Index>#x1A00</Index><Name>In</Name>
+  <Entry><Index>#x6041</Index><SubIndex>0</SubIndex><BitLen>16</BitLen><Name>Statusword</Name><DataType>UINT</DataType></Entry>
+  <Entry><Index>#x6064</Index><SubIndex>0</SubIndex><BitLen>32</BitLen><Name>Position</Name><DataType>DINT</DataType></Entry></TxPdo>
+ <Mailbox><CoE/></Mailbox><Eeprom><ByteSize>2048</ByteSize><ConfigData>0500</ConfigData></Eeprom></Device>
+</Devices></Descriptions></EtherCATInfo>"##;
+
+struct DriveMaker;
+
+impl DescriptionFiles for DriveMaker {
+    fn read(&self, _name: &str) -> Result<Vec<u8>, String> {
+        Ok(DRIVE.as_bytes().to_vec())
+    }
+}
+
+#[test]
+fn a_described_drive_moves() {
+    let text =
+        "name = \"axis\"\n[[device]]\nname = \"X\"\ntype = \"esi:d.xml\"\non = \"maindevice\"\n";
+    let file = SegmentFile::parse_with(text, &DriveMaker).expect("a segment file");
+    let mut bench = Bench::of(&file, Options::default());
+    let plan = bench.start(AlState::Op);
+    let (outputs, inputs) = (plan.devices[0].outputs.clone(), plan.devices[0].inputs.clone());
+    let statusword = |bench: &Bench| {
+        let inputs = &bench.device.inputs()[inputs.clone()];
+        u16::from_le_bytes([inputs[0], inputs[1]])
+    };
+    for (controlword, state) in [(0x0006_u16, 0x21), (0x0007, 0x23), (0x000F, 0x27)] {
+        bench.device.outputs_mut()[outputs.clone()][..2]
+            .copy_from_slice(&controlword.to_le_bytes());
+        bench.run_for(Span::ms(20));
+        assert_eq!(statusword(&bench) & 0x6F, state, "controlword 0x{controlword:04X}");
+    }
+    // Cyclic synchronous position is what it does unless told.
+    for step in 1..=200_i32 {
+        let target = (step * 50).to_le_bytes();
+        bench.device.outputs_mut()[outputs.clone()][2..].copy_from_slice(&target);
+        bench.run_for(Span::ms(1));
+    }
+    bench.run_for(Span::ms(50));
+    let position = &bench.device.inputs()[inputs.clone()][2..6];
+    let position = i32::from_le_bytes([position[0], position[1], position[2], position[3]]);
+    assert!((position - 10_000).abs() <= 100, "{position}");
+    assert_eq!(statusword(&bench) & 0x6F, 0x27);
+}

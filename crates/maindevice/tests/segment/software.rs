@@ -218,6 +218,7 @@ fn an_application_that_stops_freezes_its_inputs_alone() {
 #[test]
 fn a_crash_leads_to_init_with_its_own_code_and_back() {
     let mut bench = running();
+    assert!(upload(&mut bench, "M1", 0x1018, 1).is_ok());
     let entry = FaultEntry::new(FaultName::FirmwareFault)
         .device("M1")
         .with("how", "restarts")
@@ -239,6 +240,8 @@ fn a_crash_leads_to_init_with_its_own_code_and_back() {
         |event| matches!(event, Event::TargetReached { id: of, .. } if *of == id),
     );
     assert!(back && bench.state("M1") == "OP", "{}", bench.state("M1"));
+    // Both ends count their messages anew: the first answer is no repetition.
+    assert!(upload(&mut bench, "M1", 0x1018, 1).is_ok());
 }
 
 #[test]

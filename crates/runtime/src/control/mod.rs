@@ -76,6 +76,7 @@ impl Control {
             make_room(path)?;
         }
         let listener = UnixListener::bind(path)?;
+        hand_over(path);
         let (requests, receiver) = mpsc::sync_channel(WAITING);
         let desk = Desk { requests, bell, reading, clients: Arc::default() };
         // It ends with the process: nothing hangs on it.
@@ -100,6 +101,15 @@ impl Drop for Control {
     fn drop(&mut self) {
         // It may be gone already.
         let _ = fs::remove_file(&self.path);
+    }
+}
+
+/// Started with sudo, the socket belongs to whoever called it: faults need no privilege.
+fn hand_over(path: &Path) {
+    let number = |name| std::env::var(name).ok().and_then(|text| text.parse().ok());
+    if let (Some(user), Some(group)) = (number("SUDO_UID"), number("SUDO_GID")) {
+        // Where that is refused it stays root's, and asking needs sudo as well.
+        let _ = std::os::unix::fs::chown(path, Some(user), Some(group));
     }
 }
 

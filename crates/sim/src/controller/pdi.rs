@@ -116,7 +116,7 @@ impl Pdi<'_> {
     }
 
     /// Gives the MainDevice something to read; what `data` lacks to the SyncManager's length is
-    /// filled with 0. False when it cannot be taken: a full mailbox, too much data, a SyncManager
+    /// filled with 0, but in a mailbox, where it stays what it was. False when it cannot be taken: a full mailbox, too much data, a SyncManager
     /// that is off or of the other direction.
     pub fn write_sync_manager(&mut self, index: u8, data: &[u8]) -> bool {
         let Some(index) = self.index(index) else { return false };

@@ -22,7 +22,8 @@ impl Controller {
     }
 
     /// Gives registers the values that they had when the run began, without any effect of a write;
-    /// mappings, buffers and loops follow. Bytes the controller does not have are left out.
+    /// mappings, buffers and loops follow. Bytes the controller does not have are left out. For
+    /// process-data RAM, what it holds.
     pub fn preset(&mut self, address: RegisterAddress, data: &[u8]) {
         let start = usize::from(address.0);
         let core = &mut self.core;
@@ -30,6 +31,11 @@ impl Controller {
             if core.rights.byte(at) & Rights::READ != 0 {
                 core.memory.put(at, &[*byte]);
             }
+        }
+        let len = core.memory.len();
+        if RAM <= start && start + data.len() <= len {
+            core.memory.copy_in(start, data);
+            return;
         }
         let range = start..(start + data.len()).min(RAM);
         if touches(&range, &r::FMMU) {

@@ -225,7 +225,7 @@ impl SyncManagers {
         Some(length)
     }
 
-    /// The SubDevice writes a whole buffer; what `data` lacks is filled with 0. False when it
+    /// The SubDevice writes a whole buffer; what `data` lacks is filled with 0, in a mailbox left. False when it
     /// cannot: switched off, the wrong direction, a full mailbox, too much data.
     pub(super) fn write_by_pdi(&mut self, index: usize, data: &[u8], memory: &mut Memory) -> bool {
         let Some(manager) = self.all.get_mut(index) else { return false };
@@ -249,7 +249,10 @@ impl SyncManagers {
             }
         };
         memory.copy_in(at, data);
-        memory.clear_range(at + data.len(), at + manager.length);
+        // Behind a message stays what was there before, as recordings of real mailboxes show.
+        if manager.kind != Kind::Mailbox {
+            memory.clear_range(at + data.len(), at + manager.length);
+        }
         manager.read = false;
         manager.opened_by_pdi = false;
         manager.written = true;

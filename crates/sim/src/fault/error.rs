@@ -26,6 +26,16 @@ pub enum FaultError {
         /// What was given.
         kind: FaultName,
     },
+    /// A fault that is in the line from its making on.
+    #[error(
+        "{entry}: `{kind}` is built in: it cannot come while the line runs; write it into the segment file"
+    )]
+    BuiltIn {
+        /// Which entry.
+        entry: String,
+        /// What was given.
+        kind: String,
+    },
     /// A key that the kind does not have.
     #[error("{entry} ({kind}): unknown key `{key}`{}; this kind takes: {allowed}", did_you_mean(.near.as_ref()))]
     UnknownKey {

@@ -2,18 +2,20 @@
 //!
 //! Openings come by chance at a mean rate and last as long as an exponential draw says, at least a
 //! microsecond. An opening shorter than the detection time of the ports costs frames without any
-//! link being lost.
+//! link being lost. With one direction only (`K1.C>K2.A`) one pair of wires has the bad contact; see
+//! `link-open` for what each end notices then.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
+use super::source::Listed;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
 use crate::wire::{Change, Source};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::LinkFlapping,
-    place: PlaceRule::Link,
+    place: PlaceRule::Lines,
     parameters: &[
         Parameter {
             key: "openings_per_s",
@@ -27,9 +29,12 @@ pub(super) const KIND: Kind = Kind {
         },
     ],
     start: |start| {
-        let link = start.target.links.first().copied().unwrap_or(0);
+        let Some((opens, closes)) = start.target.breaks().next() else {
+            return Ok(Listed::boxed([]));
+        };
         Ok(Box::new(Flapping {
-            link,
+            opens,
+            closes,
             openings_per_s: start.number("openings_per_s"),
             closings_per_s: 1_000.0 / start.number("open_ms").max(1e-3),
             at: start.from,
@@ -42,7 +47,8 @@ pub(super) const KIND: Kind = Kind {
 
 #[derive(Debug)]
 struct Flapping {
-    link: usize,
+    opens: Change,
+    closes: Change,
     openings_per_s: f64,
     closings_per_s: f64,
     at: Instant,
@@ -53,14 +59,13 @@ struct Flapping {
 
 impl Source for Flapping {
     fn next_change(&mut self) -> Option<(Instant, Change)> {
-        let link = self.link;
         // It begins with an opening: that is when it was noticed.
         if !std::mem::take(&mut self.first) {
             let rate = if self.open { self.closings_per_s } else { self.openings_per_s };
             self.at += self.stream.wait(rate).max(Span::us(1));
         }
         self.open = !self.open;
-        let change = if self.open { Change::Open { link } } else { Change::Close { link } };
+        let change = if self.open { self.opens } else { self.closes };
         Some((self.at, change))
     }
 }

@@ -6,6 +6,7 @@
 //! hits) is let go. No kind knows anything of counters.
 
 mod error;
+mod manual;
 mod parameter;
 mod place;
 mod running;
@@ -24,10 +25,15 @@ mod device_off;
 mod device_wrong;
 mod devices_swapped;
 mod duplicate_address;
+mod early_link;
 mod ebus_overload;
 mod emc_noise;
 mod emergency;
+mod false_link;
 mod firmware_fault;
+mod foreign_frames;
+mod host_drops;
+mod host_jitter;
 mod init_refused;
 mod late_frames;
 mod link_flapping;
@@ -35,9 +41,13 @@ mod link_open;
 mod mailbox_error;
 mod mailbox_slow;
 mod mailbox_stuck;
+mod maindevice_wrong_port;
 mod nic_damaged;
+mod ports_swapped;
 mod receiver_damaged;
 mod reference_clock_lost;
+mod ring_open;
+mod second_maindevice;
 mod supply_off;
 mod sync_lost;
 mod transmitter_damaged;
@@ -48,6 +58,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
 pub use error::FaultError;
+pub use manual::manual;
 pub use parameter::{Parameter, Shape};
 pub use place::PlaceRule;
 pub(crate) use place::Scene;
@@ -57,6 +68,7 @@ pub(crate) use device_extra::extra;
 pub(crate) use device_missing::missing_device;
 pub(crate) use device_wrong::{Replacement, replacement};
 pub(crate) use duplicate_address::duplicate_alias;
+pub(crate) use ports_swapped::{Turned, turned};
 
 use crate::seed::{Seed, Stream};
 use crate::segment_file::FaultEntry;
@@ -79,6 +91,23 @@ pub struct Kind {
     start: fn(Start<'_>) -> Result<Box<dyn Source>, FaultError>,
 }
 
+impl Kind {
+    /// Whether it is in the line from its making on: it cannot come and go while the line runs.
+    #[must_use]
+    pub fn is_built_in(&self) -> bool {
+        let built_in = [
+            FaultName::DeviceMissing,
+            FaultName::DeviceExtra,
+            FaultName::DeviceWrong,
+            FaultName::DevicesSwapped,
+            FaultName::TwinsSwapped,
+            FaultName::PortsSwapped,
+            FaultName::MainDeviceWrongPort,
+        ];
+        built_in.contains(&self.name)
+    }
+}
+
 /// All kinds that a segment can have.
 pub const KINDS: &[Kind] = &[
     link_open::KIND,
@@ -95,6 +124,15 @@ pub const KINDS: &[Kind] = &[
     device_missing::KIND,
     init_refused::KIND,
     nic_damaged::KIND,
+    false_link::KIND,
+    early_link::KIND,
+    ports_swapped::KIND,
+    maindevice_wrong_port::KIND,
+    ring_open::KIND,
+    second_maindevice::KIND,
+    foreign_frames::KIND,
+    host_jitter::KIND,
+    host_drops::KIND,
     mailbox_error::KIND,
     mailbox_slow::KIND,
     mailbox_stuck::KIND,
@@ -123,15 +161,6 @@ pub(crate) fn swaps(entry: &FaultEntry) -> Option<bool> {
         .into_iter()
         .find_map(|(name, twins)| (entry.kind == name.name()).then_some(twins))
 }
-
-/// Kinds that are built in: their faults are there from the start, and cannot come or go.
-pub const BUILT_IN: &[FaultName] = &[
-    FaultName::DeviceWrong,
-    FaultName::DeviceMissing,
-    FaultName::DeviceExtra,
-    FaultName::DevicesSwapped,
-    FaultName::TwinsSwapped,
-];
 
 /// The kind with a name, if a segment can have it.
 #[must_use]

@@ -9,10 +9,10 @@ use linesman_proto::topology::{End, Tree};
 use super::Kind;
 use super::error::{FaultError, nearest};
 use crate::hardware::PortKind;
-use crate::segment_file::FaultEntry;
+use crate::segment_file::{FaultEntry, Supply};
 use crate::truth::Place;
-use crate::wire::Line;
 use crate::wire::world::World;
+use crate::wire::{Change, Line};
 
 /// Where a kind of fault can be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -42,6 +42,10 @@ pub enum PlaceRule {
     DeviceOrCard,
     /// `at`: a card of the MainDevice, `maindevice` unless said.
     Card,
+    /// `at`: one link of a ring, the one that closes it unless said.
+    RingLink,
+    /// `at`: one direction of a link, the one that leaves card A unless said.
+    Entrance,
 }
 
 impl PlaceRule {
@@ -49,12 +53,24 @@ impl PlaceRule {
     #[must_use]
     pub const fn keys(self) -> &'static [&'static str] {
         match self {
-            Self::Link | Self::Lines | Self::ManyLines | Self::Line | Self::Card => &["at"],
+            Self::Link
+            | Self::Lines
+            | Self::ManyLines
+            | Self::Line
+            | Self::Card
+            | Self::RingLink
+            | Self::Entrance => &["at"],
             Self::Device | Self::Feed | Self::Processor | Self::Mailbox => &["device"],
             Self::Pair => &["devices"],
             Self::DeviceOrCard => &["device", "at"],
-            Self::Devices => &["device", "devices"],
+            Self::Devices => &["device", "devices", "supply"],
         }
+    }
+
+    /// Whether something has to be written.
+    #[must_use]
+    pub const fn needs_place(self) -> bool {
+        !matches!(self, Self::Card | Self::DeviceOrCard | Self::RingLink | Self::Entrance)
     }
 
     /// What has to be written.
@@ -73,8 +89,16 @@ impl PlaceRule {
             Self::Processor => "`device = \"B3\"`, a device with a processor",
             Self::Mailbox => "`device = \"B3\"`, a device with a mailbox",
             Self::DeviceOrCard => "`device = \"B3\"`, a device, or `at = \"maindevice\"`, a card",
-            Self::Devices => "`device = \"B3\"` or `devices = [\"B3\", \"B4\"]`",
-            Self::Card => "`at = \"maindevice\"` or `\"maindevice.B\"`, a card",
+            Self::Devices => {
+                "`device = \"B3\"`, `devices = [\"B3\", \"B4\"]` or `supply = \"PS1\"`, a `[[supply]]`"
+            }
+            Self::Card => "`at = \"maindevice\"` (unless said) or `\"maindevice.B\"`, a card",
+            Self::RingLink => {
+                "`at = \"K1.C-B3.A\"`, a link of a ring; the one that closes it unless said"
+            }
+            Self::Entrance => {
+                "`at = \"K1.C>B3.A\"`, one direction of a link; the one that leaves card A unless said"
+            }
         }
     }
 }
@@ -90,8 +114,9 @@ pub(crate) struct Scene<'a> {
     pub(crate) ebus_ma: &'a [i16],
     /// Whether a terminal without a controller feeds the E-bus anew before a node.
     pub(crate) fed_anew: &'a [bool],
-    /// Which devices a name such as `group:A` or `power:B` stands for.
+    /// Which devices a name such as `group:A` stands for.
     pub(crate) groups: &'a BTreeMap<String, Vec<DeviceId>>,
+    pub(crate) supplies: &'a [Supply],
 }
 
 impl Scene<'_> {
@@ -137,6 +162,20 @@ pub(super) struct Current {
     pub(super) ma: i16,
 }
 
+impl Target {
+    /// What interrupts each place and makes it whole: both directions of a link, or one of them.
+    pub(super) fn breaks(&self) -> impl Iterator<Item = (Change, Change)> {
+        let one = match self.lines.as_slice() {
+            [line] => Some(*line),
+            _ => None,
+        };
+        self.links.iter().map(move |link| match one {
+            Some(line) => (Change::Break { line }, Change::Mend { line }),
+            None => (Change::Open { link: *link }, Change::Close { link: *link }),
+        })
+    }
+}
+
 /// What is written in `at`.
 enum Written {
     /// Both directions.
@@ -162,10 +201,30 @@ pub(super) fn resolve(
         PlaceRule::Processor | PlaceRule::Mailbox => finder.software(entry),
         PlaceRule::DeviceOrCard if entry.device.is_some() => finder.devices(entry),
         PlaceRule::Card | PlaceRule::DeviceOrCard => finder.card(entry),
-        PlaceRule::Link | PlaceRule::Lines | PlaceRule::ManyLines | PlaceRule::Line => {
-            finder.lines(entry)
+        PlaceRule::RingLink if !is_ring(scene.tree) => Err(FaultError::Combination {
+            entry: label.to_owned(),
+            kind: kind.name,
+            what: "this line is no ring: give it `[ring]` with `closes_at`".to_owned(),
+        }),
+        PlaceRule::RingLink | PlaceRule::Entrance if entry.at.is_none() => {
+            let card = if kind.place == PlaceRule::RingLink { Path::B } else { Path::A };
+            let Some(link) = scene.tree.link_at(End::MainDevice(card)) else {
+                return Err(finder.error(format!("nothing is plugged into card {card}")));
+            };
+            Ok(finder.at_card(link, card))
         }
+        PlaceRule::Link
+        | PlaceRule::Lines
+        | PlaceRule::ManyLines
+        | PlaceRule::Line
+        | PlaceRule::RingLink
+        | PlaceRule::Entrance => finder.lines(entry),
     }
+}
+
+/// Whether both cards hang on one line.
+fn is_ring(tree: &Tree) -> bool {
+    tree.links().iter().any(|link| link.downstream == End::MainDevice(Path::B))
 }
 
 struct Finder<'a> {
@@ -190,6 +249,7 @@ impl Finder<'_> {
             ("at", entry.at.is_some()),
             ("device", entry.device.is_some()),
             ("devices", entry.devices.is_some()),
+            ("supply", entry.supply.is_some()),
         ];
         match given.into_iter().find(|(key, given)| *given && !keys.contains(key)) {
             Some((key, _)) => Err(FaultError::unknown_key(self.label, self.kind, key)),
@@ -198,7 +258,14 @@ impl Finder<'_> {
     }
 
     fn devices(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
-        let names = entry.device.iter().chain(entry.devices.iter().flatten());
+        let fed = match &entry.supply {
+            None => &[][..],
+            Some(name) => match self.scene.supplies.iter().find(|known| known.name == *name) {
+                Some(supply) => supply.devices.as_slice(),
+                None => return Err(self.error(format!("no supply is called `{name}`"))),
+            },
+        };
+        let names = entry.device.iter().chain(entry.devices.iter().flatten()).chain(fed);
         let mut target = Target::default();
         for name in names {
             let of_device = |known: &str| {
@@ -308,6 +375,18 @@ impl Finder<'_> {
         })
     }
 
+    /// The link at a card, and the line that leaves it.
+    fn at_card(&self, link: usize, path: Path) -> Target {
+        let world = self.scene.world;
+        let leaves = self.lines_at_card(link, path).pop();
+        let place = match (self.kind.place, leaves) {
+            (PlaceRule::Entrance, Some(line)) => world.line_place(line),
+            (_, _) => world.link_place(link),
+        };
+        let lines = leaves.into_iter().collect();
+        Target { places: vec![place], lines, links: vec![link], ..Target::default() }
+    }
+
     /// The line that arrives at the card, then the one that leaves it.
     fn lines_at_card(&self, link: usize, path: Path) -> Vec<Line> {
         let card_is_upstream = self.scene.tree.links()[link].upstream == End::MainDevice(path);
@@ -329,10 +408,10 @@ impl Finder<'_> {
         let mut target = Target::default();
         for at in given {
             match (self.written(at)?, self.kind.place) {
-                (Written::One(_), PlaceRule::Link) => {
+                (Written::One(_), PlaceRule::Link | PlaceRule::RingLink) => {
                     return Err(self.error(format!("`{at}` is one direction")));
                 }
-                (Written::Both(_), PlaceRule::Line) => {
+                (Written::Both(_), PlaceRule::Line | PlaceRule::Entrance) => {
                     return Err(self.error(format!("`{at}` is both directions")));
                 }
                 (Written::Card(path), _) => {

@@ -74,6 +74,14 @@ impl Running {
         }
     }
 
+    /// When it sends a frame of its own next, as far as is known.
+    pub(crate) fn next_stranger(&self) -> Option<Instant> {
+        match self.next {
+            Some((at, Change::Stranger { .. })) if at < self.end() => Some(at),
+            Some(_) | None => None,
+        }
+    }
+
     /// Does it. What would come at the end of a window or later does not come.
     pub(crate) fn step(&mut self) -> Step {
         let end = self.end();

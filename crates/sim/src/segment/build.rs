@@ -12,6 +12,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
 use super::arrivals::Arrivals;
+use super::turn::turn;
 use super::{DeviceInfo, Segment, exchange, identification};
 use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
@@ -21,6 +22,7 @@ use crate::hardware::PortKind;
 use crate::seed::Seed;
 use crate::segment_file::{self, Planned, SegmentFile, SegmentFileError, TypeError};
 use crate::truth::Effect;
+use crate::wire::plug_noise::PlugNoise;
 use crate::wire::world::World;
 
 /// Why a segment cannot be built.
@@ -90,6 +92,9 @@ pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
         if let Some(device) = fault::missing_device(entry) {
             remove(&mut placed, device, &mut ring);
         }
+        if let Some(turned) = fault::turned(&label, entry)? {
+            turn(&label, &mut placed, &turned, &mut ring)?;
+        }
     }
     assemble(file, placed, ring, names)
 }
@@ -131,6 +136,9 @@ fn assemble(
         let Built { mut hardware, sii, firmware, outputs, inputs } = built;
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
         hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
+        let remakes = file.devices[one.planned.device].remakes_symbol_errors;
+        let counting = &mut hardware.counting;
+        counting.remakes_symbol_errors = remakes.unwrap_or(counting.remakes_symbol_errors);
         let mut controller = Controller::new(one.id, kinds.get(hardware), clock, firmware, sii);
         identification.finish(&mut controller);
         made.push(controller);
@@ -148,11 +156,23 @@ fn assemble(
             }
         })
         .collect();
-    let world = World::new(&tree, made, &cable_m, signals);
+    let mut world = World::new(&tree, made, &cable_m, signals);
+    for (wired, link) in tree.links().iter().zip(&mut world.links) {
+        // A device of several controllers has a cable to its first only.
+        let medium = match wired.downstream.node().map(|node| &placed[node].planned) {
+            Some(planned) if planned.part == 0 => file.devices[planned.device].medium,
+            Some(_) => None,
+            None => file.ring.as_ref().and_then(|ring| ring.medium),
+        };
+        link.medium = medium.unwrap_or_default();
+    }
+    world.plug_noise =
+        PlugNoise::new(file.noise_at_link_up.unwrap_or(0.0), seed.stream("plug noise"));
     let nodes: BTreeMap<DeviceId, usize> =
         placed.iter().enumerate().map(|(node, one)| (one.id, node)).collect();
     let current = |one: &Placed| one.planned.kind.ebus_current_ma();
     let mut segment = Segment {
+        supplies: file.supplies.clone(),
         ebus_ma: placed.iter().map(current).collect(),
         fed_anew: placed.iter().map(|one| one.planned.fed_anew).collect(),
         groups: exchange::groups(file, &placed),
@@ -165,6 +185,7 @@ fn assemble(
         names,
         now: Instant::ZERO,
         arrivals: Arrivals::default(),
+        strange: BTreeSet::new(),
         spare: Vec::new(),
         waiting: super::late::Waiting::default(),
         tally: super::FrameTally::default(),
@@ -204,6 +225,8 @@ fn schedule(
         Effect::SwappedDevice
     } else if let Some((address, _)) = fault::duplicate_alias(label, entry)? {
         Effect::SharedAddress { address }
+    } else if fault::turned(label, entry)?.is_some() {
+        Effect::WrongPort
     } else {
         return Ok(());
     };

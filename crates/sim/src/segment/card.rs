@@ -1,5 +1,7 @@
 //! A card of the MainDevice: it sends, receives, checks, and counts as a real one does.
 
+use std::collections::VecDeque;
+
 use linesman_proto::time::{Instant, Span};
 
 use super::late::Lateness;
@@ -22,6 +24,8 @@ pub struct HostPort {
     pub rx_crc_errors: u64,
     /// Frames dropped because they were too short: rests of frames.
     pub rx_length_errors: u64,
+    /// Frames that came back whole, and that the host lost before anyone could read them.
+    pub rx_dropped: u64,
 }
 
 /// What became of the frames that the MainDevice's cards sent, since the start of the run.
@@ -35,6 +39,8 @@ pub struct FrameTally {
     pub damaged: u64,
     /// Will not come back.
     pub vanished: u64,
+    /// Came back, and were lost by the host.
+    pub dropped: u64,
 }
 
 /// A card, with its PHY.
@@ -54,6 +60,14 @@ pub(crate) struct Card {
     pub(super) lateness: Lateness,
     /// Changes of the carrier that are known, in the order of time.
     carrier: Vec<(Instant, bool)>,
+    /// Frames that the host keeps back before it sends them, in the order of time.
+    delays: VecDeque<(Instant, Span, FaultId)>,
+    /// Frames that the host loses after they came back, in the order of time.
+    drops: VecDeque<(Instant, FaultId)>,
+    /// When the last frame has left.
+    pub(crate) sent_until: Instant,
+    /// When a frame that was kept back has left.
+    pub(crate) kept_until: Instant,
 }
 
 impl Default for Card {
@@ -66,6 +80,10 @@ impl Default for Card {
             silent: Vec::new(),
             lateness: Lateness::default(),
             carrier: Vec::new(),
+            delays: VecDeque::new(),
+            drops: VecDeque::new(),
+            sent_until: Instant::ZERO,
+            kept_until: Instant::ZERO,
         }
     }
 }
@@ -73,6 +91,33 @@ impl Default for Card {
 impl Card {
     pub(crate) fn set_carrier(&mut self, at: Instant, up: bool) {
         self.carrier.push((at, up));
+    }
+
+    pub(crate) fn delay_next(&mut self, from: Instant, by: Span, fault: FaultId) {
+        self.delays.push_back((from, by, fault));
+    }
+
+    pub(crate) fn drop_next(&mut self, from: Instant, fault: FaultId) {
+        self.drops.push_back((from, fault));
+    }
+
+    /// How long a frame that is sent at `now` is kept back, if it is.
+    #[inline]
+    pub(crate) fn delayed(&mut self, now: Instant) -> Option<(Span, FaultId)> {
+        let (_, by, fault) = self.delays.pop_front_if(|(from, ..)| *from <= now)?;
+        Some((by, fault))
+    }
+
+    /// Who makes the host lose a frame that arrives at `now`, if anyone does.
+    #[inline]
+    pub(crate) fn dropped(&mut self, now: Instant) -> Option<FaultId> {
+        self.drops.pop_front_if(|(from, _)| *from <= now).map(|(_, fault)| fault)
+    }
+
+    /// A fault is healed: what still waits for a frame goes with it.
+    pub(crate) fn disarm(&mut self, fault: FaultId) {
+        self.delays.retain(|(.., by)| *by != fault);
+        self.drops.retain(|(_, by)| *by != fault);
     }
 
     pub(crate) fn has_carrier(&self, at: Instant) -> bool {

@@ -139,15 +139,12 @@ pub(super) fn move_wiring(placed: &[Placed], devices: &mut [DeviceInfo]) {
     }
 }
 
-/// The groups and supplies of a file, and who belongs to them.
+/// The hot connect groups of a file, and who belongs to them.
 pub(super) fn groups(file: &SegmentFile, placed: &[Placed]) -> BTreeMap<String, Vec<DeviceId>> {
     let mut groups: BTreeMap<String, Vec<DeviceId>> = BTreeMap::new();
     for one in placed {
-        let device = &file.devices[one.planned.device];
-        let group = device.group.as_ref().map(|name| format!("group:{name}"));
-        let power = device.power.as_ref().map(|name| format!("power:{name}"));
-        for name in [group, power].into_iter().flatten() {
-            groups.entry(name).or_default().push(one.id);
+        if let Some(name) = &file.devices[one.planned.device].group {
+            groups.entry(format!("group:{name}")).or_default().push(one.id);
         }
     }
     groups

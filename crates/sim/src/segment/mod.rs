@@ -11,8 +11,9 @@ mod exchange;
 mod identification;
 mod late;
 mod ready;
+mod turn;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
@@ -29,7 +30,7 @@ use crate::device::{SignalId, Signals};
 use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
-use crate::segment_file::{FaultEntry, SegmentFile};
+use crate::segment_file::{FaultEntry, SegmentFile, Supply};
 use crate::truth::{self, Effect, FaultId, Place, TruthLog, Unexplained};
 use crate::wire::walk::{Outcome, Traveller};
 use crate::wire::world::World;
@@ -62,14 +63,18 @@ pub struct Segment {
     ebus_ma: Vec<i16>,
     /// Whether a terminal without a controller feeds the E-bus anew before a node.
     fed_anew: Vec<bool>,
-    /// Devices by the groups and supplies that the file names: `group:A`, `power:B`.
+    /// Devices by the hot connect groups that the file names, as `group:A`.
     groups: BTreeMap<String, Vec<DeviceId>>,
+    /// Supplies that devices share.
+    supplies: Vec<Supply>,
     /// The node of each device that is there.
     nodes: BTreeMap<DeviceId, usize>,
     /// Names of all devices that were planned.
     names: Vec<String>,
     now: Instant,
     arrivals: Arrivals,
+    /// Numbers of frames among them that strangers sent.
+    strange: BTreeSet<u64>,
     spare: Vec<Vec<u8>>,
     /// Frames that leave later.
     waiting: late::Waiting,
@@ -116,6 +121,7 @@ impl Segment {
         let frame = WireFrame { bytes, damage: Damage::default(), number: self.world.frames };
         self.world.look_ahead(now, frame.duration());
         self.world.advance(now);
+        self.fetch_strangers();
         let card = &mut self.world.cards[path.index()];
         if frame.bytes.len() > MAX_LEN || !card.has_carrier(now) {
             card.counts.tx_dropped += 1;
@@ -131,8 +137,9 @@ impl Segment {
         }
         card.counts.tx_frames += 1;
         self.tally.sent += 1;
+        let leaves = self.leaves(path, now, &frame);
         let mut traveller = Traveller::new(frame);
-        match self.world.carry(path, now, &mut traveller) {
+        match self.world.carry(path, leaves, &mut traveller) {
             Outcome::Arrived(path, at) => self.arrivals.push(at, path, traveller.frame),
             Outcome::Vanished => {
                 self.tally.vanished += 1;
@@ -141,26 +148,76 @@ impl Segment {
         }
     }
 
+    /// When a frame leaves its card that is sent now: a host may keep it back, another's frame may be
+    /// on the line. A frame that was kept back keeps those behind it back, too.
+    fn leaves(&mut self, path: Path, now: Instant, frame: &WireFrame) -> Instant {
+        let card = &mut self.world.cards[path.index()];
+        let mut leaves = now;
+        if let Some((by, fault)) = card.delayed(now) {
+            leaves = now + by;
+            card.kept_until = leaves + frame.duration();
+            let effect = Effect::FrameHeldBack { by };
+            self.world.truth.effect(now, Some(fault), Place::Host(path), effect);
+        } else {
+            leaves = leaves.max(card.kept_until);
+        }
+        leaves = self.world.behind_strangers(path, leaves);
+        if leaves > now {
+            self.world.look_ahead(leaves, frame.duration());
+        }
+        self.world.cards[path.index()].sent_until = leaves + frame.duration();
+        leaves
+    }
+
+    /// Frames of strangers arrive as all others do.
+    fn fetch_strangers(&mut self) {
+        for (at, path, frame) in self.world.take_strangers() {
+            self.strange.insert(frame.number);
+            self.arrivals.push(at, path, frame);
+        }
+    }
+
     /// The earliest frame that has arrived by the time last told ([`Segment::advance`],
     /// [`Segment::handle_frame`]); its bytes replace those in `buffer`.
     pub fn poll_arrival(&mut self, buffer: &mut Vec<u8>) -> Option<Arrival> {
-        let (at, path, frame) = self.arrivals.pop_until(self.now)?;
-        let intact = frame.damage.is_intact();
-        let card = &mut self.world.cards[path.index()];
-        let counts = &mut card.counts;
-        if intact {
-            counts.rx_frames += 1;
-            self.tally.whole += 1;
-        } else if frame.bytes.len() < MIN_LEN {
-            counts.rx_length_errors += 1;
-        } else {
-            counts.rx_crc_errors += 1;
+        loop {
+            let (at, path, frame) = self.arrivals.pop_until(self.now)?;
+            let intact = frame.damage.is_intact();
+            let kept = self.receive(at, path, &frame);
+            if kept {
+                buffer.clear();
+                buffer.extend_from_slice(&frame.bytes);
+            }
+            self.recycle(frame.bytes);
+            if kept {
+                return Some(Arrival { at, path, intact });
+            }
         }
-        self.tally.damaged += u64::from(!intact);
-        buffer.clear();
-        buffer.extend_from_slice(&frame.bytes);
-        self.recycle(frame.bytes);
-        Some(Arrival { at, path, intact })
+    }
+
+    /// A card and its host take in what arrived; false if the host loses it.
+    fn receive(&mut self, at: Instant, path: Path, frame: &WireFrame) -> bool {
+        let card = &mut self.world.cards[path.index()];
+        let own = u64::from(self.strange.is_empty() || !self.strange.remove(&frame.number));
+        if !frame.damage.is_intact() {
+            if frame.bytes.len() < MIN_LEN {
+                card.counts.rx_length_errors += 1;
+            } else {
+                card.counts.rx_crc_errors += 1;
+            }
+            self.tally.damaged += own;
+            return true;
+        }
+        if let Some(fault) = card.dropped(at) {
+            card.counts.rx_dropped += 1;
+            self.tally.dropped += own;
+            let effect = Effect::FrameLost { frame: frame.number };
+            self.world.truth.effect(at, Some(fault), Place::Host(path), effect);
+            return false;
+        }
+        card.counts.rx_frames += 1;
+        self.tally.whole += own;
+        true
     }
 
     fn recycle(&mut self, bytes: Vec<u8>) {
@@ -169,11 +226,13 @@ impl Segment {
         }
     }
 
-    /// When the next frame arrives, of those on their way, or leaves a card that is late. What else happens in the segment needs no
-    /// call at its time: it is made up for, in its order, by the next one.
+    /// When the next frame arrives, of those on their way, when one leaves a card that is late, or
+    /// when a stranger sends one. What else happens in the segment needs no call at its time: it is
+    /// made up for, in its order, by the next one.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        [self.arrivals.next_at(), self.next_leaves()].into_iter().flatten().min()
+        let due = [self.arrivals.next_at(), self.next_leaves(), self.world.next_stranger()];
+        due.into_iter().flatten().min()
     }
 
     /// Time passes: devices, links and faults up to `now`.
@@ -181,6 +240,7 @@ impl Segment {
         self.now = self.now.max(now);
         self.send_kept_back(self.now);
         self.world.advance(self.now);
+        self.fetch_strangers();
         for card in &mut self.world.cards {
             card.settle(self.now);
         }
@@ -210,6 +270,9 @@ impl Segment {
         self.now = self.now.max(now);
         let earliest = self.now.max(self.world.horizon) + Span::ns(1);
         let label = format!("fault {}", self.world.truth.faults().len() + 1);
+        if entry.kind.parse().ok().and_then(fault::kind).is_some_and(fault::Kind::is_built_in) {
+            return Err(FaultError::BuiltIn { entry: label, kind: entry.kind.clone() });
+        }
         self.schedule(&label, entry, earliest)
     }
 
@@ -227,6 +290,7 @@ impl Segment {
             ebus_ma: &self.ebus_ma,
             fed_anew: &self.fed_anew,
             groups: &self.groups,
+            supplies: &self.supplies,
         };
         let number = self.world.truth.faults().len();
         let stream = format!("fault {number} {}", entry.kind);
@@ -236,13 +300,15 @@ impl Segment {
         Ok(id)
     }
 
-    /// Ends a fault: just after `now`, behind all that has been worked out already. A fault that is
-    /// over, or built in, is left as it is.
+    /// Ends a fault: just after `now`, behind all that has been worked out already. Of a fault that is
+    /// over, hits that still wait for a frame do not come any more; one that is built in stays.
     pub fn heal(&mut self, now: Instant, fault: FaultId) {
         self.now = self.now.max(now);
         let at = self.now.max(self.world.horizon) + Span::ns(1);
         if let Some(running) = self.world.running.iter_mut().find(|running| running.id == fault) {
             running.heal_at(at);
+        } else {
+            self.world.disarm(fault);
         }
     }
 

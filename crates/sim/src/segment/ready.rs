@@ -1,6 +1,6 @@
 //! A segment of controllers that were made elsewhere.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
@@ -31,6 +31,7 @@ impl Segment {
         let nodes: BTreeMap<DeviceId, usize> =
             (0..count).map(|node| (world.id(node), node)).collect();
         let mut segment = Self {
+            supplies: Vec::new(),
             ebus_ma: vec![0; count],
             fed_anew: vec![false; count],
             groups: BTreeMap::new(),
@@ -43,6 +44,7 @@ impl Segment {
             names,
             now: Instant::ZERO,
             arrivals: Arrivals::default(),
+            strange: BTreeSet::new(),
             spare: Vec::new(),
             waiting: super::late::Waiting::default(),
             tally: super::FrameTally::default(),

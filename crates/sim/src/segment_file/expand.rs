@@ -11,7 +11,6 @@ use linesman_proto::sii::Image;
 use linesman_proto::topology::wiring::ports_after;
 use linesman_proto::topology::{End, WiringError};
 
-use super::cable::{Cable, as_copper_m};
 use super::passive::Passives;
 use super::{SegmentDevice, SegmentFile, SegmentFileError};
 use crate::device::{DeviceKind, Signals};
@@ -37,7 +36,6 @@ pub(crate) struct Planned {
     pub(crate) kind: DeviceKind,
     pub(crate) on: Attachment,
     pub(crate) entry: Port,
-    /// Length of the copper cable that has the delay of the way to it, in metres.
     pub(crate) cable_m: f64,
     /// A terminal without a controller feeds the E-bus before it anew.
     pub(crate) fed_anew: bool,
@@ -171,9 +169,7 @@ fn expand_device(
                     PortKind::Ebus => 0.0,
                     PortKind::Mii | PortKind::Absent => DEFAULT_CABLE_M,
                 };
-                let length = device.cable_m.unwrap_or(length);
-                let cable = device.cable.unwrap_or(Cable::Copper);
-                (on_place.clone(), entry, as_copper_m(length, cable, device.via))
+                (on_place.clone(), entry, device.cable_m.unwrap_or(length))
             }
         };
         planned.push(Planned {
@@ -227,6 +223,11 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
             });
         }
     }
+    if let Some(noise) = file.noise_at_link_up.filter(|mean| !(0.0..=1_000.0).contains(mean)) {
+        return Err(SegmentFileError::Wiring(format!(
+            "`noise_at_link_up` is {noise}, expected 0 to 1000"
+        )));
+    }
     let ring_m = file.ring.as_ref().and_then(|ring| ring.cable_m);
     if let Some(length) = ring_m.filter(|m| !(0.0..=LONGEST_CABLE_M).contains(m)) {
         return Err(SegmentFileError::Range {
@@ -237,7 +238,27 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
         });
     }
     wiring(file, planned).tree().map_err(|error| wiring_error(planned, error))?;
-    check_ports(file, planned)
+    check_ports(file, planned)?;
+    check_supplies(file)
+}
+
+/// Supplies have names of their own and feed devices that are there.
+fn check_supplies(file: &SegmentFile) -> Result<(), SegmentFileError> {
+    for (index, supply) in file.supplies.iter().enumerate() {
+        let wrong = |what: String| SegmentFileError::Supply { supply: supply.name.clone(), what };
+        if file.supplies[..index].iter().any(|other| other.name == supply.name) {
+            return Err(wrong("there are two of this name".to_owned()));
+        }
+        let known = |name: &String| file.devices.iter().any(|device| device.name == *name);
+        match supply.devices.iter().find(|name| !known(name)) {
+            Some(name) => return Err(wrong(format!("no device is called `{name}`"))),
+            None if supply.devices.is_empty() => {
+                return Err(wrong("it feeds nobody: name its `devices`".to_owned()));
+            }
+            None => {}
+        }
+    }
+    Ok(())
 }
 
 /// The same error with names for numbers.
@@ -326,7 +347,7 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
             Attachment::Device { name, .. } => by_name.get(name.as_str()).copied(),
             Attachment::MainDevice(_) => None,
         };
-        check_cable(file, parent, controller, to_kind)?;
+        check_cable(parent, controller, to_kind)?;
         if from_kind != to_kind {
             return Err(SegmentFileError::Kinds {
                 from: controller.on.to_string(),
@@ -350,25 +371,14 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
     Ok(())
 }
 
-/// What a device says of the cable to it fits its port, and Fast Hot Connect is at both ends or none.
+/// Fast Hot Connect is at both ends of a cable or at none.
 fn check_cable(
-    file: &SegmentFile,
     parent: Option<&Planned>,
     controller: &Planned,
     kind: PortKind,
 ) -> Result<(), SegmentFileError> {
-    let device = &file.devices[controller.device];
     let misplaced =
         |why: String| Err(SegmentFileError::Misplaced { device: controller.name.clone(), why });
-    if controller.part == 0 {
-        if let Some(cable) = device.cable.filter(|cable| !cable.fits(kind)) {
-            let kind = kind_name(kind);
-            return misplaced(format!("`cable` is {}, but its port is {kind}", cable.name()));
-        }
-        if let Some(via) = device.via.filter(|_| kind != PortKind::Mii) {
-            return misplaced(format!("`via` is {}, but no cable leads to it", via.name()));
-        }
-    }
     let fast = |one: Option<&Planned>| one.is_some_and(|one| one.kind.fast_hot_connect());
     if kind == PortKind::Mii && fast(parent) != fast(Some(controller)) {
         return misplaced(format!(

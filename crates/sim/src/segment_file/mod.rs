@@ -19,7 +19,6 @@
 //! Unknown keys are errors. The order of devices is the order of their numbers; a device with
 //! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
 
-mod cable;
 mod clock;
 mod expand;
 mod passive;
@@ -35,7 +34,6 @@ use linesman_config::attachment::Attachment;
 use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
-pub use cable::{Cable, Via};
 pub use clock::SegmentClock;
 pub use expand::parse_counter;
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
@@ -43,6 +41,8 @@ pub use plant::{PlantOptions, plant};
 pub use schedule::{BurstTimes, RandomTimes, Schedule, Times};
 pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
+
+use crate::wire::Medium;
 
 /// A segment, as described.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
@@ -61,6 +61,14 @@ pub struct SegmentFile {
     /// each follows its type unless said.
     #[serde(default)]
     pub counts_forwarded: Option<bool>,
+    /// Mean number of symbols that are destroyed on each line of a link when it comes up during the
+    /// run: contacts bounce. None unless said.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub noise_at_link_up: Option<f64>,
+    /// Power supplies that feed several devices, to fail together.
+    #[serde(default, rename = "supply")]
+    pub supplies: Vec<Supply>,
     /// Its devices, in the order of their numbers.
     #[serde(default, rename = "device")]
     pub devices: Vec<SegmentDevice>,
@@ -102,20 +110,9 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 2000.0))]
     pub cable_m: Option<f64>,
-    /// What the way to it is made of: `copper`, `fibre`, or `ebus` for a neighbour on the terminal
-    /// bus; as its port is unless said.
-    #[serde(default)]
-    pub cable: Option<Cable>,
-    /// What stands in the middle of that cable and passes frames on: `media-converter` (a pair of
-    /// them, with fibre in between) or `switch`.
-    #[serde(default)]
-    pub via: Option<Via>,
     /// The hot connect group it belongs to; faults can name all of it as `group:NAME`.
     #[serde(default)]
     pub group: Option<String>,
-    /// The supply that feeds it; faults can name all devices on it as `power:NAME`.
-    #[serde(default)]
-    pub power: Option<String>,
     /// Serial number in its SII; its number unless said.
     #[serde(default)]
     pub serial: Option<u32>,
@@ -130,6 +127,14 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = -200.0, max = 200.0))]
     pub clock_ppm: Option<f64>,
+    /// What its cable is made of: `direct` (copper, E-bus contacts), `fibre`, or `converters`, a pair
+    /// of media converters; `direct` unless said.
+    #[serde(default)]
+    pub medium: Option<Medium>,
+    /// Whether its controllers make a symbol error anew when they pass a bad frame on, as those in
+    /// programmable logic do; as its type has it unless said.
+    #[serde(default)]
+    pub remakes_symbol_errors: Option<bool>,
     /// How else its clock is off: warming up, jitter, what it shows at power-on.
     #[serde(default)]
     pub clock: Option<SegmentClock>,
@@ -157,6 +162,19 @@ pub struct SegmentRing {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 2000.0))]
     pub cable_m: Option<f64>,
+    /// What it is made of, as for a device.
+    #[serde(default)]
+    pub medium: Option<Medium>,
+}
+
+/// A power supply and the devices that it feeds.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Supply {
+    /// Unique name.
+    pub name: String,
+    /// Names of devices; a coupler feeds its terminals.
+    pub devices: Vec<String>,
 }
 
 /// A fault of a segment: kind, place, times, and the parameters of its kind.
@@ -174,6 +192,9 @@ pub struct FaultEntry {
     /// Several devices that share the fault.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub devices: Option<Vec<String>>,
+    /// A `[[supply]]`: all devices that it feeds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply: Option<String>,
     /// When it begins, in ms since the start of the run; at once unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_ms: Option<f64>,
@@ -306,6 +327,14 @@ pub enum SegmentFileError {
         /// What can be.
         allowed: &'static str,
     },
+    /// A supply that feeds nobody, or somebody unknown.
+    #[error("supply `{supply}`: {what}")]
+    Supply {
+        /// Which.
+        supply: String,
+        /// What is wrong with it.
+        what: String,
+    },
     /// A counter that no controller has.
     #[error("device `{device}`: no counter is called `{given}`; expected {allowed}")]
     Counter {
@@ -329,14 +358,13 @@ impl SegmentDevice {
             repeat: None,
             entry: None,
             cable_m: None,
-            cable: None,
-            via: None,
             group: None,
-            power: None,
             serial: None,
             alias: None,
             id: None,
             clock_ppm: None,
+            medium: None,
+            remakes_symbol_errors: None,
             clock: None,
             counts_forwarded: None,
             slots: None,

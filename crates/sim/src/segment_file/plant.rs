@@ -60,11 +60,9 @@ pub fn plant(seed: Seed, options: &PlantOptions) -> SegmentFile {
         name: format!("plant {}", seed.0),
         seed: Some(seed.0),
         old_counters,
-        counts_forwarded: None,
         devices: builder.devices,
         ring,
-        faults: Vec::new(),
-        types: super::DescribedTypes::default(),
+        ..SegmentFile::default()
     };
     in_order(file)
 }
@@ -270,9 +268,11 @@ impl Builder {
         let farthest = self.sockets.iter().max_by_key(|socket| socket.depth)?;
         let cable_m = (self.stream.log_uniform(5.0, 80.0) * 10.0).round() / 10.0;
         match farthest.on {
-            Attachment::Device { .. } => {
-                Some(SegmentRing { closes_at: farthest.on.clone(), cable_m: Some(cable_m) })
-            }
+            Attachment::Device { .. } => Some(SegmentRing {
+                closes_at: farthest.on.clone(),
+                cable_m: Some(cable_m),
+                medium: None,
+            }),
             Attachment::MainDevice(_) => None,
         }
     }

@@ -12,12 +12,19 @@ name = "plant \"7\""
 seed = 7
 old_counters = true
 counts_forwarded = false
+noise_at_link_up = 2.5
+
+[[supply]]
+name = "PS1"
+devices = ["K1", "K3"]
 
 [[device]]
 name = "K1"
 type = "EK1100"
 on = "maindevice"
 cable_m = 5.0
+medium = "converters"
+remakes_symbol_errors = true
 counters = { "A.physical" = 3, processing_unit = 1 }
 
 [[device]]
@@ -52,6 +59,10 @@ kind = "supply-off"
 devices = ["K1", "K3"]
 
 [[fault]]
+kind = "brown-out"
+supply = "PS1"
+
+[[fault]]
 kind = "init-refused"
 device = "Term 2 (EL2008)"
 to = "OP"
@@ -75,14 +86,14 @@ random = { mean_ms = 500.0, for_ms = 20.0 }
 fn a_file_reads_and_writes_itself() {
     let file = SegmentFile::parse(PLANT).unwrap();
     assert_eq!(SegmentFile::parse(&file.to_toml()), Ok(file.clone()));
-    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 5));
+    assert_eq!((file.seed, file.devices.len(), file.faults.len()), (Some(7), 3, 6));
     assert_eq!(file.devices[2].cable_m, Some(12.0));
     assert_eq!(file.devices[0].counters["A.physical"], 3);
     let noise = &file.faults[0];
     assert_eq!(noise.at.as_ref().unwrap().as_slice().len(), 2);
     assert_eq!((noise.from_ms, noise.to_ms), (Some(2000.0), Some(5000.0)));
     assert_eq!(noise.parameters["hits_per_s"], Value::Number(40.0));
-    assert_eq!(file.faults[2].parameters["code"], Value::Integer(27));
+    assert_eq!(file.faults[3].parameters["code"], Value::Integer(27));
 }
 
 #[test]
@@ -106,6 +117,12 @@ fn mistakes_are_named() {
         ("\"A.physical\"", "\"A.fysical\"", "no counter is called `A.fysical`"),
         ("name = \"K3\"", "name = \"K1\"", "two devices are called `K1`"),
         ("closes_at = \"K3.C\"", "closes_at = \"K3.B\"", "K3.B is an E-bus contact"),
+        (
+            "devices = [\"K1\", \"K3\"]\n\n[[device]]",
+            "devices = [\"K7\"]\n\n[[device]]",
+            "supply `PS1`: no device is called `K7`",
+        ),
+        ("medium = \"converters\"", "medium = \"wire\"", "unknown variant `wire`"),
     ];
     for (from, to, expected) in table {
         let error = SegmentFile::parse(&PLANT.replace(from, to)).expect_err(to).to_string();

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{FaultEntry, OneOrMany, Schedule, SegmentDevice, SegmentFile, Times, Value};
+use crate::wire::Medium;
 
 pub(super) fn to_toml(file: &SegmentFile) -> String {
     let mut text = format!("name = {}\n", quoted(&file.name));
@@ -15,6 +16,14 @@ pub(super) fn to_toml(file: &SegmentFile) -> String {
     if let Some(counts) = file.counts_forwarded {
         let _ = writeln!(text, "counts_forwarded = {counts}");
     }
+    if let Some(noise) = file.noise_at_link_up {
+        let _ = writeln!(text, "noise_at_link_up = {}", number(noise));
+    }
+    for supply in &file.supplies {
+        let devices: Vec<_> = supply.devices.iter().map(|name| quoted(name)).collect();
+        let (name, devices) = (quoted(&supply.name), devices.join(", "));
+        let _ = writeln!(text, "\n[[supply]]\nname = {name}\ndevices = [{devices}]");
+    }
     for device in &file.devices {
         write_device(device, &mut text);
     }
@@ -22,6 +31,9 @@ pub(super) fn to_toml(file: &SegmentFile) -> String {
         let _ = writeln!(text, "\n[ring]\ncloses_at = {}", quoted(&ring.closes_at.to_string()));
         if let Some(cable_m) = ring.cable_m {
             let _ = writeln!(text, "cable_m = {}", number(cable_m));
+        }
+        if let Some(medium) = ring.medium {
+            let _ = writeln!(text, "medium = {}", quoted(word(medium)));
         }
     }
     for fault in &file.faults {
@@ -46,16 +58,8 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     if let Some(cable_m) = device.cable_m {
         line("cable_m", number(cable_m));
     }
-    let words = [
-        ("cable", device.cable.map(|cable| cable.name())),
-        ("via", device.via.map(|via| via.name())),
-        ("group", device.group.as_deref()),
-        ("power", device.power.as_deref()),
-    ];
-    for (key, word) in words {
-        if let Some(word) = word {
-            line(key, quoted(word));
-        }
+    if let Some(group) = &device.group {
+        line("group", quoted(group));
     }
     let numbers = [("serial", device.serial), ("alias", device.alias.map(u32::from))];
     for (key, number) in numbers {
@@ -68,6 +72,12 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     }
     if let Some(ppm) = device.clock_ppm {
         line("clock_ppm", number(ppm));
+    }
+    if let Some(medium) = device.medium {
+        line("medium", quoted(word(medium)));
+    }
+    if let Some(remakes) = device.remakes_symbol_errors {
+        line("remakes_symbol_errors", remakes.to_string());
     }
     if let Some(clock) = &device.clock {
         let keys = [
@@ -114,6 +124,9 @@ fn write_fault(fault: &FaultEntry, text: &mut String) {
     if let Some(devices) = &fault.devices {
         line("devices", list(devices));
     }
+    if let Some(supply) = &fault.supply {
+        line("supply", quoted(supply));
+    }
     if let Some(from_ms) = fault.from_ms {
         line("from_ms", number(from_ms));
     }
@@ -129,6 +142,15 @@ fn write_fault(fault: &FaultEntry, text: &mut String) {
             Value::Text(text) => quoted(text),
         };
         line(&key_of(key), value);
+    }
+}
+
+/// A medium as files write it.
+const fn word(medium: Medium) -> &'static str {
+    match medium {
+        Medium::Direct => "direct",
+        Medium::Fibre => "fibre",
+        Medium::Converters => "converters",
     }
 }
 

@@ -38,6 +38,30 @@ impl World {
                     self.signal_changed(link, at);
                 }
             }
+            Change::Break { line } => {
+                self.way_changes(at);
+                self.links[line.link].pair[usize::from(line.downstream)].break_at(at, fault);
+                self.signal_changed(line.link, at);
+            }
+            Change::Mend { line } => {
+                self.way_changes(at);
+                self.links[line.link].pair[usize::from(line.downstream)].mend_at(at, fault);
+                self.signal_changed(line.link, at);
+            }
+            Change::Swallow { line } => {
+                self.way_changes(at);
+                self.links[line.link].passage[usize::from(line.downstream)].break_at(at, fault);
+            }
+            Change::Carry { line } => {
+                self.way_changes(at);
+                self.links[line.link].passage[usize::from(line.downstream)].mend_at(at, fault);
+            }
+            Change::Early { link, blind } => {
+                self.links[link].early = blind.map(|blind| (blind, fault));
+            }
+            Change::Stranger { line, what } => self.strangers.push(at, fault, line, what),
+            Change::Delay { card, by } => self.cards[card.index()].delay_next(at, by, fault),
+            Change::Drop { card } => self.cards[card.index()].drop_next(at, fault),
             Change::Off { node } => {
                 self.way_changes(at);
                 let was_on = self.nodes[node].power.is_whole();
@@ -88,9 +112,9 @@ impl World {
     }
 
     /// A symbol is destroyed. Without a signal there is none to destroy.
-    fn hit(&mut self, at: Instant, fault: FaultId, line: Line, flip: u8) {
+    pub(super) fn hit(&mut self, at: Instant, fault: FaultId, line: Line, flip: u8) {
         let link = &mut self.links[line.link];
-        if !link.signal {
+        if !link.receives[usize::from(line.downstream)] {
             return;
         }
         link.noise[usize::from(line.downstream)].push_hit(Hit { at, flip, fault });

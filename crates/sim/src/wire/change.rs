@@ -8,6 +8,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::route::Direction;
 
 use super::software::SoftwareChange;
+use super::stranger::Stranger;
 use super::timing::TimingChange;
 use crate::device::Refusal;
 
@@ -62,6 +63,52 @@ pub enum Change {
     Close {
         /// Which.
         link: usize,
+    },
+    /// One direction of a link breaks: a pair of wires or a fibre. Its receiver has no signal.
+    Break {
+        /// Which.
+        line: Line,
+    },
+    /// It is whole again.
+    Mend {
+        /// Which.
+        line: Line,
+    },
+    /// A line swallows every frame from now on, while both ends keep their link.
+    Swallow {
+        /// Which.
+        line: Line,
+    },
+    /// It carries frames again.
+    Carry {
+        /// Which.
+        line: Line,
+    },
+    /// A link shows up so long before it carries frames, or no longer does.
+    Early {
+        /// Which.
+        link: usize,
+        /// How long, each time it comes up.
+        blind: Option<Span>,
+    },
+    /// A stranger sends a frame along a line, as if through a switch at its begin.
+    Stranger {
+        /// Which.
+        line: Line,
+        /// What it sends.
+        what: Stranger,
+    },
+    /// A card keeps the next frame back before it sends it.
+    Delay {
+        /// Which.
+        card: Path,
+        /// How long.
+        by: Span,
+    },
+    /// A card's host drops the next frame that has come back.
+    Drop {
+        /// Which.
+        card: Path,
     },
     /// A controller loses its supply.
     Off {

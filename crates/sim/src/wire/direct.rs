@@ -116,7 +116,7 @@ impl World {
 
     /// Controllers learn when frames came in at their ports that did not walk: some of them latch
     /// the time of a frame other than the one that asks for it.
-    fn note_entries(&mut self) {
+    pub(super) fn note_entries(&mut self) {
         for Passed { route, at, duration, number } in self.direct.unnoted.drain(..) {
             for (node, port, after) in &route.entries {
                 let controller = &mut self.nodes.quietly(*node as usize).controller;

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
-use super::link::EndState;
+use super::change::Line;
+use super::link::{EndState, Medium};
 use super::world::World;
 use crate::controller::{PhyAct, PortEvent};
 use crate::hardware::PortKind;
-use crate::truth::{Effect, Place};
+use crate::truth::{Effect, FaultId, Place};
 
 /// What was scheduled for a link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -17,7 +18,11 @@ pub(super) enum Due {
     /// An end finds its signal gone.
     Lost { link: usize, end: usize, epoch: u64 },
     /// Both ends have a link.
-    Up { link: usize, epoch: u64 },
+    Up { link: usize, epochs: [u64; 2] },
+    /// One end has a link.
+    EndUp { link: usize, end: usize, epoch: u64 },
+    /// A link that was up too early carries frames.
+    Carries { link: usize, fault: FaultId },
     /// A PHY does something to its link.
     Phy { link: usize, end: usize, act: PhyAct },
 }
@@ -45,65 +50,139 @@ impl Agenda {
 }
 
 impl World {
-    /// Whether the signal of a link is there in both directions: contact closed, both ends on.
-    pub(super) fn has_signal(&self, link: usize) -> bool {
-        let link = &self.links[link];
-        let awake = link.asleep == [false; 2];
-        awake && link.contact.is_whole() && link.both_ends().into_iter().all(|end| self.is_on(end))
+    /// Whether an end of a link receives symbols: way whole, both ends on and awake. Between media
+    /// converters it is the near one that sends them.
+    fn receives(&self, index: usize, end: usize) -> bool {
+        let link = &self.links[index];
+        let ends = link.both_ends();
+        let is_there = |end: usize| self.is_on(ends[end]) && !link.asleep[end];
+        let whole = link.contact.is_whole() && link.pair[end].is_whole();
+        is_there(end) && (link.medium == Medium::Converters || (is_there(1 - end) && whole))
     }
 
     fn is_on(&self, end: End) -> bool {
         end.node().is_none_or(|node| self.nodes[node].power.is_whole())
     }
 
+    /// Whether an end that loses its link takes the other's with it: by autonegotiation on copper,
+    /// by the handshake of enhanced link detection on the E-bus (S1 chapter 6).
+    fn falls_together(&self, index: usize, before: [bool; 2], now: [bool; 2]) -> bool {
+        let link = &self.links[index];
+        let one_sided = before[0] != before[1] || now[0] != now[1];
+        let detects = |end: End| {
+            end.node().is_some_and(|node| {
+                self.nodes[node].controller.dl_status().enhanced_link_detection()
+            })
+        };
+        match (link.medium, link.kind) {
+            (Medium::Fibre | Medium::Converters, _) => false,
+            (Medium::Direct, _) if link.has_hole() => false,
+            (Medium::Direct, PortKind::Ebus) => {
+                !one_sided || link.both_ends().into_iter().any(detects)
+            }
+            (Medium::Direct, PortKind::Mii | PortKind::Absent) => true,
+        }
+    }
+
     /// The signal of a link may have come or gone.
     pub(super) fn signal_changed(&mut self, index: usize, at: Instant) {
-        let signal = self.has_signal(index);
-        let flipped = self.links[index].signal != signal;
-        self.links[index].signal = signal;
-        self.links[index].epoch += u64::from(flipped);
-        let epoch = self.links[index].epoch;
-        if !signal {
-            for (end, place) in self.links[index].both_ends().into_iter().enumerate() {
-                if !self.is_on(place) {
-                    self.links[index].ends[end] = EndState::Down;
-                } else if self.links[index].ends[end] == EndState::Up {
-                    self.links[index].ends[end] = EndState::Losing;
-                    let detection = self.loss_detection(index, place);
-                    self.agenda.push(at + detection, Due::Lost { link: index, end, epoch });
-                }
+        let receives = [0, 1].map(|end| self.receives(index, end));
+        let before = std::mem::replace(&mut self.links[index].receives, receives);
+        let together = self.falls_together(index, before, receives);
+        for end in 0..2 {
+            let flipped = before[end] != receives[end] || (together && before != receives);
+            self.links[index].epochs[end] += u64::from(flipped);
+        }
+        for (end, place) in self.links[index].both_ends().into_iter().enumerate() {
+            if !self.is_on(place) {
+                self.links[index].ends[end] = EndState::Down;
+            } else if !receives[end] {
+                self.begins_to_lose(index, end, at);
+            }
+        }
+        if before == receives {
+            return;
+        }
+        if together {
+            if receives == [true; 2] {
+                self.both_receive_again(index, at);
             }
             return;
         }
-        if !flipped {
-            return;
+        for end in 0..2 {
+            if receives[end] && !before[end] {
+                self.receives_again(index, end, at);
+            }
         }
-        if self.links[index].ends == [EndState::Losing; 2] {
+    }
+
+    pub(super) fn begins_to_lose(&mut self, index: usize, end: usize, at: Instant) {
+        if self.links[index].ends[end] == EndState::Up {
+            self.links[index].ends[end] = EndState::Losing;
+            let place = self.links[index].both_ends()[end];
+            let detection = self.loss_detection(index, place);
+            let epoch = self.links[index].epochs[end];
+            self.agenda.push(at + detection, Due::Lost { link: index, end, epoch });
+        }
+    }
+
+    fn both_receive_again(&mut self, index: usize, at: Instant) {
+        let ends = self.links[index].ends;
+        if !ends.contains(&EndState::Down) {
             // Back before anyone noticed.
             self.links[index].ends = [EndState::Up; 2];
             return;
         }
         // One end that lost its link starts it anew, and the other sees that.
-        for end in 0..2 {
-            if self.links[index].ends[end] != EndState::Down {
+        for (end, state) in ends.into_iter().enumerate() {
+            if state != EndState::Down {
                 self.end_lost(index, end, at);
             }
         }
-        self.agenda.push(at + self.link_up_time(index), Due::Up { link: index, epoch });
+        let epochs = self.links[index].epochs;
+        self.agenda.push(at + self.link_up_time(index), Due::Up { link: index, epochs });
+    }
+
+    fn receives_again(&mut self, index: usize, end: usize, at: Instant) {
+        match self.links[index].ends[end] {
+            EndState::Losing => self.links[index].ends[end] = EndState::Up,
+            EndState::Down => {
+                let epoch = self.links[index].epochs[end];
+                let up = at + self.link_up_time(index);
+                self.agenda.push(up, Due::EndUp { link: index, end, epoch });
+            }
+            EndState::Up => {}
+        }
     }
 
     pub(super) fn serve(&mut self, at: Instant, due: Due) {
         match due {
             Due::Lost { link, end, epoch } => {
                 let state = self.links[link].ends[end];
-                if self.links[link].epoch == epoch && state == EndState::Losing {
+                if self.links[link].epochs[end] == epoch && state == EndState::Losing {
                     self.end_lost(link, end, at);
+                    let receives = self.links[link].receives;
+                    if self.falls_together(link, receives, receives) {
+                        self.begins_to_lose(link, 1 - end, at);
+                    }
                 }
             }
             Due::Phy { link, end, act } => self.phy_acts(link, end, act, at),
-            Due::Up { link, epoch } => {
-                if self.links[link].epoch == epoch {
+            Due::Up { link, epochs } => {
+                if self.links[link].epochs == epochs {
                     self.link_up(link, at);
+                }
+            }
+            Due::EndUp { link, end, epoch } => {
+                if self.links[link].epochs[end] == epoch {
+                    self.end_up(link, end, at);
+                    self.comes_up(link, at);
+                }
+            }
+            Due::Carries { link, fault } => {
+                self.way_changes(at);
+                for line in Line::both(link) {
+                    self.links[link].passage[usize::from(line.downstream)].mend_at(at, fault);
                 }
             }
         }
@@ -125,19 +204,39 @@ impl World {
 
     /// Both ends have a link.
     pub(super) fn link_up(&mut self, index: usize, at: Instant) {
+        for end in 0..2 {
+            self.end_up(index, end, at);
+        }
+        self.comes_up(index, at);
+    }
+
+    fn end_up(&mut self, index: usize, end: usize, at: Instant) {
         self.way_changes(at);
-        self.links[index].ends = [EndState::Up; 2];
+        self.links[index].ends[end] = EndState::Up;
         let fault = self.cause_of_link(index, at).fault();
-        self.links[index].dropped = None;
         if fault.is_some() {
             self.truth.effect(at, fault, self.link_place(index), Effect::SignalBack);
         }
-        for place in self.links[index].both_ends() {
-            match place {
-                End::MainDevice(path) => self.cards[path.index()].set_carrier(at, true),
-                End::Controller(node, port) => {
-                    self.post(node, at, fault.into(), PortEvent::Link { port, up: true });
-                }
+        match self.links[index].both_ends()[end] {
+            End::MainDevice(path) => self.cards[path.index()].set_carrier(at, true),
+            End::Controller(node, port) => {
+                self.post(node, at, fault.into(), PortEvent::Link { port, up: true });
+            }
+        }
+    }
+
+    /// What a link does when it comes up: it may carry nothing yet, and it may be noisy.
+    fn comes_up(&mut self, index: usize, at: Instant) {
+        self.links[index].dropped = None;
+        if let Some((blind, fault)) = self.links[index].early {
+            for passage in &mut self.links[index].passage {
+                passage.break_at(at, fault);
+            }
+            self.agenda.push(at + blind, Due::Carries { link: index, fault });
+        }
+        if let Some(fault) = self.blame(index, at) {
+            for (line, after, flip) in self.plug_noise.draw(index) {
+                self.hit(at + after, fault, line, flip);
             }
         }
     }

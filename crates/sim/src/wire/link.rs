@@ -98,6 +98,32 @@ pub(super) enum EndState {
     Losing,
 }
 
+/// What a link is made of between its ends.
+#[derive(
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    Debug,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Medium {
+    /// Contacts of the E-bus, or two pairs of copper with autonegotiation (100BASE-TX): an end that
+    /// loses its signal starts the negotiation anew, and so the other end loses its link, too.
+    #[default]
+    Direct,
+    /// Two fibres (100BASE-FX) without negotiation: an end that still receives light keeps its link,
+    /// whatever the other one sees.
+    Fibre,
+    /// A pair of media converters: each end has a link to its own converter, whatever happens
+    /// between the two.
+    Converters,
+}
+
 /// A link between two ports.
 #[derive(Clone, Debug)]
 pub struct Link {
@@ -109,16 +135,24 @@ pub struct Link {
     pub kind: PortKind,
     /// How long a symbol is on its way, cable and both ports.
     pub transit: Span,
-    /// The contact.
+    /// What it is made of between its ends.
+    pub medium: Medium,
+    /// The contact: both directions.
     pub contact: History,
+    /// A pair of wires or a fibre by itself, upstream line first: broken, its receiver has no signal.
+    pub pair: [History; 2],
+    /// Upstream line first: broken, it swallows frames although both ends have a link.
+    pub passage: [History; 2],
+    /// How long it shows up before it carries frames, each time, and whose doing that is.
+    pub(super) early: Option<(Span, FaultId)>,
     /// By [`Line::downstream`](super::Line): upstream line first.
     pub(super) noise: [Noise; 2],
     /// Upstream end first.
     pub(super) ends: [EndState; 2],
-    /// Whether symbols arrive, in both directions.
-    pub(super) signal: bool,
-    /// Counts changes of the signal, so that what was scheduled before one can be told.
-    pub(super) epoch: u64,
+    /// Whether symbols arrive at an end, upstream end first.
+    pub(super) receives: [bool; 2],
+    /// Counts changes of what an end receives, so that what was scheduled before one can be told.
+    pub(super) epochs: [u64; 2],
     /// Whether the PHY of an end sleeps, upstream end first.
     pub(super) asleep: [bool; 2],
     /// Why a PHY dropped the link that its signal would have allowed.
@@ -136,11 +170,15 @@ impl Link {
             downstream,
             kind,
             transit,
+            medium: Medium::Direct,
             contact: History::default(),
+            pair: [History::default(), History::default()],
+            passage: [History::default(), History::default()],
+            early: None,
             noise: [Noise::default(), Noise::default()],
             ends: [EndState::Down; 2],
-            signal: true,
-            epoch: 0,
+            receives: [true; 2],
+            epochs: [0; 2],
             asleep: [false; 2],
             dropped: None,
             bad_symbols: [VecDeque::new(), VecDeque::new()],
@@ -151,6 +189,11 @@ impl Link {
     #[must_use]
     pub const fn both_ends(&self) -> [End; 2] {
         [self.upstream, self.downstream]
+    }
+
+    /// Whether something on it holds one direction apart from the other.
+    pub(super) fn has_hole(&self) -> bool {
+        self.passage.iter().any(|passage| !passage.is_whole())
     }
 
     /// The end that sends on a line and the one that receives.

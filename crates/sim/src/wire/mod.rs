@@ -19,17 +19,20 @@ pub mod link;
 mod node;
 mod nodes;
 mod phy_link;
+pub(crate) mod plug_noise;
 mod route;
 pub mod software;
 mod starve;
+pub mod stranger;
 pub mod timing;
 pub(crate) mod walk;
 pub(crate) mod world;
 
 pub use change::{Change, Line, Source};
 pub use history::History;
-pub use link::{CABLE_NS_PER_M, Link};
+pub use link::{CABLE_NS_PER_M, Link, Medium};
 pub use software::SoftwareChange;
+pub use stranger::Stranger;
 pub use timing::TimingChange;
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use linesman_proto::topology::End;
 
 use super::change::Line;
 use super::due::Due;
+use super::history::History;
 use super::link::EndState;
 use super::world::World;
 use crate::controller::PhyAct;
@@ -65,28 +66,25 @@ impl World {
 
     /// One end drops a link and negotiates anew: it has none from now on, the other end finds out.
     fn drop_link(&mut self, index: usize, end: usize, cause: Cause, at: Instant) {
-        if !self.links[index].signal || self.links[index].ends[end] != EndState::Up {
+        let link = &mut self.links[index];
+        if link.receives != [true; 2] || link.ends[end] != EndState::Up {
             return;
         }
-        let link = &mut self.links[index];
         link.dropped = Some(cause);
-        link.epoch += 1;
-        let epoch = link.epoch;
-        self.end_lost(index, end, at);
-        let other = 1 - end;
-        if self.links[index].ends[other] == EndState::Up {
-            self.links[index].ends[other] = EndState::Losing;
-            let place = self.links[index].both_ends()[other];
-            let detection = self.loss_detection(index, place);
-            self.agenda.push(at + detection, Due::Lost { link: index, end: other, epoch });
+        for epoch in &mut link.epochs {
+            *epoch += 1;
         }
-        self.agenda.push(at + self.link_up_time(index), Due::Up { link: index, epoch });
+        let epochs = link.epochs;
+        self.end_lost(index, end, at);
+        self.begins_to_lose(index, 1 - end, at);
+        self.agenda.push(at + self.link_up_time(index), Due::Up { link: index, epochs });
     }
 
     /// Why a link is as it is: a PHY dropped it, or somebody broke it.
     pub(super) fn cause_of_link(&self, index: usize, at: Instant) -> Cause {
         let link = &self.links[index];
         let whole = link.contact.is_whole()
+            && link.pair.iter().all(History::is_whole)
             && link.both_ends().into_iter().all(|end| match end {
                 End::MainDevice(_) => true,
                 End::Controller(node, _) => self.nodes[node].power.is_whole(),

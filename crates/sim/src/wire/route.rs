@@ -6,6 +6,7 @@ use linesman_proto::time::Span;
 use linesman_proto::topology::End;
 
 use super::change::Line;
+use super::history::History;
 use super::world::World;
 
 /// No place on a route.
@@ -76,7 +77,9 @@ impl World {
         for _ in 0..2 * self.links.len() {
             let link = &self.links[line.link];
             let (_, to) = link.from_to(line.downstream);
-            if !link.contact.is_whole() {
+            let direction = usize::from(line.downstream);
+            let ways = [&link.contact, &link.pair[direction], &link.passage[direction]];
+            if !ways.into_iter().all(History::is_whole) {
                 return None;
             }
             after += link.transit;

@@ -30,21 +30,33 @@ pub(crate) struct Traveller {
     pub(crate) frame: WireFrame,
     /// Who spoiled it first.
     pub(crate) spoiled_by: Option<FaultId>,
-    /// A processing unit marked it for what the MainDevice put into it.
+    /// A processing unit marked it for what its sender put into it.
     pub(crate) refused: bool,
+    /// Who sent it, if not the MainDevice.
+    pub(crate) stranger: Option<FaultId>,
 }
 
 impl Traveller {
     /// A frame that leaves a card.
     pub(crate) const fn new(frame: WireFrame) -> Self {
-        Self { frame, spoiled_by: None, refused: false }
+        Self { frame, spoiled_by: None, refused: false, stranger: None }
+    }
+
+    /// A frame that a stranger sends.
+    pub(crate) const fn of(frame: WireFrame, stranger: FaultId) -> Self {
+        Self { frame, spoiled_by: None, refused: false, stranger: Some(stranger) }
+    }
+
+    /// Whose content it is.
+    fn content(&self) -> Cause {
+        self.stranger.map_or(Cause::Content, Cause::Fault)
     }
 
     /// Why a receiver finds it damaged.
     fn cause(&self) -> Cause {
         match self.spoiled_by {
             Some(fault) => Cause::Fault(fault),
-            None if self.refused => Cause::Content,
+            None if self.refused => self.content(),
             None => Cause::Unknown,
         }
     }
@@ -72,8 +84,20 @@ enum Crossing {
 impl World {
     /// Sends a frame off by a card at `at`, port by port.
     pub(crate) fn walk(&mut self, card: Path, at: Instant, traveller: &mut Traveller) -> Outcome {
-        let Some(mut line) = self.leaving[card.index()] else { return Outcome::Vanished };
-        let mut at = at;
+        match self.leaving[card.index()] {
+            Some(line) => self.walk_from(line, at, traveller),
+            None => Outcome::Vanished,
+        }
+    }
+
+    /// Sends a frame along a line at `at`.
+    pub(super) fn walk_from(
+        &mut self,
+        line: Line,
+        at: Instant,
+        traveller: &mut Traveller,
+    ) -> Outcome {
+        let (mut line, mut at) = (line, at);
         let mut made_anew = false;
         // Every line twice in each direction is more than any frame can do.
         for _ in 0..4 * self.links.len() {
@@ -316,10 +340,11 @@ impl World {
         let marked = intact && !traveller.frame.damage.is_intact();
         if marked || controller.register(errors) > before {
             let id = controller.id();
-            self.truth.may_move(id, ErrorCounter::ProcessingUnit, Cause::Content);
+            self.truth.may_move(id, ErrorCounter::ProcessingUnit, traveller.content());
             traveller.refused = true;
             let effect = Effect::ContentRefused { frame: traveller.frame.number };
-            self.truth.effect(at, traveller.spoiled_by, Place::Device(id), effect);
+            let by = traveller.spoiled_by.or(traveller.stranger);
+            self.truth.effect(at, by, Place::Device(id), effect);
         }
         verdict
     }

@@ -9,10 +9,13 @@ use super::direct::Direct;
 use super::due::Agenda;
 use super::link::{CABLE_NS_PER_M, Link, Noise};
 use super::nodes::Nodes;
+use super::plug_noise::PlugNoise;
+use super::stranger::Strangers;
 use crate::controller::Controller;
 use crate::device::Signals;
 use crate::fault::Running;
 use crate::hardware::PortKind;
+use crate::seed::Seed;
 use crate::segment::card::Card;
 use crate::truth::{FaultId, Place, TruthLog};
 
@@ -38,6 +41,8 @@ pub(crate) struct World {
     /// An upper bound of the time that a frame of no length takes through all of it, twice.
     round: Span,
     pub(crate) frames: u64,
+    pub(crate) plug_noise: PlugNoise,
+    pub(super) strangers: Strangers,
     /// Links on which something lies in wait.
     pub(super) noisy: Vec<usize>,
     /// The last instant, so far as is known, at which a link or a supply changed.
@@ -68,6 +73,8 @@ impl World {
             horizon: Instant::ZERO,
             round: Span::ZERO,
             frames: 0,
+            plug_noise: PlugNoise::new(0.0, Seed(0).stream("plug noise")),
+            strangers: Strangers::default(),
             noisy: Vec::new(),
             changed_at: Instant::ZERO,
             direct: Direct::default(),
@@ -177,6 +184,7 @@ impl World {
     /// Brings everything to `now`.
     pub(crate) fn advance(&mut self, now: Instant) {
         self.change_until(now);
+        self.let_strangers_send(now);
         self.touch_due(now);
     }
 
@@ -224,13 +232,17 @@ impl World {
 
     /// Hits that still wait for a frame do not come any more. One whose fault ended by itself comes
     /// with the next frame: so many hits were asked for.
-    fn disarm(&mut self, fault: FaultId) {
+    pub(crate) fn disarm(&mut self, fault: FaultId) {
         for noise in self.links.iter_mut().flat_map(|link| &mut link.noise) {
             noise.disarm(fault);
         }
         for node in self.nodes.iter_mut() {
             node.glitches.retain(|glitch| glitch.fault != fault);
         }
+        for card in &mut self.cards {
+            card.disarm(fault);
+        }
+        self.strangers.disarm(fault);
     }
 
     /// A fault is over: everything it holds is let go.
@@ -238,6 +250,18 @@ impl World {
         for link in 0..self.links.len() {
             if self.links[link].contact.is_held_by(fault) {
                 self.apply(at, fault, Change::Close { link });
+            }
+            for line in Line::both(link) {
+                let index = usize::from(line.downstream);
+                if self.links[link].passage[index].is_held_by(fault) {
+                    self.apply(at, fault, Change::Carry { line });
+                }
+                if self.links[link].pair[index].is_held_by(fault) {
+                    self.apply(at, fault, Change::Mend { line });
+                }
+            }
+            if self.links[link].early.is_some_and(|(_, by)| by == fault) {
+                self.links[link].early = None;
             }
         }
         for node in 0..self.nodes.len() {
@@ -270,7 +294,8 @@ impl World {
         let power = |end: End| end.node().map(|node| &self.nodes[node].power);
         let histories = || {
             let ends = link.both_ends().into_iter().filter_map(power);
-            std::iter::once(&link.contact).chain(ends)
+            let way = std::iter::once(&link.contact).chain(&link.pair).chain(&link.passage);
+            way.chain(ends)
         };
         histories()
             .find_map(|history| history.cause_at(at))
@@ -286,9 +311,12 @@ impl World {
     ) -> Option<(Instant, FaultId)> {
         let link = &self.links[line.link];
         let (sender, _) = link.from_to(line.downstream);
+        let direction = usize::from(line.downstream);
         let contact = link.contact.first_break(from, to);
+        let pair = link.pair[direction].first_break(from, to);
+        let passage = link.passage[direction].first_break(from, to);
         let sender = sender.node().and_then(|node| self.nodes[node].power.first_break(from, to));
-        [contact, sender].into_iter().flatten().min()
+        [contact, pair, passage, sender].into_iter().flatten().min()
     }
 
     /// The card at a path.

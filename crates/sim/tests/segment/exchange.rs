@@ -1,7 +1,7 @@
 //! What is built in otherwise than planned, addresses that two have, currents that are not supplied.
 
 use linesman_config::fault::FaultName;
-use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::address::DeviceId;
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::register as r;
@@ -9,7 +9,7 @@ use linesman_proto::time::Span;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{FaultEntry, SegmentFile};
 
-use super::rig::{Bench, PLANT, at, frame};
+use super::rig::{Bench, PLANT, at};
 
 fn plant(faults: &str) -> SegmentFile {
     SegmentFile::parse(&format!("{PLANT}\n{faults}")).unwrap_or_else(|error| panic!("{error}"))
@@ -215,19 +215,13 @@ on = "T2.B"
 }
 
 #[test]
-fn groups_and_supplies_can_be_named_as_places() {
-    let grouped =
-        PLANT.replace("name = \"T7\"\n", "name = \"T7\"\ngroup = \"A\"\npower = \"left\"\n");
-    let grouped = grouped.replace("name = \"T5\"\n", "name = \"T5\"\npower = \"left\"\n");
+fn a_group_can_be_named_as_a_place() {
+    let grouped = PLANT.replace("name = \"T7\"\n", "name = \"T7\"\ngroup = \"A\"\n");
+    let grouped = grouped.replace("name = \"T5\"\n", "name = \"T5\"\ngroup = \"A\"\n");
     let mut bench = Bench::new(&grouped);
-    let fault = bench.inject(&FaultEntry::new(FaultName::SupplyOff).device("power:left"));
+    bench.inject(&FaultEntry::new(FaultName::SupplyOff).device("group:A"));
     bench.wait(Span::ms(1));
     assert_eq!(bench.count(), Some(6));
-    bench.heal(fault);
-    bench.wait(Span::ms(100));
-    bench.inject(&FaultEntry::new(FaultName::DeviceOff).device("group:A"));
-    bench.wait(Span::ms(1));
-    assert_eq!(bench.count(), Some(7));
 }
 
 #[test]
@@ -277,27 +271,4 @@ on = "K1.C"
     ))
     .unwrap_err();
     assert!(error.to_string().contains("Fast Hot Connect"), "{error}");
-}
-
-#[test]
-fn fibre_and_converters_have_their_delay() {
-    let line = |keys: &str| {
-        format!(
-            "[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
-             [[device]]\nname = \"K2\"\ntype = \"EK1100\"\non = \"K1.C\"\n{keys}\n"
-        )
-    };
-    let arrives = |keys: &str| {
-        let mut bench = Bench::new(&line(keys));
-        let sent = bench.now;
-        let frame = frame(Command::Brd, at(0, 0), &[0]);
-        let arrived = bench.send_by(Path::A, &frame);
-        arrived[0].0.at.since(sent).as_nanos() as i64
-    };
-    let none = arrives("cable_m = 0.0");
-    assert_eq!(arrives("cable_m = 100.0") - none, 1_000);
-    assert_eq!(arrives("cable_m = 1000.0\ncable = \"fibre\"") - none, 9_800);
-    assert_eq!(arrives("cable_m = 0.0\nvia = \"media-converter\"") - none, 1_200);
-    let error = SegmentFile::parse(&line("cable = \"ebus\"")).unwrap_err();
-    assert!(error.to_string().contains("100 Mbit/s port"), "{error}");
 }

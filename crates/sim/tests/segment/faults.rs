@@ -503,9 +503,12 @@ fn entries_that_cannot_be_are_refused_with_a_way_out() {
     let entry = |text: &str| format!("{PLANT}\n[[fault]]\n{text}\n");
     let table = [
         ("kind = \"link_open\"", "no fault is called `link_open` (did you mean `link-open`?)"),
-        ("kind = \"second-maindevice\"", "a segment cannot have the fault `second-maindevice`"),
-        ("kind = \"link-open\"", "no place is given; expected `at = \"K1.C-B3.A\"`"),
-        ("kind = \"link-open\"\nat = \"K1.C>K6.A\"", "is one direction"),
+        ("kind = \"one-sided-recording\"", "a segment cannot have the fault `one-sided-recording`"),
+        ("kind = \"link-open\"", "no place is given; expected `at = \"K1.C>B3.A\"`"),
+        ("kind = \"early-link\"\nat = \"K1.C>K6.A\"", "is one direction"),
+        ("kind = \"ring-open\"", "this line is no ring"),
+        ("kind = \"ports-swapped\"\ndevice = \"T3\"", "is not entered by a cable"),
+        ("kind = \"supply-off\"\nsupply = \"PS9\"", "no supply is called `PS9`"),
         ("kind = \"link-open\"\nat = \"K1.C-K8.A\"", "K1.C is wired to K6.A"),
         ("kind = \"link-open\"\nat = \"K9.C-K6.A\"", "no device is called `K9`"),
         ("kind = \"link-open\"\nat = \"T5.B\"", "no link is plugged in at `T5.B`"),

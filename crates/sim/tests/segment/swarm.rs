@@ -6,7 +6,7 @@ use linesman_proto::address::Path;
 use linesman_proto::command::Command;
 use linesman_proto::time::Span;
 use linesman_sim::device::library::{self, LibraryType};
-use linesman_sim::fault::{BUILT_IN, KINDS, Kind, PlaceRule};
+use linesman_sim::fault::{KINDS, Kind, PlaceRule};
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{FaultEntry, PlantOptions, SegmentFile, plant};
@@ -16,10 +16,12 @@ use super::rig::{Bench, PLANT, answer, at, frame};
 
 /// A random fault of any kind that can come and go.
 pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
-    let fits_anywhere = |kind: &&Kind| {
-        !BUILT_IN.contains(&kind.name) && !matches!(kind.place, PlaceRule::Feed | PlaceRule::Pair)
+    let is_ring = file.ring.is_some();
+    let fits = |kind: &&Kind| {
+        let needs_more = matches!(kind.place, PlaceRule::Feed | PlaceRule::Pair);
+        !kind.is_built_in() && !needs_more && (is_ring || kind.place != PlaceRule::RingLink)
     };
-    let kinds: Vec<_> = KINDS.iter().filter(fits_anywhere).collect();
+    let kinds: Vec<_> = KINDS.iter().filter(fits).collect();
     let kind = stream.pick(&kinds).unwrap();
     let needs_software = matches!(kind.place, PlaceRule::Processor | PlaceRule::Mailbox);
     let has_software = |name: &str| library::find(name).is_some_and(LibraryType::has_mailbox);
@@ -41,7 +43,7 @@ pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
         | PlaceRule::Processor
         | PlaceRule::Mailbox
         | PlaceRule::DeviceOrCard => entry.device(&device.name),
-        PlaceRule::Card => entry,
+        PlaceRule::Card | PlaceRule::RingLink | PlaceRule::Entrance => entry,
     }
 }
 

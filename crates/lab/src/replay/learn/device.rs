@@ -3,7 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use linesman_proto::address::RegisterAddress;
-use linesman_proto::register::{self as r, FmmuConfig, SiiCommand, SiiControl, SyncManagerConfig};
+use linesman_proto::mailbox::Message;
+use linesman_proto::register::{
+    self as r, AlStatus, FmmuConfig, SiiCommand, SiiControl, SyncManagerConfig,
+};
 use linesman_proto::time::{Instant, Span};
 
 use super::latency::Waiting;
@@ -11,6 +14,8 @@ use super::objects::ObjectsSeen;
 
 /// Bytes of registers that are followed.
 const REGISTERS: usize = 0x1000;
+/// Length of a mailbox header.
+const HEADER_LEN: usize = 6;
 /// A mailbox is full (SyncManager status).
 const FULL: u8 = 1 << 3;
 const SM0: u16 = r::SYNC_MANAGER.address.0;
@@ -46,6 +51,8 @@ pub struct MailboxTurn {
 pub struct DeviceSeen {
     /// Register bytes as they were before anything wrote them.
     pub initial: BTreeMap<u16, u8>,
+    /// Bytes behind the first messages of its mailbox: what its memory held before.
+    pub memory: BTreeMap<u16, u8>,
     /// Words of its SII as they were before anything wrote them.
     pub sii: BTreeMap<u32, u16>,
     /// How long its SII took for each command.
@@ -75,6 +82,8 @@ pub struct DeviceSeen {
     /// What 0x0508 holds: from which word on, and how many bytes of it.
     last_word: Option<(u32, usize)>,
     al_waiting: Option<(Waiting, u8)>,
+    /// Mailbox bytes of which the first content was seen.
+    memory_seen: BTreeSet<u16>,
     fetched: Option<Waiting>,
     mailbox_waiting: Option<(Waiting, Option<Span>, Waiting)>,
     /// The first set-up of mappings and buffers that requests brought.
@@ -161,6 +170,12 @@ impl DeviceSeen {
         let view = |address: u16| {
             address.checked_sub(ado.0).and_then(|offset| data.get(usize::from(offset))).copied()
         };
+        if let Some(status) = view(r::SII_CONTROL_STATUS.address.0) {
+            // Its upper bits say what the interface is; no write changes them.
+            const KIND: u8 = 0xF8;
+            let address = r::SII_CONTROL_STATUS.address.0;
+            self.initial.entry(address).or_insert(status & KIND);
+        }
         self.sii_read(&view, at);
         if let Some(status) = view(r::AL_STATUS.address.0) {
             self.al_read(u16::from(status), at);
@@ -191,6 +206,14 @@ impl DeviceSeen {
     /// A read of all devices: what of it says something of each.
     pub(super) fn read_by_all(&mut self, ado: RegisterAddress, data: &[u8], at: Instant) {
         let Some(offset) = r::AL_STATUS.address.0.checked_sub(ado.0) else { return };
+        // All in one state: each is in it.
+        let address = r::AL_STATUS.address.0;
+        if let Some(status) = data.get(usize::from(offset))
+            && AlStatus(u16::from(*status)).state().state().is_some()
+            && !self.written.contains(&r::AL_CONTROL.address.0)
+        {
+            self.initial.entry(address).or_insert(*status);
+        }
         let (Some(status), Some((waiting, requested))) =
             (data.get(usize::from(offset)).copied(), &mut self.al_waiting)
         else {
@@ -370,9 +393,24 @@ impl DeviceSeen {
     fn mailbox_fetched(&mut self, data: &[u8], answered: bool, at: Instant) {
         self.answer_polled(answered, at);
         if answered {
+            self.leftover(self.sync_manager(1).start, data);
             self.objects.answered(data);
             if self.fetched.replace(Waiting::since(at)).is_some() {
                 self.openings.push_back(None);
+            }
+        }
+    }
+
+    /// What lies behind the end of a message, where no message was before.
+    fn leftover(&mut self, start: RegisterAddress, data: &[u8]) {
+        let len =
+            Message::parse(data).map_or(data.len(), |message| HEADER_LEN + message.data.len());
+        for (address, (offset, byte)) in (start.0..).zip(data.iter().enumerate()) {
+            // Where a message was, its bytes are no leftover any more.
+            let value = if offset < len { None } else { Some(*byte) };
+            let known = self.memory_seen.insert(address);
+            if let (true, Some(value)) = (known, value) {
+                self.memory.insert(address, value);
             }
         }
     }

@@ -11,6 +11,8 @@ mod objects;
 mod stations;
 mod target;
 
+use std::collections::BTreeSet;
+
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::register::{self as r, EcatEvents};
@@ -61,19 +63,24 @@ pub struct Learned {
 }
 
 /// ECAT events when the recording begins.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct EventsAtStart {
     /// Events that stood.
     pub request: u16,
     /// Events that datagrams carried away.
     pub mask: u16,
+    /// Devices whose DL or AL status was read while an event stood; with none, all had it.
+    pub owners: BTreeSet<usize>,
+    /// The last event went with the read of a device's status.
+    pub ended: bool,
     begun: bool,
     /// DL status, AL status were read: their events are gone.
     served: u16,
 }
 
 impl EventsAtStart {
-    fn take(&mut self, request: &Datagram<'_>, reply: &Datagram<'_>) {
+    fn take(&mut self, request: &Datagram<'_>, reply: &Datagram<'_>, target: Target) {
+        self.ended |= self.request != 0 && reply.irq == 0;
         if !std::mem::replace(&mut self.begun, true) {
             self.mask = reply.irq;
         }
@@ -92,6 +99,11 @@ impl EventsAtStart {
             for (register, event) in events {
                 if covers(register) {
                     self.served |= event.0;
+                    if let Target::One(device) = target
+                        && !self.ended
+                    {
+                        self.owners.insert(device);
+                    }
                 }
             }
         }
@@ -113,7 +125,11 @@ pub fn learn(recording: &Recording) -> Learned {
     }
     for turn in &recording.turns {
         for (request, reply) in turn.pairs() {
-            learned.events.take(&request, &reply);
+            let count = learned.devices.len();
+            let target = request
+                .command
+                .map_or(Target::Nobody, |command| stations.target(command, &request, count));
+            learned.events.take(&request, &reply, target);
             learned.take(&request, &reply, turn.request.at, &mut stations);
         }
     }

@@ -95,6 +95,9 @@ pub fn model(learned: &Learned, images: &[Vec<u8>]) -> Result<Model, ModelError>
         if let Some(controller) = segment.controller_mut(id) {
             preset(controller, seen, PRESET);
             preset_events(controller, learned);
+            for (address, byte) in &seen.memory {
+                controller.preset(RegisterAddress(*address), &[*byte]);
+            }
             if let Some(time) = seen.programming {
                 controller.set_sii_programming_time(time);
             }
@@ -168,8 +171,11 @@ const PRESET: &[std::ops::Range<u16>] = &[
 /// Events that no datagram carried before they were served did not stand; the mask is that of the
 /// first answer, unless it was read.
 fn preset_events(controller: &mut Controller, learned: &Learned) {
-    let events = learned.events;
-    controller.preset(r::ECAT_EVENT_REQUEST.address, &events.request.to_le_bytes());
+    let events = &learned.events;
+    // Where the last event went with a read, those that were not read until then had none.
+    let had = !events.ended || events.owners.contains(&controller.id().index());
+    let request = if had { events.request } else { 0 };
+    controller.preset(r::ECAT_EVENT_REQUEST.address, &request.to_le_bytes());
     if events.mask != 0 {
         controller.preset(r::ECAT_EVENT_MASK.address, &events.mask.to_le_bytes());
     }

@@ -1,12 +1,13 @@
 //! `linesman lab replay`: the requests of a recording, played against a segment, and its answers
 //! beside the recorded ones.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
+use linesman_config::esi::Esi;
 use linesman_lab::replay::report::Verdict;
 use linesman_lab::replay::{Model, Recorder, Recording, Report, learn, model, on_segment, play};
 use linesman_runtime::capture::Capture;
+use linesman_sim::device::DescribedType;
 use serde::Serialize;
 
 use crate::exit::Status;
@@ -31,6 +32,9 @@ pub(crate) struct Arguments {
     /// SII images: words that the recording does not show come from the one of the same product
     #[arg(long, value_name = "FILE.bin", num_args = 1..)]
     sii: Vec<PathBuf>,
+    /// Device descriptions of their makers, for the same purpose
+    #[arg(long, value_name = "FILE.xml", num_args = 1..)]
+    esi: Vec<PathBuf>,
     /// JSON, schema linesman.replay/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -56,7 +60,10 @@ pub(crate) struct ReplayReport {
 /// Plays it.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let recording = record(&arguments.capture, output)?;
-    let images = images(&arguments.sii)?;
+    let mut images = images(&arguments.sii)?;
+    for path in &arguments.esi {
+        images.extend(described(path)?);
+    }
     let learned = learn(&recording);
     let mut made: Option<Model> = match &arguments.segment {
         Some(path) => {
@@ -128,23 +135,19 @@ fn record(path: &Path, output: &mut Output) -> Result<Recording, Failure> {
     Ok(recording)
 }
 
+/// The images of all devices of a file of descriptions that can be made.
+fn described(path: &Path) -> Result<Vec<Vec<u8>>, Failure> {
+    let bytes = files::description(path)?;
+    let esi = Esi::parse(&bytes).map_err(|error| files::in_file(path, &error))?;
+    let made = esi.usable().filter_map(|device| DescribedType::from_esi(&esi, device, None).ok());
+    let images: Vec<Vec<u8>> = made.filter_map(|made| made.image.build().ok()).collect();
+    if images.is_empty() {
+        let reason = format!("{}: no device in it that can be made", path.display());
+        return Err(Failure::new(reason, "name the description of a device of the recording"));
+    }
+    Ok(images)
+}
+
 fn images(paths: &[PathBuf]) -> Result<Vec<Vec<u8>>, Failure> {
-    paths
-        .iter()
-        .map(|path| {
-            let refuse = |error: std::io::Error| {
-                let reason = format!("{}: reading an SII image: {error}", path.display());
-                Failure::new(reason, "check the path")
-            };
-            let len = fs::metadata(path).map_err(refuse)?.len();
-            if len > MAX_IMAGE {
-                let reason = format!(
-                    "{}: {len} bytes, expected an SII image of at most {MAX_IMAGE}",
-                    path.display()
-                );
-                return Err(Failure::new(reason, "check the path"));
-            }
-            fs::read(path).map_err(refuse)
-        })
-        .collect()
+    paths.iter().map(|path| files::bytes(path, "an SII image", MAX_IMAGE)).collect()
 }

@@ -1,14 +1,16 @@
 //! What is behind the controller of a described device.
 
 use linesman_proto::address::RegisterAddress;
-use linesman_proto::sii::{Direction, Identity, SyncManagerKind};
+use linesman_proto::sii::{Direction, Identity, Protocols, SyncManagerKind};
 
 use super::DescribedType;
 use super::channel::{Driven, Taken};
 use super::objects;
 use super::signals::{Layout, Point};
 use crate::device::application::Channel;
+use crate::device::application::drive::Cia402;
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
+use crate::device::files::{Files, FirmwareSlot};
 use crate::device::firmware::{Firmware, NoFirmware};
 use crate::device::processor::{Description, ProcessBuffer, Processor, ResponseTimes};
 use crate::device::signal::SignalId;
@@ -17,6 +19,9 @@ use crate::device::signal::SignalId;
 const NO_PDI: u8 = 0x00;
 /// SII byte 0: digital inputs and outputs.
 const DIGITAL_IO: u8 = 0x04;
+
+/// The longest firmware file that a described device takes, in bytes: no description says it.
+const FIRMWARE_LIMIT: usize = 1_024 * 1_024;
 
 /// What sort of firmware it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -93,9 +98,24 @@ fn processor(
             }
         }
     }
-    let channels: Vec<Box<dyn Channel>> = vec![Box::new(driven), Box::new(taken)];
+    let mut channels: Vec<Box<dyn Channel>> = vec![Box::new(driven)];
+    if let Some((first_output, first_input)) = layout.axis
+        && let Some(position) = outputs.get(first_output)
+        && let Some(switches) = inputs.get(first_input..).and_then(|mine| mine.first_chunk())
+    {
+        channels.push(Box::new(Cia402::new(&dictionary, *position, *switches)));
+    }
+    // Last, so that what is driven from outside counts.
+    channels.push(Box::new(taken));
     let bootstrap = described.image.bootstrap_mailbox;
-    Processor::new(Description {
+    let files = if described.image.protocols.has(Protocols::FOE) {
+        let slot =
+            FirmwareSlot { type_name: described.name.clone(), limit: FIRMWARE_LIMIT, password: 0 };
+        Files::new(Vec::new(), Some(slot))
+    } else {
+        Files::default()
+    };
+    let processor = Processor::new(Description {
         dictionary,
         channels,
         buffers: buffers(described),
@@ -103,8 +123,9 @@ fn processor(
         mailbox: described.image.standard_mailbox,
         protocols: described.image.protocols,
         bootstrap: bootstrap.is_present().then_some(bootstrap),
-        times: ResponseTimes::TERMINAL,
-    })
+        times: if layout.axis.is_some() { ResponseTimes::DRIVE } else { ResponseTimes::TERMINAL },
+    });
+    processor.with_files(files)
 }
 
 /// PDOs that exclude each other. What the description assigns by default is left alone: some exclude

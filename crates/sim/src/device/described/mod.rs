@@ -140,6 +140,16 @@ impl DescribedType {
         esi::described(esi, device, slots)
     }
 
+    /// Whether it is a drive of CiA 402: it has a controlword and a statusword.
+    #[must_use]
+    pub fn is_drive(&self) -> bool {
+        let has = |index: u16| {
+            self.objects.iter().any(|object| object.index.0 == index)
+                || self.pdos.iter().flat_map(|pdo| &pdo.entries).any(|entry| entry.index == index)
+        };
+        has(objects::CONTROLWORD) && has(objects::STATUSWORD)
+    }
+
     /// All its controllers, in the order in which frames reach them.
     pub fn controllers(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(&self.further)
@@ -178,7 +188,7 @@ impl DescribedType {
     /// How many signals it drives and takes.
     #[must_use]
     pub fn channels(&self) -> (usize, usize) {
-        let layout = signals::Layout::of(&self.pdos, firmware::kind(self));
+        let layout = signals::Layout::of(self);
         (layout.outputs, layout.inputs)
     }
 
@@ -191,7 +201,7 @@ impl DescribedType {
             serial_number: serial,
             ..self.image.identity
         };
-        let layout = signals::Layout::of(&self.pdos, firmware::kind(self));
+        let layout = signals::Layout::of(self);
         let mut add = |count: usize| (0..count).map(|_| signals.add()).collect::<Vec<_>>();
         let outputs = add(layout.outputs);
         let inputs = add(layout.inputs);

@@ -13,6 +13,7 @@ use super::DescribedType;
 use super::firmware::buffers;
 use super::pdo::{DescribedEntry, DescribedPdo};
 use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY};
+use crate::device::library::drive::profile_objects;
 use crate::device::library::object::{
     IDENTITY, PDO_MAPPING, RECORD, SET_UP, insert, record, subindex_name,
 };
@@ -23,8 +24,12 @@ use crate::device::processor::ProcessBuffer;
 const DRIVE: u64 = 0x0002_0192;
 /// Device type of modular devices (ETG.5001).
 const MODULAR_DEVICE: u64 = 0x0000_1389;
-/// The status word of a drive.
-const STATUS_WORD: u16 = 0x6041;
+/// The controlword of a drive.
+pub(super) const CONTROLWORD: u16 = 0x6040;
+/// Its statusword.
+pub(super) const STATUSWORD: u16 = 0x6041;
+/// Limits and windows of a drive: where all are 0, as in many descriptions, its axis cannot move.
+const LIMITS: [u16; 8] = [0x6065, 0x6066, 0x607F, 0x6081, 0x6083, 0x6084, 0x6085, 0x60C5];
 /// How many entries a PDO has room for at least whose entries can be changed.
 const ROOM: usize = 32;
 /// Most PDOs that one SyncManager can be assigned, as their count is one byte.
@@ -62,6 +67,9 @@ pub(super) fn dictionary(described: &DescribedType, identity: Identity) -> Dicti
     for pdo in &described.pdos {
         values(pdo, &mut objects);
     }
+    if described.is_drive() {
+        complete_drive(&mut objects);
+    }
     Dictionary::new(objects, coe.complete_access())
 }
 
@@ -70,6 +78,25 @@ fn names_no_mode(object: &Object) -> bool {
     const MODES: u8 = 4;
     matches!(object.index.0, 0x1C32 | 0x1C33)
         && object.entry(MODES).is_none_or(|modes| modes.as_number() == 0)
+}
+
+/// What the profile of a drive has and its description lacks.
+fn complete_drive(objects: &mut Vec<Object>) {
+    for object in profile_objects() {
+        match objects.iter_mut().find(|known| known.index == object.index) {
+            None => objects.push(object),
+            Some(known) if LIMITS.contains(&known.index.0) => {
+                let value = object.entry(0).map(|entry| entry.value.clone());
+                if let (Some(entry), Some(value)) = (known.entries.first_mut(), value)
+                    && entry.as_number() == 0
+                    && entry.value.len() == value.len()
+                {
+                    entry.value = value;
+                }
+            }
+            Some(_) => {}
+        }
+    }
 }
 
 fn about(described: &DescribedType) -> Vec<Object> {
@@ -93,7 +120,7 @@ fn device_type(pdos: &[DescribedPdo]) -> u64 {
     let maps = |wanted: &dyn Fn(&DescribedEntry) -> bool| {
         pdos.iter().flat_map(|pdo| &pdo.entries).any(wanted)
     };
-    if maps(&|entry| entry.index == STATUS_WORD) {
+    if maps(&|entry| entry.index == STATUSWORD) {
         DRIVE
     } else if maps(&|entry| (0x6000..0x8000).contains(&entry.index) && entry.subindex > 0) {
         MODULAR_DEVICE

@@ -3,12 +3,15 @@
 //! A device with a processor has one signal for each object that a PDO maps, in the order of the
 //! PDOs; a value of more than 32 bits has one for each 32 bits, lowest first. A controller that
 //! works without a processor has one for each bit, and one for each word that fills a SyncManager by
-//! itself, such as a coding switch.
+//! itself, such as a coding switch. A drive of CiA 402 has five more, behind all others: it drives
+//! the position of its axis, and takes home switch, negative and positive limit switch, and whether
+//! something holds the axis.
 
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::sii::Direction;
 
-use super::firmware::Kind;
+use super::DescribedType;
+use super::firmware::{self, Kind};
 use super::pdo::DescribedPdo;
 
 /// A value of the process data with its signals.
@@ -35,10 +38,16 @@ pub(super) struct Layout {
     /// Signals that are taken.
     pub(super) inputs: usize,
     pub(super) points: Vec<Point>,
+    /// Where the signals of an axis begin, if it is a drive.
+    pub(super) axis: Option<(usize, usize)>,
 }
 
+/// Signals that an axis drives and takes.
+const AXIS: (usize, usize) = (1, 4);
+
 impl Layout {
-    pub(super) fn of(pdos: &[DescribedPdo], kind: Kind) -> Self {
+    pub(super) fn of(described: &DescribedType) -> Self {
+        let (pdos, kind) = (&described.pdos, firmware::kind(described));
         let mut layout = Self::default();
         let mut lengths = [0usize; 256];
         for pdo in pdos {
@@ -54,6 +63,11 @@ impl Layout {
                     layout.add(pdo, address, at, bits, kind);
                 }
             }
+        }
+        if kind == Kind::Processor && described.is_drive() {
+            layout.axis = Some((layout.outputs, layout.inputs));
+            layout.outputs += AXIS.0;
+            layout.inputs += AXIS.1;
         }
         layout
     }

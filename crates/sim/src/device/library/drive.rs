@@ -4,11 +4,13 @@ use linesman_proto::mailbox::coe::DataType;
 use linesman_proto::sii::Protocols;
 
 use super::LibraryType;
+use super::object;
 use super::smart::{TERMINAL, inputs, mailbox_in, mailbox_out, outputs};
 use super::spec::{
     Behind, COE_WITH_PDO_CONFIGURATION, EntrySpec, Function, NO_COE, NOBODY, OpModeSpec, PdoSpec,
     ProcessorSpec, Rights, SettingSpec, SettingsSpec, Spec, SyncManagerSpec, VariableSpec,
 };
+use crate::device::dictionary::Object;
 use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Mii};
 
@@ -90,6 +92,13 @@ const CIA402_VARIABLES: &[VariableSpec] = &[
     // Profile position and velocity, homing, cyclic synchronous position and velocity.
     variable(0x6502, "Supported drive modes", U32, 0x0000_01A5, Rights::Read),
 ];
+
+/// What [`Cia402`](crate::device::application::drive::Cia402) needs of the profile, with values by
+/// which an axis can move.
+pub(in crate::device) fn profile_objects() -> Vec<Object> {
+    let settings = CIA402_PROCESSOR.settings.iter().map(|settings| object::setting(settings, 0));
+    CIA402_VARIABLES.iter().map(object::variable).chain(settings).collect()
+}
 
 const CIA402_PROCESSOR: ProcessorSpec = ProcessorSpec {
     function: Function::Cia402,

@@ -1,5 +1,7 @@
 //! The files of a type, for FoE.
 
+use linesman_proto::sii::Protocols;
+
 use super::spec::Spec;
 use crate::device::files::{File, Files, FirmwareSlot};
 
@@ -8,9 +10,12 @@ const FIRMWARE_LIMIT: usize = 256 * 1_024;
 /// The password of what is not for everybody.
 const SERVICE_PASSWORD: u32 = 0x0000_4711;
 
-/// Every type with a processor takes new firmware in BOOT. The communication terminal has files of
+/// Every type that speaks FoE takes new firmware in BOOT. The communication terminal has files of
 /// its own beside it: settings that can be read and written, a log, and one behind a password.
 pub(super) fn files(spec: &Spec) -> Files {
+    if !Protocols(spec.protocols).has(Protocols::FOE) {
+        return Files::default();
+    }
     let firmware =
         FirmwareSlot { type_name: spec.name.to_owned(), limit: FIRMWARE_LIMIT, password: 0 };
     let files = match spec.name {

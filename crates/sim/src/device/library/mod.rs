@@ -11,7 +11,7 @@ pub(super) mod chip;
 mod communication;
 mod coupler;
 mod digital;
-mod drive;
+pub(super) mod drive;
 mod feed;
 mod file;
 mod generic;

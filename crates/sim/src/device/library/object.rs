@@ -183,7 +183,7 @@ fn mapping(spec: &Spec, pdo: &PdoSpec, channel: u8) -> Object {
 }
 
 /// An object with one value.
-fn variable(spec: &VariableSpec) -> Object {
+pub(super) fn variable(spec: &VariableSpec) -> Object {
     let access = match spec.rights {
         Rights::Read => READ_ONLY,
         Rights::Input => Access(READ_ONLY.0 | Access::TX_PDO),
@@ -268,7 +268,7 @@ fn clocked(spec: &Spec) -> Clocked {
     Clocked::of(spec.op_modes.iter().map(|mode| mode.assign_activate))
 }
 
-fn setting(settings: &SettingsSpec, channel: u8) -> Object {
+pub(super) fn setting(settings: &SettingsSpec, channel: u8) -> Object {
     let entries = settings.entries.iter().map(|entry| Entry {
         maximum: entry.maximum,
         ..Entry::number(

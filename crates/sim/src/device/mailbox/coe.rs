@@ -140,7 +140,10 @@ impl CoeServer {
     ) -> Vec<u8> {
         if initial.is_complete() {
             return match store(dictionary, object, complete, initial.data(), state) {
-                Ok(()) => write(&Message::SdoResponse(Response::Download { object, complete })),
+                Ok(()) => {
+                    let answer = Message::SdoResponse(Response::Download { object, complete });
+                    echo(initial.data(), write(&answer))
+                }
                 Err(code) => abort(object, code),
             };
         }
@@ -184,6 +187,18 @@ impl CoeServer {
         }
         write(&Message::SdoResponse(Response::DownloadSegment { toggle }))
     }
+}
+
+/// The four bytes of the answer that mean nothing: devices answer in the buffer of the request, as
+/// recordings show, so that its data come back.
+fn echo(data: &[u8], mut answer: Vec<u8>) -> Vec<u8> {
+    const RESERVED: std::ops::Range<usize> = 6..10;
+    if let Some(reserved) = answer.get_mut(RESERVED) {
+        for (slot, byte) in reserved.iter_mut().zip(data) {
+            *slot = *byte;
+        }
+    }
+    answer
 }
 
 fn store(
