@@ -130,7 +130,7 @@ impl<'a> Types<'a> {
 /// A name such as `STRING(12)` without its length; `ARRAY [0..7] OF BYTE` is a run of bytes.
 fn stem(name: &str) -> &str {
     match name.split_once('(') {
-        Some((stem, _)) if stem == "VISIBLE_STRING" => "STRING",
+        Some(("VISIBLE_STRING", _)) => "STRING",
         Some((stem, _)) => stem,
         None if name.starts_with("ARRAY") => "OCTET_STRING",
         None if name == "BIT" => "BOOL",

@@ -117,12 +117,15 @@ impl Element {
     }
 }
 
+/// Takes an element with the names of what is around it.
+pub(super) type Found<'a> = dyn FnMut(&[String], Element) -> Result<(), EsiError> + 'a;
+
 /// Goes through a file. Elements whose path is in `containers` are only walked through; every other
 /// one within them is handed to `found`, with the names of what is around it.
 pub(super) fn walk(
     text: &str,
     containers: &dyn Fn(&[String]) -> bool,
-    found: &mut dyn FnMut(&[String], Element) -> Result<(), EsiError>,
+    found: &mut Found<'_>,
 ) -> Result<(), EsiError> {
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;

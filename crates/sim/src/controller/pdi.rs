@@ -310,6 +310,6 @@ impl Pdi<'_> {
 
     /// The same, to drive.
     pub fn signals_mut(&mut self) -> &mut Signals {
-        self.signals
+        self.signals.at(self.now)
     }
 }

@@ -9,6 +9,7 @@ use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::{DIGITAL_OUTPUT, SyncManagerConfig};
 use linesman_proto::time::Instant;
 
+use super::application::time_stamp::TimeStamps;
 use super::application_layer::{ApplicationLayer, Refusal};
 use super::firmware::{Firmware, SampleAgain};
 use super::signal::{SignalId, Signals};
@@ -48,6 +49,7 @@ pub struct Emulated {
     outputs: Vec<DigitalArea>,
     inputs: Vec<DigitalArea>,
     words: Vec<WordArea>,
+    time_stamps: TimeStamps,
     /// The word of them that tells its identification.
     coding_switch: Option<SignalId>,
     application_layer: ApplicationLayer,
@@ -67,6 +69,12 @@ impl Emulated {
     #[must_use]
     pub fn with_words(self, words: Vec<WordArea>) -> Self {
         Self { words, ..self }
+    }
+
+    /// The same device with edges that get a time.
+    #[must_use]
+    pub fn with_time_stamps(self, time_stamps: TimeStamps) -> Self {
+        Self { time_stamps, ..self }
     }
 
     /// The same device with a switch that sets its identification: one of its words.
@@ -112,7 +120,8 @@ impl Firmware for Emulated {
         !self.inputs.is_empty() || !self.words.is_empty()
     }
 
-    fn sample(&mut self, _now: Instant, pdi: &mut Pdi<'_>) {
+    fn sample(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        self.time_stamps.sample(now, pdi);
         for area in &self.inputs {
             let bytes = &mut self.bytes[..area.len()];
             bytes.fill(0);

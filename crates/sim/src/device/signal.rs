@@ -1,5 +1,7 @@
 //! Electrical signals between devices: outputs of one terminal wired to inputs of another.
 
+use linesman_proto::time::Instant;
+
 /// A signal: a wire between terminals, by its number in [`Signals`].
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct SignalId(pub u32);
@@ -16,6 +18,10 @@ impl SignalId {
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Signals {
     values: Vec<Option<i32>>,
+    /// When each changed last.
+    changed: Vec<Instant>,
+    /// When what happens now happens.
+    now: Instant,
     /// Counts changes of values.
     edition: u64,
 }
@@ -24,12 +30,18 @@ impl Signals {
     /// `count` signals, all 0 and driven by nothing.
     #[must_use]
     pub fn new(count: usize) -> Self {
-        Self { values: vec![None; count], edition: 0 }
+        Self {
+            values: vec![None; count],
+            changed: vec![Instant::ZERO; count],
+            now: Instant::ZERO,
+            edition: 0,
+        }
     }
 
     /// One more signal, 0 at first and driven by nothing.
     pub fn add(&mut self) -> SignalId {
         self.values.push(None);
+        self.changed.push(Instant::ZERO);
         SignalId((self.values.len() - 1) as u32)
     }
 
@@ -58,6 +70,7 @@ impl Signals {
         {
             *slot = Some(value);
             self.edition += 1;
+            self.note_change(signal);
         }
     }
 
@@ -67,6 +80,25 @@ impl Signals {
             && slot.take().is_some()
         {
             self.edition += 1;
+            self.note_change(signal);
+        }
+    }
+
+    /// What is driven from here on is driven at this instant.
+    pub fn at(&mut self, now: Instant) -> &mut Self {
+        self.now = now;
+        self
+    }
+
+    /// When a signal changed last; the start of the run for one that never did.
+    #[must_use]
+    pub fn changed_at(&self, signal: SignalId) -> Instant {
+        self.changed.get(signal.0 as usize).copied().unwrap_or(Instant::ZERO)
+    }
+
+    fn note_change(&mut self, signal: SignalId) {
+        if let Some(changed) = self.changed.get_mut(signal.0 as usize) {
+            *changed = self.now;
         }
     }
 
@@ -102,8 +134,11 @@ mod tests {
         assert_eq!((signals.value(added), signals.is_high(added)), (-7, true));
         assert!(!signals.is_high(SignalId(0)));
         assert_eq!((signals.driven(SignalId(0)), signals.driven(added)), (None, Some(-7)));
-        signals.release(added);
-        assert_eq!(signals.driven(added), None);
+        let later = Instant::from_nanos(70);
+        signals.at(later).set(added, -7);
+        assert_eq!(signals.changed_at(added), Instant::ZERO, "the same value is no change");
+        signals.at(later).release(added);
+        assert_eq!((signals.driven(added), signals.changed_at(added)), (None, later));
         signals.set(SignalId(9), 1);
         signals.release(SignalId(9));
         assert_eq!(signals.value(SignalId(9)), 0, "a signal that leads nowhere reads low");

@@ -39,6 +39,11 @@ impl Card {
         }
     }
 
+    /// Whether its frames have ever left late.
+    fn is_late(&self) -> bool {
+        !self.lateness.known.is_empty()
+    }
+
     /// When a frame leaves that is sent at `now`, if not at once, and who keeps it back. None
     /// overtakes another.
     fn keeps_back(&mut self, now: Instant, bytes: usize) -> Option<(Instant, FaultId)> {
@@ -58,6 +63,9 @@ impl Card {
 impl Segment {
     /// Keeps a frame back if its card is late; true if so.
     pub(super) fn keep_back(&mut self, now: Instant, path: Path, frame: &[u8]) -> bool {
+        if self.world.running.is_empty() && !self.world.cards[path.index()].is_late() {
+            return false;
+        }
         // What happens up to now is known before.
         self.world.look_ahead(now, Span::ZERO);
         let Some((leaves, fault)) = self.world.cards[path.index()].keeps_back(now, frame.len())

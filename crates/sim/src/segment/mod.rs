@@ -356,8 +356,8 @@ impl Segment {
     }
 
     /// All signals, to drive inputs from outside.
-    pub const fn signals_mut(&mut self) -> &mut Signals {
-        &mut self.world.signals
+    pub fn signals_mut(&mut self) -> &mut Signals {
+        self.world.signals.at(self.now)
     }
 
     /// The signals that a device drives, channel by channel.

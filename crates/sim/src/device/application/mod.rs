@@ -7,6 +7,7 @@ pub(crate) mod motion;
 pub mod oversampling;
 pub mod sercos;
 pub mod stepper;
+pub mod time_stamp;
 pub mod two_times;
 
 use std::fmt::Debug;

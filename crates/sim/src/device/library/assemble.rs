@@ -1,6 +1,7 @@
 //! From the table of a type to a device: hardware, SII image and firmware.
 
 use linesman_proto::address::RegisterAddress;
+use linesman_proto::register::LATCH0_STATUS;
 use linesman_proto::sii::Protocols;
 
 use super::object::{self, Individual};
@@ -13,6 +14,7 @@ use crate::device::application::drive::Cia402;
 use crate::device::application::oversampling::{Oversampling, SampledOutput};
 use crate::device::application::sercos::Sercos;
 use crate::device::application::stepper::Stepper;
+use crate::device::application::time_stamp::TimeStamps;
 use crate::device::application::two_times::TwoTimes;
 use crate::device::dictionary::Dictionary;
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
@@ -26,10 +28,17 @@ pub(super) fn build_one(spec: &Spec, individual: Individual, signals: &mut Signa
     let outputs = add(spec.output_channels());
     let inputs = add(spec.input_channels());
     let firmware: Box<dyn Firmware> = match spec.behind {
-        Behind::Plain => Box::new(Emulated::new(
-            areas(spec, Use::Outputs, &outputs),
-            areas(spec, Use::Inputs, &inputs),
-        )),
+        Behind::Plain => {
+            let device = Emulated::new(
+                areas(spec, Use::Outputs, &outputs),
+                areas(spec, Use::Inputs, &inputs),
+            );
+            // Whose process data are the registers of the latch unit, has its inputs there.
+            let latches = LATCH0_STATUS.address.0;
+            let stamps = spec.sync_managers.iter().any(|manager| manager.start == latches);
+            let stamped: &[SignalId] = if stamps { &inputs } else { &[] };
+            Box::new(device.with_time_stamps(TimeStamps::new(stamped)))
+        }
         Behind::CodingSwitch(at) => {
             let word =
                 inputs.iter().map(|signal| WordArea { sync_manager: 0, at, signal: *signal });

@@ -320,3 +320,18 @@ fn the_objects_show_mode_and_cycle() {
     );
     assert_eq!(outputs.device.upload(0x1C33, 1).unwrap(), [2, 0]);
 }
+
+#[test]
+fn edges_get_the_time_of_the_signal_and_not_of_the_frame() {
+    let mut device = Device::of("EL1252");
+    let signal = device.built.inputs[1];
+    device.bench.wait(Span::ms(3));
+    let edge = device.bench.now + Span::us(123);
+    device.bench.signals.at(edge).set(signal, 1);
+    device.bench.wait(Span::ms(5));
+    device.bench.byte(0x0000);
+    let time = device.bench.controller.system_time(edge);
+    let shown = device.bench.read(0x09C0, 8).unwrap();
+    assert_eq!(u64::from_le_bytes(shown.try_into().unwrap()), time);
+    assert_eq!(device.bench.read(0x09AE, 2).unwrap(), [0, 4], "the second input is high");
+}
