@@ -373,7 +373,7 @@ fn descriptions() -> Made {
     let modules = "<Modules><Module><Type ModuleIdent=\"#x10\">M</Type><Name>M</Name><TxPdo Sm=\"3\">\
         <Index DependOnSlot=\"1\">#x1A10</Index><Name>P</Name><Entry><Index DependOnSlot=\"1\">#x6010\
         </Index><SubIndex>1</SubIndex><BitLen>8</BitLen></Entry></TxPdo></Module></Modules>";
-    vec![
+    let made: Made = vec![
         ("lamp.xml", whole(lamp, "")),
         ("pump.xml", whole(pump, "")),
         ("modular.xml", whole(&modular, modules)),
@@ -382,5 +382,11 @@ fn descriptions() -> Made {
             "doctype.xml",
             b"<!DOCTYPE a [<!ENTITY x \"&x;\">]><EtherCATInfo><Vendor>&x;</Vendor>".to_vec(),
         ),
-    ]
+    ];
+    // A text ends with a line feed.
+    let ended = |mut bytes: Vec<u8>| {
+        bytes.push(b'\n');
+        bytes
+    };
+    made.into_iter().map(|(name, bytes)| (name, ended(bytes))).collect()
 }

@@ -162,8 +162,10 @@ pub fn drive(data: &[u8]) {
         rig.fetch()
     });
     assert!(waiting.count() < 4_000, "answers without end");
+    // The way out of BOOT may end with an error of its own, which is to be acknowledged.
     rig.request(0x11);
     rig.wait(Span::ms(500));
+    rig.request(0x11);
     rig.set_up(rig.standard);
     rig.request(2);
     rig.post(&[10, 0, 0, 0, 0, 0x03, 0, 0x20, 0x40, 0x18, 0x10, 1, 0, 0, 0, 0]);

@@ -1,7 +1,7 @@
 //! Mailbox messages: header, protocol, answer; and a device that gets them.
 
-use linesman_proto::mailbox::coe::{DiagnosisMessage, Message as CoeMessage};
 use linesman_proto::mailbox::coe::information::{EntryDescription, ObjectDescription, ObjectList};
+use linesman_proto::mailbox::coe::{DiagnosisMessage, Message as CoeMessage};
 use linesman_proto::mailbox::foe::Message as FoeMessage;
 use linesman_proto::mailbox::{ErrorReply, Message};
 

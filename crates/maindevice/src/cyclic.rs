@@ -34,10 +34,18 @@ struct Judged {
     told: Option<WorkingCounter>,
 }
 
+/// The datagrams of one frame.
+#[derive(Debug)]
+struct JudgedFrame {
+    datagrams: Vec<Judged>,
+    /// Which version of the line's state its expectations are made of.
+    version: Option<u64>,
+}
+
 #[derive(Debug)]
 struct TaskState {
     next_at: Instant,
-    frames: Vec<Vec<Judged>>,
+    frames: Vec<JudgedFrame>,
     /// Frames lost in a row.
     lost: u64,
 }
@@ -51,7 +59,7 @@ pub(crate) struct Cyclic {
     /// Who surely serves process data, and who may.
     least: Presence,
     most: Presence,
-    /// Which version of the line's state the expectations are made of.
+    /// Which version of the line's state that is.
     version: u64,
     pub(crate) outputs: Vec<u8>,
     pub(crate) inputs: Vec<u8>,
@@ -68,7 +76,8 @@ impl Cyclic {
                         most: WorkingCounter(0),
                         told: None,
                     };
-                    frame.datagrams.iter().map(fresh).collect()
+                    let datagrams = frame.datagrams.iter().map(fresh).collect();
+                    JudgedFrame { datagrams, version: None }
                 })
                 .collect(),
             lost: 0,
@@ -89,19 +98,10 @@ impl Cyclic {
 
     /// Takes over who is present, if that has changed.
     pub(crate) fn refresh(&mut self) {
-        let line = lock(&self.line);
-        if line.version() == self.version {
-            return;
-        }
-        self.version = line.version();
-        line.copy_presence(&mut self.least, &mut self.most);
-        for (task, state) in self.plan.tasks.iter().zip(&mut self.tasks) {
-            for (frame, judged) in task.frames.iter().zip(&mut state.frames) {
-                for (datagram, judged) in frame.datagrams.iter().zip(judged) {
-                    judged.least = expect(datagram, &self.least, PathView::Merged);
-                    judged.most = expect(datagram, &self.most, PathView::Merged);
-                }
-            }
+        let mut line = lock(&self.line);
+        if line.version() != self.version {
+            self.version = line.version();
+            line.take_changes(&mut self.least, &mut self.most);
         }
     }
 
@@ -156,6 +156,7 @@ impl Cyclic {
         statistics: &mut Statistics,
         events: &mut impl FnMut(Event),
     ) {
+        self.refresh();
         let Some(state) = self.tasks.get_mut(task) else { return };
         if state.lost > 0 {
             let lost = std::mem::take(&mut state.lost);
@@ -166,10 +167,16 @@ impl Cyclic {
         }
         let plan = self.plan.tasks.get(task).and_then(|task| task.frames.get(frame));
         let (Some(plan), Some(judged)) = (plan, state.frames.get_mut(frame)) else { return };
+        if judged.version.replace(self.version) != Some(self.version) {
+            for (datagram, judged) in plan.datagrams.iter().zip(&mut judged.datagrams) {
+                judged.least = expect(datagram, &self.least, PathView::Merged);
+                judged.most = expect(datagram, &self.most, PathView::Merged);
+            }
+        }
         let Ok(view) = FrameView::parse(reply) else { return };
         let datagrams = view.datagrams().map_while(Result::ok);
         for (at, ((datagram, plan), judged)) in
-            datagrams.zip(&plan.datagrams).zip(judged).enumerate()
+            datagrams.zip(&plan.datagrams).zip(&mut judged.datagrams).enumerate()
         {
             let wkc = datagram.wkc();
             if plan.ownership.is_empty() && plan.command.addressing() == Addressing::Broadcast {

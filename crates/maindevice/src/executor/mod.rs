@@ -8,6 +8,7 @@ mod task;
 pub mod wire;
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
@@ -57,6 +58,8 @@ type Ready = Arc<Mutex<VecDeque<u64>>>;
 struct TaskWaker {
     id: u64,
     ready: Ready,
+    /// It is in the queue already.
+    queued: Arc<AtomicBool>,
 }
 
 impl Wake for TaskWaker {
@@ -65,9 +68,8 @@ impl Wake for TaskWaker {
     }
 
     fn wake_by_ref(self: &Arc<Self>) {
-        let mut ready = lock(&self.ready);
-        if !ready.contains(&self.id) {
-            ready.push_back(self.id);
+        if !self.queued.swap(true, Ordering::Relaxed) {
+            lock(&self.ready).push_back(self.id);
         }
     }
 }
@@ -76,6 +78,7 @@ struct Task {
     group: Group,
     future: task::BoxFuture,
     waker: Waker,
+    queued: Arc<AtomicBool>,
 }
 
 /// The poller.
@@ -164,6 +167,7 @@ impl Executor {
             self.adopt();
             let Some(id) = lock(&self.ready).pop_front() else { break };
             let Some(task) = self.tasks.get_mut(&id) else { continue };
+            task.queued.store(false, Ordering::Relaxed);
             let waker = task.waker.clone();
             match task.future.as_mut().poll(&mut Context::from_waker(&waker)) {
                 Poll::Pending => {}
@@ -179,8 +183,10 @@ impl Executor {
             let Some(Spawned { group, future }) = self.shared().spawned.pop_front() else { return };
             let id = self.next_task;
             self.next_task += 1;
-            let waker = Waker::from(Arc::new(TaskWaker { id, ready: Arc::clone(&self.ready) }));
-            self.tasks.insert(id, Task { group, future, waker });
+            let queued = Arc::new(AtomicBool::new(true));
+            let ready = Arc::clone(&self.ready);
+            let waker = Waker::from(Arc::new(TaskWaker { id, ready, queued: Arc::clone(&queued) }));
+            self.tasks.insert(id, Task { group, future, waker, queued });
             lock(&self.ready).push_back(id);
         }
     }

@@ -134,9 +134,7 @@ impl Keeper<'_> {
         let (id, state) = (self.device.id, self.device.target);
         let mut line = lock(&self.context.line);
         line.set_reached(id, state);
-        let reached = |device: &DevicePlan| line.has_reached(device.id);
-        let all = self.context.plan.devices.iter().all(reached);
-        let all = all && line.set_all_reached();
+        let all = line.have_all_reached() && line.set_all_reached();
         drop(line);
         self.context.wire.emit(Event::TargetReached { id, state });
         if all {

@@ -1,7 +1,7 @@
 //! What is known of each SubDevice right now: shared by the cyclic exchange, which judges by it, and
 //! by the keepers, which find it out.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex};
@@ -51,7 +51,13 @@ pub(crate) struct Line {
     devices: Vec<Live>,
     version: u64,
     alerts: u64,
-    waiting: Vec<Waker>,
+    /// Naps that an alert ends, in the order in which they began.
+    waiting: BTreeMap<u64, Waker>,
+    naps: u64,
+    /// Devices whose presence has changed since [`Line::take_changes`].
+    changed: Vec<DeviceId>,
+    /// How many are at their targets.
+    reached: usize,
     responding: Option<WorkingCounter>,
     states: Option<OredStates>,
     all_reached: bool,
@@ -61,7 +67,9 @@ pub(crate) struct Line {
 
 impl Line {
     pub(crate) fn new(plan: &Plan) -> Self {
-        Self { devices: vec![Live::default(); plan.devices.len()], ..Self::default() }
+        let count = plan.devices.len();
+        let changed = (0..count as u32).map(DeviceId).collect();
+        Self { devices: vec![Live::default(); count], changed, ..Self::default() }
     }
 
     /// Changes whenever presence or "settled" changes.
@@ -69,10 +77,12 @@ impl Line {
         self.version
     }
 
-    /// Who serves process data: `least` those that surely do, `most` also those that may, being on
-    /// their way between states or stuck short of their target.
-    pub(crate) fn copy_presence(&self, least: &mut Presence, most: &mut Presence) {
-        for (live, id) in self.devices.iter().zip(0..) {
+    /// Who serves process data, of those for whom that has changed since the last call: `least` those
+    /// that surely do, `most` also those that may, being on their way between states or stuck short
+    /// of their target.
+    pub(crate) fn take_changes(&mut self, least: &mut Presence, most: &mut Presence) {
+        for id in self.changed.drain(..) {
+            let Some(live) = self.devices.get(id.index()) else { continue };
             let serves = |serves: bool| Served {
                 reached_by: serves.then_some(Path::A),
                 inputs: serves,
@@ -84,8 +94,8 @@ impl Line {
                 Found::Lost => (false, false),
                 Found::There { .. } => (live.served && live.settled, live.served || !live.settled),
             };
-            least.set(DeviceId(id), serves(surely));
-            most.set(DeviceId(id), serves(perhaps));
+            least.set(id, serves(surely));
+            most.set(id, serves(perhaps));
         }
     }
 
@@ -99,7 +109,7 @@ impl Line {
 
     /// Notes where a SubDevice is; returns where it was.
     pub(crate) fn set_found(&mut self, id: DeviceId, found: Found) -> Found {
-        self.version += 1;
+        self.changes(id);
         let Some(live) = self.live(id) else { return Found::Unknown };
         let before = std::mem::replace(&mut live.found, found);
         // Whoever is lost serves nothing, and that is known; whoever comes is on its way.
@@ -107,7 +117,9 @@ impl Line {
             Found::Lost => true,
             Found::There { .. } | Found::Unknown => false,
         };
-        *live = Live { found, settled, openings: live.openings, ..Live::default() };
+        let (openings, reached) = (live.openings, live.reached);
+        *live = Live { found, settled, openings, reached, ..Live::default() };
+        self.set_at_target(id, false);
         before
     }
 
@@ -132,8 +144,25 @@ impl Line {
         let mailbox = state.is_some_and(AlState::has_mailbox);
         live.openings += u32::from(mailbox && !live.mailbox);
         live.mailbox = mailbox;
-        (live.settled, live.reached) = (settled, reached);
+        live.settled = settled;
+        self.set_at_target(id, reached);
+        self.changes(id);
+    }
+
+    fn set_at_target(&mut self, id: DeviceId, reached: bool) {
+        let Some(live) = self.live(id) else { return };
+        let before = std::mem::replace(&mut live.reached, reached);
+        self.reached = self.reached + usize::from(reached) - usize::from(before);
+    }
+
+    /// Whether all are where they shall be.
+    pub(crate) fn have_all_reached(&self) -> bool {
+        self.reached == self.devices.len()
+    }
+
+    fn changes(&mut self, id: DeviceId) {
         self.version += 1;
+        self.changed.push(id);
     }
 
     /// Whether the mailbox of a SubDevice can be used.
@@ -180,7 +209,7 @@ impl Line {
     /// Something is not as it was: all keepers shall look at once.
     pub(crate) fn alert(&mut self) {
         self.alerts += 1;
-        for waker in self.waiting.drain(..) {
+        for waker in std::mem::take(&mut self.waiting).into_values() {
             waker.wake();
         }
     }
@@ -196,21 +225,35 @@ pub(crate) struct Nap {
     /// The last alert that was acted upon.
     pub(crate) seen: u64,
     pub(crate) sleep: Sleep,
+    /// Its place among those that wait.
+    pub(crate) place: Option<u64>,
 }
 
 impl Future for Nap {
     type Output = ();
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
-        {
-            let mut line = lock(&self.line);
-            if line.alerts != self.seen {
-                return Poll::Ready(());
-            }
-            if !line.waiting.iter().any(|waker| waker.will_wake(context.waker())) {
-                line.waiting.push(context.waker().clone());
-            }
+        let mut line = lock(&self.line);
+        if line.alerts != self.seen {
+            return Poll::Ready(());
+        }
+        if self.place.is_none() {
+            let place = line.naps;
+            line.naps += 1;
+            line.waiting.insert(place, context.waker().clone());
+            drop(line);
+            self.place = Some(place);
+        } else {
+            drop(line);
         }
         Pin::new(&mut self.sleep).poll(context)
+    }
+}
+
+impl Drop for Nap {
+    fn drop(&mut self) {
+        if let Some(place) = self.place {
+            lock(&self.line).waiting.remove(&place);
+        }
     }
 }

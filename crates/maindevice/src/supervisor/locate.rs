@@ -4,6 +4,8 @@
 //! keeps its order: as many unknown ones as planned ones are the planned ones, one by one, and are
 //! compared; more or fewer are aligned by identity.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use linesman_config::identity::mismatch;
 use linesman_proto::address::{DeviceId, Position, StationAddress};
 use linesman_proto::register::STATION_ADDRESS;
@@ -44,10 +46,18 @@ pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), 
     for read in reads {
         stations.push(read.await.map_or(StationAddress(0), |reply| StationAddress(reply.word(0))));
     }
+    let mut uses: BTreeMap<StationAddress, u32> = BTreeMap::new();
+    for station in &stations {
+        *uses.entry(*station).or_default() += 1;
+    }
+    // Of several with one address the first is meant.
+    let devices = context.plan.devices.iter().rev();
+    let planned: BTreeMap<StationAddress, DeviceId> =
+        devices.map(|device| (device.station, device.id)).collect();
     let known = |station: StationAddress| {
-        let unique = stations.iter().filter(|other| **other == station).count() == 1;
-        let planned = context.plan.devices.iter().find(|device| device.station == station);
-        planned.filter(|_| unique && station.0 != 0 && !from_scratch).map(|device| device.id)
+        let unique = uses.get(&station) == Some(&1);
+        let planned = planned.get(&station).copied();
+        planned.filter(|_| unique && station.0 != 0 && !from_scratch)
     };
     let seen: Vec<Seen> = (stations.iter().zip(places).zip(0..))
         .map(|((station, place), at)| Seen {
@@ -109,10 +119,9 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
     } else {
         align(seen.len(), planned.len(), |at, of| differs(planned[of], &identities[at]).is_none())
     };
+    let paired: BTreeSet<usize> = pairs.iter().map(|(at, _)| *at).collect();
     for (at, found) in identities.iter().enumerate() {
-        if pairs.iter().all(|(paired, _)| *paired != at)
-            && lock(&context.line).add_stranger(None, *found)
-        {
+        if !paired.contains(&at) && lock(&context.line).add_stranger(None, *found) {
             let (position, found) = (seen[at].position, *found);
             context.wire.emit(Event::UnplannedDevice { position, found });
         }

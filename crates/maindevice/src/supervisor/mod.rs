@@ -38,7 +38,7 @@ pub(crate) struct Context {
 impl Context {
     /// Sleeps until the next alert after `seen`, at most `span`.
     pub(crate) fn nap(&self, seen: u64, span: Span) -> Nap {
-        Nap { line: Arc::clone(&self.line), seen, sleep: self.wire.sleep(span) }
+        Nap { line: Arc::clone(&self.line), seen, sleep: self.wire.sleep(span), place: None }
     }
 
     pub(crate) fn alerts(&self) -> u64 {

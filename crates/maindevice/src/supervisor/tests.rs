@@ -32,13 +32,13 @@ fn who_is_lost_serves_nothing() {
     line.set_found(id, Found::There { restarted: true });
     line.set_reached(id, AlState::Op);
     let (mut presence, mut most) = (Presence::none(2), Presence::none(2));
-    line.copy_presence(&mut presence, &mut most);
+    line.take_changes(&mut presence, &mut most);
     assert!(presence.of(id).inputs && presence.of(id).outputs);
     assert!(!presence.of(DeviceId(0)).inputs);
     let before = line.version();
     assert_eq!(line.set_found(id, Found::Lost), Found::There { restarted: true });
     assert_ne!(line.version(), before);
-    line.copy_presence(&mut presence, &mut most);
+    line.take_changes(&mut presence, &mut most);
     assert_eq!((presence.of(id).reached_by, most.of(id).inputs), (None, false));
     assert!(!line.has_reached(id));
 }
@@ -50,7 +50,7 @@ fn on_the_way_there_is_a_mailbox_and_perhaps_process_data() {
     line.set_found(id, Found::There { restarted: true });
     line.set_moving(id, Some(AlState::PreOp));
     let (mut least, mut most) = (Presence::none(1), Presence::none(1));
-    line.copy_presence(&mut least, &mut most);
+    line.take_changes(&mut least, &mut most);
     assert!(line.has_mailbox(id) && !least.of(id).inputs && most.of(id).inputs);
 }
 

@@ -128,15 +128,21 @@ impl Controller {
 
     // ---- sampling ----
 
-    /// Whether sampling at `at` could change anything.
+    /// From when on sampling could change anything, as long as signals stay as they are and nothing
+    /// happens to the controller; [`Instant::MAX`] for never.
     #[inline]
-    pub(crate) fn wants_sample(&self, at: Instant, signals: &Signals) -> bool {
-        let wanted = match self.sampling.again {
-            SampleAgain::NextFrame => true,
-            SampleAgain::From(from) => from <= at,
-            SampleAgain::OnceSignalsChange => self.sampling.seen != signals.edition(),
-        };
-        wanted && !self.core.processor_stuck
+    pub(crate) fn wants_sample(&self, signals: &Signals) -> Instant {
+        if self.core.processor_stuck {
+            return Instant::MAX;
+        }
+        match self.sampling.again {
+            SampleAgain::NextFrame => Instant::ZERO,
+            SampleAgain::From(from) => from,
+            SampleAgain::OnceSignalsChange if self.sampling.seen == signals.edition() => {
+                Instant::MAX
+            }
+            SampleAgain::OnceSignalsChange => Instant::ZERO,
+        }
     }
 
     /// A frame begins at `at`: the device behind samples its inputs.
@@ -162,10 +168,10 @@ impl Controller {
         header.command.map_or(0, |command| self.core.execute(command, header, data))
     }
 
-    /// The frame ends at `end`. Says whether registers may have changed.
+    /// The frame ends at `end`. Says whether registers may have changed, or what is sampled.
     pub(crate) fn end(&mut self, end: Instant) -> bool {
         let irq = self.core.irq;
-        let writes = !self.core.shadow.is_empty();
+        let writes = !self.core.shadow.is_empty() || (self.samples && self.core.passing.wrote);
         self.core.settle(end, true);
         self.passed();
         writes || irq != self.core.irq

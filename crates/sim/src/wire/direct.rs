@@ -49,10 +49,21 @@ pub(crate) struct Direct {
     mappings: u64,
     /// Nodes at which something is due, nodes that were touched: kept for their memory.
     due: Vec<u32>,
+    /// By card: until when no device samples anything new.
+    resting: [Resting; 2],
     /// The last frame on each route since the last walk: where it came in is not noted yet.
     unnoted: Vec<Passed>,
     touched: Vec<u32>,
     places: Vec<u32>,
+}
+
+/// No device on a route samples anything new before an instant, as long as all this stays as it is.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+struct Resting {
+    until: Instant,
+    ways: u64,
+    samplers_woken: u64,
+    signals: u64,
 }
 
 /// A frame that did not walk.
@@ -244,10 +255,12 @@ impl World {
         places.clear();
         places.extend(due.iter().filter_map(|node| route.place(*node)));
         self.direct.due = due;
+        let rests = places.is_empty() && self.rests(journey);
         if !places.is_empty() {
             places.sort_unstable();
         }
-        let mut samplers = route.samplers.iter().copied().peekable();
+        let samplers = if rests { &[] } else { route.samplers.as_slice() };
+        let mut samplers = samplers.iter().copied().peekable();
         let mut touches = places.iter().copied().peekable();
         loop {
             let place = match (touches.peek(), samplers.peek()) {
@@ -263,7 +276,7 @@ impl World {
                 }
             }
             if samplers.next_if_eq(&place).is_some()
-                && self.nodes[node].controller.wants_sample(at, &self.signals)
+                && self.nodes[node].controller.wants_sample(&self.signals) <= at
             {
                 let controller = &mut self.nodes[node].controller;
                 controller.sample(at, &mut self.signals);
@@ -273,6 +286,36 @@ impl World {
         }
         self.direct.places = places;
         self.nodes.settle();
+        if !rests {
+            self.note_rest(journey);
+        }
+    }
+
+    /// Whether no device on the way samples anything new.
+    fn rests(&self, journey: &Journey<'_>) -> bool {
+        let resting = &self.direct.resting[journey.card.index()];
+        let end = journey.at + journey.route.takes;
+        let same = Resting { until: resting.until, ..self.rest_now() };
+        same == *resting && end < resting.until
+    }
+
+    /// What must stay as it is for devices to rest.
+    fn rest_now(&self) -> Resting {
+        Resting {
+            until: Instant::ZERO,
+            ways: self.nodes.directory.ways(),
+            samplers_woken: self.nodes.samplers_woken(),
+            signals: self.signals.edition(),
+        }
+    }
+
+    fn note_rest(&mut self, journey: &Journey<'_>) {
+        let visits = &journey.route.visits;
+        let samplers = journey.route.samplers.iter();
+        let nodes = samplers.map(|place| &self.nodes[visits[*place as usize].node as usize]);
+        let wanted = nodes.map(|node| node.controller.wants_sample(&self.signals)).min();
+        let until = wanted.unwrap_or(Instant::MAX);
+        self.direct.resting[journey.card.index()] = Resting { until, ..self.rest_now() };
     }
 
     fn execute_all(&mut self, journey: &Journey<'_>, bytes: &mut [u8]) {

@@ -26,6 +26,8 @@ pub(crate) struct Nodes {
     due: BinaryHeap<Reverse<(Instant, u32)>>,
     /// Who answers to what.
     pub(super) directory: Directory,
+    /// Counts how often nodes woke that sample inputs.
+    samplers_woken: u64,
 }
 
 /// What the book says of a node.
@@ -56,6 +58,7 @@ impl Nodes {
             woken: Vec::new(),
             due: BinaryHeap::new(),
             directory: Directory::default(),
+            samplers_woken: 0,
         };
         nodes.wake_all();
         nodes
@@ -83,15 +86,28 @@ impl Nodes {
     #[inline]
     pub(super) fn wake(&mut self, node: usize) {
         let entry = &mut self.all[node].entry;
+        self.samplers_woken += u64::from(entry.manner.samples);
         if !entry.awake {
             entry.awake = true;
             self.woken.push(node as u32);
         }
     }
 
+    /// A number that changes whenever something happens to a node that samples inputs.
+    #[inline]
+    pub(super) fn samplers_woken(&self) -> u64 {
+        self.samplers_woken
+    }
+
     /// Makes the entries of all that woke anew.
     #[inline]
     pub(super) fn settle(&mut self) {
+        if !self.woken.is_empty() {
+            self.settle_woken();
+        }
+    }
+
+    fn settle_woken(&mut self) {
         while let Some(index) = self.woken.pop() {
             let index = index as usize;
             self.reschedule(index);

@@ -190,6 +190,10 @@ impl World {
 
     /// Makes all changes up to and at an instant.
     fn change_until(&mut self, until: Instant) {
+        if self.running.is_empty() && self.agenda.next_at().is_none() {
+            self.horizon = self.horizon.max(until);
+            return;
+        }
         loop {
             let due = self.agenda.next_at().filter(|at| *at <= until);
             let fault = self.next_fault().filter(|(at, _)| *at <= until);

@@ -5,6 +5,7 @@
 mod clocks;
 mod faults;
 mod identification;
+mod long_line;
 mod oracle;
 mod rig;
 mod swarm;
