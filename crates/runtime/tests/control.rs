@@ -109,7 +109,8 @@ fn exchange(socket: &Path, bytes: &[u8]) -> Vec<Faults> {
 }
 
 fn cut() -> Request {
-    Request::Inject { fault: FaultEntry::new(FaultName::LinkOpen).at("K1.B-I1.A"), for_ms: None }
+    let fault = FaultEntry::new(FaultName::LinkOpen).at("K1.B-I1.A");
+    Request::Inject { fault: Box::new(fault), for_ms: None }
 }
 
 #[test]

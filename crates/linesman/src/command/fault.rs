@@ -113,7 +113,7 @@ fn parameter(text: &str) -> Result<(String, toml::Value), String> {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     match &arguments.action {
         Action::Inject { kind, at, device, for_ms, parameters } => {
-            let fault = entry(*kind, at, device, parameters)?;
+            let fault = Box::new(entry(*kind, at, device, parameters)?);
             faults(arguments, &Request::Inject { fault, for_ms: *for_ms }, output)
         }
         Action::Heal { no } => faults(arguments, &Request::Heal { no: *no }, output),

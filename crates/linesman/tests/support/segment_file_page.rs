@@ -110,9 +110,9 @@ fn shape(value: &Value, definitions: &Map<String, Value>) -> (String, Option<Str
             return (words.join(" or "), inner);
         }
     }
-    let kind = match &value["type"] {
-        Value::Array(kinds) => kinds.iter().find(|kind| *kind != "null").unwrap_or(&Value::Null),
-        kind => kind,
+    let kind = match value["type"].as_array() {
+        Some(kinds) => kinds.iter().find(|kind| *kind != "null").unwrap_or(&Value::Null),
+        None => &value["type"],
     };
     match kind.as_str() {
         Some("boolean") => ("true or false".to_owned(), None),

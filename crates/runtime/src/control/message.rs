@@ -18,7 +18,7 @@ pub enum Request {
     /// Put a fault on the line now. The answer is about faults.
     Inject {
         /// Its kind, place, parameters and schedule; it begins with the request.
-        fault: FaultEntry,
+        fault: Box<FaultEntry>,
         /// How long it lasts, in ms; until it is healed unless said.
         for_ms: Option<f64>,
     },

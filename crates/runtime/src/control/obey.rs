@@ -15,7 +15,7 @@ pub(crate) fn obey(now: Instant, request: &Request, server: &mut Server) -> Answ
     let (segment, wiring) = server.parts();
     match request {
         Request::Inject { fault, for_ms } => {
-            let error = inject(now, fault.clone(), *for_ms, segment).err();
+            let error = inject(now, (**fault).clone(), *for_ms, segment).err();
             faults(error, segment)
         }
         Request::Heal { no } => {

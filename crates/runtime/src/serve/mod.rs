@@ -154,7 +154,7 @@ impl Server {
             if due.since(now) > SPIN {
                 self.sleep(due.before(SPIN).min(until).min(now + nap))?;
             } else if received + sent == 0 {
-                self.tally.spinning = self.tally.spinning + self.clock.now().since(now);
+                self.tally.spinning += self.clock.now().since(now);
             }
         }
     }
@@ -221,7 +221,7 @@ impl Server {
             [a] => wait_any([a as &dyn Waitable, waker], &self.clock, deadline)?,
             [] => wait_any([waker as &dyn Waitable], &self.clock, deadline)?,
         };
-        self.tally.asleep = self.tally.asleep + self.clock.now().since(before);
+        self.tally.asleep += self.clock.now().since(before);
         Ok(())
     }
 

@@ -71,9 +71,10 @@ impl Pdi<'_> {
             return index < sync_manager::MAX;
         } else if is(&r::SII_CONTROL_STATUS) || is(&r::SII_ADDRESS) || is(&r::SII_DATA) {
             return self.write_sii_byte(address, value);
-        } else if is(&r::PHY_CONTROL_STATUS) || is(&r::PHY_ADDRESS) {
-            return self.write_phy_byte(address, value);
-        } else if is(&r::PHY_REGISTER_ADDRESS) || is(&r::PHY_DATA) {
+        } else if [r::PHY_CONTROL_STATUS, r::PHY_ADDRESS, r::PHY_REGISTER_ADDRESS, r::PHY_DATA]
+            .iter()
+            .any(is)
+        {
             return self.write_phy_byte(address, value);
         } else {
             core.memory.put(address, &[value]);

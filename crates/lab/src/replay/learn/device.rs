@@ -140,7 +140,7 @@ impl DeviceSeen {
     pub(super) fn map_from_later(&mut self) -> bool {
         let mut any = false;
         for (address, byte) in &self.later {
-            any |= self.initial.get(address).is_none();
+            any |= !self.initial.contains_key(address);
             self.initial.entry(*address).or_insert(*byte);
         }
         any

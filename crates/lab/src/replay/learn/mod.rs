@@ -165,7 +165,7 @@ impl Learned {
         // All are one.
         let target = match target {
             Target::All if self.devices.len() == 1 => Target::One(0),
-            target => target,
+            Target::One(_) | Target::All | Target::Logical | Target::Nobody => target,
         };
         match target {
             Target::One(device) => {

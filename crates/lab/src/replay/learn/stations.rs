@@ -26,8 +26,9 @@ impl Stations {
                 let Some(command) = request.command.filter(|_| reply.wkc > 0) else { continue };
                 let is_station = request.ado == r::STATION_ADDRESS.address;
                 match command.addressing() {
-                    Addressing::Station if !command.effect().multiple_write => {
-                        if !given.contains(&request.adp) && !used.contains(&request.adp) {
+                    Addressing::Station => {
+                        let is_new = !given.contains(&request.adp) && !used.contains(&request.adp);
+                        if is_new && !command.effect().multiple_write {
                             used.push(request.adp);
                         }
                     }
@@ -40,7 +41,10 @@ impl Stations {
                             placed.entry(station).or_insert(position);
                         }
                     }
-                    _ => {}
+                    Addressing::Position
+                    | Addressing::Broadcast
+                    | Addressing::Logical
+                    | Addressing::None => {}
                 }
             }
         }

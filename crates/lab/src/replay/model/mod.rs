@@ -265,7 +265,7 @@ fn ports(seen: &DeviceSeen, image: &[u8], tree: &Tree, node: usize) -> PortMap<P
     };
     PortMap::from_fn(|port| match told[port] {
         PortKind::Absent if open.contains(&port) || port.index() < 2 => PortKind::Mii,
-        kind => kind,
+        kind @ (PortKind::Absent | PortKind::Ebus | PortKind::Mii) => kind,
     })
 }
 
