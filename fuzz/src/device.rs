@@ -101,6 +101,11 @@ impl Rig {
 
     /// Fetches an answer, if there is one: it is a message of a kind that devices send.
     fn fetch(&mut self) -> Option<Vec<u8>> {
+        // Switched off, the SyncManager guards nothing: what is read is memory, no message.
+        let (activate, _) = self.exchange(Command::Aprd, 0x080E, &[0]);
+        if activate.first().is_none_or(|byte| byte & 1 == 0) {
+            return None;
+        }
         let empty = vec![0; usize::from(self.areas.send.size)];
         let (data, wkc) = self.exchange(Command::Aprd, self.areas.send.offset.0, &empty);
         if wkc == 0 {

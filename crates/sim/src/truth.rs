@@ -134,6 +134,15 @@ pub enum Effect {
     WrongDevice,
     /// A device that was planned is not here.
     MissingDevice,
+    /// A device that was not planned is here.
+    ExtraDevice,
+    /// A device sits in the place of another one, and that one in its.
+    SwappedDevice,
+    /// A device answers to this address, as another one does.
+    SharedAddress {
+        /// The station address or alias.
+        address: u16,
+    },
     /// A cable is plugged into another port than planned.
     WrongPort,
 }
@@ -255,6 +264,9 @@ impl FaultRecord {
             | Effect::OldCounters
             | Effect::WrongDevice
             | Effect::MissingDevice
+            | Effect::ExtraDevice
+            | Effect::SwappedDevice
+            | Effect::SharedAddress { .. }
             | Effect::WrongPort => {}
         }
     }

@@ -281,6 +281,9 @@ impl<'a> Episode<'a> {
                 | Effect::OldCounters
                 | Effect::WrongDevice
                 | Effect::MissingDevice
+                | Effect::ExtraDevice
+                | Effect::SwappedDevice
+                | Effect::SharedAddress { .. }
                 | Effect::StrangerSent { .. }
                 | Effect::WrongPort => false,
             },

@@ -23,7 +23,8 @@ use linesman_sim::fault::{KINDS, Kind, PlaceRule, Shape};
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment::{FrameTally, Segment};
 use linesman_sim::segment_file::{
-    BurstTimes, FaultEntry, PlantOptions, RandomTimes, Schedule, SegmentFile, Times, plant,
+    BurstTimes, FaultEntry, PlantOptions, RandomTimes, Schedule, SegmentDevice, SegmentFile, Times,
+    plant,
 };
 use linesman_sim::truth::FaultId;
 
@@ -186,13 +187,17 @@ impl Run {
 
     fn inject(&mut self) -> Option<FaultId> {
         let is_ring = self.file.ring.is_some();
-        let fits =
-            |kind: &&Kind| !kind.is_built_in() && (is_ring || kind.place != PlaceRule::RingLink);
+        // An overload needs a coupler with terminals, and a supply that is too small for them.
+        let fits = |kind: &&Kind| {
+            let fed = kind.place == PlaceRule::Feed;
+            !kind.is_built_in() && !fed && (is_ring || kind.place != PlaceRule::RingLink)
+        };
         let kinds: Vec<&Kind> = KINDS.iter().filter(fits).collect();
         let kind = self.stream.pick(&kinds)?;
         let mut entry = any_fault(kind, &self.file, &mut self.stream);
         // Nothing in this plant can have it.
-        if entry.device.is_none() && entry.at.is_none() && kind.place.needs_place() {
+        let nowhere = entry.device.is_none() && entry.devices.is_none() && entry.at.is_none();
+        if nowhere && kind.place.needs_place() {
             return None;
         }
         entry.schedule = any_schedule(&mut self.stream);
@@ -372,8 +377,14 @@ fn any_fault(kind: &Kind, file: &SegmentFile, stream: &mut Stream) -> FaultEntry
         PlaceRule::Link => entry.at(both),
         PlaceRule::Lines | PlaceRule::ManyLines => entry.at(way),
         PlaceRule::Line => entry.at(one),
+        PlaceRule::Pair => {
+            let other = file.devices.iter().find(|other| other.name != device.name);
+            let pair = |other: &SegmentDevice| vec![device.name.clone(), other.name.clone()];
+            FaultEntry { devices: other.map(pair), ..entry }
+        }
         PlaceRule::Device
         | PlaceRule::Devices
+        | PlaceRule::Feed
         | PlaceRule::Processor
         | PlaceRule::Mailbox
         | PlaceRule::DeviceOrCard => entry.device(&device.name),

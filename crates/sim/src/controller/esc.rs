@@ -498,6 +498,16 @@ impl Controller {
         StationAddress(self.core.memory.u16(&r::STATION_ADDRESS))
     }
 
+    /// Sets the station address, as a datagram of somebody else does; gives the former one. Nothing
+    /// happens to a controller without supply.
+    pub fn set_station_address(&mut self, address: StationAddress) -> StationAddress {
+        let former = self.station_address();
+        if self.powered {
+            self.core.memory.set_u16(&r::STATION_ADDRESS, address.0);
+        }
+        former
+    }
+
     /// All error counters. Those of ports and kinds it does not have read 0.
     #[must_use]
     pub fn error_counters(&self) -> ErrorCounters {

@@ -69,6 +69,16 @@ impl DeviceKind {
         }
     }
 
+    /// Whether its cables have Fast Hot Connect.
+    #[must_use]
+    pub fn fast_hot_connect(&self) -> bool {
+        match self {
+            Self::Library(library) => library.fast_hot_connect(),
+            // Its data do not say so of a controller.
+            Self::Described(_) => false,
+        }
+    }
+
     /// Current from the E-bus in mA; negative is supplied.
     #[must_use]
     pub fn ebus_current_ma(&self) -> i16 {

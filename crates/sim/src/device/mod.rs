@@ -30,7 +30,7 @@ pub use emulated_sii::{EMULATION_TIME, EmulatedSii};
 pub use firmware::{Firmware, NoFirmware, SampleAgain};
 pub use kind::DeviceKind;
 pub use signal::{SignalId, Signals};
-pub use trouble::{Trouble, Troubles};
+pub use trouble::{Mismatch, Trouble, Troubles};
 
 #[cfg(test)]
 mod tests;

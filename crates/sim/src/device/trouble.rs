@@ -25,6 +25,19 @@ pub enum Trouble {
     FrozenApplication,
     /// It does not answer requests for a state.
     DeafToRequests,
+    /// A setting of it does not fit what its data say.
+    Mismatch(Mismatch),
+}
+
+/// Which setting does not fit.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Mismatch {
+    /// Its stored PDO assignment is shorter than its data say.
+    ProcessData,
+    /// The mailboxes that it takes are shorter than its data say.
+    Mailbox,
+    /// It finds a module less than were configured.
+    Modules,
 }
 
 /// Which SDO requests are refused, and how.
@@ -64,7 +77,8 @@ impl Troubles {
             | Trouble::MailboxNotRead
             | Trouble::MailboxNotFilled
             | Trouble::FrozenApplication
-            | Trouble::DeafToRequests => Seed::default(),
+            | Trouble::DeafToRequests
+            | Trouble::Mismatch(_) => Seed::default(),
         };
         self.0.push((trouble, seed.stream("trouble")));
     }
@@ -91,7 +105,8 @@ impl Troubles {
             | Trouble::MailboxNotRead
             | Trouble::MailboxNotFilled
             | Trouble::FrozenApplication
-            | Trouble::DeafToRequests => sum,
+            | Trouble::DeafToRequests
+            | Trouble::Mismatch(_) => sum,
         })
     }
 
@@ -108,7 +123,8 @@ impl Troubles {
             | Trouble::MailboxNotRead
             | Trouble::MailboxNotFilled
             | Trouble::FrozenApplication
-            | Trouble::DeafToRequests => None,
+            | Trouble::DeafToRequests
+            | Trouble::Mismatch(_) => None,
         })
     }
 }

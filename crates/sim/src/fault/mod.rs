@@ -16,12 +16,17 @@ mod source;
 mod brown_out;
 mod cable_degraded;
 mod clock_drift;
+mod config_mismatch;
 mod cycle_too_fast;
+mod device_extra;
 mod device_internal;
 mod device_missing;
 mod device_off;
 mod device_wrong;
+mod devices_swapped;
+mod duplicate_address;
 mod early_link;
+mod ebus_overload;
 mod emc_noise;
 mod emergency;
 mod false_link;
@@ -46,6 +51,7 @@ mod second_maindevice;
 mod supply_off;
 mod sync_lost;
 mod transmitter_damaged;
+mod twins_swapped;
 mod watchdog_starved;
 
 use linesman_config::fault::FaultName;
@@ -58,8 +64,10 @@ pub use place::PlaceRule;
 pub(crate) use place::Scene;
 pub(crate) use running::{Running, Step};
 
+pub(crate) use device_extra::extra;
 pub(crate) use device_missing::missing_device;
 pub(crate) use device_wrong::{Replacement, replacement};
+pub(crate) use duplicate_address::duplicate_alias;
 pub(crate) use ports_swapped::{Turned, turned};
 
 use crate::seed::{Seed, Stream};
@@ -136,7 +144,23 @@ pub const KINDS: &[Kind] = &[
     reference_clock_lost::KIND,
     clock_drift::KIND,
     sync_lost::KIND,
+    ebus_overload::KIND,
+    devices_swapped::KIND,
+    twins_swapped::KIND,
+    device_extra::KIND,
+    duplicate_address::KIND,
+    config_mismatch::KIND,
 ];
+
+pub(crate) const DEVICES: FaultName = FaultName::DevicesSwapped;
+pub(crate) const TWINS: FaultName = FaultName::TwinsSwapped;
+
+/// Whether an entry puts two devices in each other's place, and whether they are twins.
+pub(crate) fn swaps(entry: &FaultEntry) -> Option<bool> {
+    [(DEVICES, false), (TWINS, true)]
+        .into_iter()
+        .find_map(|(name, twins)| (entry.kind == name.name()).then_some(twins))
+}
 
 /// The kind with a name, if a segment can have it.
 #[must_use]

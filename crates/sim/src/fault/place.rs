@@ -30,6 +30,10 @@ pub enum PlaceRule {
     /// `device` or `devices`: what feeds one device or several, and with a coupler the terminals
     /// that it feeds over the E-bus.
     Devices,
+    /// `device`: one device that feeds the E-bus, and all that it feeds.
+    Feed,
+    /// `devices`: two devices.
+    Pair,
     /// `device`: one device with a processor.
     Processor,
     /// `device`: one device with a mailbox.
@@ -56,7 +60,8 @@ impl PlaceRule {
             | Self::Card
             | Self::RingLink
             | Self::Entrance => &["at"],
-            Self::Device | Self::Processor | Self::Mailbox => &["device"],
+            Self::Device | Self::Feed | Self::Processor | Self::Mailbox => &["device"],
+            Self::Pair => &["devices"],
             Self::DeviceOrCard => &["device", "at"],
             Self::Devices => &["device", "devices", "supply"],
         }
@@ -79,6 +84,8 @@ impl PlaceRule {
             }
             Self::Line => "`at = \"K1.C>B3.A\"`, one direction of a link",
             Self::Device => "`device = \"B3\"`, a device",
+            Self::Feed => "`device = \"K1\"`, a device that feeds the E-bus",
+            Self::Pair => "`devices = [\"B3\", \"B4\"]`, two devices",
             Self::Processor => "`device = \"B3\"`, a device with a processor",
             Self::Mailbox => "`device = \"B3\"`, a device with a mailbox",
             Self::DeviceOrCard => "`device = \"B3\"`, a device, or `at = \"maindevice\"`, a card",
@@ -105,6 +112,10 @@ pub(crate) struct Scene<'a> {
     pub(crate) world: &'a World,
     /// Current that each node takes from the E-bus, in mA; negative where it feeds it.
     pub(crate) ebus_ma: &'a [i16],
+    /// Whether a terminal without a controller feeds the E-bus anew before a node.
+    pub(crate) fed_anew: &'a [bool],
+    /// Which devices a name such as `group:A` stands for.
+    pub(crate) groups: &'a BTreeMap<String, Vec<DeviceId>>,
     pub(crate) supplies: &'a [Supply],
 }
 
@@ -120,6 +131,7 @@ impl Scene<'_> {
                 let children = self.tree.children(from);
                 fed.extend(children.filter_map(|(port, child)| {
                     let takes = self.ebus_ma.get(child).is_some_and(|current| *current > 0);
+                    let takes = takes && !self.fed_anew.get(child).is_some_and(|anew| *anew);
                     (takes && ports[port] == PortKind::Ebus).then_some(child)
                 }));
             }
@@ -138,6 +150,16 @@ pub(crate) struct Target {
     pub(super) nodes: Vec<usize>,
     /// Cards of the MainDevice.
     pub(super) cards: Vec<Path>,
+    /// What feeds an E-bus, then what it feeds, in order.
+    pub(super) currents: Vec<Current>,
+}
+
+/// The E-bus current of a controller.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Current {
+    pub(super) node: usize,
+    /// In mA; negative is supplied.
+    pub(super) ma: i16,
 }
 
 impl Target {
@@ -174,6 +196,8 @@ pub(super) fn resolve(
     finder.refuse_other_keys(entry)?;
     match kind.place {
         PlaceRule::Device | PlaceRule::Devices => finder.devices(entry),
+        PlaceRule::Feed => finder.feed(entry),
+        PlaceRule::Pair => finder.pair(entry),
         PlaceRule::Processor | PlaceRule::Mailbox => finder.software(entry),
         PlaceRule::DeviceOrCard if entry.device.is_some() => finder.devices(entry),
         PlaceRule::Card | PlaceRule::DeviceOrCard => finder.card(entry),
@@ -249,8 +273,13 @@ impl Finder<'_> {
                     || known.strip_prefix(name.as_str()).is_some_and(|rest| rest.starts_with('/'))
             };
             let known = self.scene.names.iter().zip(0u32..);
-            let ids: Vec<DeviceId> =
-                known.filter(|(known, _)| of_device(known)).map(|(_, id)| DeviceId(id)).collect();
+            let ids: Vec<DeviceId> = match self.scene.groups.get(name) {
+                Some(members) => members.clone(),
+                None => known
+                    .filter(|(known, _)| of_device(known))
+                    .map(|(_, id)| DeviceId(id))
+                    .collect(),
+            };
             if ids.is_empty() {
                 return Err(self.error(self.no_device(name)));
             }
@@ -268,6 +297,35 @@ impl Finder<'_> {
         }
         target.nodes.sort_unstable();
         target.nodes.dedup();
+        Ok(target)
+    }
+
+    /// What feeds an E-bus, and what it feeds.
+    fn feed(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
+        let mut target = self.devices(entry)?;
+        let first = target.nodes.first().copied();
+        target.nodes = first.map_or(Vec::new(), |feed| self.scene.with_fed(feed));
+        target.currents = target
+            .nodes
+            .iter()
+            .map(|node| Current { node: *node, ma: self.scene.ebus_ma[*node] })
+            .collect();
+        Ok(target)
+    }
+
+    /// Two devices in the order in which they are given; of one with several controllers the first.
+    fn pair(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
+        let names = entry.devices.as_deref().unwrap_or(&[]);
+        if names.len() != 2 || names[0] == names[1] {
+            return Err(self.error(format!("{} devices are given", names.len())));
+        }
+        let mut target = Target::default();
+        for name in names {
+            let one = FaultEntry { devices: None, device: Some(name.clone()), ..entry.clone() };
+            let found = self.devices(&one)?;
+            target.places.extend(found.places);
+            target.nodes.extend(found.nodes.first());
+        }
         Ok(target)
     }
 
@@ -313,6 +371,7 @@ impl Finder<'_> {
             cards: vec![path],
             links: vec![link],
             nodes: Vec::new(),
+            ..Target::default()
         })
     }
 

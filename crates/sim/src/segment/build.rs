@@ -13,7 +13,7 @@ use linesman_proto::topology::wiring::ports_after;
 
 use super::arrivals::Arrivals;
 use super::turn::turn;
-use super::{DeviceInfo, Segment, identification};
+use super::{DeviceInfo, Segment, exchange, identification};
 use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
@@ -61,23 +61,33 @@ pub enum BuildError {
 
 /// What is really put in a place.
 pub(super) struct Placed {
-    id: DeviceId,
+    pub(super) id: DeviceId,
     pub(super) planned: Planned,
     revision: Option<u32>,
+    /// Alias that a fault has put into its EEPROM.
+    pub(super) alias: Option<u16>,
+    /// The place from which its wiring came along, if from another.
+    pub(super) wiring_of: Option<DeviceId>,
 }
 
 pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
     file.check()?;
+    let file = &exchange::with_extras(file)?;
     let planned = segment_file::expand(file)?;
     let names: Vec<String> = planned.iter().map(|controller| controller.name.clone()).collect();
     let ids = (0u32..).map(DeviceId);
-    let mut placed: Vec<Placed> =
-        ids.zip(planned).map(|(id, planned)| Placed { id, planned, revision: None }).collect();
+    let place =
+        |(id, planned)| Placed { id, planned, revision: None, alias: None, wiring_of: None };
+    let mut placed: Vec<Placed> = ids.zip(planned).map(place).collect();
     let mut ring = file.ring.as_ref().map(|ring| Ring { closes_at: ring.closes_at.clone() });
     for (index, entry) in file.faults.iter().enumerate() {
         let label = label(index);
         if let Some(replacement) = fault::replacement(&label, entry)? {
             replace(&label, file, &mut placed, &replacement)?;
+        }
+        exchange::swap(&label, &mut placed, entry)?;
+        if let Some((alias, devices)) = fault::duplicate_alias(&label, entry)? {
+            exchange::share_alias(&mut placed, alias, &devices);
         }
         if let Some(device) = fault::missing_device(entry) {
             remove(&mut placed, device, &mut ring);
@@ -89,7 +99,7 @@ pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
     assemble(file, placed, ring, names)
 }
 
-fn label(index: usize) -> String {
+pub(super) fn label(index: usize) -> String {
     format!("fault {}", index + 1)
 }
 
@@ -117,6 +127,11 @@ fn assemble(
         }
         let id = file.devices[one.planned.device].id.filter(|_| one.planned.part == 0);
         let identification = identification::set(&mut built, id, &mut signals);
+        let first = one.planned.part == 0 && one.planned.copy == 0;
+        let said = file.devices[one.planned.device].alias.filter(|_| first);
+        if let Some(alias) = one.alias.or(said) {
+            identification::set_alias(&mut built.sii, alias);
+        }
         let clock = clock(file, &one.planned, seed);
         let Built { mut hardware, sii, firmware, outputs, inputs } = built;
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
@@ -129,6 +144,7 @@ fn assemble(
         made.push(controller);
         devices.push(DeviceInfo { outputs, inputs });
     }
+    exchange::move_wiring(&placed, &mut devices);
     let cable_m: Vec<f64> = tree
         .links()
         .iter()
@@ -158,6 +174,8 @@ fn assemble(
     let mut segment = Segment {
         supplies: file.supplies.clone(),
         ebus_ma: placed.iter().map(current).collect(),
+        fed_anew: placed.iter().map(|one| one.planned.fed_anew).collect(),
+        groups: exchange::groups(file, &placed),
         name: file.name.clone(),
         tree,
         world,
@@ -202,6 +220,12 @@ fn schedule(
         Effect::MissingDevice
     } else if fault::replacement(label, entry)?.is_some() {
         Effect::WrongDevice
+    } else if fault::extra(label, entry)?.is_some() {
+        Effect::ExtraDevice
+    } else if fault::swaps(entry).is_some() {
+        Effect::SwappedDevice
+    } else if let Some((address, _)) = fault::duplicate_alias(label, entry)? {
+        Effect::SharedAddress { address }
     } else if fault::turned(label, entry)?.is_some() {
         Effect::WrongPort
     } else {
@@ -221,10 +245,13 @@ fn build_one(one: &Placed, signals: &mut Signals) -> Option<Built> {
 
 /// A quartz that is a little off, warms up, and has run for some time.
 fn clock(file: &SegmentFile, planned: &Planned, seed: Seed) -> LocalClock {
-    let mut stream = seed.stream(&format!("clock {}", planned.name));
+    let device = &file.devices[planned.device];
+    // A device keeps its quartz wherever it sits.
+    let alone = planned.part == 0 && device.repeat.is_none();
+    let name = if alone { &device.name } else { &planned.name };
+    let mut stream = seed.stream(&format!("clock {name}"));
     let start = stream.below(1_000_000_000_000);
     let ppm = stream.fraction() * 50.0 - 25.0;
-    let device = &file.devices[planned.device];
     let mut clock = LocalClock::with_ppm(start, device.clock_ppm.unwrap_or(ppm));
     clock.ramp_ppb_per_s = (stream.fraction() * 40.0 - 20.0).round() as i64;
     clock.ramp = Span::s(stream.between(60, 300));
@@ -307,7 +334,7 @@ fn replace(
 }
 
 /// The ports of a controller that something is plugged into.
-fn used_ports(placed: &[Placed], index: usize) -> Vec<Port> {
+pub(super) fn used_ports(placed: &[Placed], index: usize) -> Vec<Port> {
     let name = &placed[index].planned.name;
     let children = placed.iter().filter_map(|other| match &other.planned.on {
         Attachment::Device { name: on, port } if on == name => Some(*port),

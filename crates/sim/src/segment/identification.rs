@@ -50,7 +50,7 @@ impl Rest {
 }
 
 /// Writes the alias into an SII image, and with it the checksum.
-fn set_alias(sii: &mut [u8], alias: u16) {
+pub(super) fn set_alias(sii: &mut [u8], alias: u16) {
     let (at, sum) = (word::STATION_ALIAS.byte(), word::CHECKSUM.byte());
     if sii.len() < sum + 2 {
         return;

@@ -7,6 +7,7 @@
 mod arrivals;
 mod build;
 pub(crate) mod card;
+mod exchange;
 mod identification;
 mod late;
 pub mod plug;
@@ -62,6 +63,10 @@ pub struct Segment {
     devices: Vec<DeviceInfo>,
     /// Current that each node takes from the E-bus, in mA.
     ebus_ma: Vec<i16>,
+    /// Whether a terminal without a controller feeds the E-bus anew before a node.
+    fed_anew: Vec<bool>,
+    /// Devices by the hot connect groups that the file names, as `group:A`.
+    groups: BTreeMap<String, Vec<DeviceId>>,
     /// Supplies that devices share.
     supplies: Vec<Supply>,
     /// The node of each device that is there.
@@ -287,6 +292,8 @@ impl Segment {
             tree: &self.tree,
             world: &self.world,
             ebus_ma: &self.ebus_ma,
+            fed_anew: &self.fed_anew,
+            groups: &self.groups,
             supplies: &self.supplies,
         };
         let number = self.world.truth.faults().len();

@@ -33,6 +33,8 @@ impl Segment {
         let mut segment = Self {
             supplies: Vec::new(),
             ebus_ma: vec![0; count],
+            fed_anew: vec![false; count],
+            groups: BTreeMap::new(),
             name: name.to_owned(),
             tree,
             world,

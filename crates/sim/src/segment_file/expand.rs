@@ -11,6 +11,7 @@ use linesman_proto::sii::Image;
 use linesman_proto::topology::wiring::ports_after;
 use linesman_proto::topology::{End, WiringError};
 
+use super::passive::Passives;
 use super::{SegmentDevice, SegmentFile, SegmentFileError};
 use crate::device::{DeviceKind, Signals};
 use crate::hardware::PortKind;
@@ -36,6 +37,8 @@ pub(crate) struct Planned {
     pub(crate) on: Attachment,
     pub(crate) entry: Port,
     pub(crate) cable_m: f64,
+    /// A terminal without a controller feeds the E-bus before it anew.
+    pub(crate) fed_anew: bool,
     pub(crate) ports: PortMap<PortKind>,
     pub(crate) serial: u32,
 }
@@ -50,7 +53,12 @@ impl Planned {
 /// All controllers of a file, in the order of their numbers.
 pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileError> {
     let mut planned = Vec::with_capacity(file.devices.len());
+    let passives = Passives::of(file);
     for (index, device) in file.devices.iter().enumerate() {
+        let place = passives.resolve(device)?;
+        if passives.devices().any(|passive| std::ptr::eq(passive, device)) {
+            continue;
+        }
         let kind = file.kind(&device.type_name, device.slots.as_deref()).map_err(|source| {
             SegmentFileError::Type { device: device.name.clone(), source: Box::new(source) }
         })?;
@@ -65,24 +73,23 @@ pub(crate) fn expand(file: &SegmentFile) -> Result<Vec<Planned>, SegmentFileErro
         };
         let Some(repeat) = device.repeat else {
             let serial = device.serial.unwrap_or(planned.len() as u32 + 1);
-            expand_device(device, (index, 0), &kind, entry, serial, &mut planned);
+            expand_device(device, (index, 0), &kind, entry, serial, place, &mut planned);
             continue;
         };
         for copy in 0..count_of(device, repeat)? {
             let no = copy as u32 + 1;
-            let on = match copy {
-                0 => device.on.clone(),
-                copy => behind(device, &kind, entry, copy)?,
+            let place = match copy {
+                0 => place.clone(),
+                copy => (behind(device, &kind, entry, copy)?, false),
             };
             let one = SegmentDevice {
                 name: format!("{}[{no}]", device.name),
-                on,
                 repeat: None,
                 ..device.clone()
             };
             let next = planned.len() as u32 + 1;
             let serial = device.serial.map_or(next, |first| first.wrapping_add(no - 1));
-            expand_device(&one, (index, copy), &kind, entry, serial, &mut planned);
+            expand_device(&one, (index, copy), &kind, entry, serial, place, &mut planned);
         }
     }
     Ok(planned)
@@ -145,6 +152,7 @@ fn expand_device(
     kind: &DeviceKind,
     entry: Port,
     serial: u32,
+    (on_place, fed_anew): (Attachment, bool),
     planned: &mut Vec<Planned>,
 ) {
     let name = |part: usize| part_name(&device.name, part);
@@ -161,7 +169,7 @@ fn expand_device(
                     PortKind::Ebus => 0.0,
                     PortKind::Mii | PortKind::Absent => DEFAULT_CABLE_M,
                 };
-                (device.on.clone(), entry, device.cable_m.unwrap_or(length))
+                (on_place.clone(), entry, device.cable_m.unwrap_or(length))
             }
         };
         planned.push(Planned {
@@ -173,6 +181,7 @@ fn expand_device(
             on,
             entry,
             cable_m,
+            fed_anew: fed_anew && inner.is_none(),
             ports,
             serial,
         });
@@ -319,9 +328,26 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
             None => Ok(PortKind::Mii),
         },
     };
+    for passive in Passives::of(file).devices() {
+        let (on, _) = Passives::of(file).resolve(passive)?;
+        let from_kind = kind_at(&on)?;
+        if from_kind != PortKind::Ebus {
+            return Err(SegmentFileError::Kinds {
+                from: on.to_string(),
+                from_kind: kind_name(from_kind),
+                to: format!("{}.A", passive.name),
+                to_kind: kind_name(PortKind::Ebus),
+            });
+        }
+    }
     for controller in planned {
         let from_kind = kind_at(&controller.on)?;
         let to_kind = has_port(controller, controller.entry)?;
+        let parent = match &controller.on {
+            Attachment::Device { name, .. } => by_name.get(name.as_str()).copied(),
+            Attachment::MainDevice(_) => None,
+        };
+        check_cable(parent, controller, to_kind)?;
         if from_kind != to_kind {
             return Err(SegmentFileError::Kinds {
                 from: controller.on.to_string(),
@@ -341,6 +367,24 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
                 to_kind: kind_name(PortKind::Mii),
             });
         }
+    }
+    Ok(())
+}
+
+/// Fast Hot Connect is at both ends of a cable or at none.
+fn check_cable(
+    parent: Option<&Planned>,
+    controller: &Planned,
+    kind: PortKind,
+) -> Result<(), SegmentFileError> {
+    let misplaced =
+        |why: String| Err(SegmentFileError::Misplaced { device: controller.name.clone(), why });
+    let fast = |one: Option<&Planned>| one.is_some_and(|one| one.kind.fast_hot_connect());
+    if kind == PortKind::Mii && fast(parent) != fast(Some(controller)) {
+        return misplaced(format!(
+            "a port with Fast Hot Connect fits another such port only, not `{}`",
+            controller.on
+        ));
     }
     Ok(())
 }

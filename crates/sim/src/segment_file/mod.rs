@@ -21,6 +21,7 @@
 
 mod clock;
 mod expand;
+mod passive;
 mod plant;
 mod schedule;
 mod types;
@@ -109,9 +110,15 @@ pub struct SegmentDevice {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 2000.0))]
     pub cable_m: Option<f64>,
+    /// The hot connect group it belongs to; faults can name all of it as `group:NAME`.
+    #[serde(default)]
+    pub group: Option<String>,
     /// Serial number in its SII; its number unless said.
     #[serde(default)]
     pub serial: Option<u32>,
+    /// Station alias in its SII; none unless said.
+    #[serde(default)]
+    pub alias: Option<u16>,
     /// Its identification, 0 to 65535: what its coding switch says, or what it answers when AL control
     /// asks for it, whichever its type has; else its station alias.
     #[serde(default)]
@@ -300,6 +307,14 @@ pub enum SegmentFileError {
         /// What it is.
         to_kind: &'static str,
     },
+    /// Something that does not go where it is put.
+    #[error("device `{device}`: {why}")]
+    Misplaced {
+        /// Whose.
+        device: String,
+        /// What is wrong, and what to do.
+        why: String,
+    },
     /// A number out of its range.
     #[error("device `{device}`: `{key}` is {given}, expected {allowed}")]
     Range {
@@ -330,6 +345,32 @@ pub enum SegmentFileError {
         /// What can be.
         allowed: &'static str,
     },
+}
+
+impl SegmentDevice {
+    /// A device of which no more is said than it must.
+    #[must_use]
+    pub fn new(name: impl Into<String>, type_name: impl Into<String>, on: Attachment) -> Self {
+        Self {
+            name: name.into(),
+            type_name: type_name.into(),
+            on,
+            repeat: None,
+            entry: None,
+            cable_m: None,
+            group: None,
+            serial: None,
+            alias: None,
+            id: None,
+            clock_ppm: None,
+            medium: None,
+            remakes_symbol_errors: None,
+            clock: None,
+            counts_forwarded: None,
+            slots: None,
+            counters: BTreeMap::new(),
+        }
+    }
 }
 
 impl SegmentFile {

@@ -256,21 +256,9 @@ impl Builder {
         let serial = Some(self.stream.between(1, 999_999) as u32);
         self.controllers += kind.ports().count();
         self.devices.push(SegmentDevice {
-            name: name.clone(),
-            repeat: None,
-            type_name: kind.name().to_owned(),
-            on,
-            entry: None,
             cable_m,
             serial,
-            id: None,
-            clock_ppm: None,
-            medium: None,
-            remakes_symbol_errors: None,
-            clock: None,
-            counts_forwarded: None,
-            slots: None,
-            counters: std::collections::BTreeMap::new(),
+            ..SegmentDevice::new(name.clone(), kind.name(), on)
         });
         name
     }

@@ -99,7 +99,7 @@ fn a_file_reads_and_writes_itself() {
 #[test]
 fn mistakes_are_named() {
     let table = [
-        ("cable_m = 5.0", "cable = 5.0", "unknown field `cable`"),
+        ("cable_m = 5.0", "cabel_m = 5.0", "unknown field `cabel_m`"),
         ("seed = 7", "sead = 7", "line 3"),
         ("\"EL2008\"", "\"EL9999\"", "device `Term 2 (EL2008)`: device type \"EL9999\""),
         ("\"K1.B\"", "\"K9.B\"", "no device is called `K9`"),

@@ -58,8 +58,14 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     if let Some(cable_m) = device.cable_m {
         line("cable_m", number(cable_m));
     }
-    if let Some(serial) = device.serial {
-        line("serial", serial.to_string());
+    if let Some(group) = &device.group {
+        line("group", quoted(group));
+    }
+    let numbers = [("serial", device.serial), ("alias", device.alias.map(u32::from))];
+    for (key, number) in numbers {
+        if let Some(number) = number {
+            line(key, number.to_string());
+        }
     }
     if let Some(id) = device.id {
         line("id", id.to_string());

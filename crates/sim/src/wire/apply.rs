@@ -88,6 +88,7 @@ impl World {
             }
             Change::Silence { path, until } => self.silence(at, fault, path, until),
             Change::Watchdog { node, time } => self.set_watchdog(at, fault, node, time),
+            Change::Readdress { node, like } => self.readdress(at, fault, node, like),
             Change::Software { node, change } => self.change_software(at, fault, node, change),
             Change::Timing { node, change } => self.change_timing(at, fault, node, change),
             Change::Late { path, by } => self.make_late(at, fault, path, by),

@@ -151,6 +151,14 @@ pub enum Change {
         /// The time, as it is written to 0x0420; `None` for the former one.
         time: Option<WatchdogTime>,
     },
+    /// A controller is given the station address of another one, or its own again when its fault
+    /// ends.
+    Readdress {
+        /// Which.
+        node: usize,
+        /// Whose address it gets.
+        like: usize,
+    },
     /// Something happens to the software of a device.
     Software {
         /// Which.

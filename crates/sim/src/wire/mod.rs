@@ -8,6 +8,7 @@
 //!
 //! Read first: "The physical model" in `ARCHITECTURE.md`; S1 chapters 3, 6 and 14.1.
 
+mod address;
 mod apply;
 pub mod change;
 mod direct;

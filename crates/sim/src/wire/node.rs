@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use linesman_proto::address::StationAddress;
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::WatchdogTime;
@@ -27,6 +28,7 @@ pub(super) enum Act {
     Reboot,
     Watchdog(Option<WatchdogTime>),
     Report(Emergency),
+    Address(Option<StationAddress>),
     Drift { ppb: i64, ramp_ppb_per_s: i64, ramp: Span },
     RestoreDrift,
     RestartClock,
@@ -56,6 +58,10 @@ pub(crate) struct Node {
     /// Whose doing it is that its watchdog has another time, and the time before.
     pub(super) watchdog_by: Option<FaultId>,
     former_watchdog: Option<WatchdogTime>,
+    /// Whose doing it is that it has another station address.
+    pub(super) address_by: Option<FaultId>,
+    /// Its address before, and the one it was given.
+    former_address: Option<[StationAddress; 2]>,
     /// What faults have done to its software.
     pub(super) software: Vec<Held>,
     /// What faults have done to its clock and deadlines.
@@ -78,6 +84,8 @@ impl Node {
             refused_by: None,
             watchdog_by: None,
             former_watchdog: None,
+            address_by: None,
+            former_address: None,
             software: Vec::new(),
             timing: Vec::new(),
             acts: VecDeque::new(),
@@ -114,9 +122,22 @@ impl Node {
                 Act::CutSync(cut) => self.controller.cut_sync(cut),
                 Act::SlowDown(takes) => self.controller.slow_down(takes),
                 Act::Report(emergency) => self.controller.report(at, emergency),
+                Act::Address(address) => self.set_address(address),
             }
         }
         self.controller.advance(now, signals);
+    }
+
+    /// Gives it another station address, or back what it had.
+    fn set_address(&mut self, address: Option<StationAddress>) {
+        if let Some(address) = address {
+            let former = self.controller.set_station_address(address);
+            self.former_address = Some([former, address]);
+        } else if let Some([former, given]) = self.former_address.take()
+            && self.controller.station_address() == given
+        {
+            self.controller.set_station_address(former);
+        }
     }
 
     /// When something happens to it by itself; [`Instant::MAX`] for never.

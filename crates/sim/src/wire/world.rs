@@ -315,6 +315,7 @@ impl World {
             }
         }
         self.release_starved(at, fault);
+        self.release_addresses(at, fault);
         self.release_software(at, fault);
         self.release_timing(at, fault);
         self.truth.end(at, fault);

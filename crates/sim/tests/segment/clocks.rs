@@ -52,7 +52,7 @@ impl Clocks {
             let bytes: [u8; 16] = self.read(node, 0x0900).unwrap();
             let mut times = PortMap::default();
             for port in tree.open_ports(node) {
-                let at = usize::from(port.index()) * 4;
+                let at = port.index() * 4;
                 let raw = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
                 times[port] = Some(DcTime32(raw));
             }
@@ -144,7 +144,7 @@ fn delays(file: &SegmentFile) -> (Vec<u64>, Vec<PortMap<Option<DcTime32>>>) {
 }
 
 fn since_entry(received: &PortMap<Option<DcTime32>>, port: Port) -> i32 {
-    received[port].unwrap().delta(received[Port::A].unwrap()) as i32
+    received[port].unwrap().delta(received[Port::A].unwrap())
 }
 
 // proves: ESC-12 partial: the delays of two lines that were measured on real hardware

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 mod clocks;
+mod exchange;
 mod faults;
 mod identification;
 mod long_line;

@@ -17,7 +17,10 @@ use super::rig::{Bench, PLANT, answer, at, frame};
 /// A random fault of any kind that can come and go.
 pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
     let is_ring = file.ring.is_some();
-    let fits = |kind: &&Kind| !kind.is_built_in() && (is_ring || kind.place != PlaceRule::RingLink);
+    let fits = |kind: &&Kind| {
+        let needs_more = matches!(kind.place, PlaceRule::Feed | PlaceRule::Pair);
+        !kind.is_built_in() && !needs_more && (is_ring || kind.place != PlaceRule::RingLink)
+    };
     let kinds: Vec<_> = KINDS.iter().filter(fits).collect();
     let kind = stream.pick(&kinds).unwrap();
     let needs_software = matches!(kind.place, PlaceRule::Processor | PlaceRule::Mailbox);
@@ -35,6 +38,8 @@ pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
         PlaceRule::Line => entry.at(format!("{far}>{near}")),
         PlaceRule::Device
         | PlaceRule::Devices
+        | PlaceRule::Feed
+        | PlaceRule::Pair
         | PlaceRule::Processor
         | PlaceRule::Mailbox
         | PlaceRule::DeviceOrCard => entry.device(&device.name),

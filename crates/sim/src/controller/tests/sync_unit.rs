@@ -10,10 +10,13 @@ use super::rig::{Bench, at, hardware, sii};
 use crate::controller::{Pdi, SyncSignal};
 use crate::device::{Firmware, NoFirmware, Refusal};
 
+/// Signals and when they came.
+type Heard = Arc<Mutex<Vec<(SyncSignal, Instant)>>>;
+
 /// A device that writes down when it hears a signal.
 #[derive(Debug, Default)]
 struct Listener {
-    heard: Arc<Mutex<Vec<(SyncSignal, Instant)>>>,
+    heard: Heard,
     acknowledges: bool,
 }
 
@@ -119,19 +122,14 @@ fn a_start_in_the_past_comes_with_the_wrap_of_32_bits() {
     assert_eq!(bench.read(0x0994, 4), None);
 }
 
-fn listen(pulse: u16, acknowledges: bool) -> (Bench, Arc<Mutex<Vec<(SyncSignal, Instant)>>>) {
+fn listen(pulse: u16, acknowledges: bool) -> (Bench, Heard) {
     let listener = Listener { acknowledges, ..Listener::default() };
     let heard = Arc::clone(&listener.heard);
     (Bench::with(hardware(), image(pulse, false), Box::new(listener)), heard)
 }
 
 /// When a signal came, as local time behind `zero`, in ns.
-fn times(
-    heard: &Arc<Mutex<Vec<(SyncSignal, Instant)>>>,
-    bench: &Bench,
-    which: SyncSignal,
-    zero: u64,
-) -> Vec<u64> {
+fn times(heard: &Heard, bench: &Bench, which: SyncSignal, zero: u64) -> Vec<u64> {
     let heard = heard.lock().unwrap();
     let mine = heard.iter().filter(|(signal, _)| *signal == which);
     mine.map(|(_, at)| bench.controller.local_time(*at) - zero).collect()

@@ -22,12 +22,15 @@ pub(crate) enum Goal {
         /// In inc/s².
         deceleration: f64,
     },
-    /// An even way to `target`, there at `until`.
+    /// An even way to `target`, there at `until`. As the next target may be a little late it goes on
+    /// like that for a while; then it is to be at the target.
     Line {
         /// In increments.
         target: f64,
         /// When it is to be there.
         until: Instant,
+        /// How long it goes on.
+        grace: Span,
     },
     /// A velocity, reached with this acceleration.
     Velocity {
@@ -127,8 +130,9 @@ impl Motion {
                 return;
             }
             let step = left.min(STEP);
+            let lag = self.demand - self.position;
             self.generate(at, step);
-            self.follow(step);
+            self.follow(lag, step);
             left -= step;
             at += Span::ns((step * 1e9) as u64);
         }
@@ -146,7 +150,7 @@ impl Motion {
         let settled = match self.goal {
             Goal::Coast => true,
             Goal::Stop { .. } => self.demanded_velocity == 0.0,
-            Goal::Line { until, .. } => at >= until && self.demanded_velocity == 0.0,
+            Goal::Line { until, grace, .. } => at >= until + grace && self.demanded_velocity == 0.0,
             Goal::Velocity { target, .. } => self.demanded_velocity == target,
             Goal::Position { target, .. } => self.demand == target && self.demanded_velocity == 0.0,
         };
@@ -171,13 +175,15 @@ impl Motion {
                 self.demanded_velocity = toward(target, acceleration, deceleration);
                 self.demand += (before + self.demanded_velocity) / 2.0 * step;
             }
-            Goal::Line { target, until } => {
+            Goal::Line { target, until, grace } => {
                 let remaining = until.since(at).as_secs_f64();
-                if remaining <= step {
-                    (self.demand, self.demanded_velocity) = (target, 0.0);
-                } else {
+                if remaining > 0.0 {
                     self.demanded_velocity = (target - self.demand) / remaining;
                     self.demand += self.demanded_velocity * step;
+                } else if at < until + grace {
+                    self.demand += self.demanded_velocity * step;
+                } else {
+                    (self.demand, self.demanded_velocity) = (target, 0.0);
                 }
             }
             Goal::Position { target, velocity, acceleration, deceleration } => {
@@ -197,8 +203,8 @@ impl Motion {
         }
     }
 
-    /// Lets the axis follow its demand.
-    fn follow(&mut self, step: f64) {
+    /// Lets the axis follow its demand, behind which it was by `lag` when the step began.
+    fn follow(&mut self, lag: f64, step: f64) {
         if self.blocked {
             self.velocity = 0.0;
             return;
@@ -212,7 +218,6 @@ impl Motion {
             return;
         }
         let Limits { velocity, acceleration } = self.limits;
-        let lag = self.demand - self.position;
         let catch_up = (STIFFNESS * lag).clamp(
             -(2.0 * acceleration * lag.abs()).sqrt(),
             (2.0 * acceleration * lag.abs()).sqrt(),
@@ -316,7 +321,8 @@ mod tests {
         for ms in 0..500u64 {
             axis.advance(at(ms));
             let target = (ms as f64 + 1.0) * 100.0;
-            axis.demand(Goal::Line { target, until: at(ms + 1) }, LIMITS);
+            let goal = Goal::Line { target, until: at(ms + 1), grace: Span::ms(1) };
+            axis.demand(goal, LIMITS);
         }
         axis.advance(at(500));
         assert!((axis.position - 50_000.0).abs() < 1.0, "{}", axis.position);

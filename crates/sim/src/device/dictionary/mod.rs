@@ -210,6 +210,13 @@ impl Dictionary {
         self.place(index).ok().map(|at| &self.objects[at])
     }
 
+    /// Puts another object in the place of one with the same index; nothing where there is none.
+    pub fn replace(&mut self, object: Object) {
+        if let Ok(at) = self.place(object.index) {
+            self.objects[at] = object;
+        }
+    }
+
     /// Where an entry is.
     #[must_use]
     pub fn find(&self, address: ObjectAddress) -> Option<EntryRef> {

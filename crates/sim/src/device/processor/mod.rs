@@ -6,6 +6,7 @@
 mod areas;
 mod check;
 mod in_step;
+mod mismatch;
 mod note;
 mod process_image;
 mod synchronisation;
@@ -113,6 +114,8 @@ pub struct Processor {
     files: Files,
     history: History,
     troubles: Troubles,
+    /// Settings before they were made not to fit.
+    former: Vec<mismatch::Former>,
     /// Errors to tell of.
     emergencies: Vec<Emergency>,
     buffer: Vec<u8>,
@@ -150,6 +153,7 @@ impl Processor {
             files: Files::default(),
             history: History::default(),
             troubles: Troubles::default(),
+            former: Vec::new(),
             emergencies: Vec::new(),
             buffer: Vec::new(),
             description,
@@ -464,6 +468,9 @@ impl Firmware for Processor {
     }
 
     fn trouble(&mut self, trouble: Trouble, begins: bool) {
+        if let Trouble::Mismatch(what) = trouble {
+            self.mismatch(what, begins);
+        }
         if begins {
             self.troubles.begin(trouble);
         } else {

@@ -17,6 +17,7 @@ use super::Signals;
 use super::library::{Built, build};
 use crate::controller::tests::rig::{Bench, logical};
 
+mod drive;
 mod files;
 mod history;
 mod hostile;

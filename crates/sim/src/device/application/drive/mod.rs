@@ -213,8 +213,8 @@ impl Cia402 {
             Mode::CyclicPosition if halt => Some(stop),
             Mode::CyclicPosition => {
                 let target = objects.target_position.signed(dictionary) - self.offset;
-                let until = now + objects.interpolation_time(dictionary);
-                Some(Goal::Line { target, until })
+                let grace = objects.interpolation_time(dictionary);
+                Some(Goal::Line { target, until: now + grace, grace })
             }
             Mode::CyclicVelocity | Mode::ProfileVelocity => {
                 let target = objects.target_velocity.signed(dictionary);
