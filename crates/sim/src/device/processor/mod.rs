@@ -5,6 +5,7 @@
 
 mod areas;
 mod check;
+mod firmware;
 mod in_step;
 mod mismatch;
 mod note;
@@ -22,15 +23,14 @@ use self::areas::Areas;
 pub use self::areas::ProcessBuffer;
 use self::synchronisation::Synchronisation;
 use super::application::Channel;
-use super::application_layer::{ApplicationLayer, Refusal};
+use super::application_layer::ApplicationLayer;
 use super::dictionary::Dictionary;
 use super::files::Files;
-use super::firmware::{Firmware, SampleAgain};
 use super::history::History;
-use super::mailbox::{Mailbox, Served};
+use super::mailbox::Mailbox;
 use super::signal::Signals;
 use super::trouble::{Trouble, Troubles};
-use crate::controller::{Pdi, SyncSignal};
+use crate::controller::Pdi;
 
 /// Emergencies that wait for a mailbox; further ones are forgotten.
 const UNTOLD: usize = 8;
@@ -403,127 +403,5 @@ impl Processor {
         let watched = check::watched(pdi, &self.process_data);
         let expired = pdi.watchdog_expired();
         watched && expired && pdi.register_u16(r::WATCHDOG_TIME_PROCESS_DATA.address) != 0
-    }
-}
-
-impl Firmware for Processor {
-    fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        self.dictionary.restart(&self.description.dictionary);
-        self.history = History::default();
-        self.mailbox.restart();
-        // An update that the loss of the supply broke off is forgotten; the old firmware runs.
-        self.files.take_broken_update();
-        self.start_new_firmware(pdi);
-        self.process_data = Areas::default();
-        self.synchronisation.start(&self.description.dictionary, &mut self.dictionary);
-        self.step = None;
-        self.emergencies.clear();
-        self.next_sample = now;
-        self.make_safe(pdi);
-    }
-
-    fn run(&mut self, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
-        if pdi.take_activation_event() {
-            self.check_again(pdi);
-        }
-        self.serve_process_data(now, pdi);
-        self.serve_requests(now, pdi);
-        let state = ApplicationLayer::state(pdi);
-        let again = if state.has_mailbox() && self.description.mailbox.is_present() {
-            self.tell_emergencies(pdi);
-            self.tell_time(pdi);
-            let mut served = Served {
-                dictionary: &mut self.dictionary,
-                files: &mut self.files,
-                troubles: &mut self.troubles,
-                state,
-            };
-            let again = self.mailbox.serve(now, pdi, &mut served);
-            self.follow_up();
-            again
-        } else {
-            None
-        };
-        let step = self.step.map(|step| if step.due > now { step.due } else { step.deadline });
-        let due = self.synchronisation.next(ApplicationLayer::is_operational(pdi));
-        [again, step, due].into_iter().flatten().min()
-    }
-
-    fn refuse(&mut self, refusal: Option<Refusal>) {
-        self.application_layer.refuse(refusal);
-    }
-
-    fn report(&mut self, emergency: Emergency) {
-        if self.emergencies.len() < UNTOLD {
-            self.emergencies.push(emergency);
-        }
-    }
-
-    fn has_processor(&self) -> bool {
-        true
-    }
-
-    fn has_mailbox(&self) -> bool {
-        self.description.mailbox.is_present()
-    }
-
-    fn trouble(&mut self, trouble: Trouble, begins: bool) {
-        if let Trouble::Mismatch(what) = trouble {
-            self.mismatch(what, begins);
-        }
-        if begins {
-            self.troubles.begin(trouble);
-        } else {
-            self.troubles.end(trouble);
-        }
-    }
-
-    fn reboot(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        // What the MainDevice asked meanwhile nobody has heard.
-        pdi.take_al_control_event();
-        self.start(now, pdi);
-        self.lock_outputs(pdi, false);
-        ApplicationLayer::fail(pdi, AlState::Init, AlStatusCode::RESTARTED_LOCALLY);
-        self.note_crash(pdi);
-    }
-
-    fn identify(&mut self, id: u16, _signals: &mut Signals) -> bool {
-        self.application_layer.identify(id);
-        true
-    }
-
-    fn samples(&self) -> bool {
-        self.description.channels.iter().any(|channel| channel.has_inputs())
-    }
-
-    fn sample(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        let with_frames = self.synchronisation.samples_with_frames();
-        if with_frames && now >= self.next_sample && ApplicationLayer::state(pdi).has_inputs() {
-            self.sample_inputs(now, pdi);
-        }
-    }
-
-    fn sample_again(&self, pdi: &Pdi<'_>) -> SampleAgain {
-        let samples =
-            self.synchronisation.samples_with_frames() && ApplicationLayer::state(pdi).has_inputs();
-        SampleAgain::From(if samples { self.next_sample } else { Instant::MAX })
-    }
-
-    fn synchronises(&self) -> bool {
-        true
-    }
-
-    fn sync(&mut self, signal: SyncSignal, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
-        self.keep_step(signal, now, pdi)
-    }
-
-    fn slow_down(&mut self, takes: Option<Span>) {
-        self.synchronisation.set_takes(takes);
-    }
-
-    fn stop(&mut self, signals: &mut Signals) {
-        for channel in &mut self.description.channels {
-            channel.lose_supply(signals);
-        }
     }
 }

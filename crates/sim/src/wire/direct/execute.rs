@@ -1,0 +1,226 @@
+//! The datagrams of a frame that needs no walk, each at everybody it is for.
+
+use std::sync::Arc;
+
+use linesman_proto::address::LogicalAddress;
+use linesman_proto::command::{Addressing, Command};
+use linesman_proto::frame::{DATAGRAM_HEADER_LEN, WKC_LEN};
+
+use super::{Journey, KEPT_QUERIES};
+use crate::controller::{Answer, Header, PlainRead};
+use crate::wire::world::World;
+
+impl World {
+    pub(super) fn execute_all(&mut self, journey: &Journey<'_>, bytes: &mut [u8]) {
+        let interrupting = self.nodes.directory.interrupting();
+        let irq = interrupting.iter().filter(|node| journey.route.place(**node).is_some());
+        let irq = irq.fold(0, |irq, node| irq | self.nodes[*node as usize].controller.irq());
+        let mut rest = bytes;
+        while let Some((header, body)) = rest.split_first_chunk_mut::<DATAGRAM_HEADER_LEN>() {
+            let read = Header::read(header);
+            if irq != 0 {
+                let irq = u16::from_le_bytes([header[8], header[9]]) | irq;
+                header[8..10].copy_from_slice(&irq.to_le_bytes());
+            }
+            let (data, behind) = body.split_at_mut(read.len);
+            let Some((counter, next)) = behind.split_first_chunk_mut::<WKC_LEN>() else { return };
+            if let Some(command) = read.command {
+                if command.increments_position() {
+                    let passed = read.adp.wrapping_add(journey.route.visits.len() as u16);
+                    header[2..4].copy_from_slice(&passed.to_le_bytes());
+                }
+                let increment = self.execute(journey, command, read, data);
+                *counter = u16::from_le_bytes(*counter).wrapping_add(increment).to_le_bytes();
+            }
+            if !read.more {
+                return;
+            }
+            rest = next;
+        }
+    }
+
+    /// Executes a datagram at everybody it is for, and says what to add to its working counter.
+    fn execute(
+        &mut self,
+        journey: &Journey<'_>,
+        command: Command,
+        header: Header,
+        data: &mut [u8],
+    ) -> u16 {
+        let effect = command.effect();
+        let plain = if effect.reads && !effect.writes && !effect.multiple_write {
+            PlainRead::of(header.ado, header.len)
+        } else {
+            None
+        };
+        let addressing = command.addressing();
+        if effect.multiple_write {
+            return self.execute_everywhere(journey, addressing, header, data);
+        }
+        let ors = effect.ors;
+        match addressing {
+            Addressing::None => 0,
+            Addressing::Broadcast => match plain {
+                Some(read) => self.broadcast(journey, &read, header, data),
+                None => self.execute_everywhere(journey, addressing, header, data),
+            },
+            Addressing::Position => {
+                let first = usize::from(0_u16.wrapping_sub(header.adp));
+                let header = Header { adp: 0, ..header };
+                let mut sum = 0_u16;
+                for place in (first..journey.route.visits.len()).step_by(1 << 16) {
+                    let place = place as u32;
+                    sum = sum.wrapping_add(self.one(
+                        journey,
+                        place,
+                        plain.as_ref(),
+                        ors,
+                        header,
+                        data,
+                    ));
+                }
+                sum
+            }
+            Addressing::Station => {
+                let mut places = std::mem::take(&mut self.direct.places);
+                places.clear();
+                let nodes = self.nodes.directory.stations(header.adp);
+                places.extend(nodes.filter_map(|node| journey.route.place(node)));
+                if places.len() > 1 {
+                    places.sort_unstable();
+                }
+                let mut sum = 0_u16;
+                for place in &places {
+                    sum = sum.wrapping_add(self.one(
+                        journey,
+                        *place,
+                        plain.as_ref(),
+                        ors,
+                        header,
+                        data,
+                    ));
+                }
+                self.direct.places = places;
+                sum
+            }
+            Addressing::Logical => {
+                let places = self.mapped(journey, header.logical(), header.len);
+                let mut sum = 0_u16;
+                for place in places.iter() {
+                    sum = sum.wrapping_add(self.at(journey, *place, header, data));
+                }
+                sum
+            }
+        }
+    }
+
+    /// Reads registers of all controllers into one.
+    fn broadcast(
+        &mut self,
+        journey: &Journey<'_>,
+        read: &PlainRead,
+        header: Header,
+        data: &mut [u8],
+    ) -> u16 {
+        let mut sum = 0_u16;
+        for place in 0..journey.route.visits.len() {
+            let node = journey.route.visits[place].node as usize;
+            match self.nodes[node].controller.read_plainly(read, data, true) {
+                Answer::Nothing => {}
+                Answer::Read => sum = sum.wrapping_add(1),
+                Answer::Effect => {
+                    sum = sum.wrapping_add(self.at(journey, place as u32, header, data));
+                }
+            }
+        }
+        sum
+    }
+
+    /// Goes past all controllers, as auto-increment and multiple-write commands need it.
+    fn execute_everywhere(
+        &mut self,
+        journey: &Journey<'_>,
+        addressing: Addressing,
+        header: Header,
+        data: &mut [u8],
+    ) -> u16 {
+        let counts = addressing == Addressing::Position;
+        let mut sum = 0_u16;
+        for place in 0..journey.route.visits.len() as u32 {
+            let adp = if counts { header.adp.wrapping_add(place as u16) } else { header.adp };
+            sum = sum.wrapping_add(self.at(journey, place, Header { adp, ..header }, data));
+        }
+        sum
+    }
+
+    /// Executes a datagram at one controller that it is for.
+    #[inline]
+    fn one(
+        &mut self,
+        journey: &Journey<'_>,
+        place: u32,
+        plain: Option<&PlainRead>,
+        ors: bool,
+        header: Header,
+        data: &mut [u8],
+    ) -> u16 {
+        if let Some(read) = plain {
+            let node = journey.route.visits[place as usize].node as usize;
+            match self.nodes[node].controller.read_plainly(read, data, ors) {
+                Answer::Nothing => return 0,
+                Answer::Read => return 1,
+                Answer::Effect => {}
+            }
+        }
+        self.at(journey, place, header, data)
+    }
+
+    /// Executes a datagram at one controller.
+    #[inline]
+    fn at(&mut self, journey: &Journey<'_>, place: u32, header: Header, data: &mut [u8]) -> u16 {
+        let (index, at) = journey.at_place(place);
+        let node = self.nodes.quietly(index);
+        if node.last_frame != journey.number {
+            node.last_frame = journey.number;
+            node.controller.begin(at, journey.number);
+            self.direct.touched.push(place);
+        }
+        node.controller.execute(&header, data)
+    }
+
+    /// The frame has passed all.
+    pub(super) fn end_all(&mut self, journey: &Journey<'_>) {
+        let mut touched = std::mem::take(&mut self.direct.touched);
+        for place in touched.drain(..) {
+            let (index, at) = journey.at_place(place);
+            let changed = self.nodes.quietly(index).controller.end(at + journey.duration);
+            if changed {
+                self.nodes.wake(index);
+            } else {
+                self.nodes.reschedule(index);
+            }
+        }
+        self.direct.touched = touched;
+    }
+
+    /// Places on the way with FMMUs that map any of these logical bytes, in order.
+    fn mapped(&mut self, journey: &Journey<'_>, start: LogicalAddress, len: usize) -> Arc<[u32]> {
+        let directory = &self.nodes.directory;
+        if self.direct.mappings != directory.mappings() || self.direct.queries.len() > KEPT_QUERIES
+        {
+            self.direct.mappings = directory.mappings();
+            self.direct.queries.clear();
+        }
+        let key = (journey.card.index(), start.0, len as u16);
+        if let Some(places) = self.direct.queries.get(&key) {
+            return Arc::clone(places);
+        }
+        let nodes = directory.mapping(start, len);
+        let mut places: Vec<u32> = nodes.filter_map(|node| journey.route.place(node)).collect();
+        places.sort_unstable();
+        places.dedup();
+        let places: Arc<[u32]> = places.into();
+        self.direct.queries.insert(key, Arc::clone(&places));
+        places
+    }
+}
