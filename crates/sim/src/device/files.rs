@@ -258,7 +258,8 @@ mod tests {
     #[test]
     fn who_may_read_what() {
         use AlState::{Boot, PreOp};
-        let table: [(&str, u32, AlState, Result<&[u8], u32>); 9] = [
+        type Case<'a> = (&'a str, u32, AlState, Result<&'a [u8], u32>);
+        let table: [Case<'_>; 9] = [
             ("settings.txt", 0, PreOp, Ok(b"a=1\n")),
             ("settings.txt\0", 9, PreOp, Ok(b"a=1\n")),
             ("settings.txt", 0, Boot, Err(0x8009)),

@@ -140,9 +140,7 @@ impl Motion {
 
     /// Whether nothing changes any more by itself.
     fn is_even(&self, at: Instant) -> bool {
-        let follows = if self.goal == Goal::Coast {
-            self.velocity == 0.0
-        } else if self.blocked {
+        let follows = if self.goal == Goal::Coast || self.blocked {
             self.velocity == 0.0
         } else {
             self.velocity == self.demanded_velocity && self.position == self.demand

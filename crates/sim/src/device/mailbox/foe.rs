@@ -265,7 +265,8 @@ mod tests {
         let begin: &[u8] = b"\x02\0\0\0\0\0nine";
         let read: &[u8] = b"\x01\0\0\0\0\0nine";
         let full: &[u8] = b"\x03\0\x01\0\0\0abcdefgh";
-        let table: [(&[&[u8]], &[u8], u16); 9] = [
+        type Case<'a> = (&'a [&'a [u8]], &'a [u8], u16);
+        let table: [Case<'_>; 9] = [
             (&[], b"\x01\0\0\0\0\0nowhere", 0x8001),
             (&[], b"\x02\0\0\0\0\0eight", 0x8002),
             (&[], b"\x02\0\0\0\0\0a.efw", 0x8008),
