@@ -91,10 +91,11 @@ fn run(devices: usize) {
     };
     let begin = Clock::now();
     bench.main.scan(bench.now);
-    let inventory: Inventory = bench.until(|event| match event {
-        Event::Scanned(inventory) => Some(*inventory),
-        Event::ScanFailed(error) => panic!("{error}"),
-        _ => None,
+    let inventory: Inventory = bench.until(|event| {
+        if let Event::ScanFailed(error) = &event {
+            panic!("{error}");
+        }
+        if let Event::Scanned(inventory) = event { Some(*inventory) } else { None }
     });
     let scanned = (begin.elapsed(), bench.now);
     assert_eq!(inventory.devices.len(), devices);

@@ -30,13 +30,9 @@ impl Lab {
         let answer = |lab: &Self| {
             // Those of the same instant that were there already do not count.
             let new = lab.events.iter().filter(|(at, _)| Some(*at) >= since);
-            new.skip(before).find_map(|(_, event)| match event {
-                Event::SdoUploaded { id, object: about, result }
-                    if (*id, *about) == (of, object) =>
-                {
-                    Some(result.clone())
-                }
-                _ => None,
+            new.skip(before).find_map(|(_, event)| {
+                let Event::SdoUploaded { id, object: about, result } = event else { return None };
+                ((*id, *about) == (of, object)).then(|| result.clone())
             })
         };
         self.run_while(PATIENCE, LOOK, |lab| answer(lab).is_some())?;

@@ -418,7 +418,7 @@ fn any_fault(kind: &Kind, file: &SegmentFile, stream: &mut Stream) -> FaultEntry
 /// Once, again and again, by chance, in bursts.
 fn any_schedule(stream: &mut Stream) -> Schedule {
     let for_ms = Some(stream.log_uniform(0.01, 20.0));
-    let burst = stream.chance(0.2).then(|| BurstTimes { count: 3, every_ms: 25.0 });
+    let burst = stream.chance(0.2).then_some(BurstTimes { count: 3, every_ms: 25.0 });
     let repeated = Schedule { for_ms, burst, ..Schedule::default() };
     match stream.below(6) {
         0 => Schedule { every_ms: Some(stream.log_uniform(100.0, 300.0)), ..repeated },

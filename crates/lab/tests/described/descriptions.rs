@@ -31,8 +31,8 @@ fn bring_up(file: &str, device: &EsiDevice, collection: &Collection) -> Outcome 
     let name = type_name(file, device);
     match segment(&name, collection).and_then(|segment| to_op(&segment)) {
         Ok(lab) => {
-            let found = lab.inventory().unwrap().devices.last().unwrap().clone();
-            let identity = found.identity.unwrap();
+            let found = lab.inventory().expect("scanned").devices.last().expect("a device").clone();
+            let identity = found.identity.expect("an identity");
             let last = device.sub_devices.last().copied();
             let expected = last.unwrap_or((device.product_code, device.revision));
             if (identity.product_code, identity.revision) != expected {

@@ -40,7 +40,11 @@ fn effects(bench: &Bench, fault: FaultId) -> Vec<Effect> {
 }
 
 fn register(bench: &Bench, name: &str, address: u16) -> u8 {
-    bench.segment.controller(bench.id(name)).unwrap().register(RegisterAddress(address))
+    bench
+        .segment
+        .controller(bench.id(name))
+        .expect("it is there")
+        .register(RegisterAddress(address))
 }
 
 #[test]
@@ -153,21 +157,19 @@ fn emergencies_come_with_code_register_and_data_and_are_taken_back() {
     let told: Vec<(u16, u8, [u8; 5])> = bench
         .events
         .iter()
-        .filter_map(|(_, event)| match event {
-            Event::Emergency { id: by, emergency } => {
-                assert_eq!(*by, id);
-                Some((emergency.code, emergency.register.0, emergency.data))
-            }
-            _ => None,
+        .filter_map(|(_, event)| {
+            let Event::Emergency { id: by, emergency } = event else { return None };
+            assert_eq!(*by, id);
+            Some((emergency.code, emergency.register.0, emergency.data))
         })
         .collect();
     let error = (0x4310, 8, [1, 2, 3, 0, 0]);
     assert_eq!(told, [error, error, error, (0, 0, [0; 5])]);
     let codes: Vec<u16> = effects(&bench, fault)
         .into_iter()
-        .map(|effect| match effect {
-            Effect::EmergencySent { code } => code,
-            other => panic!("{other:?}"),
+        .map(|effect| {
+            let Effect::EmergencySent { code } = effect else { panic!("{effect:?}") };
+            code
         })
         .collect();
     assert_eq!(codes, [0x4310, 0x4310, 0x4310, 0], "the log has each");

@@ -29,6 +29,7 @@ fn value(text: &str, key: &str) -> f64 {
 
 /// PR2, 11 January 2011: of 1,127,295 frames 156 were late and one was lost, and no controller had
 /// counted anything. A host that keeps frames back leaves just that.
+#[expect(clippy::disallowed_macros, reason = "a test that skips says so")]
 #[test]
 fn the_counters_of_a_real_robot_come_out_of_a_late_host() {
     let Some(data) = std::env::var_os("LINESMAN_DATA") else {
