@@ -26,7 +26,7 @@ enum Rhythm {
     Once,
     At(Vec<Span>),
     Every(Span),
-    Random { mean: Span, stays: Option<Span>, stream: Stream },
+    Random { mean: Span, stays: Option<Span>, stream: Box<Stream> },
 }
 
 /// The windows of a fault, in the order of time.
@@ -219,7 +219,7 @@ impl Check<'_> {
         let Some(random) = schedule.random else { return Ok(Rhythm::Once) };
         let mean = self.span("random.mean_ms", Some(random.mean_ms))?.unwrap_or(Span::s(1));
         let stays = self.span("random.for_ms", random.for_ms)?;
-        Ok(Rhythm::Random { mean, stays, stream })
+        Ok(Rhythm::Random { mean, stays, stream: Box::new(stream) })
     }
 
     /// One window ends before the next begins.

@@ -35,7 +35,7 @@ impl PlugNoise {
             let mut after = self.stream.wait(rate_per_s);
             while after < LASTS {
                 hits.push((line, after, self.stream.between(1, 255) as u8));
-                after = after + self.stream.wait(rate_per_s);
+                after += self.stream.wait(rate_per_s);
             }
         }
         hits
