@@ -12,6 +12,7 @@
 
 use std::fmt;
 
+use linesman_config::fault::FaultName;
 use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::command::Command;
 use linesman_proto::ethernet::MacAddress;
@@ -187,11 +188,8 @@ impl Run {
 
     fn inject(&mut self) -> Option<FaultId> {
         let is_ring = self.file.ring.is_some();
-        // An overload needs a coupler with terminals, and a supply that is too small for them.
-        let fits = |kind: &&Kind| {
-            let fed = kind.place == PlaceRule::Feed;
-            !kind.is_built_in() && !fed && (is_ring || kind.place != PlaceRule::RingLink)
-        };
+        let fits =
+            |kind: &&Kind| !kind.is_built_in() && (is_ring || kind.place != PlaceRule::RingLink);
         let kinds: Vec<&Kind> = KINDS.iter().filter(fits).collect();
         let kind = self.stream.pick(&kinds)?;
         let mut entry = any_fault(kind, &self.file, &mut self.stream);
@@ -203,6 +201,8 @@ impl Run {
         entry.schedule = any_schedule(&mut self.stream);
         let id = match self.segment.inject(self.now, &entry) {
             Ok(id) => id,
+            // What feeds nobody cannot be overloaded.
+            Err(_) if kind.place == PlaceRule::Feed => return None,
             // Chance has put together what does not go together; without its own choices it must do.
             Err(_) => {
                 (entry.schedule, entry.parameters) = (Schedule::default(), Default::default());
@@ -341,6 +341,8 @@ impl Run {
     }
 
     fn audit(&mut self, when: &str) {
+        // What a frame on its way does to counters is in the log before it is in the counters.
+        self.wait(Span::ms(5));
         let holes = self.segment.audit();
         if !holes.is_empty() {
             self.violation(format!("{when} counters moved without a cause: {holes:?}"));
@@ -353,7 +355,7 @@ impl Run {
 }
 
 /// Whether a fault is in the line from its making on, and stays.
-fn is_for_ever(name: linesman_config::fault::FaultName) -> bool {
+fn is_for_ever(name: FaultName) -> bool {
     linesman_sim::fault::kind(name).is_some_and(Kind::is_built_in)
 }
 
@@ -412,7 +414,16 @@ fn any_fault(kind: &Kind, file: &SegmentFile, stream: &mut Stream) -> FaultEntry
             Shape::Text => {}
         }
     }
-    entry
+    #[expect(clippy::wildcard_enum_match_arm, reason = "only these need more than chance")]
+    match kind.name {
+        // Any terminal draws more than that.
+        FaultName::EbusOverload => entry.with("supply_ma", 1.0),
+        FaultName::DeviceExtra => {
+            entry.device = Some("extra".to_owned());
+            entry.with("type", "EL1008").with("on", near.as_str())
+        }
+        _ => entry,
+    }
 }
 
 /// Once, again and again, by chance, in bursts.

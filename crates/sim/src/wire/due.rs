@@ -21,6 +21,8 @@ pub(super) enum Due {
     Up { link: usize, epochs: [u64; 2] },
     /// One end has a link.
     EndUp { link: usize, end: usize, epoch: u64 },
+    /// A symbol is destroyed as a link comes up.
+    Noise { line: Line, flip: u8, fault: FaultId },
     /// A link that was up too early carries frames.
     Carries { link: usize, fault: FaultId },
     /// A PHY does something to its link.
@@ -179,6 +181,7 @@ impl World {
                     self.comes_up(link, at);
                 }
             }
+            Due::Noise { line, flip, fault } => self.hit(at, fault, line, flip),
             Due::Carries { link, fault } => {
                 self.way_changes(at);
                 for line in Line::both(link) {
@@ -236,7 +239,7 @@ impl World {
         }
         if let Some(fault) = self.blame(index, at) {
             for (line, after, flip) in self.plug_noise.draw(index) {
-                self.hit(at + after, fault, line, flip);
+                self.agenda.push(at + after, Due::Noise { line, flip, fault });
             }
         }
     }
