@@ -133,6 +133,10 @@ fn add(
     if let Some(last_hop) = &suspicion.last_hop {
         condition.evidence.push(card_evidence(last_hop));
     }
+    // What follows from sums alone, while SubDevices went away and came back, is not claimed.
+    if condition.evidence.is_empty() {
+        return;
+    }
     for action in actions(survey, most_likely.cause, most_likely.spot) {
         condition = condition.advise(action);
     }
