@@ -64,7 +64,8 @@ KINDS = {
 
 # What a drive is told in one round after the other (controlword, target position), and what it must say then
 # (statusword under the mask 0x6F): ready to switch on, switched on, operation enabled, and on to another position.
-DRIVE_ROUNDS = [(0x06, 0, 0x21), (0x07, 0, 0x23), (0x0F, 0, 0x27), (0x0F, 5000, 0x27)]
+# The step stays below the drives' following error window of 100,000, whatever the position in the line.
+DRIVE_ROUNDS = [(0x06, 0, 0x21), (0x07, 0, 0x23), (0x0F, 0, 0x27), (0x0F, 2000, 0x27)]
 # Mode of operation: cyclic synchronous position.
 CSP = 8
 
