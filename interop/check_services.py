@@ -52,7 +52,12 @@ def with_power_cycle(line, ask):
             if present == len(LINE):
                 break
         assert present == len(LINE), f"{present} answer after the power cycle"
-        status, out, _ = line.python(line.near, "probe.py", NEAR, "alias", ALIAS)
+        # A controller passes frames on before it has loaded its SII, which comes about 170 ms after the supply.
+        for _ in range(20):
+            status, out, _ = line.python(line.near, "probe.py", NEAR, "alias", ALIAS)
+            if status == 0 and int(out) == 1:
+                break
+            time.sleep(0.05)
         assert status == 0 and int(out) == 1, f"nobody answers to the alias: {out!r}"
         second = ask()
         assert second["sii"][:16] == first["sii"][:16], "the SII changed where it was not written"

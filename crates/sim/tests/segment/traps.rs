@@ -96,3 +96,31 @@ fn a_phy_that_negotiates_anew_drops_its_link() {
     assert_eq!(bench.count(), Some(8));
     bench.assert_audit();
 }
+
+// Addressed by its alias, once the use of it is on (0x0100, bit 24). A controller passes frames on before it has
+// loaded its SII, so the device is counted first and called by its alias later. facts 1.3, 2.2.
+#[test]
+fn an_alias_is_loaded_anew_after_a_restart() {
+    let mut bench = Bench::new(
+        "[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+         [[device]]\nname = \"T2\"\ntype = \"EL3104\"\non = \"K1.B\"\nalias = 4711\n",
+    );
+    let ask = |bench: &mut Bench| {
+        bench.send(Command::Bwr, at(0, 0x0103), &[1]).unwrap();
+        bench.send(Command::Fprd, at(4711, 0x0012), &[0; 2]).unwrap()
+    };
+    let loaded = (4711_u16.to_le_bytes().to_vec(), 1);
+    assert_eq!(ask(&mut bench), loaded);
+    bench.inject(&FaultEntry::new(FaultName::BrownOut).device("T2"));
+    bench.wait(Span::ms(20));
+    assert_eq!((bench.count(), ask(&mut bench).1), (Some(1), 0), "it is off");
+    bench.wait(Span::ms(80));
+    assert_eq!(
+        (bench.count(), ask(&mut bench).1),
+        (Some(2), 0),
+        "it forwards, and has loaded nothing yet"
+    );
+    bench.wait(Span::ms(200));
+    assert_eq!(ask(&mut bench), loaded);
+    bench.assert_audit();
+}
