@@ -18,9 +18,11 @@ pub mod options;
 pub mod procedure;
 pub mod statistics;
 mod supervisor;
+pub mod watch;
 
 pub use event::Event;
 pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};
 pub use options::Options;
 pub use statistics::Statistics;
+pub use watch::Watch;
