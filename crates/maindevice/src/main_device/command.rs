@@ -77,7 +77,9 @@ impl MainDevice {
             mailboxes: mailboxes.clone(),
         };
         wire.spawn(supervisor::supervise(context));
-        let cyclic = Cyclic::new(Arc::clone(&plan), Arc::clone(&line), now);
+        let allowed = self.options.allowed_misses;
+        let (shared, known) = (Arc::clone(&plan), Arc::clone(&line));
+        let cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
         self.running = Some(Running { cyclic, plan, line, mailboxes });
         self.acyclic_left = self.options.frames_at_once;
         self.handle_timeout(now);
