@@ -351,7 +351,8 @@ impl Frame {
     fn new(plan: &Plan, task: usize, number: usize) -> Self {
         let planned = &plan.tasks[task].frames[number];
         let (mut outputs, mut datagrams, mut carries) = (Vec::new(), Vec::new(), 0);
-        for (at, (one, data_at)) in planned.datagrams.iter().zip(data_offsets(planned)).enumerate() {
+        for (at, (one, data_at)) in planned.datagrams.iter().zip(data_offsets(planned)).enumerate()
+        {
             for owned in one.ownership.iter().filter(|one| one.direction == Direction::Outputs) {
                 run::push(&mut outputs, owned, data_at);
                 carries |= FrameStatus::bit(at);

@@ -2,9 +2,9 @@
 
 use linesman_config::identity::RevisionRule;
 use linesman_config::plan::{DeviceSettings, OnWrongCounter, PlanOptions, PlannedDevice};
-use linesman_proto::command::Command;
 use linesman_config::profile::{DeviceProfile, ProcessSyncManager};
 use linesman_proto::address::{DeviceId, Path, RegisterAddress, StationAddress};
+use linesman_proto::command::Command;
 use linesman_proto::ethernet::{MacAddress, SOURCE_MARK};
 use linesman_proto::port::Port;
 use linesman_proto::register::SmControl;
@@ -64,8 +64,7 @@ impl Fixture {
         let line = Arc::new(Mutex::new(Line::new(&plan)));
         let sources = [MacAddress([0, 0, 0, 0, 0, 1]), MacAddress([0, 0, 0, 0, 0, 2])];
         let mut exchange = Exchange::new(sources, false, Span::ms(10));
-        let cyclic =
-            Cyclic::new(plan, Arc::clone(&line), &mut exchange, allowed, Instant::ZERO);
+        let cyclic = Cyclic::new(plan, Arc::clone(&line), &mut exchange, allowed, Instant::ZERO);
         Self {
             cyclic,
             line,

@@ -345,8 +345,9 @@ impl Exchange {
         let slot = &self.slots[at];
         match slot.purpose {
             Purpose::Acyclic => frame.starts_with(&slot.sent),
-            Purpose::Cyclic { frame: index } => (self.cyclic.get(index))
-                .is_some_and(|prebuilt| frame.starts_with(prebuilt.bytes())),
+            Purpose::Cyclic { frame: index } => {
+                (self.cyclic.get(index)).is_some_and(|prebuilt| frame.starts_with(prebuilt.bytes()))
+            }
         }
     }
 

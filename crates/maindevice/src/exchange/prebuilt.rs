@@ -54,8 +54,8 @@ impl Prebuilt {
     pub(crate) fn new(plan: &FramePlan, source: MacAddress) -> Self {
         let mut bytes = vec![0; MAX_LEN];
         let mut builder = FrameBuilder::new(&mut bytes, source);
-        let mut at = linesman_proto::ethernet::HEADER_LEN
-            + linesman_proto::frame::ETHERCAT_HEADER_LEN;
+        let mut at =
+            linesman_proto::ethernet::HEADER_LEN + linesman_proto::frame::ETHERCAT_HEADER_LEN;
         let mut places = Vec::new();
         for datagram in &plan.datagrams {
             let DatagramPlan { command, address, len, .. } = datagram;
