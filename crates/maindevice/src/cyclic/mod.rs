@@ -52,6 +52,8 @@ struct Frame {
     carries: u16,
     /// Which version of the line's state its expectations are made of.
     version: Option<u64>,
+    /// It is on its way.
+    out: bool,
     status: FrameStatus,
 }
 
@@ -70,6 +72,10 @@ struct Departure {
 struct TaskState {
     /// Frames lost in a row.
     lost: u64,
+    /// Frames that are on their way.
+    out: u32,
+    /// The last of them has come back, or was given up.
+    exchanged: bool,
     application: Application,
 }
 
@@ -127,7 +133,12 @@ impl Cyclic {
                 frames.push(Frame::new(&plan, index, number));
             }
         }
-        let task = |_| TaskState { lost: 0, application: Application::new(allowed_misses) };
+        let task = |_| TaskState {
+            lost: 0,
+            out: 0,
+            exchanged: false,
+            application: Application::new(allowed_misses),
+        };
         let live = lock(&line).live_version();
         let mut cyclic = Self {
             tasks: plan.tasks.iter().map(task).collect(),
@@ -177,6 +188,18 @@ impl Cyclic {
             Some(task) => self.tasks.get_mut(task).into_iter().for_each(|t| t.application.give()),
             None => self.tasks.iter_mut().for_each(|task| task.application.give()),
         }
+    }
+
+    /// Whether all frames of a task have come back, or were given up, since this was asked last.
+    #[inline]
+    pub(crate) fn take_exchanged(&mut self, task: usize) -> bool {
+        self.tasks.get_mut(task).is_some_and(|task| std::mem::replace(&mut task.exchanged, false))
+    }
+
+    /// When the next cycle of a task begins.
+    pub(crate) fn next_cycle(&self, task: usize) -> Option<Instant> {
+        let begins = |one: &&Departure| one.task == task && one.begins;
+        self.departures.iter().find(begins).map(|one| one.next_at)
     }
 
     /// Sends the frames of all tasks whose cycle has begun. Returns whether any had.
@@ -235,6 +258,7 @@ impl Cyclic {
                     (true, false) => 0,
                 };
                 statistics.cyclic_unsent += u64::from(!sent);
+                task.out += u32::from(sent && !std::mem::replace(&mut frame.out, sent));
             }
         }
         self.next_at = self.earliest();
@@ -256,6 +280,7 @@ impl Cyclic {
         let Some(frame) = frames.get_mut(index) else { return };
         let (task, number) = (frame.task, frame.number);
         let Some(state) = tasks.get_mut(task) else { return };
+        state.came(&mut frame.out);
         if state.lost > 0 {
             let lost = std::mem::take(&mut state.lost);
             if lost >= LOST_IS_NEWS {
@@ -314,6 +339,7 @@ impl Cyclic {
         }
         let task = frame.task;
         let Some(state) = self.tasks.get_mut(task) else { return };
+        state.came(&mut frame.out);
         state.lost += 1;
         if state.lost == LOST_IS_NEWS {
             events(Event::CyclicFramesLost { task });
@@ -347,6 +373,17 @@ impl Cyclic {
     }
 }
 
+impl TaskState {
+    /// One of its frames is on its way no longer.
+    #[inline]
+    fn came(&mut self, out: &mut bool) {
+        if std::mem::replace(out, false) {
+            self.out = self.out.saturating_sub(1);
+            self.exchanged |= self.out == 0;
+        }
+    }
+}
+
 impl Frame {
     fn new(plan: &Plan, task: usize, number: usize) -> Self {
         let planned = &plan.tasks[task].frames[number];
@@ -367,6 +404,7 @@ impl Frame {
             datagrams,
             carries,
             version: None,
+            out: false,
             status: FrameStatus::default(),
         }
     }

@@ -12,7 +12,7 @@ use super::{MainDevice, Running};
 use crate::cyclic::Cyclic;
 use crate::event::Event;
 use crate::exchange::Target;
-use crate::executor::Wire;
+use crate::executor::{Handle, Wire};
 use crate::mailbox::{Job, Queues, SdoError};
 use crate::procedure::{look, scan, state};
 use crate::supervisor::{self, Context, Line};
@@ -124,6 +124,18 @@ impl MainDevice {
         let wire = self.executor.group(self.options.repeats);
         self.control = Some(wire.clone());
         wire
+    }
+
+    /// Runs a procedure beside all else, in the gaps of the cycle; what it gives is fetched from the
+    /// handle. Commands do not end it.
+    pub fn perform<T, F>(&mut self, now: Instant, procedure: impl FnOnce(Wire) -> F) -> Handle<T>
+    where
+        T: Send + 'static,
+        F: Future<Output = T> + Send + 'static,
+    {
+        let handle = self.aside.spawn(procedure(self.aside.clone()));
+        self.handle_timeout(now);
+        handle
     }
 
     /// One register access beside all else. Ends in [`Event::Probed`]; whoever sees the frames sees

@@ -277,6 +277,13 @@ impl MainDevice {
             .min()
     }
 
+    /// When the next cyclic frames are due.
+    #[inline]
+    #[must_use]
+    pub fn poll_cycle_timeout(&self) -> Option<Instant> {
+        self.running.as_ref().and_then(|running| running.cyclic.poll_timeout())
+    }
+
     /// What has happened, oldest first.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.executor.poll_event()
@@ -323,6 +330,19 @@ impl MainDevice {
     #[must_use]
     pub fn inputs(&self) -> &[u8] {
         self.running.as_ref().map_or(&[], |running| &running.cyclic.inputs)
+    }
+
+    /// Whether all frames of a task's cycle have come back, or were given up, since this was asked
+    /// last: the moment for an application that works on fresh inputs.
+    #[inline]
+    pub fn take_exchanged(&mut self, task: usize) -> bool {
+        self.running.as_mut().is_some_and(|running| running.cyclic.take_exchanged(task))
+    }
+
+    /// When the next cycle of a task begins; `None` unless the running plan has it.
+    #[must_use]
+    pub fn next_cycle(&self, task: usize) -> Option<Instant> {
+        self.running.as_ref()?.cyclic.next_cycle(task)
     }
 
     /// How good the process data of a SubDevice are, and how old.
