@@ -1,7 +1,7 @@
 //! Process data against frames made by hand: two SubDevices, one byte each way.
 
 use linesman_config::identity::RevisionRule;
-use linesman_config::plan::{PlanOptions, PlannedDevice};
+use linesman_config::plan::{DeviceSettings, PlanOptions, PlannedDevice};
 use linesman_config::profile::{DeviceProfile, ProcessSyncManager};
 use linesman_proto::address::{DeviceId, Path, RegisterAddress, StationAddress};
 use linesman_proto::ethernet::{MacAddress, SOURCE_MARK};
@@ -36,6 +36,7 @@ fn device() -> PlannedDevice {
             ..DeviceProfile::default()
         },
         target: AlState::Op,
+        settings: DeviceSettings::default(),
     }
 }
 
