@@ -10,7 +10,7 @@ use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode};
 
 use crate::exchange::{ExchangeError, Reply};
-use crate::mailbox::SdoError;
+use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
 use crate::procedure::{Look, LookError, ScanError};
 
@@ -189,7 +189,7 @@ pub enum Event {
         /// What.
         object: ObjectAddress,
         /// The data.
-        result: Result<Vec<u8>, SdoError>,
+        result: Result<Vec<u8>, MailboxFailure>,
     },
     /// A download is done.
     SdoDownloaded {
@@ -198,7 +198,7 @@ pub enum Event {
         /// What.
         object: ObjectAddress,
         /// Whether it was taken.
-        result: Result<(), SdoError>,
+        result: Result<(), MailboxFailure>,
     },
     /// A probe is done.
     Probed {
