@@ -20,6 +20,7 @@ pub mod statistics;
 mod supervisor;
 pub mod watch;
 
+pub use cyclic::{FrameStatus, Quality};
 pub use event::Event;
 pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};
