@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, demo, diagnose, explain, fault, interfaces, lab, scan, schema, sim,
+    completion, demo, diagnose, explain, fault, interfaces, lab, log, scan, schema, sim,
 };
 use crate::version::VERSION;
 
@@ -60,6 +60,8 @@ pub(crate) enum Command {
     Fault(fault::Arguments),
     /// Stories, swarms and recordings in virtual time
     Lab(lab::Arguments),
+    /// What happened on networks: the event log of `run`
+    Log(log::Arguments),
     /// JSON schema of a file or output
     Schema(schema::Arguments),
     /// Shell completion: write it to where your shell looks for it
@@ -75,6 +77,7 @@ impl Command {
             Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
             Self::Lab(arguments) => arguments.wants_json(),
+            Self::Log(arguments) => arguments.json,
             Self::Sim(arguments) => arguments.json,
             Self::Demo(_) | Self::Explain(_) | Self::Schema(_) | Self::Completion(_) => false,
         }

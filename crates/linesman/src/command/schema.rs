@@ -12,6 +12,7 @@ use schemars::{Schema, schema_for};
 use super::diagnose::follow::EventReport;
 use super::interfaces;
 use super::lab::replay::ReplayReport;
+use super::log::LogReport;
 use super::scan::report::Scan;
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
@@ -52,6 +53,8 @@ pub(crate) enum Name {
     Truth,
     /// A line that the control socket of `sim` takes
     Control,
+    /// `log --json`
+    Log,
     /// `interfaces --json`
     Interfaces,
     /// What every command with --json prints when nothing could be judged
@@ -78,6 +81,7 @@ fn schema(name: Name) -> Schema {
         Name::Sim => schema_for!(SimStatus),
         Name::Truth => schema_for!(TruthEvent),
         Name::Control => schema_for!(Request),
+        Name::Log => schema_for!(LogReport),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Error => schema_for!(ErrorReport),
     }

@@ -225,10 +225,7 @@ impl WatchedDevice {
     }
 
     /// By how much the counters rise with this reading.
-    pub(super) fn rises(
-        &self,
-        reading: &ErrorCounters,
-    ) -> Vec<(ErrorCounter, u64)> {
+    pub(super) fn rises(&self, reading: &ErrorCounters) -> Vec<(ErrorCounter, u64)> {
         self.counters.clone().record(reading)
     }
 

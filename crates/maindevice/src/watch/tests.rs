@@ -74,10 +74,7 @@ fn a_cable_that_is_pulled_and_plugged_is_told_as_the_sources_do() {
     }
     texts(&mut watch);
     for id in 0..7 {
-        watch.handle_event(
-            at(182 + u64::from(id)),
-            &Event::DeviceLost { id: DeviceId(id) },
-        );
+        watch.handle_event(at(182 + u64::from(id)), &Event::DeviceLost { id: DeviceId(id) });
     }
     assert_eq!(texts(&mut watch), Vec::<String>::new(), "waits whether more get lost");
     assert_eq!(watch.poll_timeout(), Some(at(202)));
@@ -119,12 +116,8 @@ fn those_who_are_no_neighbours_are_told_of_apart() {
 fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
     let mut watch = watch();
     let status = AlStatus::new(AlState::Init).with_error(true);
-    let refused = Event::Refused {
-        id: DeviceId(1),
-        to: AlState::PreOp,
-        status,
-        code: AlStatusCode(0x0014),
-    };
+    let refused =
+        Event::Refused { id: DeviceId(1), to: AlState::PreOp, status, code: AlStatusCode(0x0014) };
     watch.handle_event(at(1), &refused);
     let lines = texts(&mut watch);
     assert_eq!(
@@ -281,8 +274,7 @@ fn counters_are_summed_up_through_clears_and_restarts() {
 #[test]
 fn an_emergency_is_told_with_its_class() {
     let mut watch = watch();
-    let emergency =
-        Emergency { code: 0x8611, register: ErrorRegister(0x20), data: [0; 5] };
+    let emergency = Emergency { code: 0x8611, register: ErrorRegister(0x20), data: [0; 5] };
     watch.handle_event(at(0), &Event::Emergency { id: DeviceId(4), emergency });
     let lines = texts(&mut watch);
     assert!(lines[0].starts_with("'Term 68 (EL7041)' (1019): emergency 0x8611 ("), "{lines:?}");

@@ -107,8 +107,7 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
                     (false, true) => "has a neighbour",
                     (true, true) | (false, false) => return None,
                 };
-                let severity =
-                    if now.communication { Severity::Info } else { Severity::Warning };
+                let severity = if now.communication { Severity::Info } else { Severity::Warning };
                 Some(about(*id, severity, EntryKind::Link, format!(": port {port} {word}")))
             };
             Port::ALL.into_iter().filter_map(change).collect()
@@ -133,7 +132,9 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
         Event::WorkingCounterGood { task, frame, datagram } => vec![line(
             Severity::Info,
             EntryKind::WorkingCounter,
-            format!("working counter of task {task}, frame {frame}, datagram {datagram} is right again"),
+            format!(
+                "working counter of task {task}, frame {frame}, datagram {datagram} is right again"
+            ),
         )],
         Event::CyclicFramesLost { task } => vec![line(
             Severity::Error,
