@@ -13,3 +13,4 @@ pub mod inventory;
 pub mod plan;
 pub mod profile;
 pub mod project;
+pub mod start_up;

@@ -166,7 +166,8 @@ fn process_sync_managers(image: &Image) -> Vec<ProcessSyncManager> {
             let mapped = image.pdo_bits(index, direction);
             // Some images bear no PDOs; then the record's own length is all there is.
             let has_pdos = image.pdos(direction).next().is_some();
-            let len = if has_pdos { u16::try_from(mapped.div_ceil(8)).ok()? } else { record.length };
+            let len =
+                if has_pdos { u16::try_from(mapped.div_ceil(8)).ok()? } else { record.length };
             let bits = if has_pdos { u16::try_from(mapped).unwrap_or(0) } else { 0 };
             let (start, is_virtual) = (record.start, record.enable.is_virtual());
             Some(ProcessSyncManager { index, direction, start, len, control, is_virtual, bits })

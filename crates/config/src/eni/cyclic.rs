@@ -73,7 +73,8 @@ impl FileDatagram {
     }
 
     pub(super) fn error(&self, reason: impl Into<String>) -> EsiError {
-        let element = format!("Config/Cyclic/Frame/Cmd {} \"{}\"", self.command.name(), self.comment);
+        let element =
+            format!("Config/Cyclic/Frame/Cmd {} \"{}\"", self.command.name(), self.comment);
         EsiError::new(self.line, &element, reason)
     }
 }
@@ -88,9 +89,9 @@ pub(super) fn task(element: &Element, number: usize) -> Result<FileTask, EsiErro
         _ => format!("Task {number}"),
     };
     let cycle = element.child_number::<u32>("CycleTime").map_err(|one| one.within("Cyclic"))?;
-    let cycle = cycle.filter(|us| *us > 0).ok_or_else(|| {
-        element.error("it has no CycleTime, expected one in µs above 0")
-    })?;
+    let cycle = cycle
+        .filter(|us| *us > 0)
+        .ok_or_else(|| element.error("it has no CycleTime, expected one in µs above 0"))?;
     let frames = element.children("Frame").map(frame).collect::<Result<_, _>>();
     let own = element.child(OWN);
     let at_end = own.is_some_and(|own| own.attribute("io-at") == Some("task-end"));
@@ -113,7 +114,8 @@ fn frame(element: &Element) -> Result<FileFrame, EsiError> {
     }
     let size = frame_size(frame.datagrams.iter().map(|datagram| datagram.len));
     if size > MAX_LEN {
-        let reason = format!("its datagrams make {size} bytes, an Ethernet frame has at most {MAX_LEN}");
+        let reason =
+            format!("its datagrams make {size} bytes, an Ethernet frame has at most {MAX_LEN}");
         return Err(element.error(reason));
     }
     Ok(frame)
@@ -129,10 +131,14 @@ fn datagram(element: &Element) -> Result<FileDatagram, EsiError> {
         DatagramAddress::Logical(LogicalAddress(start))
     } else {
         let register = element.child_number("Ado")?.unwrap_or(0);
-        DatagramAddress::Physical(element.child_number("Adp")?.unwrap_or(0), RegisterAddress(register))
+        DatagramAddress::Physical(
+            element.child_number("Adp")?.unwrap_or(0),
+            RegisterAddress(register),
+        )
     };
     let len: Option<usize> = element.child_number("DataLength")?;
-    let data = element.child("Data").map(|data| value::bytes(data.text()).map_err(|one| data.error(one)));
+    let data =
+        element.child("Data").map(|data| value::bytes(data.text()).map_err(|one| data.error(one)));
     let len = match (len, data.transpose()?) {
         (Some(len), _) => len,
         (None, Some(data)) => data.len(),
@@ -151,10 +157,7 @@ fn datagram(element: &Element) -> Result<FileDatagram, EsiError> {
         expected: element.child_number("Cnt")?,
         image: offset("InputOffs")?.or(offset("OutputOffs")?),
         comment: clean(element.child_text("Comment")),
-        sync_unit: element
-            .child(OWN)
-            .and_then(|own| own.attribute("sync-unit"))
-            .map(str::to_owned),
+        sync_unit: element.child(OWN).and_then(|own| own.attribute("sync-unit")).map(str::to_owned),
     })
 }
 

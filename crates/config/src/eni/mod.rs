@@ -154,7 +154,8 @@ impl File {
         own::agree(&self.devices, &self.tasks, &plan)?;
         image::variables(&self.devices, self.image.as_ref(), &mut plan)?;
         if self.tasks.is_empty() {
-            self.notes.push("there is no Cyclic element: nothing is exchanged cyclically".to_owned());
+            self.notes
+                .push("there is no Cyclic element: nothing is exchanged cyclically".to_owned());
         }
         Ok(Eni { name: self.name, plan, notes: self.notes })
     }

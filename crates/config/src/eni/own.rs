@@ -31,11 +31,8 @@ pub(super) fn own(
             frames: Vec::new(),
         };
         for frame in &file.frames {
-            let mut planned = FramePlan {
-                ahead: frame.ahead,
-                repeats: frame.repeats,
-                ..FramePlan::default()
-            };
+            let mut planned =
+                FramePlan { ahead: frame.ahead, repeats: frame.repeats, ..FramePlan::default() };
             for datagram in &frame.datagrams {
                 let datagram = one(datagram, states, &mut task.sync_units, plan)?;
                 planned.datagrams.push(datagram);
@@ -84,8 +81,7 @@ fn one(
 fn role(file: &FileDatagram, states: u32, ownership: &[Ownership]) -> Role {
     let at_al_status =
         matches!(file.address, DatagramAddress::Physical(_, at) if at == AL_STATUS.address);
-    let latched =
-        matches!(file.address, DatagramAddress::Physical(_, RegisterAddress(0x0900)));
+    let latched = matches!(file.address, DatagramAddress::Physical(_, RegisterAddress(0x0900)));
     match file.command {
         _ if !ownership.is_empty() => Role::ProcessData,
         Command::Lrd if file.logical().is_some_and(|all| all.contains(&u64::from(states))) => {
@@ -151,7 +147,8 @@ fn claims(
                 Direction::Outputs => &mut device.outputs,
                 Direction::Inputs => &mut device.inputs,
             };
-            let begin = if mine.is_empty() { owned.image_at } else { mine.start.min(owned.image_at) };
+            let none = mine.start == mine.end;
+            let begin = if none { owned.image_at } else { mine.start.min(owned.image_at) };
             *mine = begin..mine.end.max(owned.image_at + owned.range.len());
         }
         done.push(owned);
@@ -201,7 +198,8 @@ pub(super) fn agree(
         for direction in [Direction::Outputs, Direction::Inputs] {
             let runs = file.image(direction);
             let said: u64 = runs.iter().map(|run| run.len).sum();
-            let mapped: u64 = fmmus_of(device, direction).map(|fmmu| u64::from(fmmu.bit_len())).sum();
+            let mapped: u64 =
+                fmmus_of(device, direction).map(|fmmu| u64::from(fmmu.bit_len())).sum();
             let Some(first) = runs.first() else { continue };
             // Bits of a byte that is not full are mapped along.
             let most = said + 7 * runs.len() as u64;

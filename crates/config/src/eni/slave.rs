@@ -13,9 +13,7 @@ use crate::esi::EsiError;
 use crate::esi::device::physics;
 use crate::esi::xml::Element;
 use crate::identity::RevisionRule;
-use crate::plan::{
-    AddressingChoice, ClockSettings, DevicePlan, OnWrongCounter, ProcessAccess,
-};
+use crate::plan::{AddressingChoice, ClockSettings, DevicePlan, OnWrongCounter, ProcessAccess};
 use crate::profile::Mailbox;
 
 /// Status byte of the SyncManager that serves the mailbox in.
@@ -110,7 +108,8 @@ fn read(
     for command in element.at("InitCmds").into_iter().flat_map(|list| list.children("InitCmd")) {
         match command::register(command).map_err(|error| error.within("InitCmds"))? {
             Some(command) => meaning.read(&command, &mut device)?,
-            None => notes.push(format!("{}: an InitCmd with a logical address is left out", device.name)),
+            None => notes
+                .push(format!("{}: an InitCmd with a logical address is left out", device.name)),
         }
     }
     if !meaning.checks_serial {
@@ -196,9 +195,8 @@ fn mailbox(element: &Element, device: &mut DevicePlan) -> Result<Option<Mailbox>
 
 fn clock(element: &Element) -> Result<Option<ClockSettings>, EsiError> {
     let Some(clock) = element.child("DC") else { return Ok(None) };
-    let span = |name: &str| {
-        clock.child_number::<u32>(name).map(|ns| Span::ns(u64::from(ns.unwrap_or(0))))
-    };
+    let span =
+        |name: &str| clock.child_number::<u32>(name).map(|ns| Span::ns(u64::from(ns.unwrap_or(0))));
     Ok(Some(ClockSettings {
         assign_activate: 0,
         sync0_cycle: span("CycleTime0")?,
@@ -215,9 +213,8 @@ fn previous(element: &Element) -> Result<Option<(u32, u16, Port)>, EsiError> {
     let letter = found.child_text("Port");
     let mut letters = letter.chars();
     let port = letters.next().and_then(Port::from_letter).filter(|_| letters.next().is_none());
-    let port = port.ok_or_else(|| {
-        found.error(format!("Port \"{letter}\", expected A, B, C or D"))
-    })?;
+    let port =
+        port.ok_or_else(|| found.error(format!("Port \"{letter}\", expected A, B, C or D")))?;
     let station = found.child_number("PhysAddr")?;
     let station = station.ok_or_else(|| found.error("it has no PhysAddr"))?;
     Ok(Some((found.line, station, port)))
@@ -273,7 +270,8 @@ fn sync_managers(
 fn ours(own: &Element, file: &mut FileDevice) -> Result<(), EsiError> {
     let device = &mut file.plan;
     let text = |name: &str| own.attribute(name).unwrap_or_default();
-    let choice = |name: &str| serde::de::value::StrDeserializer::new(own.attribute(name).unwrap_or(""));
+    let choice =
+        |name: &str| serde::de::value::StrDeserializer::new(own.attribute(name).unwrap_or(""));
     device.type_name = text("type").to_owned();
     device.device_emulation = own.flag("emulation")?;
     device.settings.frame_repeat = own.flag("frame-repeat")?;
@@ -281,16 +279,17 @@ fn ours(own: &Element, file: &mut FileDevice) -> Result<(), EsiError> {
     if let Some(port) = text("entry").chars().next().and_then(Port::from_letter) {
         file.entry = port;
     }
-    device.revision_rule = known::<RevisionRule>(choice("revision-rule")).unwrap_or(device.revision_rule);
+    device.revision_rule =
+        known::<RevisionRule>(choice("revision-rule")).unwrap_or(device.revision_rule);
     device.settings.access = known::<ProcessAccess>(choice("access")).unwrap_or_default();
-    device.settings.addressing = known::<AddressingChoice>(choice("addressing")).unwrap_or_default();
-    device.settings.on_wrong_counter = known::<OnWrongCounter>(choice("on-wrong-counter")).unwrap_or_default();
+    device.settings.addressing =
+        known::<AddressingChoice>(choice("addressing")).unwrap_or_default();
+    device.settings.on_wrong_counter =
+        known::<OnWrongCounter>(choice("on-wrong-counter")).unwrap_or_default();
     device.settings.task = own.attribute("task").map(str::to_owned);
     device.settings.sync_unit = own.attribute("sync-unit").map(str::to_owned);
-    device.settings.modules = own
-        .children("Module")
-        .map(Element::number)
-        .collect::<Result<_, _>>()?;
+    device.settings.modules =
+        own.children("Module").map(Element::number).collect::<Result<_, _>>()?;
     device.target = match text("target") {
         "INIT" => AlState::Init,
         "PREOP" => AlState::PreOp,

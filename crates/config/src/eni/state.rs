@@ -69,7 +69,8 @@ impl Meaning {
             _ if AL_CONTROL.contains(&address) => {
                 // The first step up says whether errors are acknowledged.
                 if command.at(Transition::INIT_TO_PRE_OP) && self.emulated.is_none() {
-                    let acknowledges = command.data.first().is_some_and(|low| low & ACKNOWLEDGE != 0);
+                    let acknowledges =
+                        command.data.first().is_some_and(|low| low & ACKNOWLEDGE != 0);
                     self.emulated = Some(!acknowledges);
                 }
             }

@@ -23,7 +23,8 @@ pub(super) fn sort(devices: &mut [FileDevice]) -> Result<(), EsiError> {
         if let Some(position) = device.position
             && let Some(other) = positions.insert(position, name)
         {
-            let reason = format!("AutoIncAddr says position {position}, which \"{other}\" has already");
+            let reason =
+                format!("AutoIncAddr says position {position}, which \"{other}\" has already");
             return Err(device.error("Info", device.line, reason));
         }
     }
@@ -57,6 +58,10 @@ pub(super) fn tree(devices: &[FileDevice]) -> Result<Tree, EsiError> {
         // Which of them it is stands in the error by number; the first that says anything is a place.
         let device = devices.iter().find(|device| device.previous.is_some());
         let line = device.and_then(|device| device.previous).map_or(1, |(line, ..)| line);
-        EsiError::new(line, "Config/Slave/PreviousPort", format!("the wiring does not fit: {error}"))
+        EsiError::new(
+            line,
+            "Config/Slave/PreviousPort",
+            format!("the wiring does not fit: {error}"),
+        )
     })
 }

@@ -23,6 +23,7 @@ use linesman_proto::topology::Tree;
 
 use crate::identity::RevisionRule;
 use crate::profile::{DeviceProfile, Mailbox};
+use crate::start_up::StartUpCommand;
 
 pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
@@ -48,6 +49,8 @@ pub struct PlannedDevice {
     pub profile: DeviceProfile,
     /// How far it is to be driven.
     pub target: AlState,
+    /// What it is told on its way, in order.
+    pub start_up: Vec<StartUpCommand>,
     /// What the user chose for it.
     pub settings: DeviceSettings,
 }
@@ -97,6 +100,8 @@ pub struct DevicePlan {
     pub device_emulation: bool,
     /// How far it is driven.
     pub target: AlState,
+    /// What it is told on its way, in order.
+    pub start_up: Vec<StartUpCommand>,
     /// Where its outputs lie in the process image, in bytes.
     pub outputs: Range<usize>,
     /// Where its inputs lie in the process image, in bytes.
@@ -127,6 +132,7 @@ impl DevicePlan {
             mailbox_state: None,
             device_emulation: false,
             target: AlState::Op,
+            start_up: Vec::new(),
             outputs: 0..0,
             inputs: 0..0,
             settings: DeviceSettings::default(),

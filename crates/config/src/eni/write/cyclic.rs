@@ -41,7 +41,12 @@ impl Image {
     }
 
     /// The bits of an FMMU in the file's process image.
-    fn bits(&self, device: DeviceId, direction: Direction, fmmu: &FmmuConfig) -> Option<Range<u64>> {
+    fn bits(
+        &self,
+        device: DeviceId,
+        direction: Direction,
+        fmmu: &FmmuConfig,
+    ) -> Option<Range<u64>> {
         let at = u64::from(fmmu.logical_start.0);
         let (range, byte, _) = self.logical.iter().find(|(range, _, owners)| {
             range.contains(&at) && owners.binary_search(&(device, direction)).is_ok()
@@ -91,10 +96,13 @@ pub(super) fn write(xml: &mut Xml, plan: &Plan, image: &Image) {
                         write_datagram(xml, datagram, start, &present, unit);
                     }
                     if frame.ahead.as_nanos() > 0 || frame.repeats > 0 {
-                        xml.empty(OWN, &[
-                            ("ahead-ns", frame.ahead.as_nanos().to_string()),
-                            ("repeats", frame.repeats.to_string()),
-                        ]);
+                        xml.empty(
+                            OWN,
+                            &[
+                                ("ahead-ns", frame.ahead.as_nanos().to_string()),
+                                ("repeats", frame.repeats.to_string()),
+                            ],
+                        );
                     }
                 });
             }

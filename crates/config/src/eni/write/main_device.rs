@@ -4,8 +4,8 @@ use linesman_proto::command::Command;
 
 use super::transition::{Init, Target, command};
 use super::xml::Xml;
-use crate::plan::layout::MAILBOX_STATES;
 use crate::plan::Plan;
+use crate::plan::layout::MAILBOX_STATES;
 
 pub(super) fn write(xml: &mut Xml, name: &str, plan: &Plan) {
     xml.element("Master", &[], |xml| {

@@ -63,10 +63,13 @@ pub(super) fn command(xml: &mut Xml, init: &Init<'_>, command: Command, data: &[
         xml.text("Comment", init.comment);
         xml.text("Requires", "cycle");
         xml.text("Cmd", command.code());
-        xml.text("Adp", match init.target {
-            Target::All => 0,
-            Target::Position(address) | Target::Station(address) => address,
-        });
+        xml.text(
+            "Adp",
+            match init.target {
+                Target::All => 0,
+                Target::Position(address) | Target::Station(address) => address,
+            },
+        );
         xml.text("Ado", init.register);
         if data.len() > SHORT && data.iter().all(|byte| *byte == 0) {
             xml.text("DataLength", data.len());

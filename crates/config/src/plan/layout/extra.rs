@@ -65,12 +65,7 @@ fn map_mailboxes(plan: &mut Plan, devices: &[PlannedDevice]) -> usize {
 /// The broadcast read of the AL status that closes the last frame: its working counter says how
 /// many SubDevices the frame reached.
 pub(super) fn presence_monitor() -> DatagramPlan {
-    datagram(
-        Command::Brd,
-        DatagramAddress::Physical(0, AL_STATUS.address),
-        2,
-        Role::Presence,
-    )
+    datagram(Command::Brd, DatagramAddress::Physical(0, AL_STATUS.address), 2, Role::Presence)
 }
 
 /// The FMMU of a mailbox comes behind those of the process data, where it does not anyway.

@@ -22,7 +22,9 @@ pub(super) struct Group {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Kind {
     /// Outputs and inputs in one LRW, or in LWR and LRD side by side.
-    Both { lrw: bool },
+    Both {
+        lrw: bool,
+    },
     Outputs,
     Inputs,
 }

@@ -232,6 +232,7 @@ fn device(planned: &PlannedDevice, id: u32) -> DevicePlan {
             .collect(),
         device_emulation: planned.profile.device_emulation,
         target: planned.target,
+        start_up: planned.start_up.clone(),
         settings: planned.settings.clone(),
         ebus_current_ma: planned.profile.ebus_current_ma,
         ports: planned.profile.ports,

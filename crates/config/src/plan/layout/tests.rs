@@ -1,10 +1,10 @@
 //! Layouts by hand and by chance.
 
 use super::super::{DeviceSettings, PathView, Presence, expect};
-use linesman_proto::address::RegisterAddress;
 use super::*;
 use crate::identity::RevisionRule;
 use crate::profile::DeviceProfile;
+use linesman_proto::address::RegisterAddress;
 use linesman_proto::address::{Path, StationAddress, WorkingCounter};
 use linesman_proto::port::Port;
 use linesman_proto::register::SmControl;
@@ -27,6 +27,7 @@ fn planned(process: Vec<ProcessSyncManager>, no_lrw: bool) -> PlannedDevice {
         revision_rule: RevisionRule::Equal,
         profile: DeviceProfile { process, no_lrw, ..DeviceProfile::default() },
         target: AlState::Op,
+        start_up: Vec::new(),
         settings: DeviceSettings::default(),
     }
 }
@@ -71,12 +72,9 @@ fn outputs_first_then_inputs_in_one_lrw() {
 
 #[test]
 fn neighbouring_byte_buffers_share_an_fmmu() {
-    let managers = vec![
-        manager(0, Direction::Outputs, 0x0F00, 1),
-        manager(1, Direction::Outputs, 0x0F01, 1),
-    ];
-    let plan =
-        Plan::build(&[planned(managers, false)], line(1), &PlanOptions::default()).unwrap();
+    let managers =
+        vec![manager(0, Direction::Outputs, 0x0F00, 1), manager(1, Direction::Outputs, 0x0F01, 1)];
+    let plan = Plan::build(&[planned(managers, false)], line(1), &PlanOptions::default()).unwrap();
     assert_eq!(plan.devices[0].fmmus.len(), 1);
     assert_eq!(plan.devices[0].fmmus[0].1.length, 2);
     assert_eq!(plan.devices[0].sync_managers.len(), 2);
@@ -86,10 +84,7 @@ fn neighbouring_byte_buffers_share_an_fmmu() {
 #[test]
 fn a_device_without_lrw_gets_lwr_and_lrd() {
     let both = || {
-        vec![
-            manager(2, Direction::Outputs, 0x1100, 4),
-            manager(3, Direction::Inputs, 0x1180, 4),
-        ]
+        vec![manager(2, Direction::Outputs, 0x1100, 4), manager(3, Direction::Inputs, 0x1180, 4)]
     };
     let devices = [planned(both(), true), planned(both(), false)];
     let plan = Plan::build(&devices, line(2), &PlanOptions::default()).unwrap();
