@@ -38,6 +38,7 @@ fn device() -> PlannedDevice {
             ..DeviceProfile::default()
         },
         target: AlState::Op,
+        start_up: Vec::new(),
         settings: DeviceSettings::default(),
     }
 }
