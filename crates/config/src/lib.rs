@@ -12,3 +12,4 @@ pub mod inventory;
 pub mod plan;
 pub mod profile;
 pub mod project;
+pub mod start_up;

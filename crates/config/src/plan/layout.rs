@@ -119,6 +119,7 @@ fn device(planned: &PlannedDevice, id: u32) -> DevicePlan {
         fmmus: Vec::new(),
         device_emulation: planned.profile.device_emulation,
         target: planned.target,
+        start_up: planned.start_up.clone(),
         outputs: 0..0,
         inputs: 0..0,
     }
@@ -344,6 +345,7 @@ mod tests {
             revision_rule: RevisionRule::Equal,
             profile: DeviceProfile { process, no_lrw, ..DeviceProfile::default() },
             target: AlState::Op,
+            start_up: Vec::new(),
         }
     }
 

@@ -23,6 +23,7 @@ use linesman_proto::topology::Tree;
 
 use crate::identity::RevisionRule;
 use crate::profile::{DeviceProfile, Mailbox};
+use crate::start_up::StartUpCommand;
 
 pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
@@ -42,6 +43,8 @@ pub struct PlannedDevice {
     pub profile: DeviceProfile,
     /// How far it is to be driven.
     pub target: AlState,
+    /// What it is told on its way, in order.
+    pub start_up: Vec<StartUpCommand>,
 }
 
 /// Everything the MainDevice needs to run one network.
@@ -82,6 +85,8 @@ pub struct DevicePlan {
     pub device_emulation: bool,
     /// How far it is driven.
     pub target: AlState,
+    /// What it is told on its way, in order.
+    pub start_up: Vec<StartUpCommand>,
     /// Where its outputs lie in the process image, in bytes.
     pub outputs: Range<usize>,
     /// Where its inputs lie in the process image, in bytes.

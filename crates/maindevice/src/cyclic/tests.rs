@@ -36,6 +36,7 @@ fn device() -> PlannedDevice {
             ..DeviceProfile::default()
         },
         target: AlState::Op,
+        start_up: Vec::new(),
     }
 }
 

@@ -19,6 +19,7 @@ use crate::exchange::{ExchangeError, Reply, Request, Ticket};
 use task::Spawned;
 
 pub use task::Handle;
+pub(crate) use task::{Promise, promise};
 pub use wire::Wire;
 
 /// Tasks that end together.

@@ -25,23 +25,43 @@ pub struct Handle<T> {
     outcome: Arc<Mutex<Outcome<T>>>,
 }
 
-/// A task that leaves its value for a handle.
-pub(crate) fn with_handle<T: Send + 'static>(
-    future: impl Future<Output = T> + Send + 'static,
-) -> (BoxFuture, Handle<T>) {
+/// A value that another task will give.
+pub(crate) struct Promise<T> {
+    outcome: Arc<Mutex<Outcome<T>>>,
+}
+
+/// A value to be given, and the handle that awaits it.
+pub(crate) fn promise<T>() -> (Promise<T>, Handle<T>) {
     let outcome = Arc::new(Mutex::new(Outcome { value: None, waker: None }));
-    let handle = Handle { outcome: Arc::clone(&outcome) };
-    let task = async move {
-        let value = future.await;
+    (Promise { outcome: Arc::clone(&outcome) }, Handle { outcome })
+}
+
+impl<T> Promise<T> {
+    /// Gives the value to whoever awaits it.
+    pub(crate) fn keep(self, value: T) {
         let waker = {
-            let mut outcome = lock(&outcome);
+            let mut outcome = lock(&self.outcome);
             outcome.value = Some(value);
             outcome.waker.take()
         };
         if let Some(waker) = waker {
             waker.wake();
         }
-    };
+    }
+}
+
+impl<T> std::fmt::Debug for Promise<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Promise")
+    }
+}
+
+/// A task that leaves its value for a handle.
+pub(crate) fn with_handle<T: Send + 'static>(
+    future: impl Future<Output = T> + Send + 'static,
+) -> (BoxFuture, Handle<T>) {
+    let (promise, handle) = promise();
+    let task = async move { promise.keep(future.await) };
     (Box::pin(task), handle)
 }
 

@@ -58,6 +58,10 @@ async fn work(context: &Context, multiplexer: &mut Multiplexer<'_>, id: DeviceId
             let result = coe::download(multiplexer, object, complete, &data, patience).await;
             Event::SdoDownloaded { id, object, result }
         }
+        Job::StartUp { object, complete, data, done } => {
+            done.keep(coe::download(multiplexer, object, complete, &data, patience).await);
+            return;
+        }
     };
     context.wire.emit(event);
 }
@@ -67,6 +71,7 @@ fn refuse(context: &Context, id: DeviceId, job: Job) {
     context.wire.emit(match job {
         Job::Upload { object, .. } => Event::SdoUploaded { id, object, result: Err(error) },
         Job::Download { object, .. } => Event::SdoDownloaded { id, object, result: Err(error) },
+        Job::StartUp { done, .. } => return done.keep(Err(error)),
     });
 }
 

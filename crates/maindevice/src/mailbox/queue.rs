@@ -9,8 +9,9 @@ use std::task::{Context, Poll, Waker};
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 
-use crate::executor::lock;
+use super::SdoError;
 use crate::executor::wire::Sleep;
+use crate::executor::{Promise, lock};
 
 /// Something to be done through a mailbox.
 #[derive(Debug)]
@@ -19,6 +20,13 @@ pub(crate) enum Job {
     Upload { object: ObjectAddress, complete: bool },
     /// Bring an object.
     Download { object: ObjectAddress, complete: bool, data: Vec<u8> },
+    /// Bring an object for a procedure that awaits the result.
+    StartUp {
+        object: ObjectAddress,
+        complete: bool,
+        data: Vec<u8>,
+        done: Promise<Result<(), SdoError>>,
+    },
 }
 
 #[derive(Default, Debug)]

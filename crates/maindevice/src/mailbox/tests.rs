@@ -37,11 +37,12 @@ fn device() -> DevicePlan {
         station: StationAddress(0x1005),
         identity: linesman_proto::sii::Identity::default(),
         revision_rule: RevisionRule::Any,
-        mailbox: Some(Mailbox { areas, protocols, complete_access: false }),
+        mailbox: Some(Mailbox { areas, bootstrap: None, protocols, complete_access: false }),
         sync_managers: Vec::new(),
         fmmus: Vec::new(),
         device_emulation: false,
         target: AlState::PreOp,
+        start_up: Vec::new(),
         outputs: 0..0,
         inputs: 0..0,
     }

@@ -17,7 +17,7 @@ use crate::executor::{Executor, Wire, lock};
 use crate::mailbox::Queues;
 use crate::options::Options;
 use crate::statistics::Statistics;
-use crate::supervisor::Line;
+use crate::supervisor::{BringUpTimes, Line};
 
 pub use command::ProbeRequest;
 
@@ -101,7 +101,9 @@ impl MainDevice {
         {
             return;
         }
-        if self.running.is_some() {
+        // Beside process data so many a cycle; before, as fast as they come back.
+        if self.running.as_ref().is_some_and(|running| lock(&running.line).all_have_been_reached())
+        {
             let Some(left) = self.acyclic_left.checked_sub(1) else { return };
             self.acyclic_left = left;
         }
@@ -255,6 +257,12 @@ impl MainDevice {
             let line = lock(&running.line);
             running.plan.devices.iter().all(|device| line.has_reached(device.id))
         })
+    }
+
+    /// What bringing up the running plan took so far; `None` unless one is running.
+    #[must_use]
+    pub fn bring_up_times(&self) -> Option<BringUpTimes> {
+        self.running.as_ref().and_then(|running| lock(&running.line).times().cloned())
     }
 
     /// The outputs of the process image; empty unless a plan is running.

@@ -18,6 +18,7 @@ fn line(devices: usize) -> Line {
         fmmus: Vec::new(),
         device_emulation: true,
         target: AlState::Op,
+        start_up: Vec::new(),
         outputs: 0..0,
         inputs: 0..0,
     };
