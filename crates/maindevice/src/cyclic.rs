@@ -183,6 +183,9 @@ impl Cyclic {
                 watch_line(&self.line, wkc, datagram.data(), events);
                 continue;
             }
+            if !plan.role.is_judged() {
+                continue;
+            }
             if (judged.least..=judged.most).contains(&wkc) {
                 copy_inputs(plan, datagram.data(), &self.least, &mut self.inputs);
                 if judged.told.take().is_some() {

@@ -1,7 +1,7 @@
 //! Process data against frames made by hand: two SubDevices, one byte each way.
 
 use linesman_config::identity::RevisionRule;
-use linesman_config::plan::{PlanOptions, PlannedDevice};
+use linesman_config::plan::{DeviceSettings, PlanOptions, PlannedDevice};
 use linesman_config::profile::{DeviceProfile, ProcessSyncManager};
 use linesman_proto::address::{DeviceId, Path, RegisterAddress, StationAddress};
 use linesman_proto::ethernet::{MacAddress, SOURCE_MARK};
@@ -37,6 +37,7 @@ fn device() -> PlannedDevice {
         },
         target: AlState::Op,
         start_up: Vec::new(),
+        settings: DeviceSettings::default(),
     }
 }
 

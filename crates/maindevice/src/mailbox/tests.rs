@@ -32,19 +32,12 @@ fn device() -> DevicePlan {
     let areas = MailboxPair::from_words([OUT, 32, IN, 32]);
     let protocols = Protocols(Protocols::COE);
     DevicePlan {
-        id: ID,
         name: "5".to_owned(),
         station: StationAddress(0x1005),
-        identity: linesman_proto::sii::Identity::default(),
         revision_rule: RevisionRule::Any,
         mailbox: Some(Mailbox { areas, bootstrap: None, protocols, complete_access: false }),
-        sync_managers: Vec::new(),
-        fmmus: Vec::new(),
-        device_emulation: false,
         target: AlState::PreOp,
-        start_up: Vec::new(),
-        outputs: 0..0,
-        inputs: 0..0,
+        ..DevicePlan::bare(ID)
     }
 }
 
@@ -107,7 +100,7 @@ fn run(scripted: &mut Scripted, job: Job) -> Event {
     let tree = linesman_proto::topology::derive(&[]).unwrap();
     let mut devices: Vec<DevicePlan> = (0..4).map(|_| device()).collect();
     devices.push(device());
-    let plan = Plan { devices, tree, tasks: Vec::new(), outputs_len: 0, inputs_len: 0 };
+    let plan = Plan { devices, ..Plan::empty(tree) };
     let mut line = Line::new(&plan);
     line.set_reached(ID, AlState::PreOp);
     let mailboxes = Queues::of([ID].into_iter());

@@ -1,9 +1,9 @@
 //! What a SubDevice is told before a step: SyncManagers and FMMUs.
 //!
 //! Reference: ETG.1000.6; the order is that of public MainDevices. Watchdogs keep the times the
-//! SubDevice has.
+//! SubDevice has unless others are chosen.
 
-use linesman_config::plan::DevicePlan;
+use linesman_config::plan::{DevicePlan, WatchdogSettings};
 use linesman_proto::address::{RegisterAddress, WorkingCounter};
 use linesman_proto::register::{
     self, EscInformation, FMMU, FmmuConfig, SII_ACCESS_ECAT, SYNC_MANAGER, SmControl,
@@ -49,8 +49,14 @@ pub async fn before_mailbox(
         let off = (SYNC_MANAGER.address, vec![0; managers.len()]);
         write_all(wire, target, vec![(FMMU.address, vec![0; fmmus]), off]).await?;
     }
-    let offer = (SII_ACCESS_ECAT.address, vec![1]);
-    write_all(wire, target, vec![(SYNC_MANAGER.address, managers), offer]).await
+    let mut writes = vec![(SYNC_MANAGER.address, managers)];
+    if let Some((index, fmmu)) = &device.mailbox_state
+        && let Some(address) = FMMU.at(u16::from(*index))
+    {
+        writes.push((address, fmmu.to_bytes().to_vec()));
+    }
+    writes.push((SII_ACCESS_ECAT.address, vec![1]));
+    write_all(wire, target, writes).await
 }
 
 /// Before PREOP to SAFEOP: where process data lie, and how they are guarded.
@@ -72,6 +78,17 @@ pub async fn before_safe_op(wire: &Wire, device: &DevicePlan) -> Result<(), Exch
             on.push((address, fmmu.to_bytes().to_vec()));
         }
     }
+    let WatchdogSettings { divider, pdi, process_data } = device.settings.watchdog;
+    let watchdogs = [
+        (register::WATCHDOG_DIVIDER, divider),
+        (register::WATCHDOG_TIME_PDI, pdi),
+        (register::WATCHDOG_TIME_PROCESS_DATA, process_data),
+    ];
+    on.extend(
+        watchdogs.into_iter().filter_map(|(register, value)| {
+            Some((register.address, value?.to_le_bytes().to_vec()))
+        }),
+    );
     write_all(wire, target, off).await?;
     write_all(wire, target, on).await
 }

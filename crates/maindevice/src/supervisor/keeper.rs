@@ -81,10 +81,10 @@ impl Keeper<'_> {
     async fn until_found(&self) -> bool {
         loop {
             let seen = self.context.alerts();
-            if let Found::There { restarted } = lock(&self.context.line).found(self.device.id) {
-                if self.may_be_set_up() {
-                    return restarted;
-                }
+            let found = lock(&self.context.line).found(self.device.id);
+            match found {
+                Found::There { restarted } if self.may_be_set_up() => return restarted,
+                Found::There { .. } | Found::Lost | Found::Unknown => {}
             }
             self.context.nap(seen, Span::s(1)).await;
         }
