@@ -75,6 +75,8 @@ impl Event {
             | Self::SdoUploaded { .. }
             | Self::SdoDownloaded { .. }
             | Self::Probed { .. }
+            | Self::OutputsWithheld { .. }
+            | Self::OutputsResumed { .. }
             | Self::Stopped => Vec::new(),
         }
     }

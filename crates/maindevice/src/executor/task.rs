@@ -25,44 +25,32 @@ pub struct Handle<T> {
     outcome: Arc<Mutex<Outcome<T>>>,
 }
 
-/// A value that another task will give.
-pub(crate) struct Promise<T> {
-    outcome: Arc<Mutex<Outcome<T>>>,
-}
-
-/// A value to be given, and the handle that awaits it.
-pub(crate) fn promise<T>() -> (Promise<T>, Handle<T>) {
+/// A task that leaves its value for a handle.
+pub(crate) fn with_handle<T: Send + 'static>(
+    future: impl Future<Output = T> + Send + 'static,
+) -> (BoxFuture, Handle<T>) {
     let outcome = Arc::new(Mutex::new(Outcome { value: None, waker: None }));
-    (Promise { outcome: Arc::clone(&outcome) }, Handle { outcome })
-}
-
-impl<T> Promise<T> {
-    /// Gives the value to whoever awaits it.
-    pub(crate) fn keep(self, value: T) {
+    let handle = Handle { outcome: Arc::clone(&outcome) };
+    let task = async move {
+        let value = future.await;
         let waker = {
-            let mut outcome = lock(&self.outcome);
+            let mut outcome = lock(&outcome);
             outcome.value = Some(value);
             outcome.waker.take()
         };
         if let Some(waker) = waker {
             waker.wake();
         }
-    }
-}
-
-impl<T> std::fmt::Debug for Promise<T> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Promise")
-    }
-}
-
-/// A task that leaves its value for a handle.
-pub(crate) fn with_handle<T: Send + 'static>(
-    future: impl Future<Output = T> + Send + 'static,
-) -> (BoxFuture, Handle<T>) {
-    let (promise, handle) = promise();
-    let task = async move { promise.keep(future.await) };
+    };
     (Box::pin(task), handle)
+}
+
+impl<T> Handle<T> {
+    /// What the task has given, once it has; to be asked again and again from outside.
+    #[must_use]
+    pub fn take(&self) -> Option<T> {
+        lock(&self.outcome).value.take()
+    }
 }
 
 impl<T> Future for Handle<T> {

@@ -5,8 +5,7 @@ use linesman_config::start_up::{StartUpAction, StartUpCommand, Transition};
 
 use super::Context;
 use crate::exchange::{ExchangeError, Target};
-use crate::executor::promise;
-use crate::mailbox::{Job, SdoError};
+use crate::mailbox::{MailboxFailure, MailboxRequest};
 use crate::procedure::state::StepError;
 
 /// A start-up command that was not taken.
@@ -14,7 +13,7 @@ use crate::procedure::state::StepError;
 pub enum StartUpError {
     /// Its object was not written.
     #[error(transparent)]
-    Object(#[from] SdoError),
+    Object(#[from] MailboxFailure),
     /// Its registers were not written.
     #[error(transparent)]
     Register(#[from] ExchangeError),
@@ -43,13 +42,13 @@ pub(super) async fn execute(
         let outcome = match &command.action {
             StartUpAction::CoeDownload { .. } if due(transition) != moment => continue,
             StartUpAction::CoeDownload { object, complete_access, data } => {
-                let (done, result) = promise();
-                let (object, complete) = (*object, *complete_access);
-                let job = Job::StartUp { object, complete, data: data.clone(), done };
-                match context.mailboxes.push(device.id, job) {
-                    Ok(()) => result.await.map_err(StartUpError::from),
-                    Err(_no_mailbox) => Err(SdoError::NotOpen { id: device.id }.into()),
-                }
+                let request = MailboxRequest::Download {
+                    object: *object,
+                    complete: *complete_access,
+                    data: data.clone(),
+                };
+                let outcome = context.mailboxes.ask(device.id, request).await;
+                outcome.map(|_| ()).map_err(StartUpError::from)
             }
             StartUpAction::RegisterWrite { .. } if moment == Moment::After => continue,
             StartUpAction::RegisterWrite { address, data } => {
