@@ -1,9 +1,11 @@
-"""Two network namespaces with a virtual cable between them, for one run.
+"""Two network namespaces with a virtual cable between them, for one check.
 
 `near` holds the MainDevice's end, veth0; `far` the segment's, veth1. Names of namespaces carry the
-process number, so that runs side by side do not meet; they are removed at the end whatever happens.
+process number and that of the bench, so that checks side by side do not meet; they are removed at the
+end whatever happens.
 """
 
+import itertools
 import json
 import os
 import pathlib
@@ -20,12 +22,15 @@ NEAR, FAR = "veth0", "veth1"
 NEAR_B, FAR_B = "veth2", "veth3"
 
 
+NUMBERS = itertools.count(1)
+
+
 class Bench:
     """The namespaces; use it in `with`."""
 
     def __enter__(self):
-        self.near = f"linesman-near-{os.getpid()}"
-        self.far = f"linesman-far-{os.getpid()}"
+        number = f"{os.getpid()}-{next(NUMBERS)}"
+        self.near, self.far = f"linesman-near-{number}", f"linesman-far-{number}"
         self.running = []
         self.folder = tempfile.TemporaryDirectory(prefix="linesman-interop-")
         self.work = pathlib.Path(self.folder.name)
@@ -85,11 +90,15 @@ class Bench:
     def python(self, namespace, script, *arguments, seconds=60):
         return self.run(namespace, sys.executable, HERE / script, *arguments, seconds=seconds)
 
+    def packets(self, interface, directions=("rx", "tx")):
+        """Frames that were received and sent at an interface on the MainDevice's end so far."""
+        files = [f"/sys/class/net/{interface}/statistics/{one}_packets" for one in directions]
+        _, out, _ = self.run(self.near, "cat", *files)
+        return sum(map(int, out.split()))
+
     def sent_near(self):
         """Frames that any program has sent on the MainDevice's end so far."""
-        path = f"/sys/class/net/{NEAR}/statistics/tx_packets"
-        _, out, _ = self.run(self.near, "cat", path)
-        return int(out)
+        return self.packets(NEAR, ["tx"])
 
 
 class Segment:
@@ -178,23 +187,34 @@ class Capture:
         for interface in (NEAR, NEAR_B):
             file = self.bench.path(f"{interface}.pcap")
             process = self.bench.start(
-                self.bench.near, "tcpdump", "-i", interface, "-B", 16384, "-Z", "root", "-w", file, "ether proto 0x88a4",
+                self.bench.near, "tcpdump", "-i", interface, "-B", 16384, "-U", "--immediate-mode", "-Z", "root", "-w", file,
+                "ether proto 0x88a4",
             )
             # It says so once it listens.
             while (line := process.stderr.readline()) and "listening on" not in line:
                 pass
             self.files.append(file)
             self.processes.append(process)
+        self.before = self.crossed()
         return self
 
+    def crossed(self):
+        """Packets that crossed both cables so far."""
+        return sum(self.bench.packets(interface) for interface in (NEAR, NEAR_B))
+
     def __exit__(self, *_):
-        time.sleep(0.1)
+        self.passed = self.crossed() - self.before
+        # It may be behind: it has all once its files grow no more.
+        size, end_at = -1, time.monotonic() + 10
+        while (now := sum(file.stat().st_size for file in self.files)) != size and time.monotonic() < end_at:
+            size = now
+            time.sleep(0.2)
         for process in self.processes:
             end(process)
             self.bench.running.remove(process)
 
     def malformed(self):
-        """How many packets were kept, and which of them tshark cannot read."""
+        """How many packets were kept, how many crossed, and which of them tshark cannot read."""
         count, bad = 0, []
         for file in self.files:
             command = ["tshark", "-r", file, "-T", "fields", "-e", "frame.number", "-e", "_ws.malformed"]
@@ -206,7 +226,7 @@ class Capture:
                 if mark.strip():
                     bad.append(f"{file.name} packet {number}")
             file.unlink()
-        return count, bad
+        return count, self.passed, bad
 
 
 def end(process):

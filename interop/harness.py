@@ -50,11 +50,11 @@ class Client:
         # Some stacks print words of their own before.
         return parse(out.strip().splitlines()[-1] if out.strip() else out, err)
 
-    def exchange(self, line, plant, rounds, cycles=CYCLES, on=NEAR):
+    def exchange(self, line, plant, rounds, cycles=CYCLES, *options, on=NEAR, cycle_us=CYCLE_US, seconds=90):
         """Takes a plant to OP and writes these rounds of values."""
         file = line.path("rounds.json")
         file.write_text(json.dumps([plant.image(values, number) for number, values in enumerate(rounds)]))
-        return self.run(line, on, cycles, CYCLE_US, file)
+        return self.run(line, on, cycles, cycle_us, file, *options, seconds=seconds)
 
 
 SOEM, CRAB = Client("soem"), Client("ethercrab")
@@ -100,8 +100,9 @@ def values_came_back(result, plant, rounds, wires, held=None):
     return compared
 
 
-def to_op(line, plant, client, cycles=CYCLES):
-    """Finds, identifies, configures, runs; process data are right in both directions, value by value."""
+def to_op(line, plant, client, cycles=CYCLES, *options, cycle_us=CYCLE_US, look=None):
+    """Finds, identifies, configures, runs; process data are right in both directions, value by value. Gives how many
+    values were compared; `look` sees what else the client told."""
     with Segment(line, LINESMAN, plant.file) as segment:
         # All ports have opened by themselves: the first frame ever, without any address, meets all.
         assert segment.present == len(plant), segment.present
@@ -111,7 +112,9 @@ def to_op(line, plant, client, cycles=CYCLES):
         for name, value in held.items():
             segment.ask(do="set", input=name, value=value)
         with Watch(segment) as watch:
-            result = client.exchange(line, plant, rounds, cycles)
+            result = client.exchange(line, plant, rounds, cycles, *options, cycle_us=cycle_us)
+        if look:
+            look(result)
         found(result, plant, client)
         ran(result, plant=plant)
         for number, values in enumerate(rounds, 1):

@@ -9,8 +9,10 @@ import peer
 
 
 def main():
-    interfaces, cycles, cycle_s, rounds = peer.arguments()
-    link = kickcat.create_link(interfaces[0], interfaces[1] if len(interfaces) > 1 else "")
+    asked = peer.arguments()
+    rounds = asked.rounds
+    first, *second = asked.interfaces
+    link = kickcat.create_link(first, second[0] if second else "")
     # Of the host, not of the line: it may be busy.
     link.set_timeout(timedelta(milliseconds=50))
     bus = kickcat.Bus(link)
@@ -29,18 +31,18 @@ def main():
     due = time.monotonic()
     for values in rounds:
         write(slaves, values)
-        for _ in range(cycles // len(rounds)):
+        for _ in range(asked.cycles // len(rounds)):
             try:
                 bus.process_data()
                 complete += 1
             except Exception:  # its own exception type, for a wrong working counter or a lost frame
                 pass
-            due += cycle_s
+            due += asked.cycle_s
             time.sleep(max(0.0, due - time.monotonic()))
         inputs.append([bytes(slave.input_data).hex() for slave in slaves])
     reached = all(bus.get_state(slave) == kickcat.State.OPERATIONAL for slave in slaves)
     peer.report(
-        devices=len(slaves), state="OP" if reached else "other", cycles=cycles, complete=complete,
+        devices=len(slaves), state="OP" if reached else "other", cycles=asked.cycles, complete=complete,
         rounds=inputs,
     )
 
