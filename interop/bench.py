@@ -9,6 +9,7 @@ import itertools
 import json
 import os
 import pathlib
+import queue
 import socket
 import subprocess
 import sys
@@ -87,6 +88,10 @@ class Bench:
         self.running.remove(process)
         return process.returncode, out, err
 
+    def telling(self, *command):
+        """A command on the near end that tells, line by line, what it does; use it in `with`."""
+        return Telling(self, command)
+
     def python(self, namespace, script, *arguments, seconds=60):
         return self.run(namespace, sys.executable, HERE / script, *arguments, seconds=seconds)
 
@@ -146,6 +151,59 @@ class Segment:
         if self.process in self.bench.running:
             end(self.process)
             self.bench.running.remove(self.process)
+
+
+class Telling:
+    """A process that prints an object of JSON whenever it has something to tell."""
+
+    def __init__(self, bench, command):
+        self.bench, self.command = bench, command
+
+    def __enter__(self):
+        self.process = self.bench.start(self.bench.near, *self.command)
+        self.lines = queue.Queue()
+        self.thread = threading.Thread(target=self.read)
+        self.thread.start()
+        return self
+
+    def read(self):
+        for line in self.process.stdout:
+            # Some stacks print words of their own.
+            if line.startswith("{"):
+                self.lines.put(json.loads(line))
+        self.lines.put(None)
+
+    def next(self, seconds):
+        """The next object it tells."""
+        try:
+            told = self.lines.get(timeout=seconds)
+        except queue.Empty:
+            raise AssertionError(f"nothing was told in {seconds} s") from None
+        assert told is not None, f"it ended: {self.process.stderr.read()[-600:]}"
+        return told
+
+    def until(self, wanted, seconds):
+        """Waits until it tells this; gives what it told before."""
+        end_at, before = time.monotonic() + seconds, []
+        while True:
+            try:
+                told = self.next(max(0.01, end_at - time.monotonic()))
+            except AssertionError as error:
+                raise AssertionError(f"{error}; waited for {wanted} after {before[-5:]}") from None
+            if told == wanted:
+                return before
+            before.append(told)
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.send_signal(2)
+            try:
+                self.process.wait(5)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+        self.thread.join()
+        self.process.communicate()
+        self.bench.running.remove(self.process)
 
 
 class Watch:

@@ -13,7 +13,6 @@ STORED = {
 TOO_LONG = 0x06070012
 
 
-# proves: SW-08 partial: by SOEM, on a device from an ESI file
 @check
 def soem_reads_and_writes_objects_of_every_length(line):
     result = on_the_store(line, SOEM, "soem", script="objects.py")

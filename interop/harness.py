@@ -4,6 +4,7 @@ import importlib.util
 import json
 import os
 import sys
+import time
 
 from bench import HERE, NEAR, Segment, Watch, parse
 from plant import Plant
@@ -52,13 +53,18 @@ class Client:
 
     def exchange(self, line, plant, rounds, cycles=CYCLES, *options, on=NEAR, cycle_us=CYCLE_US, seconds=90):
         """Takes a plant to OP and writes these rounds of values."""
-        file = line.path("rounds.json")
-        file.write_text(json.dumps([plant.image(values, number) for number, values in enumerate(rounds)]))
-        return self.run(line, on, cycles, cycle_us, file, *options, seconds=seconds)
+        return self.run(line, on, cycles, cycle_us, rounds_file(line, plant, rounds), *options, seconds=seconds)
 
 
 SOEM, CRAB = Client("soem"), Client("ethercrab")
 CAT = Client("kickcat", tells_identity=False)
+
+
+def rounds_file(line, plant, rounds):
+    """The output bytes of these rounds of values, as peer.py reads them."""
+    file = line.path("rounds.json")
+    file.write_text(json.dumps([plant.image(values, number) for number, values in enumerate(rounds)]))
+    return file
 
 
 def found(result, plant, client):
@@ -121,6 +127,16 @@ def to_op(line, plant, client, cycles=CYCLES, *options, cycle_us=CYCLE_US, look=
             shown = plant.shown(values)
             assert watch.saw(shown), f"round {number}: the outputs never were {shown}; last: {watch.seen[-1]}"
         return values_came_back(result, plant, rounds, wires, held)
+
+
+def until_present(line, count):
+    """Waits until as many SubDevices answer and have loaded their SII: they pass frames on before that."""
+    for _ in range(100):
+        status, out, _ = line.python(line.near, "probe.py", NEAR, "loaded")
+        if status == 0 and int(out) == count:
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"{out.strip() or 'none'} are ready, expected {count}")
 
 
 def open_inputs(plant, wires):

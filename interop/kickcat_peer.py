@@ -1,5 +1,6 @@
 """KickCAT as a foreign MainDevice; see peer.py. Its Python interface tells no identities."""
 
+import sys
 import time
 from datetime import timedelta
 
@@ -7,16 +8,13 @@ import kickcat
 
 import peer
 
+ATTEMPTS = 6
+
 
 def main():
     asked = peer.arguments()
     rounds = asked.rounds
-    first, *second = asked.interfaces
-    link = kickcat.create_link(first, second[0] if second else "")
-    # Of the host, not of the line: it may be busy.
-    link.set_timeout(timedelta(milliseconds=50))
-    bus = kickcat.Bus(link)
-    bus.init(timedelta(seconds=3))
+    bus = bring_up(asked.interfaces)
     bus.create_mapping(4096)
     slaves = bus.slaves()
     request(bus, kickcat.State.SAFE_OP)
@@ -45,6 +43,23 @@ def main():
         devices=len(slaves), state="OP" if reached else "other", cycles=asked.cycles, complete=complete,
         rounds=inputs,
     )
+
+
+def bring_up(interfaces):
+    """All SubDevices in PREOP."""
+    first, *second = interfaces
+    link = kickcat.create_link(first, second[0] if second else "")
+    # Without a second card it waits as long after each frame, and each frame that comes later ends everything: so it is
+    # short, and there is another attempt, as a busy host is late at times.
+    link.set_timeout(timedelta(milliseconds=30))
+    for attempt in range(ATTEMPTS):
+        bus = kickcat.Bus(link)
+        try:
+            bus.init(timedelta(seconds=3))
+            return bus
+        except RuntimeError as error:
+            print(f"attempt {attempt + 1}: {error}", file=sys.stderr)
+    peer.refuse(f"not in PREOP after {ATTEMPTS} attempts")
 
 
 def request(bus, state):

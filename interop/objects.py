@@ -53,11 +53,9 @@ def soem(interface):
 def kickcat(interface):
     import kickcat
 
-    link = kickcat.create_link(interface, "")
-    # Of the host, not of the line: it may be busy.
-    link.set_timeout(timedelta(milliseconds=200))
-    bus = kickcat.Bus(link)
-    bus.init(timedelta(seconds=3))
+    import kickcat_peer
+
+    bus = kickcat_peer.bring_up([interface])
     store = bus.slaves()[0]
 
     def read(index):

@@ -108,9 +108,9 @@ class Plant:
     def __len__(self):
         return len(self.devices)
 
-    def wkc(self):
-        """The working counter of one LRW over all process data."""
-        return sum(kind.wkc for _, kind, _ in self.devices if kind)
+    def wkc(self, count=None):
+        """The working counter of one LRW over all process data; with `count`, of the first controllers only."""
+        return sum(kind.wkc for _, kind, _ in self.devices[:count] if kind)
 
     def clocked(self):
         """Positions with a clock: of what is used here, all but plain digital inputs and outputs."""
