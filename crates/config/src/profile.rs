@@ -3,8 +3,9 @@
 //! It is made from the SII image, which the device itself carries.
 
 use linesman_proto::address::RegisterAddress;
+use linesman_proto::port::PortMap;
 use linesman_proto::register::{SmControl, SmMode};
-use linesman_proto::sii::{Direction, Image, MailboxPair, Protocols, SyncManagerKind};
+use linesman_proto::sii::{Direction, Image, MailboxPair, PortKind, Protocols, SyncManagerKind};
 
 /// A SyncManager for process data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -51,6 +52,8 @@ pub struct DeviceProfile {
     pub device_emulation: bool,
     /// Current from the E-bus in mA; negative supplies. `None`: not said.
     pub ebus_current_ma: Option<i16>,
+    /// What its ports are; `None`: not said.
+    pub ports: Option<PortMap<PortKind>>,
 }
 
 impl DeviceProfile {
@@ -71,6 +74,7 @@ impl DeviceProfile {
             no_lrw: general.is_some_and(|general| general.flags.no_lrw()),
             device_emulation: image.configuration.device_emulation(),
             ebus_current_ma: image.ebus_current_ma(),
+            ports: general.map(|general| general.ports),
         }
     }
 

@@ -10,7 +10,7 @@ use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode};
 
 use crate::exchange::{ExchangeError, Reply};
-use crate::mailbox::SdoError;
+use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
 use crate::procedure::{Look, LookError, ScanError};
 
@@ -155,6 +155,17 @@ pub enum Event {
         /// How many were lost.
         lost: u64,
     },
+    /// The application was late more often than allowed: outputs of a task are withheld, inputs go
+    /// on. [`Event::OutputsResumed`] ends it.
+    OutputsWithheld {
+        /// Index of the task in the plan.
+        task: usize,
+    },
+    /// The application gives outputs again.
+    OutputsResumed {
+        /// Index of the task in the plan.
+        task: usize,
+    },
     /// A SubDevice reports an error on its own account.
     Emergency {
         /// Which.
@@ -178,7 +189,7 @@ pub enum Event {
         /// What.
         object: ObjectAddress,
         /// The data.
-        result: Result<Vec<u8>, SdoError>,
+        result: Result<Vec<u8>, MailboxFailure>,
     },
     /// A download is done.
     SdoDownloaded {
@@ -187,7 +198,7 @@ pub enum Event {
         /// What.
         object: ObjectAddress,
         /// Whether it was taken.
-        result: Result<(), SdoError>,
+        result: Result<(), MailboxFailure>,
     },
     /// A probe is done.
     Probed {

@@ -19,6 +19,7 @@ pub mod procedure;
 pub mod statistics;
 mod supervisor;
 
+pub use cyclic::{FrameStatus, Quality};
 pub use event::Event;
 pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};

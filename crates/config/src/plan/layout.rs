@@ -17,7 +17,9 @@ use linesman_proto::sii::Direction;
 use linesman_proto::time::Span;
 use linesman_proto::topology::Tree;
 
-use super::{DatagramPlan, DevicePlan, FramePlan, Ownership, Plan, PlannedDevice, SyncUnit, Task};
+use super::{
+    DatagramPlan, DevicePlan, FramePlan, IoAt, Ownership, Plan, PlannedDevice, Role, SyncUnit, Task,
+};
 use crate::profile::ProcessSyncManager;
 
 /// Where the process data of the first task begin in the logical space.
@@ -79,10 +81,7 @@ impl Plan {
         }
         let mut plan = Self {
             devices: devices.iter().zip(0..).map(|(planned, id)| device(planned, id)).collect(),
-            tree,
-            tasks: Vec::new(),
-            outputs_len: 0,
-            inputs_len: 0,
+            ..Self::empty(tree)
         };
         let mut layout = Layout { next: LOGICAL_START, datagrams: Vec::new() };
         for group in groups(devices, options)? {
@@ -93,6 +92,7 @@ impl Plan {
         plan.tasks.push(Task {
             name: "cyclic".to_owned(),
             cycle: options.cycle,
+            io_at: IoAt::default(),
             sync_units: vec![sync_unit],
             frames: frames(layout.datagrams),
         });
@@ -103,8 +103,8 @@ impl Plan {
 fn device(planned: &PlannedDevice, id: u32) -> DevicePlan {
     let mapped = planned.profile.process.iter().filter(|manager| manager.len > 0);
     DevicePlan {
-        id: DeviceId(id),
         name: planned.name.clone(),
+        type_name: planned.profile.type_name.clone(),
         station: planned.station,
         identity: planned.identity,
         revision_rule: planned.revision_rule,
@@ -116,11 +116,12 @@ fn device(planned: &PlannedDevice, id: u32) -> DevicePlan {
                 (index, SyncManagerConfig::enabled(start, len, control))
             })
             .collect(),
-        fmmus: Vec::new(),
         device_emulation: planned.profile.device_emulation,
         target: planned.target,
-        outputs: 0..0,
-        inputs: 0..0,
+        settings: planned.settings.clone(),
+        ebus_current_ma: planned.profile.ebus_current_ma,
+        ports: planned.profile.ports,
+        ..DevicePlan::bare(DeviceId(id))
     }
 }
 
@@ -131,6 +132,7 @@ fn presence_monitor() -> DatagramPlan {
         command: Command::Brd,
         address: DatagramAddress::Physical(0, AL_STATUS.address),
         len: 2,
+        role: Role::Presence,
         sync_unit: None,
         ownership: Vec::new(),
     }
@@ -229,6 +231,7 @@ impl Layout {
                 command,
                 address,
                 len,
+                role: Role::ProcessData,
                 sync_unit: Some(0),
                 ownership,
             });
@@ -291,7 +294,13 @@ impl Plan {
         let image_at = *image_len;
         *image_len += len;
         extend(mine, image_at, len);
-        Ownership { device: device.id, direction, range: at..at + len, image_at }
+        Ownership {
+            device: device.id,
+            direction,
+            range: at..at + len,
+            image_at,
+            masks: Ownership::WHOLE,
+        }
     }
 }
 
@@ -310,7 +319,7 @@ fn frames(datagrams: Vec<DatagramPlan>) -> Vec<FramePlan> {
             Some(frame) if frame.size() + datagram.len + DATAGRAM_OVERHEAD <= MAX_LEN => {
                 frame.datagrams.push(datagram);
             }
-            Some(_) | None => frames.push(FramePlan { datagrams: vec![datagram] }),
+            Some(_) | None => frames.push(FramePlan::new(vec![datagram])),
         }
     }
     frames
@@ -318,7 +327,7 @@ fn frames(datagrams: Vec<DatagramPlan>) -> Vec<FramePlan> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{PathView, Presence, expect};
+    use super::super::{DeviceSettings, PathView, Presence, expect};
     use super::*;
     use crate::identity::RevisionRule;
     use crate::profile::DeviceProfile;
@@ -344,6 +353,7 @@ mod tests {
             revision_rule: RevisionRule::Equal,
             profile: DeviceProfile { process, no_lrw, ..DeviceProfile::default() },
             target: AlState::Op,
+            settings: DeviceSettings::default(),
         }
     }
 

@@ -50,6 +50,11 @@ pub async fn before_pre_op(wire: &Wire, device: &DevicePlan) -> Result<(), Excha
             set_sync_manager(wire, target, index, manager).await?;
         }
     }
+    if let Some((index, fmmu)) = &device.mailbox_state
+        && let Some(address) = FMMU.at(u16::from(*index))
+    {
+        write(wire, target, address, &fmmu.to_bytes()).await?;
+    }
     wire.write_one(target, SII_ACCESS_ECAT.address, &[1]).await?;
     Ok(())
 }
