@@ -44,6 +44,8 @@ impl ProcessSyncManager {
 pub struct Mailbox {
     /// Where it lies.
     pub areas: MailboxPair,
+    /// Where it lies in BOOT, if the device has a BOOT.
+    pub bootstrap: Option<MailboxPair>,
     /// What it speaks.
     pub protocols: Protocols,
     /// Whether the device takes whole objects in one transfer.
@@ -124,6 +126,7 @@ impl DeviceProfile {
             name: text(image.name()),
             mailbox: image.mailbox().map(|areas| Mailbox {
                 areas: *areas,
+                bootstrap: Some(image.bootstrap_mailbox).filter(|pair| pair.is_present()),
                 protocols: image.protocols,
                 complete_access: general.is_some_and(|general| general.coe.complete_access()),
             }),
