@@ -158,16 +158,8 @@ fn take_over(meaning: Meaning, device: &mut DevicePlan) {
 }
 
 fn mailbox(element: &Element, device: &mut DevicePlan) -> Result<Option<Mailbox>, EsiError> {
-    let area = |names: [&str; 2]| {
-        let found = names.iter().find_map(|name| element.child(name));
-        let Some(area) = found else { return Ok(MailboxArea::default()) };
-        Ok(MailboxArea {
-            offset: RegisterAddress(area.child_number("Start")?.unwrap_or(0)),
-            size: area.child_number("Length")?.unwrap_or(0),
-        })
-    };
-    // What the MainDevice sends, the SubDevice receives.
-    let areas = MailboxPair { receive: area(["Send", "send"])?, send: area(["Recv", "Receive"])? };
+    let areas = areas(element)?;
+    let bootstrap = element.child("BootStrap").map(self::areas).transpose()?;
     let mut protocols = 0;
     for protocol in element.children("Protocol") {
         protocols |= match protocol.text() {
@@ -190,7 +182,21 @@ fn mailbox(element: &Element, device: &mut DevicePlan) -> Result<Option<Mailbox>
     if !areas.is_present() {
         return Ok(None);
     }
-    Ok(Some(Mailbox { areas, protocols: Protocols(protocols), complete_access }))
+    let bootstrap = bootstrap.filter(|pair| pair.is_present());
+    Ok(Some(Mailbox { areas, bootstrap, protocols: Protocols(protocols), complete_access }))
+}
+
+/// What the MainDevice sends, the SubDevice receives.
+fn areas(element: &Element) -> Result<MailboxPair, EsiError> {
+    let area = |names: [&str; 2]| {
+        let found = names.iter().find_map(|name| element.child(name));
+        let Some(area) = found else { return Ok(MailboxArea::default()) };
+        Ok(MailboxArea {
+            offset: RegisterAddress(area.child_number("Start")?.unwrap_or(0)),
+            size: area.child_number("Length")?.unwrap_or(0),
+        })
+    };
+    Ok(MailboxPair { receive: area(["Send", "send"])?, send: area(["Recv", "Receive"])? })
 }
 
 fn clock(element: &Element) -> Result<Option<ClockSettings>, EsiError> {

@@ -218,6 +218,7 @@ fn everything() -> Plan {
             mailbox: Some(Mailbox {
                 areas: MailboxPair::from_words([0x1000, 128, 0x1080, 128]),
                 protocols: Protocols(Protocols::COE | Protocols::FOE),
+                bootstrap: Some(MailboxPair::from_words([0x1000, 256, 0x1200, 256])),
                 complete_access: true,
             }),
             process: vec![

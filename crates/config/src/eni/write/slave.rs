@@ -110,6 +110,16 @@ fn write_mailbox(xml: &mut Xml, device: &DevicePlan, mailbox: &Mailbox) {
                 }
             });
         }
+        if let Some(bootstrap) = &mailbox.bootstrap {
+            xml.element("BootStrap", &[], |xml| {
+                for (name, area) in [("Send", bootstrap.receive), ("Recv", bootstrap.send)] {
+                    xml.element(name, &[], |xml| {
+                        xml.text("Start", area.offset.0);
+                        xml.text("Length", area.size);
+                    });
+                }
+            });
+        }
         for (bit, name) in [
             (Protocols::AOE, "AoE"),
             (Protocols::EOE, "EoE"),
