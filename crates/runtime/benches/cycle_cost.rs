@@ -200,9 +200,9 @@ fn run(
 
 /// What is measured: its name, the line, whether the broadcast read is in the frame.
 const LINES: &[(&str, &[(&str, usize)], bool)] = &[
-    ("64", &[("EL4102", 8), ("EL3102", 5), ("EL1008", 2)], false),
-    ("1400", &[("EL4102", 175), ("EL3102", 116), ("EL1008", 4)], false),
-    ("64+monitor", &[("EL4102", 8), ("EL3102", 5), ("EL1008", 2)], true),
+    ("64", &[("EL4102", 8), ("EL3102", 4)], false),
+    ("1400", &[("EL4102", 175), ("EL3102", 87), ("EL1008", 4)], false),
+    ("64+monitor", &[("EL4102", 8), ("EL3102", 4)], true),
     ("10", &[("EL1008", 5), ("EL2008", 4)], true),
     ("100", &[("EL1008", 50), ("EL2008", 49)], true),
     ("1000", &[("EL1008", 500), ("EL2008", 499)], true),

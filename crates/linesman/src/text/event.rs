@@ -17,10 +17,10 @@ pub(crate) fn words(event: &Event, names: &Names) -> Option<String> {
         }
         Event::DeviceState { id, status, .. } => format!("{} is in {status}", who(id)),
         Event::AllReached => "all SubDevices are where they shall be".to_owned(),
-        Event::Refused { id, to, status, code } => {
+        Event::Refused { id, to, status, code, .. } => {
             format!("{} refuses to enter {to}, is in {status}: {code}", who(id))
         }
-        Event::StepTimedOut { id, to, status } => {
+        Event::StepTimedOut { id, to, status, .. } => {
             format!("{} was asked to enter {to} and is still in {status}; its time is up", who(id))
         }
         Event::DeviceLost { id } => format!("{} does not answer", who(id)),

@@ -142,8 +142,9 @@ impl Tap {
     /// Hands over what is old.
     #[inline]
     pub fn turn(&mut self, now: Instant) {
-        if self.began.is_some_and(|began| now.since(began) >= OLD) {
-            self.hand_over();
+        if self.began.is_some_and(|began| now.since(began) >= OLD) && !self.hand_over() {
+            // Nobody takes it now: there is room left, and asking costs something.
+            self.began = Some(now);
         }
     }
 
