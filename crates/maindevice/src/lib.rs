@@ -26,4 +26,5 @@ pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};
 pub use options::Options;
 pub use statistics::Statistics;
+pub use supervisor::{BringUpTimes, DeviceTimes, Phase, StartUpError};
 pub use watch::Watch;
