@@ -3,13 +3,15 @@
 mod told;
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 use linesman_diagnosis::Setup;
 use linesman_diagnosis::report::Verdict;
 use linesman_link::clock::HostClock;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
+use linesman_runtime::event_log::{EventLog, EventLogWriter};
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
 use linesman_runtime::run::{self as running, Choices, Ended, Idle, RealTime, RunOptions, Wanted};
 use linesman_runtime::selector::Selector;
@@ -22,6 +24,10 @@ use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
+use crate::version;
+
+/// After so long without news, what was waited with is told.
+const QUIET: Duration = Duration::from_millis(100);
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -62,6 +68,9 @@ pub(crate) struct Arguments {
     /// Do not judge the line meanwhile
     #[arg(long)]
     no_diagnosis: bool,
+    /// Keep what happens in an event log, for `linesman log`; runs are added to a file that is there
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
     /// At the end one JSON object, schema linesman.run/1, and nothing else
     #[arg(long)]
     pub(crate) json: bool,
@@ -106,6 +115,16 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Some((_, project)) => choices.project(project),
         None => choices.as_found(),
     };
+    let began = HostClock::start().started_at();
+    let log = match &arguments.log {
+        Some(path) => {
+            let project = arguments.file.as_deref().map_or_else(String::new, |file| file.display().to_string());
+            let log = EventLog::create(path)?;
+            Some(EventLogWriter::start(log, began, &arguments.on, &project, &version::tool())?)
+        }
+        None => None,
+    };
+    let teller = Teller::new(arguments.json, began, log);
     let stop = driven::stop()?;
     let said = format!(
         "Drives {title} on {} to {}; Ctrl-C stops it: outputs to zero, all back to {}.",
@@ -124,13 +143,13 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             });
             let options =
                 with_source(options, real_time, HostClock::start().started_at().rfc3339());
-            drive(line, names.len() > 1, wanted, &options, &stop, &said, arguments.json, output)
+            drive(line, names.len() > 1, wanted, &options, &stop, &said, teller, output)
         }
         Selector::Segment(path) => {
             let line = virtual_line(path, lasts.is_some())?;
             stop.rings(&line.bell()).map_err(no_bell)?;
             let ring = line.count() > 1;
-            drive(line, ring, wanted, &options, &stop, &said, arguments.json, output)
+            drive(line, ring, wanted, &options, &stop, &said, teller, output)
         }
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             let reason = format!("`{selector}`: nothing can be driven there");
@@ -181,22 +200,33 @@ fn drive<L: Line + Send>(
     options: &RunOptions,
     stop: &Stop,
     said: &str,
-    json: bool,
+    mut teller: Teller,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    let mut teller = Teller::new(json);
     teller.line(said, output);
     let (notes, told) = mpsc::channel();
     let ended = std::thread::scope(|scope| {
         let work = move || running::run(line, ring, wanted, Idle, options, stop, notes);
         let thread = scope.spawn(work);
-        for note in told {
-            teller.note(&note, output);
+        loop {
+            match told.recv_timeout(QUIET) {
+                Ok(note) => teller.note(&note, output),
+                Err(RecvTimeoutError::Timeout) => teller.flush(output),
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
         }
+        teller.flush(output);
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     });
+    let lasted = ended.as_ref().map_or(Span::ZERO, |ended| Span::ns(ended.report.time_ns));
+    if let Some(log) = teller.finish(lasted)
+        && (log.dropped > 0 || log.failure.is_some())
+    {
+        let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
+        output.warn(&format!("{} entries are missing in the event log: {why}", log.dropped));
+    }
     let Ended { report, diagnosis, error } = ended.map_err(|error| failure(&error, &options.on))?;
-    if json {
+    if teller.is_json() {
         output.json(&report);
     } else {
         output.text(&told::summary(&report));

@@ -37,8 +37,6 @@ pub struct WatchedDevice {
     present: Option<bool>,
     status: Option<AlStatus>,
     code: AlStatusCode,
-    /// The state it reached and was to stay in.
-    held: Option<AlState>,
     wrong_identity: bool,
     init_error: bool,
     links: Option<DlStatus>,
@@ -59,7 +57,6 @@ impl WatchedDevice {
             present: None,
             status: None,
             code: AlStatusCode::NO_ERROR,
-            held: None,
             wrong_identity: false,
             init_error: false,
             links: None,
@@ -160,40 +157,33 @@ impl WatchedDevice {
         self.history.iter()
     }
 
-    /// The state that it was to keep and has left, if this status says so.
-    pub(super) fn falls(&self, status: AlStatus) -> Option<AlState> {
-        let held = self.held?;
-        (status.state() != StateValue::Known(held)).then_some(held)
-    }
-
+    #[allow(clippy::wildcard_enum_match_arm, reason = "the others say nothing of a SubDevice")]
     pub(super) fn handle_event(&mut self, now: Instant, event: &Event) {
         match event {
             Event::DeviceState { status, code, .. } => {
-                if let Some(from) = self.falls(*status) {
-                    self.held = None;
-                    self.abnormal += 1;
-                    if self.history.len() == REMEMBERED {
-                        self.history.pop_front();
-                    }
-                    let to = status.state();
-                    self.history.push_back(AbnormalChange { at: now, from, to, code: *code });
-                }
                 self.present = Some(true);
                 self.status = Some(*status);
                 self.code = *code;
             }
-            Event::TargetReached { state, .. } => {
+            Event::AbnormalState { from, status, code, .. } => {
+                self.abnormal += 1;
+                if self.history.len() == REMEMBERED {
+                    self.history.pop_front();
+                }
+                let to = status.state();
+                self.history.push_back(AbnormalChange { at: now, from: *from, to, code: *code });
+            }
+            Event::TargetReached { .. } => {
                 self.present = Some(true);
                 self.wrong_identity = false;
                 self.init_error = false;
-                self.held = Some(*state);
             }
             Event::Refused { status, code, .. } => {
                 self.init_error = true;
                 self.status = Some(*status);
                 self.code = *code;
             }
-            Event::StepTimedOut { status, .. } => {
+            Event::StepTimedOut { status, .. } | Event::StartUpFailed { status, .. } => {
                 self.init_error = true;
                 self.status = Some(*status);
             }
@@ -202,7 +192,6 @@ impl WatchedDevice {
                     self.not_present += 1;
                 }
                 self.present = Some(false);
-                self.held = None;
                 self.links = None;
             }
             Event::DeviceBack { restarted, .. } => {
@@ -229,10 +218,6 @@ impl WatchedDevice {
         self.counters.clone().record(reading)
     }
 
-    pub(super) fn release(&mut self) {
-        self.held = None;
-    }
-
     pub(super) fn clear(&mut self) {
         self.counters.clear();
         self.abnormal = 0;
@@ -241,12 +226,15 @@ impl WatchedDevice {
 }
 
 /// Whom an event is about.
+#[allow(clippy::wildcard_enum_match_arm, reason = "the others are of the network")]
 pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
     match event {
         Event::DeviceState { id, .. }
         | Event::TargetReached { id, .. }
         | Event::Refused { id, .. }
         | Event::StepTimedOut { id, .. }
+        | Event::StartUpFailed { id, .. }
+        | Event::AbnormalState { id, .. }
         | Event::DeviceLost { id }
         | Event::DeviceBack { id, .. }
         | Event::WrongDevice { id, .. }

@@ -114,6 +114,7 @@ impl Watch {
     // ---- what comes in ----
 
     /// Something happened.
+    #[allow(clippy::wildcard_enum_match_arm, reason = "the others are of one SubDevice")]
     pub fn handle_event(&mut self, now: Instant, event: &Event) {
         self.handle_timeout(now);
         if let Event::DeviceLost { id } = event {
@@ -127,6 +128,8 @@ impl Watch {
             Event::Ring { intact } => {
                 self.own = self.own.with(NetworkState::REDUNDANCY_FRAME_MISSING, !intact);
             }
+            Event::OutputsWithheld { .. } => self.own = self.own.with(NetworkState::WATCHDOG, true),
+            Event::OutputsResumed { .. } => self.own = self.own.with(NetworkState::WATCHDOG, false),
             _ => {}
         }
         // The wording may need what was before.
@@ -159,15 +162,6 @@ impl Watch {
         self.own = self.own.with(NetworkState::OUT_OF_SEND_RESOURCES, failing);
     }
 
-    /// The application gave no fresh outputs in time, or does so again.
-    pub fn handle_stale_outputs(&mut self, now: Instant, stale: bool) {
-        let before = self.own;
-        self.own = before.with(NetworkState::WATCHDOG, stale);
-        if self.own != before {
-            self.push(wording::stale_outputs(now, stale));
-        }
-    }
-
     /// The clocks are further apart than the window allows, or are not any more.
     pub fn handle_clocks(&mut self, now: Instant, apart: bool) {
         let before = self.own;
@@ -179,9 +173,13 @@ impl Watch {
 
     /// Time has passed: what was waited with is told.
     pub fn handle_timeout(&mut self, now: Instant) {
-        if self.lost.is_empty() || now < self.lost_at + LOST_TOGETHER {
-            return;
+        if now >= self.lost_at + LOST_TOGETHER {
+            self.flush();
         }
+    }
+
+    /// What is waited with is told at once: nothing more will come.
+    pub fn flush(&mut self) {
         let mut lost = std::mem::take(&mut self.lost);
         lost.sort_unstable();
         for entry in wording::lost(self.lost_at, &lost, &self.plan) {
@@ -190,13 +188,6 @@ impl Watch {
     }
 
     // ---- commands ----
-
-    /// A SubDevice was asked to leave its state: that it does is not abnormal.
-    pub fn release(&mut self, id: DeviceId) {
-        if let Some(device) = self.devices.get_mut(id.index()) {
-            device.release();
-        }
-    }
 
     /// All error counters and change counters of the list begin at 0 again. Nothing is written to
     /// the SubDevices: other tools go on as they were, and no count is lost.

@@ -3,17 +3,19 @@
 //! Reference: the message texts of the sources (`facts` 3.2): state change aborted, abnormal state
 //! change, communication interrupted and re-established, SDO abort, frames missed.
 
+use linesman_config::identity;
 use linesman_config::plan::Plan;
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
 use linesman_proto::register::AlStatus;
-use linesman_proto::state::{AlState, AlStatusCode, StateValue};
+use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::Instant;
 
 use super::{EntryKind, LogEntry, Severity, Watch};
 use crate::event::Event;
 
 /// The entries for an event; `watch` still stands as it was before it.
+#[allow(clippy::wildcard_enum_match_arm, reason = "answers are told by whoever asked")]
 pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
     let plan = &watch.plan;
     let about = |id: DeviceId, severity, kind, text: String| LogEntry {
@@ -25,10 +27,7 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
     };
     let line = |severity, kind, text: String| LogEntry { at, severity, kind, device: None, text };
     match event {
-        Event::DeviceState { id, status, code } => {
-            let Some(from) = watch.device(*id).and_then(|device| device.falls(*status)) else {
-                return Vec::new();
-            };
+        Event::AbnormalState { id, from, status, code } => {
             let reason = match *code {
                 AlStatusCode::NO_ERROR => String::new(),
                 code => format!(" with code 0x{:02x} ({})", code.value(), code.explain().name),
@@ -45,17 +44,27 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
             EntryKind::State,
             format!("all {} SubDevices have reached their states", plan.devices.len()),
         )],
-        Event::Refused { id, to, status, code } => {
-            let mut entries = aborted(*to, *status, Some(*code))
-                .map(|text| about(*id, Severity::Error, EntryKind::StateAborted, text));
-            entries.reverse();
-            entries.into()
+        Event::Refused { id, from, to, status, code } => {
+            let details = failed(*from, *to, *status, Some(*code));
+            [aborted(*to, *status), details]
+                .map(|text| about(*id, Severity::Error, EntryKind::StateAborted, text))
+                .into()
         }
-        Event::StepTimedOut { id, to, status } => {
-            let mut entries = aborted(*to, *status, None)
-                .map(|text| about(*id, Severity::Error, EntryKind::StateAborted, text));
-            entries.reverse();
-            entries.into()
+        Event::StepTimedOut { id, from, to, status } => {
+            let details = failed(*from, *to, *status, None);
+            [aborted(*to, *status), details]
+                .map(|text| about(*id, Severity::Error, EntryKind::StateAborted, text))
+                .into()
+        }
+        Event::StartUpFailed { id, to, status, command, error } => {
+            let what = match command.comment.as_str() {
+                "" => String::new(),
+                comment => format!(" ({comment})"),
+            };
+            let details = format!(": start-up command{what}: {error}");
+            [aborted(*to, *status), details]
+                .map(|text| about(*id, Severity::Error, EntryKind::StateAborted, text))
+                .into()
         }
         Event::DeviceBack { id, restarted } => {
             let how = if *restarted { ", after a restart" } else { "" };
@@ -64,14 +73,9 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
         }
         Event::WrongDevice { id, mismatch, expected, found } => {
             let text = format!(
-                ": another device is in its place ({mismatch}): vendor 0x{:08X}, product 0x{:08X}, \
-                 revision 0x{:08X} found; vendor 0x{:08X}, product 0x{:08X}, revision 0x{:08X} expected",
-                found.vendor_id,
-                found.product_code,
-                found.revision,
-                expected.vendor_id,
-                expected.product_code,
-                expected.revision
+                ": another {mismatch}: expected {}, found {}",
+                identity::text(expected),
+                identity::text(found)
             );
             vec![about(*id, Severity::Error, EntryKind::Identity, text)]
         }
@@ -79,8 +83,8 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
             Severity::Warning,
             EntryKind::Identity,
             format!(
-                "a SubDevice that nobody planned stands at position {position}: vendor 0x{:08X}, product 0x{:08X}, revision 0x{:08X}",
-                found.vendor_id, found.product_code, found.revision
+                "a SubDevice that the plan does not have at position {position}: {}",
+                identity::text(found)
             ),
         )],
         Event::Responding { before, now } => {
@@ -146,6 +150,18 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
             EntryKind::Frames,
             format!("frames of task {task} come back; missed {lost} times"),
         )],
+        Event::OutputsWithheld { task } => vec![line(
+            Severity::Error,
+            EntryKind::Host,
+            format!(
+                "the application is late: outputs of task {task} are withheld, so that watchdogs can expire"
+            ),
+        )],
+        Event::OutputsResumed { task } => vec![line(
+            Severity::Info,
+            EntryKind::Host,
+            format!("the application is back: outputs of task {task} are sent again"),
+        )],
         Event::Emergency { id, emergency } => {
             let text = format!(
                 ": emergency 0x{:04X} ({}), error register 0x{:02X}",
@@ -193,19 +209,6 @@ pub(super) fn carrier(at: Instant, card: Path, carrier: bool) -> LogEntry {
     LogEntry { at, severity, kind: EntryKind::Host, device: None, text }
 }
 
-/// The application's deadline.
-pub(super) fn stale_outputs(at: Instant, stale: bool) -> LogEntry {
-    let (severity, text) = match stale {
-        true => (
-            Severity::Error,
-            "the application gives no fresh outputs: output datagrams are held back, so that the watchdogs of \
-             the SubDevices can expire",
-        ),
-        false => (Severity::Info, "the application gives fresh outputs again"),
-    };
-    LogEntry { at, severity, kind: EntryKind::Host, device: None, text: text.into() }
-}
-
 /// The window of the clocks.
 pub(super) fn clocks(at: Instant, apart: bool) -> LogEntry {
     let (severity, text) = match apart {
@@ -215,27 +218,31 @@ pub(super) fn clocks(at: Instant, apart: bool) -> LogEntry {
     LogEntry { at, severity, kind: EntryKind::Clock, device: None, text: text.into() }
 }
 
-/// The two lines for a step that did not succeed, the details first.
-fn aborted(to: AlState, status: AlStatus, code: Option<AlStatusCode>) -> [String; 2] {
-    let from = match status.state() {
-        StateValue::Known(state) => state.to_string(),
-        StateValue::Unknown(value) => format!("0x{value:X}"),
-    };
+/// Where a SubDevice is left after a step that came to nothing.
+fn aborted(to: AlState, status: AlStatus) -> String {
+    format!(": state change aborted (requested '{to}', back to '{}').", status.state())
+}
+
+/// What was asked and what was read.
+fn failed(
+    from: Option<AlState>,
+    to: AlState,
+    status: AlStatus,
+    code: Option<AlStatusCode>,
+) -> String {
+    let from = from.map_or_else(|| status.state().to_string(), |from| from.to_string());
     let code = match code {
         Some(code) => {
             format!(" AL Status Code '0x{:04x} - {}'", code.value(), code.explain().name)
         }
         None => " It did not answer in time, and gives no code.".into(),
     };
-    [
-        format!(
-            ": '{from} to {to}' failed! Error: 'check device state for {to}'. AL Status '0x{:04x}' read and \
-             '0x{:04x}' expected.{code}",
-            status.0,
-            AlStatus::new(to).0
-        ),
-        format!(": state change aborted (requested '{to}', back to '{from}')."),
-    ]
+    format!(
+        ": '{from} to {to}' failed! Error: 'check device state for {to}'. AL Status '0x{:04x}' read and \
+         '0x{:04x}' expected.{code}",
+        status.0,
+        AlStatus::new(to).0
+    )
 }
 
 /// `'Term 5 (EL3154)' (1005)`.
