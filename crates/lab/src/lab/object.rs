@@ -1,7 +1,7 @@
 //! Objects of SubDevices, read by the MainDevice of the lab.
 
 use linesman_maindevice::Event;
-use linesman_maindevice::mailbox::SdoError;
+use linesman_maindevice::mailbox::MailboxFailure;
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::{Instant, Span};
@@ -41,7 +41,7 @@ impl Lab {
         &mut self,
         id: DeviceId,
         object: ObjectAddress,
-    ) -> Result<Option<Result<Vec<u8>, SdoError>>, LabError> {
+    ) -> Result<Option<Result<Vec<u8>, MailboxFailure>>, LabError> {
         let (of, now) = (self.in_plan(id), self.now);
         let mark = self.event_mark();
         self.main.sdo_upload(now, of, object, false);
