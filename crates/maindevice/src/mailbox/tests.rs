@@ -38,7 +38,7 @@ fn device() -> DevicePlan {
         name: "5".to_owned(),
         station: StationAddress(0x1005),
         revision_rule: RevisionRule::Any,
-        mailbox: Some(Mailbox { areas, protocols, complete_access: false }),
+        mailbox: Some(Mailbox { areas, bootstrap: None, protocols, complete_access: false }),
         target: AlState::PreOp,
         ..DevicePlan::bare(ID)
     }
