@@ -117,7 +117,13 @@ fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
     let mut watch = watch();
     let status = AlStatus::new(AlState::Init).with_error(true);
     let refused =
-        Event::Refused { id: DeviceId(1), to: AlState::PreOp, status, code: AlStatusCode(0x0014) };
+        Event::Refused {
+            id: DeviceId(1),
+            from: Some(AlState::Init),
+            to: AlState::PreOp,
+            status,
+            code: AlStatusCode(0x0014),
+        };
     watch.handle_event(at(1), &refused);
     let lines = texts(&mut watch);
     assert_eq!(
