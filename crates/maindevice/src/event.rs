@@ -13,6 +13,7 @@ use crate::exchange::{ExchangeError, Reply};
 use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
 use crate::procedure::{Look, LookError, ScanError};
+use crate::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
 
 /// Something that happened. Events come in the order in which it did.
 #[derive(Clone, Debug)]
@@ -188,6 +189,15 @@ pub enum Event {
         object: ObjectAddress,
         /// Whether it was taken.
         result: Result<(), MailboxFailure>,
+    },
+    /// [`MainDevice::serve`](crate::MainDevice::serve) is done.
+    Served {
+        /// Which service.
+        ticket: ServiceTicket,
+        /// For whom.
+        id: DeviceId,
+        /// What it gives.
+        result: Box<Result<ServiceAnswer, ServiceFailure>>,
     },
     /// A probe is done.
     Probed {

@@ -46,6 +46,7 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
             multiplexer.reset();
             openings = now;
         }
+        multiplexer.set_areas(context.mailboxes.areas(id));
         match job {
             Some(job) => work(&context, &mut multiplexer, job, open).await,
             None if open => multiplexer.drain().await,

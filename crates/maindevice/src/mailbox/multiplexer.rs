@@ -36,6 +36,8 @@ pub(crate) struct Multiplexer {
     id: DeviceId,
     target: Target,
     areas: MailboxPair,
+    /// Where the plan says that it lies.
+    planned: MailboxPair,
     protocols: Protocols,
     /// Counter of the last message that was sent; `None` before the first.
     sent: Option<Counter>,
@@ -57,6 +59,7 @@ impl Multiplexer {
             id: device.id,
             target: Target::Station(device.station),
             areas: mailbox.areas,
+            planned: mailbox.areas,
             protocols: mailbox.protocols,
             sent: None,
             received: Counter::NONE,
@@ -70,6 +73,11 @@ impl Multiplexer {
     pub(crate) fn reset(&mut self) {
         (self.sent, self.received) = (None, Counter::NONE);
         (self.fetched_again, self.late) = (false, false);
+    }
+
+    /// It lies there now; `None`: where the plan says.
+    pub(crate) fn set_areas(&mut self, areas: Option<MailboxPair>) {
+        self.areas = areas.unwrap_or(self.planned);
     }
 
     pub(crate) fn now(&self) -> Instant {
