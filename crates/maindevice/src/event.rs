@@ -156,6 +156,17 @@ pub enum Event {
         /// How many were lost.
         lost: u64,
     },
+    /// The application was late more often than allowed: outputs of a task are withheld, inputs go
+    /// on. [`Event::OutputsResumed`] ends it.
+    OutputsWithheld {
+        /// Index of the task in the plan.
+        task: usize,
+    },
+    /// The application gives outputs again.
+    OutputsResumed {
+        /// Index of the task in the plan.
+        task: usize,
+    },
     /// A SubDevice reports an error on its own account.
     Emergency {
         /// Which.

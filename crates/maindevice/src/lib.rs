@@ -21,6 +21,7 @@ pub mod service;
 pub mod statistics;
 mod supervisor;
 
+pub use cyclic::{FrameStatus, Quality};
 pub use event::Event;
 pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};

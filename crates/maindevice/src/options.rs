@@ -18,6 +18,10 @@ pub struct Options {
     pub repeats: u8,
     /// Most frames of procedures that are out at once, without and beside a cycle.
     pub frames_at_once: usize,
+    /// How many cycles in a row the application may leave its outputs as they are. Beyond that
+    /// datagrams with outputs are sent without them, so that the watchdogs of SubDevices expire;
+    /// `None`: it may be as late as it likes. It counts from the first outputs that it gives.
+    pub allowed_misses: Option<u32>,
     /// How often each SubDevice's error counters, DL status and AL status are read while running.
     pub watch_interval: Span,
     /// How often mailboxes are looked into, when nothing is expected.
@@ -42,6 +46,7 @@ impl Default for Options {
             patience: Span::ms(10),
             repeats: 3,
             frames_at_once: 4,
+            allowed_misses: None,
             watch_interval: Span::ms(100),
             mailbox_interval: Span::ms(50),
             mailbox_patience: Span::s(2),

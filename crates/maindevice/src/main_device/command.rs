@@ -12,7 +12,7 @@ use super::{MainDevice, Running};
 use crate::cyclic::Cyclic;
 use crate::event::Event;
 use crate::exchange::Target;
-use crate::executor::Wire;
+use crate::executor::{Handle, Wire};
 use crate::mailbox::queue::Pending;
 use crate::mailbox::{MailboxRequest, ProtocolErrors, Queues};
 use crate::procedure::{look, scan, state};
@@ -79,7 +79,9 @@ impl MainDevice {
             mailboxes: mailboxes.clone(),
         };
         wire.spawn(supervisor::supervise(context));
-        let cyclic = Cyclic::new(Arc::clone(&plan), Arc::clone(&line), now);
+        let allowed = self.options.allowed_misses;
+        let (shared, known) = (Arc::clone(&plan), Arc::clone(&line));
+        let cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
         self.running = Some(Running { cyclic, plan, line, mailboxes });
         self.acyclic_left = self.options.frames_at_once;
         self.handle_timeout(now);
@@ -125,6 +127,18 @@ impl MainDevice {
         let wire = self.executor.group(self.options.repeats);
         self.control = Some(wire.clone());
         wire
+    }
+
+    /// Runs a procedure beside all else, in the gaps of the cycle; what it gives is fetched from the
+    /// handle. Commands do not end it.
+    pub fn perform<T, F>(&mut self, now: Instant, procedure: impl FnOnce(Wire) -> F) -> Handle<T>
+    where
+        T: Send + 'static,
+        F: Future<Output = T> + Send + 'static,
+    {
+        let handle = self.aside.spawn(procedure(self.aside.clone()));
+        self.handle_timeout(now);
+        handle
     }
 
     /// One register access beside all else. Ends in [`Event::Probed`]; whoever sees the frames sees

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
 use std::pin::Pin;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 
@@ -49,7 +50,8 @@ struct Live {
 #[derive(Debug, Default)]
 pub(crate) struct Line {
     devices: Vec<Live>,
-    version: u64,
+    /// Shared, so that the cycle sees without a lock whether anything has changed.
+    version: Arc<AtomicU64>,
     alerts: u64,
     /// Naps that an alert ends, in the order in which they began.
     waiting: BTreeMap<u64, Waker>,
@@ -74,7 +76,12 @@ impl Line {
 
     /// Changes whenever presence or "settled" changes.
     pub(crate) fn version(&self) -> u64 {
-        self.version
+        self.version.load(Ordering::Relaxed)
+    }
+
+    /// The same, to be looked at without the line.
+    pub(crate) fn live_version(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.version)
     }
 
     /// Who serves process data, of those for whom that has changed since the last call: `least` those
@@ -161,7 +168,7 @@ impl Line {
     }
 
     fn changes(&mut self, id: DeviceId) {
-        self.version += 1;
+        self.version.fetch_add(1, Ordering::Relaxed);
         self.changed.push(id);
     }
 
