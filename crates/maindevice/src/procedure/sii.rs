@@ -186,7 +186,10 @@ pub(super) struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    pub(super) async fn open(wire: &'a Wire, target: Target) -> Result<Session<'a>, SiiAccessError> {
+    pub(super) async fn open(
+        wire: &'a Wire,
+        target: Target,
+    ) -> Result<Session<'a>, SiiAccessError> {
         let access = SII_ACCESS_ECAT.address;
         let failed = |error| SiiAccessError::Exchange { target, error };
         let owner = wire.read_one(target, access, 2).await.map_err(failed)?;
@@ -261,7 +264,11 @@ impl<'a> Session<'a> {
 
     /// Command and address in one datagram. The working counter is not looked at: when the frame
     /// before was lost on its way back, the controller is busy with the command already.
-    pub(super) async fn command(&self, command: SiiCommand, word: WordAddress) -> Result<(), SiiAccessError> {
+    pub(super) async fn command(
+        &self,
+        command: SiiCommand,
+        word: WordAddress,
+    ) -> Result<(), SiiAccessError> {
         let [low, high] = SiiControl::start(command).to_bytes();
         let [a, b, c, d] = word.value().to_le_bytes();
         let bytes = [low, high, a, b, c, d];

@@ -78,9 +78,13 @@ pub enum ServiceFailure {
 
 fn advice(error: &StepError) -> String {
     match error {
-        StepError::Refused { code, .. } => {
-            code.explain().actions.first().map_or("", |first| first).trim_end_matches('.').to_owned()
-        }
+        StepError::Refused { code, .. } => code
+            .explain()
+            .actions
+            .first()
+            .map_or("", |first| first)
+            .trim_end_matches('.')
+            .to_owned(),
         _ => "look at the line with `linesman diagnose`".to_owned(),
     }
 }

@@ -16,8 +16,8 @@ use linesman_proto::state::{AlState, AlStatusCode};
 
 use crate::mailbox::MailboxRequest;
 
-pub use failure::ServiceFailure;
 pub(crate) use attend::Attended;
+pub use failure::ServiceFailure;
 pub(crate) use perform::{Servant, perform};
 
 /// Tells services apart that are under way at once.

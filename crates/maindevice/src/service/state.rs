@@ -6,9 +6,9 @@ use linesman_proto::sii::word::BOOTSTRAP_MAILBOX;
 use linesman_proto::state::transition::next_step;
 use linesman_proto::state::{AlState, StateValue};
 
+use super::ServiceAnswer;
 use super::failure::ServiceFailure;
 use super::perform::Servant;
-use super::ServiceAnswer;
 use crate::exchange::Target;
 use crate::executor::lock;
 use crate::procedure::{StepError, set_up, sii, state};
@@ -88,7 +88,9 @@ pub(super) async fn enter(
         let limit = servant.options.state_timeouts.of(from, next);
         let step = state::Step { to: next, limit, emulated: device.device_emulation };
         let stepped = state::request(wire, target, step).await;
-        if stepped.is_err() && let Some(attended) = &servant.attended {
+        if stepped.is_err()
+            && let Some(attended) = &servant.attended
+        {
             attended.look(wire, device).await;
         }
         stepped.map_err(failed)?;
@@ -120,7 +122,9 @@ async fn before_boot(servant: &Servant, device: &DevicePlan) -> Result<(), Servi
     let mut boots = device.clone();
     boots.mailbox = Some(linesman_config::profile::Mailbox { areas, ..mailbox });
     servant.mailboxes.set_areas(id, Some(areas));
-    set_up::before_pre_op(wire, &boots)
-        .await
-        .map_err(|error| ServiceFailure::State { id, to: AlState::Boot, error: error.into() })
+    set_up::before_pre_op(wire, &boots).await.map_err(|error| ServiceFailure::State {
+        id,
+        to: AlState::Boot,
+        error: error.into(),
+    })
 }
