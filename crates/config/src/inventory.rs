@@ -79,6 +79,7 @@ impl Inventory {
             revision_rule: RevisionRule::Equal,
             profile: found.profile.clone(),
             target,
+            start_up: Vec::new(),
             settings: DeviceSettings::default(),
         };
         self.devices.iter().map(planned).collect()

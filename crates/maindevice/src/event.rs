@@ -2,6 +2,7 @@
 
 use linesman_config::identity::Mismatch;
 use linesman_config::inventory::Inventory;
+use linesman_config::start_up::StartUpCommand;
 use linesman_proto::address::{DeviceId, Position, WorkingCounter};
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
@@ -14,6 +15,9 @@ use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
 use crate::procedure::{Look, LookError, ScanError};
 use crate::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
+use crate::supervisor::StartUpError;
+
+mod text;
 
 /// Something that happened. Events come in the order in which it did.
 #[derive(Clone, Debug)]
@@ -48,6 +52,8 @@ pub enum Event {
     Refused {
         /// Which.
         id: DeviceId,
+        /// Where the step began; `None` when its state was not known.
+        from: Option<AlState>,
         /// The state it was asked to enter.
         to: AlState,
         /// The state it is in.
@@ -59,10 +65,36 @@ pub enum Event {
     StepTimedOut {
         /// Which.
         id: DeviceId,
+        /// Where the step began; `None` when its state was not known.
+        from: Option<AlState>,
         /// The state it was asked to enter.
         to: AlState,
         /// The state it is in.
         status: AlStatus,
+    },
+    /// A SubDevice did not take a start-up command. It will be tried again later.
+    StartUpFailed {
+        /// Which.
+        id: DeviceId,
+        /// The state it was to enter.
+        to: AlState,
+        /// The state it is in.
+        status: AlStatus,
+        /// What it was told.
+        command: Box<StartUpCommand>,
+        /// What it answered.
+        error: Box<StartUpError>,
+    },
+    /// A SubDevice has left the state in which it was, on its own.
+    AbnormalState {
+        /// Which.
+        id: DeviceId,
+        /// Where it was.
+        from: AlState,
+        /// Where it is.
+        status: AlStatus,
+        /// Why, when it reports an error.
+        code: AlStatusCode,
     },
     /// A SubDevice that the plan wants was not found on the line, or does not answer any more.
     DeviceLost {

@@ -27,3 +27,4 @@ pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};
 pub use options::Options;
 pub use statistics::Statistics;
+pub use supervisor::{BringUpTimes, DeviceTimes, Phase, StartUpError};

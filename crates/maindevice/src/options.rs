@@ -30,6 +30,13 @@ pub struct Options {
     pub mailbox_patience: Span,
     /// How long a SubDevice may take for a step between states.
     pub state_timeouts: StateTimeouts,
+    /// Whether a SubDevice that left its state on its own is brought back.
+    pub restore_states: bool,
+    /// Whether a SubDevice that was lost is brought up again when it answers.
+    pub reinitialise: bool,
+    /// No SubDevice goes beyond this state until [`MainDevice::release`](crate::MainDevice::release)
+    /// is called, as for an application that is not ready yet.
+    pub hold_at: Option<linesman_proto::state::AlState>,
     /// After a refused step: when it is tried again; the wait doubles up to the second value.
     pub retry_after: [Span; 2],
 }
@@ -51,6 +58,9 @@ impl Default for Options {
             mailbox_interval: Span::ms(50),
             mailbox_patience: Span::s(2),
             state_timeouts: StateTimeouts::DEFAULT,
+            restore_states: true,
+            reinitialise: true,
+            hold_at: None,
             retry_after: [Span::s(1), Span::s(16)],
         }
     }

@@ -23,6 +23,7 @@ use linesman_proto::topology::Tree;
 
 use crate::identity::RevisionRule;
 use crate::profile::{DeviceProfile, Mailbox};
+use crate::start_up::StartUpCommand;
 
 pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
@@ -48,6 +49,8 @@ pub struct PlannedDevice {
     pub profile: DeviceProfile,
     /// How far it is to be driven.
     pub target: AlState,
+    /// What it is told on its way, in order.
+    pub start_up: Vec<StartUpCommand>,
     /// What the user chose for it.
     pub settings: DeviceSettings,
 }
@@ -97,6 +100,8 @@ pub struct DevicePlan {
     pub device_emulation: bool,
     /// How far it is driven.
     pub target: AlState,
+    /// What it is told on its way, in order.
+    pub start_up: Vec<StartUpCommand>,
     /// Where its outputs lie in the process image, in bytes.
     pub outputs: Range<usize>,
     /// Where its inputs lie in the process image, in bytes.
@@ -127,6 +132,7 @@ impl DevicePlan {
             mailbox_state: None,
             device_emulation: false,
             target: AlState::Op,
+            start_up: Vec::new(),
             outputs: 0..0,
             inputs: 0..0,
             settings: DeviceSettings::default(),
@@ -148,6 +154,14 @@ impl Plan {
             inputs_len: 0,
             variables: Vec::new(),
         }
+    }
+
+    /// Whose clock all others follow: the one that was chosen, else the first with a clock that is used.
+    #[must_use]
+    pub fn reference_clock(&self) -> Option<DeviceId> {
+        let clocked = || self.devices.iter().filter(|device| device.settings.clock.is_some());
+        let chosen = |device: &&DevicePlan| device.settings.clock.is_some_and(|one| one.reference);
+        clocked().find(chosen).or_else(|| clocked().next()).map(|device| device.id)
     }
 
     /// The plan of a SubDevice; `None` for an identity that is not of this plan.

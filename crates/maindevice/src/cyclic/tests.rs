@@ -23,6 +23,7 @@ fn device() -> PlannedDevice {
         len: 1,
         control: SmControl::OUTPUTS,
         is_virtual: false,
+        bits: 0,
     };
     PlannedDevice {
         name: "both ways".to_owned(),
@@ -37,6 +38,7 @@ fn device() -> PlannedDevice {
             ..DeviceProfile::default()
         },
         target: AlState::Op,
+        start_up: Vec::new(),
         settings: DeviceSettings::default(),
     }
 }

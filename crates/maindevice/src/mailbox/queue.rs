@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 
 use linesman_proto::address::DeviceId;
-use linesman_proto::sii::MailboxPair;
 use linesman_proto::time::Instant;
 
 use super::errand::MailboxRequest;
@@ -88,8 +87,6 @@ struct Queue {
     jobs: VecDeque<Job>,
     waker: Option<Waker>,
     errors: ProtocolErrors,
-    /// Where its mailbox lies, if not where the plan says: in BOOT.
-    areas: Option<MailboxPair>,
 }
 
 /// The queues of all SubDevices with a mailbox. Clones mean the same queues.
@@ -137,18 +134,6 @@ impl Queues {
                 Err(failure) => queue.errors.failed(at, failure.clone()),
             }
         }
-    }
-
-    /// Notes where a mailbox lies now; `None`: where the plan says.
-    pub(crate) fn set_areas(&self, id: DeviceId, areas: Option<MailboxPair>) {
-        if let Some(queue) = lock(&self.queues).get_mut(&id) {
-            queue.areas = areas;
-        }
-    }
-
-    /// Where a mailbox lies, if not where the plan says.
-    pub(crate) fn areas(&self, id: DeviceId) -> Option<MailboxPair> {
-        lock(&self.queues).get(&id)?.areas
     }
 
     /// What went wrong in a mailbox; `None` for a SubDevice without one.

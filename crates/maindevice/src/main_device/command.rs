@@ -12,7 +12,7 @@ use super::{MainDevice, Running};
 use crate::cyclic::Cyclic;
 use crate::event::Event;
 use crate::exchange::Target;
-use crate::executor::{Handle, Wire};
+use crate::executor::{Handle, Wire, lock};
 use crate::mailbox::queue::Pending;
 use crate::mailbox::{MailboxRequest, ProtocolErrors, Queues};
 use crate::procedure::{look, scan, state};
@@ -67,7 +67,9 @@ impl MainDevice {
     pub fn start(&mut self, now: Instant, plan: Plan) {
         let wire = self.command();
         let plan = Arc::new(plan);
-        let line = Arc::new(Mutex::new(Line::new(&plan)));
+        let mut line = Line::new(&plan);
+        line.set_hold(self.options.hold_at);
+        let line = Arc::new(Mutex::new(line));
         let with_mailbox = plan.devices.iter().filter(|device| device.mailbox.is_some());
         let mailboxes = Queues::of(with_mailbox.map(|device| device.id));
         let context = Context {
@@ -84,6 +86,30 @@ impl MainDevice {
         let cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
         self.running = Some(Running { cyclic, plan, line, mailboxes });
         self.acyclic_left = self.options.frames_at_once;
+        self.handle_timeout(now);
+    }
+
+    /// Asks for a state of one SubDevice of the running plan, or of all; it is kept there from now on.
+    /// Ends in [`Event::TargetReached`], or in the event of the step that failed. False when no plan
+    /// runs, or it has no such SubDevice.
+    pub fn request_state(&mut self, now: Instant, id: Option<DeviceId>, state: AlState) -> bool {
+        let Some(running) = &self.running else { return false };
+        let mut line = lock(&running.line);
+        let asked = match id {
+            Some(id) => line.ask_for(id, state),
+            None => running.plan.devices.iter().all(|device| line.ask_for(device.id, state)),
+        };
+        drop(line);
+        self.handle_timeout(now);
+        asked
+    }
+
+    /// Lets SubDevices go beyond the state at which [`Options::hold_at`](crate::Options::hold_at)
+    /// holds them.
+    pub fn release(&mut self, now: Instant) {
+        if let Some(running) = &self.running {
+            lock(&running.line).set_hold(None);
+        }
         self.handle_timeout(now);
     }
 
@@ -219,13 +245,12 @@ impl MainDevice {
 
     fn servant(&self) -> Option<Servant> {
         let (wire, options) = (self.aside.clone(), Arc::clone(&self.options));
-        if let Some(Running { plan, mailboxes, .. }) = &self.running {
-            let (plan, mailboxes) = (Arc::clone(plan), mailboxes.clone());
-            return Some(Servant { wire, plan, mailboxes, attended: None, options });
+        if let Some(Running { plan, line, mailboxes, .. }) = &self.running {
+            let (plan, line, mailboxes) = (Arc::clone(plan), Arc::clone(line), mailboxes.clone());
+            return Some(Servant { wire, plan, line, mailboxes, driven: true, options });
         }
-        let attended = self.attended.clone()?;
-        let (plan, mailboxes) = (Arc::clone(&attended.plan), attended.mailboxes.clone());
-        Some(Servant { wire, plan, mailboxes, attended: Some(attended), options })
+        let Attended { plan, line, mailboxes } = self.attended.clone()?;
+        Some(Servant { wire, plan, line, mailboxes, driven: false, options })
     }
 
     /// Asks a running SubDevice through its mailbox. Without a plan that runs nobody has one.

@@ -20,7 +20,7 @@ use crate::mailbox::Queues;
 use crate::options::Options;
 use crate::service::Attended;
 use crate::statistics::Statistics;
-use crate::supervisor::Line;
+use crate::supervisor::{BringUpTimes, Line};
 
 pub use command::ProbeRequest;
 
@@ -115,7 +115,9 @@ impl MainDevice {
             return;
         }
         let mut room = MAX_LEN;
-        if let Some(running) = &self.running {
+        // Beside process data so many a cycle; before, as fast as they come back.
+        let settled = |running: &&Running| lock(&running.line).all_have_been_reached();
+        if let Some(running) = self.running.as_ref().filter(settled) {
             let Some(left) = self.acyclic_left.checked_sub(1) else { return };
             if let Some(next_at) = running.cyclic.poll_timeout() {
                 let until = next_at.since(now).as_nanos() / BYTE_NS;
@@ -310,6 +312,12 @@ impl MainDevice {
             let line = lock(&running.line);
             running.plan.devices.iter().all(|device| line.has_reached(device.id))
         })
+    }
+
+    /// What bringing up the running plan took so far; `None` unless one is running.
+    #[must_use]
+    pub fn bring_up_times(&self) -> Option<BringUpTimes> {
+        self.running.as_ref().and_then(|running| lock(&running.line).times().cloned())
     }
 
     /// The outputs of the process image; empty unless a plan is running. Asking for them counts as

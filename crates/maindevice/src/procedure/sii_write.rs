@@ -23,14 +23,14 @@ pub async fn write(
     at: WordAddress,
     data: &[u8],
 ) -> Result<u32, SiiAccessError> {
-    let session = Session::open(wire, target).await?;
-    let outcome = write_all(&session, at, data).await;
+    let mut session = Session::open(wire, target).await?;
+    let outcome = write_all(&mut session, at, data).await;
     session.close().await;
     outcome
 }
 
 async fn write_all(
-    session: &Session<'_>,
+    session: &mut Session<'_>,
     at: WordAddress,
     data: &[u8],
 ) -> Result<u32, SiiAccessError> {
@@ -54,15 +54,17 @@ async fn write_all(
 
 impl Session<'_> {
     /// Writes one word, and reads it back.
-    async fn write(&self, word: WordAddress, value: [u8; 2]) -> Result<(), SiiAccessError> {
+    async fn write(&mut self, word: WordAddress, value: [u8; 2]) -> Result<(), SiiAccessError> {
         let mut status = SiiControl::default();
         for attempt in 0..ATTEMPTS {
             if attempt > 0 {
                 self.wire.sleep(RETRY_AFTER).await;
             }
-            let before = self.idle(word).await?;
-            if SiiControl(before.word(0)).command_failed() {
-                self.command(SiiCommand::None, word).await?;
+            if !std::mem::take(&mut self.idle) {
+                let before = self.idle(word).await?;
+                if SiiControl(before.word(0)).command_failed() {
+                    self.command(SiiCommand::None, word).await?;
+                }
             }
             let target = self.target;
             self.wire

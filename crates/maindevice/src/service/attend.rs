@@ -4,13 +4,10 @@ use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::Plan;
 use linesman_proto::address::Network;
-use linesman_proto::state::{AlState, StateValue};
 
-use crate::exchange::Target;
-use crate::executor::{Wire, lock};
+use crate::executor::Wire;
 use crate::mailbox::{Queues, serve_mailbox};
 use crate::options::Options;
-use crate::procedure::state;
 use crate::supervisor::{Context, Line};
 
 /// SubDevices that are served, and left in their states.
@@ -42,20 +39,5 @@ impl Attended {
             wire.spawn(serve_mailbox(context.clone(), device.id));
         }
         attended
-    }
-
-    /// Looks in which state a SubDevice is: that opens or closes its mailbox.
-    pub(crate) async fn look(
-        &self,
-        wire: &Wire,
-        device: &linesman_config::plan::DevicePlan,
-    ) -> Option<AlState> {
-        let looked = state::read(wire, Target::Station(device.station)).await;
-        let found = match looked.map(|(status, _)| status.state()) {
-            Ok(StateValue::Known(found)) => Some(found),
-            Ok(StateValue::Unknown(_)) | Err(_) => None,
-        };
-        lock(&self.line).set_moving(device.id, found);
-        found
     }
 }

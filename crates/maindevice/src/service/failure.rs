@@ -33,16 +33,6 @@ pub enum ServiceFailure {
         /// Whose.
         id: DeviceId,
     },
-    /// A plan runs, and keeps every SubDevice in the state that it plans.
-    #[error(
-        "SubDevice {}: a plan runs and would take it back at once. Do: ask whoever runs the plan, or \
-         stop it first",
-        id.no()
-    )]
-    Driven {
-        /// Whose.
-        id: DeviceId,
-    },
     /// It has no mailbox for BOOT.
     #[error(
         "SubDevice {}: its SII names no mailbox for BOOT. Do: choose a SubDevice that can be updated",
@@ -97,7 +87,6 @@ impl ServiceFailure {
             Self::Mailbox(failure) => failure.why.is_refusal(),
             Self::State { error, .. } => matches!(error, StepError::Refused { .. }),
             Self::NeedsCycle { .. }
-            | Self::Driven { .. }
             | Self::NoBootstrap { .. }
             | Self::Sii { .. }
             | Self::Register { .. }

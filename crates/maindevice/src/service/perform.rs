@@ -1,26 +1,28 @@
 //! Doing a service.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::{DevicePlan, Plan};
 use linesman_proto::address::DeviceId;
 
-use super::attend::Attended;
 use super::failure::ServiceFailure;
 use super::{Service, ServiceAnswer, state};
 use crate::exchange::Target;
 use crate::executor::Wire;
 use crate::mailbox::Queues;
 use crate::procedure;
+use crate::supervisor::Line;
 
 /// Whoever does services.
 #[derive(Clone)]
 pub(crate) struct Servant {
     pub(crate) wire: Wire,
     pub(crate) plan: Arc<Plan>,
+    pub(crate) line: Arc<Mutex<Line>>,
     pub(crate) mailboxes: Queues,
-    /// The line is served, but not driven; `None` while a plan runs.
-    pub(crate) attended: Option<Attended>,
+    /// A plan runs: SubDevices are kept where they shall be, and what is known of them is known to
+    /// those who do so.
+    pub(crate) driven: bool,
     pub(crate) options: Arc<crate::options::Options>,
 }
 
@@ -36,9 +38,7 @@ pub(crate) async fn perform(
     let (wire, target) = (&servant.wire, Target::Station(device.station));
     match service {
         Service::Mailbox(request) => {
-            if let Some(attended) = &servant.attended {
-                attended.look(wire, device).await;
-            }
+            state::learn(servant, device).await;
             Ok(ServiceAnswer::Data(servant.mailboxes.ask(id, request).await?))
         }
         Service::State => state::look(servant, device).await,

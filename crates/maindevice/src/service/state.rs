@@ -1,17 +1,16 @@
-//! States of single SubDevices, on a line that nobody drives.
+//! States of single SubDevices: on a line that nobody drives step by step, else by asking whoever does.
 
 use linesman_config::plan::DevicePlan;
-use linesman_proto::sii::MailboxPair;
-use linesman_proto::sii::word::BOOTSTRAP_MAILBOX;
-use linesman_proto::state::transition::next_step;
+use linesman_proto::state::transition::{next_step, steps};
 use linesman_proto::state::{AlState, StateValue};
+use linesman_proto::time::Span;
 
 use super::ServiceAnswer;
 use super::failure::ServiceFailure;
 use super::perform::Servant;
 use crate::exchange::Target;
 use crate::executor::lock;
-use crate::procedure::{StepError, set_up, sii, state};
+use crate::procedure::{StepError, set_up, state};
 
 /// Looks at the state.
 pub(super) async fn look(
@@ -42,6 +41,16 @@ pub(super) async fn acknowledge(
     look(servant, device).await
 }
 
+/// Notes in which state a SubDevice of a line is that nobody drives: that opens or closes its mailbox.
+pub(super) async fn learn(servant: &Servant, device: &DevicePlan) {
+    if servant.driven {
+        return;
+    }
+    let looked = state::read(&servant.wire, Target::Station(device.station)).await;
+    let found = looked.ok().and_then(|(status, _)| status.state().state());
+    lock(&servant.line).set_moving(device.id, found);
+}
+
 /// Takes a SubDevice to a state.
 pub(super) async fn enter(
     servant: &Servant,
@@ -49,23 +58,22 @@ pub(super) async fn enter(
     to: AlState,
 ) -> Result<ServiceAnswer, ServiceFailure> {
     let id = device.id;
-    if servant.attended.is_none() {
-        return Err(ServiceFailure::Driven { id });
+    if to == AlState::Boot && device.mailbox.is_none_or(|mailbox| mailbox.bootstrap.is_none()) {
+        return Err(ServiceFailure::NoBootstrap { id });
+    }
+    if servant.driven {
+        return redirect(servant, device, to).await;
     }
     if to == AlState::Op && !device.outputs.is_empty() {
         return Err(ServiceFailure::NeedsCycle { id });
     }
     acknowledge(servant, device).await?;
     let failed = |error| ServiceFailure::State { id, to, error };
-    let (wire, target) = (&servant.wire, Target::Station(device.station));
-    let looked = state::read(wire, target).await;
+    let looked = state::read(&servant.wire, Target::Station(device.station)).await;
     let (status, _) = looked.map_err(|error| failed(StepError::from(error)))?;
-    let mut current = match status.state() {
-        StateValue::Known(current) => Some(current),
-        StateValue::Unknown(_) => None,
-    };
+    let mut current = status.state().state();
     loop {
-        moving(servant, device, current);
+        lock(&servant.line).set_moving(id, current);
         let next = match current {
             None => AlState::Init,
             Some(current) => match next_step(current, to) {
@@ -73,58 +81,76 @@ pub(super) async fn enter(
                 None => return look(servant, device).await,
             },
         };
-        match (current, next) {
-            (Some(AlState::Init), AlState::PreOp) => {
-                servant.mailboxes.set_areas(id, None);
-                set_up::before_pre_op(wire, device).await.map_err(|error| failed(error.into()))?;
-            }
-            (Some(AlState::Init), AlState::Boot) => before_boot(servant, device).await?,
-            (Some(AlState::PreOp), AlState::SafeOp) => {
-                set_up::before_safe_op(wire, device).await.map_err(|error| failed(error.into()))?;
-            }
-            _ => {}
+        let made = step(servant, device, current, next).await;
+        if made.is_err() {
+            learn(servant, device).await;
         }
-        let from = current.unwrap_or(AlState::Op);
-        let limit = servant.options.state_timeouts.of(from, next);
-        let step = state::Step { to: next, limit, emulated: device.device_emulation };
-        let stepped = state::request(wire, target, step).await;
-        if stepped.is_err()
-            && let Some(attended) = &servant.attended
-        {
-            attended.look(wire, device).await;
-        }
-        stepped.map_err(failed)?;
+        made.map_err(failed)?;
         current = Some(next);
     }
 }
 
-fn moving(servant: &Servant, device: &DevicePlan, state: Option<AlState>) {
-    if let Some(attended) = &servant.attended {
-        lock(&attended.line).set_moving(device.id, state);
+/// One step of a SubDevice that nobody drives.
+async fn step(
+    servant: &Servant,
+    device: &DevicePlan,
+    current: Option<AlState>,
+    next: AlState,
+) -> Result<(), StepError> {
+    let wire = &servant.wire;
+    match (current, next) {
+        (Some(AlState::Init), AlState::PreOp) => {
+            let areas = device.mailbox.map(|mailbox| mailbox.areas);
+            set_up::before_mailbox(wire, device, areas).await?;
+        }
+        (Some(AlState::Init), AlState::Boot) => {
+            let areas = device.mailbox.and_then(|mailbox| mailbox.bootstrap);
+            set_up::before_mailbox(wire, device, areas).await?;
+        }
+        (Some(AlState::PreOp), AlState::SafeOp) => set_up::before_safe_op(wire, device).await?,
+        _ => {}
     }
+    let limit = servant.options.state_timeouts.of(current.unwrap_or(AlState::Op), next);
+    let step = state::Step { to: next, limit, emulated: device.device_emulation };
+    state::request(wire, Target::Station(device.station), step).await
 }
 
-/// Before INIT to BOOT: the mailbox where the SII says it lies in BOOT (words 0x14 to 0x17).
-async fn before_boot(servant: &Servant, device: &DevicePlan) -> Result<(), ServiceFailure> {
+/// Between two looks at a SubDevice that others take to a state.
+const LOOK: Span = Span::ms(2);
+/// An error that stood before the request is not its outcome, unless it stays so long.
+const OLD_ERROR: Span = Span::ms(500);
+
+/// Asks whoever drives the line for another state of a SubDevice, and waits for it.
+async fn redirect(
+    servant: &Servant,
+    device: &DevicePlan,
+    to: AlState,
+) -> Result<ServiceAnswer, ServiceFailure> {
     let (wire, target, id) = (&servant.wire, Target::Station(device.station), device.id);
-    let words = sii::read_words(wire, target, BOOTSTRAP_MAILBOX, 4)
-        .await
-        .map_err(|error| ServiceFailure::Sii { id, error })?;
-    let word = |at: usize| {
-        let bytes = words.get(2 * at..2 * at + 2).and_then(|slice| slice.first_chunk());
-        u16::from_le_bytes(bytes.copied().unwrap_or_default())
-    };
-    let areas = MailboxPair::from_words([word(0), word(1), word(2), word(3)]);
-    let (Some(mailbox), true) = (device.mailbox, areas.receive.size > 0 && areas.send.size > 0)
-    else {
-        return Err(ServiceFailure::NoBootstrap { id });
-    };
-    let mut boots = device.clone();
-    boots.mailbox = Some(linesman_config::profile::Mailbox { areas, ..mailbox });
-    servant.mailboxes.set_areas(id, Some(areas));
-    set_up::before_pre_op(wire, &boots).await.map_err(|error| ServiceFailure::State {
-        id,
-        to: AlState::Boot,
-        error: error.into(),
-    })
+    let failed = |error| ServiceFailure::State { id, to, error };
+    let before = state::read(wire, target).await.map_err(|error| failed(error.into()))?;
+    if !lock(&servant.line).ask_for(id, to) {
+        return Err(ServiceFailure::Unknown { id });
+    }
+    let began = wire.now();
+    let from = before.0.state().state().unwrap_or(AlState::Init);
+    let limits = steps(from, to).chain([to]).zip(std::iter::once(from).chain(steps(from, to)));
+    let patience = limits
+        .fold(OLD_ERROR, |sum, (next, from)| sum + servant.options.state_timeouts.of(from, next));
+    loop {
+        wire.sleep(LOOK).await;
+        let looked = state::read(wire, target).await.map_err(|error| failed(error.into()))?;
+        let (status, code) = looked;
+        let is_there = status.state() == StateValue::Known(to) && !status.error();
+        if is_there && lock(&servant.line).has_reached(id) {
+            return Ok(ServiceAnswer::State { status, code });
+        }
+        let waited = wire.now().since(began);
+        if status.error() && (looked != before || waited >= OLD_ERROR) {
+            return Err(failed(StepError::Refused { to, status, code }));
+        }
+        if waited >= patience {
+            return Err(failed(StepError::TimedOut { to, status }));
+        }
+    }
 }

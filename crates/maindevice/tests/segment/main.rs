@@ -9,3 +9,4 @@ mod run;
 mod scan;
 mod soak;
 mod software;
+mod start_up;
