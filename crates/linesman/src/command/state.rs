@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let mut session = Session::open(&arguments.line)?;
     let chosen: Vec<DeviceId> = match &arguments.device {
         Some(word) => vec![session.device(word)?],
-        None => session.devices().collect(),
+        None => session.devices().iter().map(|known| known.id).collect(),
     };
     let outcome = act(&mut session, &chosen, arguments, output);
     for emergency in session.emergencies() {

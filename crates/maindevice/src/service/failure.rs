@@ -4,7 +4,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::state::AlState;
 
 use crate::exchange::ExchangeError;
-use crate::mailbox::MailboxFailure;
+use crate::mailbox::{MailboxFailure, Why};
 use crate::procedure::{SiiAccessError, StepError};
 
 /// A service that was not done.
@@ -79,18 +79,56 @@ fn advice(error: &StepError) -> String {
     }
 }
 
+/// Whose code a refusal carries.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum RefusalKind {
+    /// An SDO abort code.
+    SdoAbort,
+    /// The code of an FoE error message.
+    FoeError,
+    /// The code of a mailbox error reply.
+    MailboxError,
+    /// An AL status code.
+    AlStatus,
+}
+
+impl RefusalKind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::SdoAbort, Self::FoeError, Self::MailboxError, Self::AlStatus];
+
+    /// The word for programs.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SdoAbort => "sdo-abort",
+            Self::FoeError => "foe-error",
+            Self::MailboxError => "mailbox-error",
+            Self::AlStatus => "al-status",
+        }
+    }
+}
+
 impl ServiceFailure {
+    /// The SubDevice's own code, if it has said no itself.
+    #[must_use]
+    pub fn refusal(&self) -> Option<(RefusalKind, u32)> {
+        match self {
+            Self::Mailbox(failure) => match &failure.why {
+                Why::Aborted { code } => Some((RefusalKind::SdoAbort, code.value())),
+                Why::File { code, .. } => Some((RefusalKind::FoeError, code.0)),
+                Why::Mailbox { code } => Some((RefusalKind::MailboxError, code.code().into())),
+                _ => None,
+            },
+            Self::State { error: StepError::Refused { code, .. }, .. } => {
+                Some((RefusalKind::AlStatus, code.0.into()))
+            }
+            _ => None,
+        }
+    }
+
     /// Whether the SubDevice itself has said no.
     #[must_use]
-    pub const fn is_refusal(&self) -> bool {
-        match self {
-            Self::Mailbox(failure) => failure.why.is_refusal(),
-            Self::State { error, .. } => matches!(error, StepError::Refused { .. }),
-            Self::NeedsCycle { .. }
-            | Self::NoBootstrap { .. }
-            | Self::Sii { .. }
-            | Self::Register { .. }
-            | Self::Unknown { .. } => false,
-        }
+    pub fn is_refusal(&self) -> bool {
+        self.refusal().is_some()
     }
 }

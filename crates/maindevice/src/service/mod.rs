@@ -17,7 +17,7 @@ use linesman_proto::state::{AlState, AlStatusCode};
 use crate::mailbox::MailboxRequest;
 
 pub(crate) use attend::Attended;
-pub use failure::ServiceFailure;
+pub use failure::{RefusalKind, ServiceFailure};
 pub(crate) use perform::{Servant, perform};
 
 /// Tells services apart that are under way at once.

@@ -96,7 +96,7 @@ fn description(path: &Path) -> Result<Esi, Failure> {
 
 /// The texts of the SubDevice's own description: of its product, and of its revision if that is there.
 fn texts(esi: &Esi, session: &Session, id: DeviceId, output: &Output) -> Texts {
-    let Some(identity) = session.found(id).and_then(|found| found.identity) else {
+    let Some(identity) = session.known(id).and_then(|known| known.identity) else {
         return Vec::new();
     };
     let mut of_product: Vec<_> =

@@ -240,7 +240,9 @@ fn read(
         let data = match upload(dictionary.session, id, object, false) {
             Ok(data) => data,
             // Lists have gaps, and entries that can only be written.
-            Err(Trouble::Refused(refusal)) if last > 0 && refusal.abort_code().is_some() => {
+            Err(Trouble::Refused(refusal))
+                if wanted.subindex.is_none() && last > 0 && refusal.abort_code().is_some() =>
+            {
                 objects.push(ObjectReport::refused(object, entry, &refusal));
                 continue;
             }

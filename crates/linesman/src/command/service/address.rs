@@ -1,24 +1,19 @@
 //! Which SubDevice a word means: `3`, `0x1003`, `alias:7`, `EL3204`, `B3`.
 
-use linesman_config::inventory::Inventory;
 use linesman_proto::address::DeviceId;
 
+use super::known::Known;
 use crate::failure::Failure;
 
 /// The SubDevice that a word means.
-pub(super) fn find(
-    inventory: &Inventory,
-    names: &[String],
-    place: &str,
-    word: &str,
-) -> Result<DeviceId, Failure> {
-    let count = inventory.devices.len();
-    let is = |condition: &dyn Fn(usize) -> bool| -> Vec<DeviceId> {
-        (0..count).filter(|at| condition(*at)).map(|at| inventory.devices[at].id).collect()
+pub(super) fn find(devices: &[Known], place: &str, word: &str) -> Result<DeviceId, Failure> {
+    let count = devices.len();
+    let is = |condition: &dyn Fn(&Known) -> bool| -> Vec<DeviceId> {
+        devices.iter().filter(|known| condition(known)).map(|known| known.id).collect()
     };
-    let alias = |alias: u16| is(&|at| inventory.devices[at].alias.0 == alias && alias != 0);
+    let alias = |alias: u16| is(&|known| known.alias == alias && alias != 0);
     // A name is nobody else's; numbers and types come behind it.
-    let by_name = is(&|at| names.get(at).is_some_and(|name| name == word));
+    let by_name = is(&|known| known.name.as_deref() == Some(word));
     let found = if !by_name.is_empty() {
         by_name
     } else if let Some(number) = word.strip_prefix("alias:") {
@@ -27,12 +22,12 @@ pub(super) fn find(
     } else if let Some(hex) = word.strip_prefix("0x") {
         let wanted = u16::from_str_radix(hex, 16);
         let wanted = wanted.map_err(|_| no_number(word, "a station address"))?;
-        let station = is(&|at| inventory.devices[at].station.0 == wanted);
+        let station = is(&|known| known.station == wanted);
         if station.is_empty() { alias(wanted) } else { station }
     } else if word.bytes().all(|letter| letter.is_ascii_digit()) && !word.is_empty() {
-        is(&|at| inventory.devices[at].id.no().to_string() == word)
+        is(&|known| known.id.no().to_string() == word)
     } else {
-        is(&|at| inventory.devices[at].profile.type_name.eq_ignore_ascii_case(word))
+        is(&|known| known.type_name.eq_ignore_ascii_case(word))
     };
     match found[..] {
         [one] => Ok(one),

@@ -12,7 +12,8 @@ use linesman_proto::time::{Instant, Span};
 use linesman_runtime::drive::{Audience, Driver};
 use linesman_runtime::stop::Stop;
 
-use super::Line;
+use super::known::{self, Known};
+use super::{Line, NotDone};
 use crate::command::driven;
 use crate::failure::Failure;
 
@@ -30,7 +31,7 @@ pub(super) struct Cards {
 }
 
 /// Opens and scans the line.
-pub(super) fn open(names: &[String]) -> Result<(Cards, Inventory), Failure> {
+pub(super) fn open(names: &[String]) -> Result<(Cards, Vec<Known>), Failure> {
     driven::refuse(names)?;
     let stop = driven::stop()?;
     let driver = Driver::open(names, HostClock::start())?;
@@ -46,7 +47,7 @@ pub(super) fn open(names: &[String]) -> Result<(Cards, Inventory), Failure> {
         None => return Err(cards.interrupted()),
     };
     cards.asking.order = Some(Order::Attend(Box::new(super::plan(&inventory))));
-    Ok((cards, inventory))
+    Ok((cards, known::all(&inventory, &[])))
 }
 
 impl Cards {
@@ -68,10 +69,11 @@ impl Line for Cards {
         &mut self,
         id: DeviceId,
         service: Service,
-    ) -> Result<Result<ServiceAnswer, ServiceFailure>, Failure> {
+    ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
         self.asking.service = Some((id, service));
         self.run(SERVICE_PATIENCE)?;
-        self.asking.served.take().ok_or_else(|| self.interrupted())
+        let served = self.asking.served.take().ok_or_else(|| self.interrupted())?;
+        Ok(served.map_err(|failure| NotDone::from(&failure)))
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {

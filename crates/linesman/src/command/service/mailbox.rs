@@ -35,7 +35,7 @@ impl Session {
         output: &Output,
     ) -> Result<Opened, Trouble> {
         let label = self.label(id);
-        if self.found(id).is_none_or(|found| found.profile.mailbox.is_none()) {
+        if self.known(id).is_none_or(|known| !known.mailbox) {
             let reason = format!("{label} has no mailbox: it has no objects and no files");
             let advice = "choose a SubDevice that has one; `linesman scan -v` lists them";
             return Err(Failure::new(reason, advice).into());
@@ -75,8 +75,9 @@ impl Session {
         let was = status.state().state().unwrap_or(AlState::Init);
         // OP needs outputs, which nobody sends here.
         let back_to = if was == AlState::Op { AlState::SafeOp } else { was };
+        let way = if back_to == AlState::Init { "back" } else { "through INIT" };
         output.warn(&format!(
-            "{label} is taken from {status} to BOOT for this, then through INIT to {back_to}"
+            "{label} is taken from {status} to BOOT for this, then {way} to {back_to}"
         ));
         self.ask(id, Service::Enter(AlState::Boot))?;
         Ok(Opened { id, back_to: Some(back_to) })
@@ -98,8 +99,9 @@ impl Session {
             (Ok(done), Ok(_)) => Ok(done),
             (Ok(_), Err(trouble)) => Err(trouble),
             (Err(trouble), Ok(_)) => Err(trouble),
-            (Err(trouble), Err(_)) => {
-                output.warn(&format!("{} did not go back to {back_to}", self.label(opened.id)));
+            (Err(trouble), Err(stays)) => {
+                let (why, label) = (stays.reason(), self.label(opened.id));
+                output.warn(&format!("{label} did not go back to {back_to}: {why}"));
                 Err(trouble)
             }
         }

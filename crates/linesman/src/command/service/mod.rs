@@ -2,13 +2,14 @@
 
 mod address;
 mod cards;
+mod known;
 mod mailbox;
 mod refusal;
 mod segment;
 
 use linesman_config::inventory::{FoundDevice, Inventory};
 use linesman_config::plan::{DevicePlan, Plan, PlanOptions};
-use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure};
+use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer, ServiceFailure};
 use linesman_proto::address::DeviceId;
 use linesman_proto::state::AlState;
 use linesman_runtime::selector::Selector;
@@ -18,6 +19,7 @@ use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::Output;
 
+pub(crate) use known::Known;
 pub(crate) use refusal::{Refusal, Report as RefusalReport};
 
 /// Where the line is, and whom the service is for.
@@ -38,20 +40,41 @@ pub(crate) trait Line {
         &mut self,
         id: DeviceId,
         service: Service,
-    ) -> Result<Result<ServiceAnswer, ServiceFailure>, Failure>;
+    ) -> Result<Result<ServiceAnswer, NotDone>, Failure>;
     /// Emergencies that SubDevices sent meanwhile, in words.
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)>;
 }
 
-/// A line that was scanned and is served.
+/// A service that was not done.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct NotDone {
+    /// Why, with what to do.
+    told: Failure,
+    /// The SubDevice's own code, if it has said no itself.
+    refusal: Option<(RefusalKind, u32)>,
+}
+
+impl From<&ServiceFailure> for NotDone {
+    fn from(failure: &ServiceFailure) -> Self {
+        Self { told: Failure::from_error(failure), refusal: failure.refusal() }
+    }
+}
+
+/// A line that is served.
 pub(crate) struct Session {
     line: Box<dyn Line>,
-    inventory: Inventory,
-    /// What people call the SubDevices, by index; empty without a project.
-    names: Vec<String>,
+    devices: Vec<Known>,
     place: String,
+    kind: Kind,
+}
+
+/// What becomes of a line when the command ends.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    /// It stays as it is.
+    Cards,
     /// A virtual segment of a file begins anew with each command.
-    passing: bool,
+    Passing,
 }
 
 /// A SubDevice in a report.
@@ -77,6 +100,16 @@ pub(crate) enum Trouble {
     Failed(Failure),
 }
 
+impl Trouble {
+    /// Why, in words.
+    pub(crate) fn reason(&self) -> &str {
+        match self {
+            Self::Refused(refusal) => &refusal.failure.reason,
+            Self::Failed(failure) => &failure.reason,
+        }
+    }
+}
+
 impl From<Failure> for Trouble {
     fn from(failure: Failure) -> Self {
         Self::Failed(failure)
@@ -87,75 +120,67 @@ impl Session {
     /// Scans the line and begins to serve it.
     pub(crate) fn open(place: &str) -> Result<Self, Failure> {
         let selector: Selector = place.parse()?;
-        let (line, inventory, names, passing): (Box<dyn Line>, _, _, _) = match &selector {
+        let (line, devices, kind): (Box<dyn Line>, _, _) = match &selector {
             Selector::Cards(names) => {
-                let (line, inventory) = cards::open(names)?;
-                (Box::new(line), inventory, Vec::new(), false)
+                let (line, devices) = cards::open(names)?;
+                (Box::new(line), devices, Kind::Cards)
             }
             Selector::Segment(path) => {
-                let (line, inventory, names) = segment::open(path)?;
-                (Box::new(line), inventory, names, true)
+                let (line, devices) = segment::open(path)?;
+                (Box::new(line), devices, Kind::Passing)
             }
-            _ => {
+            Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
                 let reason =
                     format!("`{selector}`: a service sends frames, and nobody answers there");
                 return Err(Failure::new(reason, "name a network card, or sim:plant.toml"));
             }
         };
-        Ok(Self { line, inventory, names, place: place.to_owned(), passing })
+        Ok(Self { line, devices, place: place.to_owned(), kind })
     }
 
     /// Whether what is written is gone when the command ends.
     pub(crate) fn is_passing(&self) -> bool {
-        self.passing
+        self.kind == Kind::Passing
     }
 
     /// All SubDevices.
-    pub(crate) fn devices(&self) -> impl Iterator<Item = DeviceId> + use<> {
-        (0..self.inventory.devices.len() as u32).map(DeviceId)
+    pub(crate) fn devices(&self) -> &[Known] {
+        &self.devices
     }
 
     /// The SubDevice that a word means.
     pub(crate) fn device(&self, word: &str) -> Result<DeviceId, Failure> {
-        address::find(&self.inventory, &self.names, &self.place, word)
+        address::find(&self.devices, &self.place, word)
     }
 
-    /// A SubDevice as it was found.
-    pub(crate) fn found(&self, id: DeviceId) -> Option<&FoundDevice> {
-        self.inventory.devices.get(id.index())
+    /// What is known of a SubDevice.
+    pub(crate) fn known(&self, id: DeviceId) -> Option<&Known> {
+        self.devices.iter().find(|known| known.id == id)
     }
 
     /// `3 (EL3204)`, or `3 (B3)` where it has a name.
     pub(crate) fn label(&self, id: DeviceId) -> String {
-        match self.names.get(id.index()) {
-            Some(name) => format!("{} ({name})", id.no()),
-            None => self.found(id).map_or_else(|| id.no().to_string(), FoundDevice::label),
-        }
+        self.known(id).map_or_else(|| id.no().to_string(), Known::label)
     }
 
     /// A SubDevice for a report.
     pub(crate) fn report(&self, id: DeviceId) -> DeviceReport {
-        let found = self.found(id);
-        DeviceReport {
-            no: id.no(),
-            station: found.map_or(0, |found| found.station.0),
-            name: self.names.get(id.index()).cloned(),
-            r#type: found.map(|found| found.profile.type_name.clone()).unwrap_or_default(),
-        }
+        let nobody = || DeviceReport { no: id.no(), station: 0, name: None, r#type: String::new() };
+        self.known(id).map_or_else(nobody, Known::report)
     }
 
     /// Does one service.
     pub(crate) fn ask(&mut self, id: DeviceId, service: Service) -> Result<ServiceAnswer, Trouble> {
         match self.line.ask(id, service)? {
             Ok(answer) => Ok(answer),
-            Err(failure) if failure.is_refusal() => {
-                let device = self.report(id);
-                Err(Trouble::Refused(Box::new(Refusal::new(device, &self.label(id), &failure))))
+            Err(NotDone { told, refusal: Some(refusal) }) => {
+                let (device, label) = (self.report(id), self.label(id));
+                Err(Trouble::Refused(Box::new(Refusal::new(device, &label, refusal, told))))
             }
-            Err(failure) => {
-                let mut failure = Failure::from_error(&failure);
-                failure.reason = format!("{}: {}", self.place, self.named(id, &failure.reason));
-                Err(Trouble::Failed(failure))
+            Err(NotDone { told, refusal: None }) => {
+                let reason = refusal::named(id, &self.label(id), &told.reason);
+                let reason = format!("{}: {reason}", self.place);
+                Err(Trouble::Failed(Failure { reason, ..told }))
             }
         }
     }
@@ -174,11 +199,6 @@ impl Session {
     pub(crate) fn emergencies(&mut self) -> Vec<String> {
         let all = self.line.take_emergencies();
         all.into_iter().map(|(id, text)| format!("{}: {text}", self.label(id))).collect()
-    }
-
-    /// A text of the MainDevice, with the SubDevice as people call it.
-    fn named(&self, id: DeviceId, text: &str) -> String {
-        refusal::named(id, &self.label(id), text)
     }
 }
 

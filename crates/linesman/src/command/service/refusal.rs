@@ -1,8 +1,6 @@
 //! A SubDevice said no: told like a failure, and with `--json` as an object of its own.
 
-use linesman_maindevice::mailbox::Why;
-use linesman_maindevice::procedure::StepError;
-use linesman_maindevice::service::ServiceFailure;
+use linesman_maindevice::service::RefusalKind;
 use linesman_proto::address::DeviceId;
 use serde::Serialize;
 
@@ -40,9 +38,12 @@ pub(crate) struct Report {
 }
 
 impl Refusal {
-    pub(super) fn new(device: DeviceReport, label: &str, failure: &ServiceFailure) -> Self {
-        let (kind, code) = code(failure);
-        let mut told = Failure::from_error(failure);
+    pub(super) fn new(
+        device: DeviceReport,
+        label: &str,
+        (kind, code): (RefusalKind, u32),
+        mut told: Failure,
+    ) -> Self {
         if let Some(id) = DeviceId::from_no(device.no) {
             told.reason = named(id, label, &told.reason);
         }
@@ -51,7 +52,7 @@ impl Refusal {
             schema: "linesman.refusal/1".to_owned(),
             tool: version::tool(),
             device,
-            kind: kind.to_owned(),
+            kind: kind.name().to_owned(),
             code,
             reason: told.reason.clone(),
             next_step,
@@ -61,26 +62,8 @@ impl Refusal {
 
     /// The code, if it is an SDO abort.
     pub(crate) fn abort_code(&self) -> Option<u32> {
-        (self.report.kind == "sdo-abort").then_some(self.report.code)
+        (self.report.kind == RefusalKind::SdoAbort.name()).then_some(self.report.code)
     }
-}
-
-fn code(failure: &ServiceFailure) -> (&'static str, u32) {
-    if let ServiceFailure::Mailbox(failure) = failure {
-        if let Why::Aborted { code } = &failure.why {
-            return ("sdo-abort", code.value());
-        }
-        if let Why::File { code, .. } = &failure.why {
-            return ("foe-error", code.0);
-        }
-        if let Why::Mailbox { code } = &failure.why {
-            return ("mailbox-error", u32::from(code.code()));
-        }
-    }
-    if let ServiceFailure::State { error: StepError::Refused { code, .. }, .. } = failure {
-        return ("al-status", u32::from(code.0));
-    }
-    ("other", 0)
 }
 
 /// A text of the MainDevice, which calls a SubDevice by its number, with the name that people use.

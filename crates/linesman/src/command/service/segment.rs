@@ -6,11 +6,12 @@ use linesman_config::inventory::Inventory;
 use linesman_lab::lab::Lab;
 use linesman_lab::options::{Begin, LabOptions};
 use linesman_maindevice::Event;
-use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure};
+use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
 
-use super::Line;
+use super::known::{self, Known};
+use super::{Line, NotDone};
 use crate::command::driven;
 use crate::failure::Failure;
 use crate::files;
@@ -31,8 +32,8 @@ pub(super) struct Virtual {
     told: usize,
 }
 
-/// Builds and scans the segment; gives the names of its SubDevices too.
-pub(super) fn open(path: &Path) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
+/// Builds and scans the segment.
+pub(super) fn open(path: &Path) -> Result<(Virtual, Vec<Known>), Failure> {
     let file = files::segment_file(path)?;
     let options = LabOptions { begin: Begin::Idle, ..LabOptions::default() };
     let lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
@@ -52,7 +53,7 @@ pub(super) fn open(path: &Path) -> Result<(Virtual, Inventory, Vec<String>), Fai
     let now = segment.lab.now();
     segment.lab.main_mut().attend(now, super::plan(&inventory));
     let names = names(&segment.lab, &inventory);
-    Ok((segment, inventory, names))
+    Ok((segment, known::all(&inventory, &names)))
 }
 
 /// The names of the file, if the line is as the file says: else they would be those of others.
@@ -99,14 +100,14 @@ impl Line for Virtual {
         &mut self,
         id: DeviceId,
         service: Service,
-    ) -> Result<Result<ServiceAnswer, ServiceFailure>, Failure> {
+    ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
         let now = self.lab.now();
         let wanted = self.lab.main_mut().serve(now, id, service);
         self.until(SERVICE_PATIENCE, |event| {
             if let Event::Served { ticket, result, .. } = event
                 && *ticket == wanted
             {
-                Some((**result).clone())
+                Some((**result).clone().map_err(|failure| NotDone::from(&failure)))
             } else {
                 None
             }

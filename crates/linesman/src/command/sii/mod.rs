@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
+use linesman_proto::register;
 use linesman_proto::sii::word::{CHECKSUM, STATION_ALIAS};
 use linesman_proto::sii::{Image, WordAddress, checksum};
 
@@ -220,7 +221,7 @@ fn fits(session: &Session, id: DeviceId, file: &Path, image: &[u8]) -> Result<()
     if let linesman_proto::sii::Checksum::Wrong(_) = parsed.checksum {
         return Err(wrong("the checksum of its first words is wrong".to_owned()));
     }
-    let found = session.found(id).and_then(|found| found.identity);
+    let found = session.known(id).and_then(|known| known.identity);
     let Some(found) = found else { return Ok(()) };
     let (theirs, ours) = (
         (parsed.identity.vendor_id, parsed.identity.product_code),
@@ -255,7 +256,8 @@ fn verify(
 
 fn tell_alias(session: &mut Session, id: DeviceId) -> Result<Report, Trouble> {
     let bytes = session.bytes(id, Service::ReadSii { whole: false })?;
-    let in_use = session.found(id).map(|found| found.alias.0);
+    let at = Service::ReadRegister { address: register::STATION_ALIAS.address, len: 2 };
+    let in_use = session.bytes(id, at)?.first_chunk().map(|word| u16::from_le_bytes(*word));
     Ok(Report::alias(session.report(id), &bytes, in_use))
 }
 
@@ -267,13 +269,9 @@ fn set_alias(
     backup: Option<&Path>,
     output: &Output,
 ) -> Result<Report, Trouble> {
-    let others: Vec<DeviceId> = session
-        .devices()
-        .filter(|other| *other != id && alias != 0)
-        .filter(|other| session.found(*other).is_some_and(|found| found.alias.0 == alias))
-        .collect();
-    if let Some(other) = others.first() {
-        let reason = format!("alias {alias} is that of {} already", session.label(*other));
+    let mut others = session.devices().iter().filter(|other| other.id != id && alias != 0);
+    if let Some(other) = others.find(|other| other.alias == alias) {
+        let reason = format!("alias {alias} is that of {} already", other.label());
         return Err(Failure::new(reason, "choose another; `linesman scan` tells them").into());
     }
     let (there, backup) = back_up(session, id, 0, backup)?;

@@ -160,7 +160,7 @@ impl Report {
             "{label}: EEPROM of {}, {} {}",
             bytes_text(self.size),
             bytes_text(self.len),
-            if self.words_written.is_some() { "compared" } else { "read" }
+            if self.action == "write" { "compared" } else { "read" }
         )];
         if let Some(words) = self.words_written {
             lines.push(match words {
