@@ -18,6 +18,8 @@ use linesman_proto::mailbox::foe::FoeErrorCode;
 use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
+use proptest::collection::vec;
+use proptest::prelude::*;
 
 use super::*;
 use crate::event::Event;
@@ -37,7 +39,7 @@ const COE: u8 = 3;
 const FOE: u8 = 4;
 
 /// A message of the SubDevice.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 enum Said {
     /// What is behind the mailbox header.
     Body(Vec<u8>),
@@ -454,4 +456,45 @@ fn files_that_are_refused_say_why() {
     let request = MailboxRequest::ReadFile { name, password: 0 };
     let failure = run(&mut Scripted::of_files(&[]), request).0.unwrap_err();
     assert!(matches!(failure.why, Why::TooSmall(_)), "{failure}");
+}
+
+/// Something that may come: mostly with a header that can be read.
+fn anything() -> impl Strategy<Value = (u8, Said)> {
+    let raw = vec(any::<u8>(), 32).prop_map(|bytes| (COE, Said::Raw(bytes)));
+    let coe = (vec(prop::sample::select(vec![0x10, 0x20, 0x30, 0x80]), 1), vec(any::<u8>(), 0..25))
+        .prop_map(|(service, rest)| (COE, Said::Body([&[0], &service[..], &rest].concat())));
+    // A response about the object that is asked for.
+    let about = (prop::sample::select(vec![0x41, 0x43, 0x4F, 0x60, 0x00, 0x01, 0x11, 0x20, 0x80]))
+        .prop_flat_map(|command| {
+            vec(any::<u8>(), 0..20).prop_map(move |rest| {
+                let head = [0x00, 0x30, command, 0x00, 0x20, 1];
+                (COE, Said::Body([&head[..], &rest].concat()))
+            })
+        });
+    let foe = (1_u8..8, 0_u8..4, vec(any::<u8>(), 0..20)).prop_map(|(opcode, number, rest)| {
+        (FOE, Said::Body([&[opcode, 0, number, 0, 0, 0][..], &rest].concat()))
+    });
+    let error = vec(any::<u8>(), 0..6).prop_map(|body| (0, Said::Body(body)));
+    prop_oneof![raw, coe, about, foe, error]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+    #[test]
+    fn whatever_comes_an_errand_ends(said in vec(anything(), 0..10), which in 0..6_usize) {
+        let object = ObjectAddress::new(0x2000, 1);
+        let name = "file".to_owned();
+        let request = match which {
+            0 => MailboxRequest::Upload { object, complete: false },
+            1 => MailboxRequest::Download { object, complete: true, data: vec![7; 60] },
+            2 => MailboxRequest::ObjectList { list: ListKind::All },
+            3 => MailboxRequest::DescribeEntry { object, values: Default::default() },
+            4 => MailboxRequest::ReadFile { name, password: 0 },
+            _ => MailboxRequest::WriteFile { name, password: 0, data: vec![7; 60] },
+        };
+        let (outcome, _) = run(&mut Scripted::with(said), request);
+        if let Err(failure) = outcome {
+            prop_assert!(failure.to_string().starts_with("SubDevice 5, "));
+        }
+    }
 }
