@@ -10,6 +10,7 @@ pub mod dictionary;
 pub mod eeprom;
 pub mod error;
 pub mod find;
+pub mod header;
 pub mod image;
 pub mod mailbox;
 pub mod module;

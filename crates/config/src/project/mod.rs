@@ -17,6 +17,7 @@
 mod choice;
 mod description;
 mod device;
+mod from_esi;
 mod resolve;
 
 use std::collections::BTreeMap;
@@ -36,7 +37,7 @@ pub use description::{
     DescribedEntry, DescribedMailbox, DescribedPdo, DescribedSyncManager, Description, FmmuWord, Way,
 };
 pub use device::ProjectDevice;
-pub use resolve::{Described, ResolveError, Resolved};
+pub use resolve::{Described, Lookup, ResolveError, Resolved};
 
 /// A project.
 #[derive(Clone, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
