@@ -66,9 +66,9 @@ mod tests {
 
     #[test]
     fn devices_are_found_without_reading_the_file() {
-        let text = br#"<EtherCATInfo><Vendor><Id>#x2</Id></Vendor><Descriptions><Devices>
+        let text = br##"<EtherCATInfo><Vendor><Id>#x2</Id></Vendor><Descriptions><Devices>
             <Device><Type ProductCode="#x07d43052" RevisionNo='18'>EL2004</Type><HideType RevisionNo="1"/>
-            <Dictionary><Type Any="1">UINT</Type></Dictionary></Device></Devices></Descriptions>"#;
+            <Dictionary><Type Any="1">UINT</Type></Dictionary></Device></Devices></Descriptions>"##;
         let expected = EsiHeader {
             vendor_id: 2,
             type_name: "EL2004".to_owned(),

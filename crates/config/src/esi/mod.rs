@@ -16,6 +16,7 @@ pub mod mailbox;
 pub mod module;
 pub mod pdo;
 pub mod sync_manager;
+pub mod write;
 
 pub(crate) mod encoding;
 pub(crate) mod value;

@@ -4,7 +4,6 @@
 use std::collections::BTreeMap;
 
 use linesman_config::attachment::Attachment;
-use linesman_config::identity::RevisionRule;
 use linesman_config::project::{Project, ProjectDevice, ProjectError, Ring};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::sii::Image;

@@ -7,7 +7,7 @@ use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::register::FmmuConfig;
 use linesman_proto::sii::Direction;
 
-use super::xml::Xml;
+use crate::xml_writer::Xml;
 use crate::eni::OWN;
 use crate::eni::slave::fmmus_of;
 use crate::plan::{DatagramPlan, DevicePlan, IoAt, PathView, Plan, Presence, Role, expect};

@@ -3,7 +3,7 @@
 use linesman_proto::command::Command;
 
 use super::transition::{Init, Target, command};
-use super::xml::Xml;
+use crate::xml_writer::Xml;
 use crate::plan::Plan;
 use crate::plan::layout::MAILBOX_STATES;
 

@@ -8,10 +8,9 @@ mod cyclic;
 mod main_device;
 mod slave;
 mod transition;
-mod xml;
 
 use self::cyclic::Image;
-use self::xml::Xml;
+use crate::xml_writer::Xml;
 use crate::plan::Plan;
 
 /// The file of a plan.

@@ -10,7 +10,7 @@ use linesman_proto::topology::End;
 
 use super::cyclic::Image;
 use super::transition::{Init, Target, command};
-use super::xml::{Xml, hex};
+use crate::xml_writer::{Xml, hex};
 use crate::eni::OWN;
 use crate::esi::device::letters;
 use crate::identity::RevisionRule;
