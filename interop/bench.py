@@ -1,12 +1,15 @@
-"""Two network namespaces with a virtual cable between them, for one run.
+"""Two network namespaces with a virtual cable between them, for one check.
 
 `near` holds the MainDevice's end, veth0; `far` the segment's, veth1. Names of namespaces carry the
-process number, so that runs side by side do not meet; they are removed at the end whatever happens.
+process number and that of the bench, so that checks side by side do not meet; they are removed at the
+end whatever happens.
 """
 
+import itertools
 import json
 import os
 import pathlib
+import queue
 import socket
 import subprocess
 import sys
@@ -20,12 +23,15 @@ NEAR, FAR = "veth0", "veth1"
 NEAR_B, FAR_B = "veth2", "veth3"
 
 
+NUMBERS = itertools.count(1)
+
+
 class Bench:
     """The namespaces; use it in `with`."""
 
     def __enter__(self):
-        self.near = f"linesman-near-{os.getpid()}"
-        self.far = f"linesman-far-{os.getpid()}"
+        number = f"{os.getpid()}-{next(NUMBERS)}"
+        self.near, self.far = f"linesman-near-{number}", f"linesman-far-{number}"
         self.running = []
         self.folder = tempfile.TemporaryDirectory(prefix="linesman-interop-")
         self.work = pathlib.Path(self.folder.name)
@@ -82,14 +88,22 @@ class Bench:
         self.running.remove(process)
         return process.returncode, out, err
 
+    def telling(self, *command):
+        """A command on the near end that tells, line by line, what it does; use it in `with`."""
+        return Telling(self, command)
+
     def python(self, namespace, script, *arguments, seconds=60):
         return self.run(namespace, sys.executable, HERE / script, *arguments, seconds=seconds)
 
+    def packets(self, interface, directions=("rx", "tx")):
+        """Frames that were received and sent at an interface on the MainDevice's end so far."""
+        files = [f"/sys/class/net/{interface}/statistics/{one}_packets" for one in directions]
+        _, out, _ = self.run(self.near, "cat", *files)
+        return sum(map(int, out.split()))
+
     def sent_near(self):
         """Frames that any program has sent on the MainDevice's end so far."""
-        path = f"/sys/class/net/{NEAR}/statistics/tx_packets"
-        _, out, _ = self.run(self.near, "cat", path)
-        return int(out)
+        return self.packets(NEAR, ["tx"])
 
 
 class Segment:
@@ -139,6 +153,59 @@ class Segment:
             self.bench.running.remove(self.process)
 
 
+class Telling:
+    """A process that prints an object of JSON whenever it has something to tell."""
+
+    def __init__(self, bench, command):
+        self.bench, self.command = bench, command
+
+    def __enter__(self):
+        self.process = self.bench.start(self.bench.near, *self.command)
+        self.lines = queue.Queue()
+        self.thread = threading.Thread(target=self.read)
+        self.thread.start()
+        return self
+
+    def read(self):
+        for line in self.process.stdout:
+            # Some stacks print words of their own.
+            if line.startswith("{"):
+                self.lines.put(json.loads(line))
+        self.lines.put(None)
+
+    def next(self, seconds):
+        """The next object it tells."""
+        try:
+            told = self.lines.get(timeout=seconds)
+        except queue.Empty:
+            raise AssertionError(f"nothing was told in {seconds} s") from None
+        assert told is not None, f"it ended: {self.process.stderr.read()[-600:]}"
+        return told
+
+    def until(self, wanted, seconds):
+        """Waits until it tells this; gives what it told before."""
+        end_at, before = time.monotonic() + seconds, []
+        while True:
+            try:
+                told = self.next(max(0.01, end_at - time.monotonic()))
+            except AssertionError as error:
+                raise AssertionError(f"{error}; waited for {wanted} after {before[-5:]}") from None
+            if told == wanted:
+                return before
+            before.append(told)
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.send_signal(2)
+            try:
+                self.process.wait(5)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+        self.thread.join()
+        self.process.communicate()
+        self.bench.running.remove(self.process)
+
+
 class Watch:
     """Looks at the outputs of a segment again and again while others write them; use it in `with`."""
 
@@ -178,23 +245,34 @@ class Capture:
         for interface in (NEAR, NEAR_B):
             file = self.bench.path(f"{interface}.pcap")
             process = self.bench.start(
-                self.bench.near, "tcpdump", "-i", interface, "-B", 16384, "-Z", "root", "-w", file, "ether proto 0x88a4",
+                self.bench.near, "tcpdump", "-i", interface, "-B", 16384, "-U", "--immediate-mode", "-Z", "root", "-w", file,
+                "ether proto 0x88a4",
             )
             # It says so once it listens.
             while (line := process.stderr.readline()) and "listening on" not in line:
                 pass
             self.files.append(file)
             self.processes.append(process)
+        self.before = self.crossed()
         return self
 
+    def crossed(self):
+        """Packets that crossed both cables so far."""
+        return sum(self.bench.packets(interface) for interface in (NEAR, NEAR_B))
+
     def __exit__(self, *_):
-        time.sleep(0.1)
+        self.passed = self.crossed() - self.before
+        # It may be behind: it has all once its files grow no more.
+        size, end_at = -1, time.monotonic() + 10
+        while (now := sum(file.stat().st_size for file in self.files)) != size and time.monotonic() < end_at:
+            size = now
+            time.sleep(0.2)
         for process in self.processes:
             end(process)
             self.bench.running.remove(process)
 
     def malformed(self):
-        """How many packets were kept, and which of them tshark cannot read."""
+        """How many packets were kept, how many crossed, and which of them tshark cannot read."""
         count, bad = 0, []
         for file in self.files:
             command = ["tshark", "-r", file, "-T", "fields", "-e", "frame.number", "-e", "_ws.malformed"]
@@ -206,7 +284,7 @@ class Capture:
                 if mark.strip():
                     bad.append(f"{file.name} packet {number}")
             file.unlink()
-        return count, bad
+        return count, self.passed, bad
 
 
 def end(process):

@@ -1,9 +1,7 @@
 """Mailbox and SII services, seen by foreign MainDevices; the alias is written, and used after a power cycle."""
 
-import time
-
 from bench import NEAR, Segment
-from harness import CRAB, LINE, LINESMAN, SOEM, check
+from harness import CRAB, LINE, LINESMAN, SOEM, check, until_present
 
 # The analogue terminal of the line; its SII begins with its configuration and ends the first 16 bytes with a checksum.
 TERMINAL, ALIAS = "A1", 0x2A
@@ -44,20 +42,8 @@ def with_power_cycle(line, ask):
         status, out, _ = line.python(line.near, "probe.py", NEAR, "alias", ALIAS)
         assert status == 0 and int(out) == 0, f"the alias is in force before the power cycle: {out!r}"
         segment.ask(do="inject", fault={"kind": "brown-out", "device": TERMINAL})
-        present = 0
-        for _ in range(100):
-            time.sleep(0.05)
-            _, out, _ = line.python(line.near, "probe.py", NEAR)
-            present = int(out or 0)
-            if present == len(LINE):
-                break
-        assert present == len(LINE), f"{present} answer after the power cycle"
-        # A controller passes frames on before it has loaded its SII, which comes about 170 ms after the supply.
-        for _ in range(20):
-            status, out, _ = line.python(line.near, "probe.py", NEAR, "alias", ALIAS)
-            if status == 0 and int(out) == 1:
-                break
-            time.sleep(0.05)
+        until_present(line, len(LINE))
+        status, out, _ = line.python(line.near, "probe.py", NEAR, "alias", ALIAS)
         assert status == 0 and int(out) == 1, f"nobody answers to the alias: {out!r}"
         second = ask()
         assert second["sii"][:16] == first["sii"][:16], "the SII changed where it was not written"

@@ -4,6 +4,7 @@ import importlib.util
 import json
 import os
 import sys
+import time
 
 from bench import HERE, NEAR, Segment, Watch, parse
 from plant import Plant
@@ -50,15 +51,20 @@ class Client:
         # Some stacks print words of their own before.
         return parse(out.strip().splitlines()[-1] if out.strip() else out, err)
 
-    def exchange(self, line, plant, rounds, cycles=CYCLES, on=NEAR):
+    def exchange(self, line, plant, rounds, cycles=CYCLES, *options, on=NEAR, cycle_us=CYCLE_US, seconds=90):
         """Takes a plant to OP and writes these rounds of values."""
-        file = line.path("rounds.json")
-        file.write_text(json.dumps([plant.image(values, number) for number, values in enumerate(rounds)]))
-        return self.run(line, on, cycles, CYCLE_US, file)
+        return self.run(line, on, cycles, cycle_us, rounds_file(line, plant, rounds), *options, seconds=seconds)
 
 
 SOEM, CRAB = Client("soem"), Client("ethercrab")
 CAT = Client("kickcat", tells_identity=False)
+
+
+def rounds_file(line, plant, rounds):
+    """The output bytes of these rounds of values, as peer.py reads them."""
+    file = line.path("rounds.json")
+    file.write_text(json.dumps([plant.image(values, number) for number, values in enumerate(rounds)]))
+    return file
 
 
 def found(result, plant, client):
@@ -100,8 +106,9 @@ def values_came_back(result, plant, rounds, wires, held=None):
     return compared
 
 
-def to_op(line, plant, client, cycles=CYCLES):
-    """Finds, identifies, configures, runs; process data are right in both directions, value by value."""
+def to_op(line, plant, client, cycles=CYCLES, *options, cycle_us=CYCLE_US, look=None):
+    """Finds, identifies, configures, runs; process data are right in both directions, value by value. Gives how many
+    values were compared; `look` sees what else the client told."""
     with Segment(line, LINESMAN, plant.file) as segment:
         # All ports have opened by themselves: the first frame ever, without any address, meets all.
         assert segment.present == len(plant), segment.present
@@ -111,13 +118,25 @@ def to_op(line, plant, client, cycles=CYCLES):
         for name, value in held.items():
             segment.ask(do="set", input=name, value=value)
         with Watch(segment) as watch:
-            result = client.exchange(line, plant, rounds, cycles)
+            result = client.exchange(line, plant, rounds, cycles, *options, cycle_us=cycle_us)
+        if look:
+            look(result)
         found(result, plant, client)
         ran(result, plant=plant)
         for number, values in enumerate(rounds, 1):
             shown = plant.shown(values)
             assert watch.saw(shown), f"round {number}: the outputs never were {shown}; last: {watch.seen[-1]}"
         return values_came_back(result, plant, rounds, wires, held)
+
+
+def until_present(line, count):
+    """Waits until as many SubDevices answer and have loaded their SII: they pass frames on before that."""
+    for _ in range(100):
+        status, out, _ = line.python(line.near, "probe.py", NEAR, "loaded")
+        if status == 0 and int(out) == count:
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"{out.strip() or 'none'} are ready, expected {count}")
 
 
 def open_inputs(plant, wires):

@@ -1,5 +1,6 @@
 """KickCAT as a foreign MainDevice; see peer.py. Its Python interface tells no identities."""
 
+import sys
 import time
 from datetime import timedelta
 
@@ -7,14 +8,13 @@ import kickcat
 
 import peer
 
+ATTEMPTS = 6
+
 
 def main():
-    interfaces, cycles, cycle_s, rounds = peer.arguments()
-    link = kickcat.create_link(interfaces[0], interfaces[1] if len(interfaces) > 1 else "")
-    # Of the host, not of the line: it may be busy.
-    link.set_timeout(timedelta(milliseconds=50))
-    bus = kickcat.Bus(link)
-    bus.init(timedelta(seconds=3))
+    asked = peer.arguments()
+    rounds = asked.rounds
+    bus = bring_up(asked.interfaces)
     bus.create_mapping(4096)
     slaves = bus.slaves()
     request(bus, kickcat.State.SAFE_OP)
@@ -29,20 +29,37 @@ def main():
     due = time.monotonic()
     for values in rounds:
         write(slaves, values)
-        for _ in range(cycles // len(rounds)):
+        for _ in range(asked.cycles // len(rounds)):
             try:
                 bus.process_data()
                 complete += 1
             except Exception:  # its own exception type, for a wrong working counter or a lost frame
                 pass
-            due += cycle_s
+            due += asked.cycle_s
             time.sleep(max(0.0, due - time.monotonic()))
         inputs.append([bytes(slave.input_data).hex() for slave in slaves])
     reached = all(bus.get_state(slave) == kickcat.State.OPERATIONAL for slave in slaves)
     peer.report(
-        devices=len(slaves), state="OP" if reached else "other", cycles=cycles, complete=complete,
+        devices=len(slaves), state="OP" if reached else "other", cycles=asked.cycles, complete=complete,
         rounds=inputs,
     )
+
+
+def bring_up(interfaces):
+    """All SubDevices in PREOP."""
+    first, *second = interfaces
+    link = kickcat.create_link(first, second[0] if second else "")
+    # Without a second card it waits as long after each frame, and each frame that comes later ends everything: so it is
+    # short, and there is another attempt, as a busy host is late at times.
+    link.set_timeout(timedelta(milliseconds=30))
+    for attempt in range(ATTEMPTS):
+        bus = kickcat.Bus(link)
+        try:
+            bus.init(timedelta(seconds=3))
+            return bus
+        except RuntimeError as error:
+            print(f"attempt {attempt + 1}: {error}", file=sys.stderr)
+    peer.refuse(f"not in PREOP after {ATTEMPTS} attempts")
 
 
 def request(bus, state):

@@ -24,10 +24,17 @@ class Kind:
     """A type: its products (one for each controller), its channels, what its analogue converters resolve, what it adds
     to the working counter of an LRW: 2 for outputs, 1 for inputs."""
 
-    def __init__(self, *products, vendor=VENDOR, outputs=None, inputs=None, low=-0x8000, lost_bits=0, wkc=None):
+    def __init__(self, *products, vendor=VENDOR, outputs=None, inputs=None, low=-0x8000, lost_bits=0, axis=False, wkc=None):
         self.products, self.vendor, self.outputs, self.inputs = products, vendor, outputs, inputs
-        self.low, self.lost_bits = low, lost_bits
-        self.wkc = 2 * bool(outputs) + bool(inputs) if wkc is None else wkc
+        self.low, self.lost_bits, self.axis = low, lost_bits, axis
+        self.wkc = 2 * bool(outputs or axis) + bool(inputs or axis) if wkc is None else wkc
+
+    def is_digital(self):
+        return any(channels and channels[3] == 1 for channels in (self.outputs, self.inputs))
+
+    def has_processor(self):
+        """Analogue values, and axes."""
+        return self.axis or any(channels and channels[3] == 16 for channels in (self.outputs, self.inputs))
 
     def shown(self, value):
         """What the converter makes of a value."""
@@ -53,9 +60,9 @@ KINDS = {
     "EL4004": Kind(0x0FA43052, outputs=words(4), low=0, lost_bits=4),
     "EL4102": Kind(0x10063052, outputs=words(2), low=0),
     "EL4112": Kind(0x10103052, outputs=words(2), low=0),
-    "EL7041": Kind(0x1B813052, wkc=3),
+    "EL7041": Kind(0x1B813052, axis=True),
     # Its vendor is nobody: it is what all drives of the profile have in common.
-    "CiA402-Drive": Kind(0x402, vendor=0xFFFFFFF0, wkc=3),
+    "CiA402-Drive": Kind(0x402, vendor=0xFFFFFFF0, axis=True),
     "EP1008-0001": Kind(0x03F04052, inputs=BITS_8),
     "EP2308-0001": Kind(0x09044052, outputs=BITS_4, inputs=BITS_4),
     "EP4174-0002": Kind(0x104E4052, outputs=words(4)),
@@ -101,9 +108,17 @@ class Plant:
     def __len__(self):
         return len(self.devices)
 
-    def wkc(self):
-        """The working counter of one LRW over all process data."""
-        return sum(kind.wkc for _, kind, _ in self.devices if kind)
+    def wkc(self, count=None):
+        """The working counter of one LRW over all process data; with `count`, of the first controllers only."""
+        return sum(kind.wkc for _, kind, _ in self.devices[:count] if kind)
+
+    def clocked(self):
+        """Positions with a clock: of what is used here, all but plain digital inputs and outputs."""
+        return [place for place, (_, kind, _) in enumerate(self.devices) if not (kind and kind.is_digital())]
+
+    def in_step(self):
+        """Positions of those who have a mode that goes by SYNC0: what has a processor."""
+        return [place for place, (_, kind, _) in enumerate(self.devices) if kind and kind.has_processor()]
 
     def channels(self, direction):
         """(position, name, type, channels) of the devices with channels."""

@@ -5,65 +5,87 @@ import time
 import pysoem
 
 import peer
+import soem_clocks
 
 
 def main():
-    interfaces, cycles, cycle_s, rounds = peer.arguments()
+    asked = peer.arguments()
     master = pysoem.Master()
-    master.open(*interfaces)
+    master.open(*asked.interfaces)
     try:
         found = master.config_init()
         if found <= 0:
             peer.refuse(f"config_init found {found} SubDevices")
         devices = [[slave.man, slave.id, slave.rev] for slave in master.slaves]
         names = [slave.name for slave in master.slaves]
-        mapped = master.config_map()
-        if master.state_check(pysoem.SAFEOP_STATE, 2_000_000) != pysoem.SAFEOP_STATE:
-            peer.refuse("SAFEOP not reached: " + states(master))
-        # SubDevices with outputs want process data before they go to OP.
-        master.send_processdata()
-        master.receive_processdata(20_000)
-        master.state = pysoem.OP_STATE
-        master.write_state()
-        for _ in range(200):
-            master.send_processdata()
-            master.receive_processdata(20_000)
-            if master.state_check(pysoem.OP_STATE, 10_000) == pysoem.OP_STATE:
-                break
-        else:
-            peer.refuse("OP not reached: " + states(master))
-        complete, wkc, inputs = exchange(master, cycles, cycle_s, rounds)
-        state = "OP" if master.state_check(pysoem.OP_STATE, 50_000) == pysoem.OP_STATE else "other"
-        # Orderly, so that no watchdog has to step in.
-        master.state = pysoem.INIT_STATE
-        master.write_state()
-        master.state_check(pysoem.INIT_STATE, 500_000)
+        clocks = soem_clocks.Clocks(master, asked.sync0_ns) if asked.sync0_ns else None
+        mapped, send = configure(master, asked.overlap)
+        if clocks:
+            clocks.align(send)
+        to_op(master, send, asked.cycle_s)
+        complete, wkc, inputs = exchange(master, send, asked)
+        state = "OP" if master.state_check(pysoem.OP_STATE, 50_000) == pysoem.OP_STATE else states(master)
+        clocks = clocks.told() if clocks else None
+        stop(master)
         peer.report(
             devices=devices, names=names, state=state, mapped=mapped,
-            wkc=wkc, cycles=cycles, complete=complete, rounds=inputs,
+            wkc=wkc, cycles=asked.cycles, complete=complete, rounds=inputs, clocks=clocks,
         )
     finally:
         master.close()
 
 
-def exchange(master, cycles, cycle_s, rounds):
+def configure(master, overlap=False):
+    """Up to SAFEOP: the size of the process data, and what sends them."""
+    mapped = master.config_overlap_map() if overlap else master.config_map()
+    if master.state_check(pysoem.SAFEOP_STATE, 5_000_000) != pysoem.SAFEOP_STATE:
+        peer.refuse("SAFEOP not reached: " + states(master))
+    return mapped, master.send_overlap_processdata if overlap else master.send_processdata
+
+
+def to_op(master, send, cycle_s=0.0):
+    """SubDevices with outputs want process data before they go to OP, and on the way."""
+    send()
+    master.receive_processdata(20_000)
+    master.state = pysoem.OP_STATE
+    master.write_state()
+    end = time.monotonic() + 20
+    while time.monotonic() < end:
+        for _ in range(5):
+            send()
+            master.receive_processdata(20_000)
+            time.sleep(cycle_s)
+        if master.state_check(pysoem.OP_STATE, 2_000) == pysoem.OP_STATE:
+            return
+    peer.refuse("OP not reached: " + states(master))
+
+
+def exchange(master, send, asked):
+    """The rounds: how many exchanges were complete, the working counter, and the inputs at the end of each."""
     # SOEM leaves SubDevices whose data fill no byte out of what it expects; the highest one seen must be seen always.
     complete, expected = 0, 0
     inputs = []
     due = time.monotonic()
-    for values in rounds:
+    for values in asked.rounds:
         for position, slave in enumerate(master.slaves):
             slave.output = peer.outputs(values, position, len(slave.output))
-        for _ in range(cycles // len(rounds)):
-            master.send_processdata()
+        for _ in range(asked.cycles // len(asked.rounds)):
+            send()
             wkc = master.receive_processdata(20_000)
             if wkc > expected:
                 complete, expected = 0, wkc
             complete += wkc == expected
-            due += cycle_s
+            due += asked.cycle_s
             time.sleep(max(0.0, due - time.monotonic()))
         inputs.append([slave.input.hex() for slave in master.slaves])
     return complete, expected, inputs
+
+
+def stop(master):
+    """Orderly, so that no watchdog has to step in."""
+    master.state = pysoem.INIT_STATE
+    master.write_state()
+    master.state_check(pysoem.INIT_STATE, 500_000)
 
 
 def states(master):

@@ -7,7 +7,7 @@ use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::topology::{Reconstruction, Tree};
 
 use crate::identity::RevisionRule;
-use crate::plan::PlannedDevice;
+use crate::plan::{DeviceSettings, PlannedDevice};
 use crate::profile::DeviceProfile;
 
 /// A SubDevice as it was found.
@@ -79,6 +79,8 @@ impl Inventory {
             revision_rule: RevisionRule::Equal,
             profile: found.profile.clone(),
             target,
+            start_up: Vec::new(),
+            settings: DeviceSettings::default(),
         };
         self.devices.iter().map(planned).collect()
     }

@@ -5,6 +5,7 @@
 //! [`esi`] reads device descriptions of makers. [`fault`] holds the names that segment, diagnosis and score share.
 
 pub mod attachment;
+pub mod eni;
 pub mod esi;
 pub mod fault;
 pub mod identity;
@@ -12,3 +13,4 @@ pub mod inventory;
 pub mod plan;
 pub mod profile;
 pub mod project;
+pub mod start_up;

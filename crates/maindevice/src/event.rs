@@ -2,6 +2,7 @@
 
 use linesman_config::identity::Mismatch;
 use linesman_config::inventory::Inventory;
+use linesman_config::start_up::StartUpCommand;
 use linesman_proto::address::{DeviceId, Position, WorkingCounter};
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
@@ -10,9 +11,12 @@ use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode};
 
 use crate::exchange::{ExchangeError, Reply};
-use crate::mailbox::SdoError;
+use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
 use crate::procedure::{Look, LookError, ScanError};
+use crate::supervisor::StartUpError;
+
+mod text;
 
 /// Something that happened. Events come in the order in which it did.
 #[derive(Clone, Debug)]
@@ -47,6 +51,8 @@ pub enum Event {
     Refused {
         /// Which.
         id: DeviceId,
+        /// Where the step began; `None` when its state was not known.
+        from: Option<AlState>,
         /// The state it was asked to enter.
         to: AlState,
         /// The state it is in.
@@ -58,10 +64,36 @@ pub enum Event {
     StepTimedOut {
         /// Which.
         id: DeviceId,
+        /// Where the step began; `None` when its state was not known.
+        from: Option<AlState>,
         /// The state it was asked to enter.
         to: AlState,
         /// The state it is in.
         status: AlStatus,
+    },
+    /// A SubDevice did not take a start-up command. It will be tried again later.
+    StartUpFailed {
+        /// Which.
+        id: DeviceId,
+        /// The state it was to enter.
+        to: AlState,
+        /// The state it is in.
+        status: AlStatus,
+        /// What it was told.
+        command: Box<StartUpCommand>,
+        /// What it answered.
+        error: Box<StartUpError>,
+    },
+    /// A SubDevice has left the state in which it was, on its own.
+    AbnormalState {
+        /// Which.
+        id: DeviceId,
+        /// Where it was.
+        from: AlState,
+        /// Where it is.
+        status: AlStatus,
+        /// Why, when it reports an error.
+        code: AlStatusCode,
     },
     /// A SubDevice that the plan wants was not found on the line, or does not answer any more.
     DeviceLost {
@@ -155,6 +187,17 @@ pub enum Event {
         /// How many were lost.
         lost: u64,
     },
+    /// The application was late more often than allowed: outputs of a task are withheld, inputs go
+    /// on. [`Event::OutputsResumed`] ends it.
+    OutputsWithheld {
+        /// Index of the task in the plan.
+        task: usize,
+    },
+    /// The application gives outputs again.
+    OutputsResumed {
+        /// Index of the task in the plan.
+        task: usize,
+    },
     /// A SubDevice reports an error on its own account.
     Emergency {
         /// Which.
@@ -178,7 +221,7 @@ pub enum Event {
         /// What.
         object: ObjectAddress,
         /// The data.
-        result: Result<Vec<u8>, SdoError>,
+        result: Result<Vec<u8>, MailboxFailure>,
     },
     /// A download is done.
     SdoDownloaded {
@@ -187,7 +230,7 @@ pub enum Event {
         /// What.
         object: ObjectAddress,
         /// Whether it was taken.
-        result: Result<(), SdoError>,
+        result: Result<(), MailboxFailure>,
     },
     /// A probe is done.
     Probed {

@@ -19,8 +19,10 @@ pub mod procedure;
 pub mod statistics;
 mod supervisor;
 
+pub use cyclic::{FrameStatus, Quality};
 pub use event::Event;
 pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};
 pub use options::Options;
 pub use statistics::Statistics;
+pub use supervisor::{BringUpTimes, DeviceTimes, Phase, StartUpError};

@@ -18,6 +18,10 @@ pub struct Options {
     pub repeats: u8,
     /// Most frames of procedures that are out at once, without and beside a cycle.
     pub frames_at_once: usize,
+    /// How many cycles in a row the application may leave its outputs as they are. Beyond that
+    /// datagrams with outputs are sent without them, so that the watchdogs of SubDevices expire;
+    /// `None`: it may be as late as it likes. It counts from the first outputs that it gives.
+    pub allowed_misses: Option<u32>,
     /// How often each SubDevice's error counters, DL status and AL status are read while running.
     pub watch_interval: Span,
     /// How often mailboxes are looked into, when nothing is expected.
@@ -26,6 +30,13 @@ pub struct Options {
     pub mailbox_patience: Span,
     /// How long a SubDevice may take for a step between states.
     pub state_timeouts: StateTimeouts,
+    /// Whether a SubDevice that left its state on its own is brought back.
+    pub restore_states: bool,
+    /// Whether a SubDevice that was lost is brought up again when it answers.
+    pub reinitialise: bool,
+    /// No SubDevice goes beyond this state until [`MainDevice::release`](crate::MainDevice::release)
+    /// is called, as for an application that is not ready yet.
+    pub hold_at: Option<linesman_proto::state::AlState>,
     /// After a refused step: when it is tried again; the wait doubles up to the second value.
     pub retry_after: [Span; 2],
 }
@@ -42,10 +53,14 @@ impl Default for Options {
             patience: Span::ms(10),
             repeats: 3,
             frames_at_once: 4,
+            allowed_misses: None,
             watch_interval: Span::ms(100),
             mailbox_interval: Span::ms(50),
             mailbox_patience: Span::s(2),
             state_timeouts: StateTimeouts::DEFAULT,
+            restore_states: true,
+            reinitialise: true,
+            hold_at: None,
             retry_after: [Span::s(1), Span::s(16)],
         }
     }

@@ -1,19 +1,16 @@
-//! A MainDevice on real cards: the thread that sends, receives and waits.
+//! A MainDevice on a line: the thread that sends, receives and waits.
 
 use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
-use linesman_link::clock::{HostClock, tighten_timers};
+use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
-use linesman_link::socket::{Batch, RawSocket, Ready, SocketOptions, Waitable, wait_any};
 use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::address::{Network, Path};
 use linesman_proto::ethernet::MAX_LEN;
 use linesman_proto::time::{Instant, Span};
 
-use crate::host_watch::HostWatch;
+use crate::line::{Cards, Line};
 use crate::stop::Stop;
 
-/// Frames fetched in one call.
-const BATCH: usize = 64;
 /// Most frames handed out in one go; a MainDevice has far fewer out at once.
 const MOST_FRAMES: usize = 1024;
 /// Longest sleep, so that a wish to stop is noticed.
@@ -31,48 +28,59 @@ pub trait Audience {
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool;
     /// When [`turn`](Self::turn) has something to do.
     fn poll_timeout(&self) -> Option<Instant>;
+    /// The thread came so late for the begin of a cycle.
+    fn late(&mut self, _late: Span) {}
 }
 
-/// A MainDevice and its card, or its two cards at the ends of a ring.
-pub struct Driver {
-    clock: HostClock,
+/// A MainDevice and its line.
+pub struct Driver<L = Cards> {
     main: MainDevice,
-    cards: Vec<Card>,
-    batch: Batch,
+    line: L,
     buffer: Vec<u8>,
     frames: u64,
 }
 
-struct Card {
-    socket: RawSocket,
-    watch: HostWatch,
-    path: Path,
-}
-
-impl Driver {
+impl Driver<Cards> {
     /// Opens the cards; nothing is sent until the audience gives a command.
     ///
     /// # Errors
     /// When an interface cannot be used.
     pub fn open(names: &[String], clock: HostClock) -> Result<Self, LinkError> {
         let options = Options { ring: names.len() > 1, ..Options::default() };
-        let open = |(path, name): (Path, &String)| {
-            Ok(Card {
-                socket: RawSocket::open(name, &SocketOptions::default())?,
-                watch: HostWatch::open(name, path, &clock)?,
-                path,
-            })
-        };
-        let cards: Result<Vec<Card>, LinkError> =
-            Path::ALL.into_iter().zip(names).map(open).collect();
-        Ok(Self {
-            clock,
+        Ok(Self::new(Cards::open(names, clock)?, options))
+    }
+
+    /// The clock of the run.
+    #[must_use]
+    pub const fn clock(&self) -> &HostClock {
+        self.line.clock()
+    }
+}
+
+impl<L: Line> Driver<L> {
+    /// A MainDevice with these options on a line.
+    pub fn new(line: L, options: Options) -> Self {
+        Self {
             main: MainDevice::new(Network::default(), options),
-            cards: cards?,
-            batch: Batch::new(BATCH),
+            line,
             buffer: vec![0; MAX_LEN],
             frames: 0,
-        })
+        }
+    }
+
+    /// The line.
+    pub fn line_mut(&mut self) -> &mut L {
+        &mut self.line
+    }
+
+    /// The MainDevice.
+    pub fn main_mut(&mut self) -> &mut MainDevice {
+        &mut self.main
+    }
+
+    /// Now, by the clock of the line.
+    pub fn now(&self) -> Instant {
+        self.line.now()
     }
 
     /// Drives the line until `until`, `stop`, or the audience has enough.
@@ -85,10 +93,16 @@ impl Driver {
         stop: &Stop,
         audience: &mut impl Audience,
     ) -> Result<(), LinkError> {
-        tighten_timers();
         loop {
             self.receive(audience)?;
-            let now = self.clock.now();
+            let now = self.line.now();
+            if let Some(due) = self.main.poll_cycle_timeout()
+                && due <= now
+            {
+                let late = now.since(due);
+                self.line.note_late(late);
+                audience.late(late);
+            }
             self.main.handle_timeout(now);
             while let Some(event) = self.main.poll_event() {
                 audience.event(now, event, &mut self.main);
@@ -100,58 +114,37 @@ impl Driver {
             }
             let due = [self.main.poll_timeout(), audience.poll_timeout()];
             let due = due.into_iter().flatten().min().unwrap_or(Instant::MAX);
-            self.wait(due.min(until).min(now + NAP))?;
+            self.line.wait(due.min(until).min(now + NAP))?;
         }
     }
 
     /// Takes in what has come back, and what the host noticed.
     fn receive(&mut self, audience: &mut impl Audience) -> Result<(), LinkError> {
-        let Self { clock, main, cards, batch, frames, .. } = self;
-        for card in cards {
-            card.socket.recv_batch(batch, clock)?;
-            for frame in batch.iter() {
-                *frames += 1;
-                let seen = seen(*frames, card.path, Direction::Received, frame.at, frame.bytes);
-                audience.frame(&FrameSeen { truncated: frame.truncated, ..seen });
-                if !frame.truncated {
-                    main.handle_frame(clock.now(), card.path, frame.bytes);
-                }
+        let Self { main, line, frames, .. } = self;
+        // Frames are judged at the time at which they are taken in, not at that of their stamp.
+        let now = line.now();
+        line.receive(&mut |frame| {
+            *frames += 1;
+            let seen = seen(*frames, frame.path, Direction::Received, frame.at, frame.bytes);
+            audience.frame(&FrameSeen { truncated: frame.truncated, ..seen });
+            if !frame.truncated {
+                main.handle_frame(frame.at.max(now), frame.path, frame.bytes);
             }
-            let counters = card.socket.counters()?;
-            for observation in card.watch.poll(clock.now(), counters)? {
-                audience.host(&observation);
-            }
-        }
-        Ok(())
+        })?;
+        line.look_at_host(&mut |observation| audience.host(observation))
     }
 
     /// Sends what the MainDevice has to send.
     fn send(&mut self, audience: &mut impl Audience) -> Result<(), LinkError> {
         for _ in 0..MOST_FRAMES {
-            let now = self.clock.now();
+            let now = self.line.now();
             let Some(transmit) = self.main.poll_transmit(now, &mut self.buffer) else { break };
             let bytes = &self.buffer[..transmit.len];
-            let Some(card) = self.cards.get_mut(transmit.path.index()) else { continue };
+            self.line.send(transmit.path, bytes)?;
             self.frames += 1;
             audience.frame(&seen(self.frames, transmit.path, Direction::Sent, now, bytes));
-            // What a full queue refuses is lost; the MainDevice sends it again, the host watch tells.
-            let _sent = card.socket.send_batch([bytes])?;
         }
         Ok(())
-    }
-
-    fn wait(&self, deadline: Instant) -> Result<Ready, LinkError> {
-        match self.cards.as_slice() {
-            [a, b, ..] => wait_any([&a.socket as &dyn Waitable, &b.socket], &self.clock, deadline),
-            [a] => a.socket.wait(&self.clock, deadline),
-            [] => Ok(Ready::Deadline),
-        }
-    }
-
-    /// The clock of the run.
-    #[must_use]
-    pub const fn clock(&self) -> &HostClock {
-        &self.clock
     }
 }
 

@@ -1,7 +1,7 @@
 //! Threads, selectors and recorders: what joins the cores to a real interface.
 //!
 //! [`selector`] says what a word like `eth0+eth1` means, wherever it is written; [`capture`] reads
-//! files, [`drive`] runs a MainDevice on cards, [`listen`] hears what is on a card, [`host_watch`]
+//! files, [`line`](mod@line) is where frames go, [`drive`] runs a MainDevice there, [`listen`] hears what is on a card, [`host_watch`]
 //! asks about a card, [`record`] writes what was seen to a file. [`serve`] puts a segment on real
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
 //! outside, [`journal`] writes down what really happened, [`names`] says where. [`stop`] is the wish
@@ -9,12 +9,16 @@
 
 pub mod capture;
 pub mod control;
+mod desk;
 pub mod drive;
 pub mod host_watch;
+pub mod image;
 pub mod journal;
+pub mod line;
 pub mod listen;
 pub mod names;
 pub mod record;
+pub mod run;
 pub mod selector;
 pub mod serve;
 pub mod stop;

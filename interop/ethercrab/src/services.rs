@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use anyhow::{Result, anyhow};
-use ethercrab::std::ethercat_now;
 use serde_json::json;
 
-use crate::{IMAGE_MAX, SUBDEVICES_MAX, hex};
+use crate::failed;
+use crate::rounds::hex;
 
 /// The analogue terminal whose objects are read and written, and the alias it gets.
 const TERMINAL: u32 = 0x0C20_3052;
@@ -22,11 +22,7 @@ const LIMIT: u8 = 0x13;
 /// Goes to PREOP, tries everything once and tells.
 pub(crate) async fn run(interface: &str) -> Result<()> {
     let maindevice = crate::open(interface)?;
-    let mut group = maindevice
-        .init_single_group::<SUBDEVICES_MAX, IMAGE_MAX>(ethercat_now)
-        .await
-        .map_err(|error| anyhow!("scan: {error:?}"))?;
-    let failed = |what: &'static str| move |error| anyhow!("{what}: {error:?}");
+    let mut group = crate::scan(&maindevice).await?;
     let mut told = None;
     for mut subdevice in group.iter_mut(&maindevice) {
         if subdevice.identity().product_id != TERMINAL || told.is_some() {

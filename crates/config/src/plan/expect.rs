@@ -140,7 +140,7 @@ fn logical(datagram: &DatagramPlan, presence: &Presence, view: PathView) -> u16 
 
 #[cfg(test)]
 mod tests {
-    use super::super::Ownership;
+    use super::super::{Ownership, Role};
     use super::*;
     use linesman_proto::address::{LogicalAddress, RegisterAddress};
     use linesman_proto::frame::builder::DatagramAddress;
@@ -151,11 +151,13 @@ mod tests {
             direction: *direction,
             range: at..at + 1,
             image_at: at,
+            masks: Ownership::WHOLE,
         });
         DatagramPlan {
             command,
             address: DatagramAddress::Logical(LogicalAddress(0x0100_0000)),
             len: owners.len(),
+            role: Role::ProcessData,
             sync_unit: Some(0),
             ownership: ownership.collect(),
         }
@@ -199,6 +201,7 @@ mod tests {
             command: Command::Brd,
             address: DatagramAddress::Physical(0, RegisterAddress(0x0130)),
             len: 2,
+            role: Role::Presence,
             sync_unit: None,
             ownership: Vec::new(),
         };

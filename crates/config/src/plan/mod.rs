@@ -8,24 +8,31 @@
 
 pub mod expect;
 pub mod layout;
+pub mod settings;
+pub mod task;
+pub mod variable;
 
 use std::ops::Range;
 
 use linesman_proto::address::{DeviceId, StationAddress};
-use linesman_proto::command::Command;
-use linesman_proto::frame::builder::DatagramAddress;
-use linesman_proto::frame::size::frame_size;
+use linesman_proto::port::PortMap;
 use linesman_proto::register::{FmmuConfig, SyncManagerConfig};
-use linesman_proto::sii::{Direction, Identity};
+use linesman_proto::sii::{Identity, PortKind};
 use linesman_proto::state::AlState;
-use linesman_proto::time::Span;
 use linesman_proto::topology::Tree;
 
 use crate::identity::RevisionRule;
 use crate::profile::{DeviceProfile, Mailbox};
+use crate::start_up::StartUpCommand;
 
 pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
+pub use settings::{
+    AddressingChoice, ClockSettings, DeviceSettings, OnWrongCounter, ProcessAccess,
+    WatchdogSettings,
+};
+pub use task::{DatagramPlan, FramePlan, IoAt, Ownership, Role, SyncUnit, Task};
+pub use variable::Variable;
 
 /// A SubDevice that the plan is made for.
 #[derive(Clone, Debug)]
@@ -42,10 +49,14 @@ pub struct PlannedDevice {
     pub profile: DeviceProfile,
     /// How far it is to be driven.
     pub target: AlState,
+    /// What it is told on its way, in order.
+    pub start_up: Vec<StartUpCommand>,
+    /// What the user chose for it.
+    pub settings: DeviceSettings,
 }
 
 /// Everything the MainDevice needs to run one network.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Plan {
     /// The SubDevices, by [`DeviceId`]: in the order in which the whole line is processed.
     pub devices: Vec<DevicePlan>,
@@ -57,15 +68,19 @@ pub struct Plan {
     pub outputs_len: usize,
     /// Bytes of inputs in the process image.
     pub inputs_len: usize,
+    /// What the bits of the process image are called, outputs first, in the order of their places.
+    pub variables: Vec<Variable>,
 }
 
 /// What one SubDevice is set up with.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct DevicePlan {
     /// Who it is within this run.
     pub id: DeviceId,
     /// Name for people.
     pub name: String,
+    /// Order designation, such as `EL2004`; may be empty.
+    pub type_name: String,
     /// Station address.
     pub station: StationAddress,
     /// Who it must be.
@@ -78,82 +93,77 @@ pub struct DevicePlan {
     pub sync_managers: Vec<(u8, SyncManagerConfig)>,
     /// FMMUs by number.
     pub fmmus: Vec<(u8, FmmuConfig)>,
+    /// The FMMU that maps the full bit of its mailbox for [`Role::MailboxStates`], by number. It is
+    /// set up before PREOP.
+    pub mailbox_state: Option<(u8, FmmuConfig)>,
     /// AL status mirrors AL control: no acknowledge bit is sent.
     pub device_emulation: bool,
     /// How far it is driven.
     pub target: AlState,
+    /// What it is told on its way, in order.
+    pub start_up: Vec<StartUpCommand>,
     /// Where its outputs lie in the process image, in bytes.
     pub outputs: Range<usize>,
     /// Where its inputs lie in the process image, in bytes.
     pub inputs: Range<usize>,
+    /// What the user chose for it.
+    pub settings: DeviceSettings,
+    /// Current from the E-bus in mA; negative supplies. `None`: not said.
+    pub ebus_current_ma: Option<i16>,
+    /// What its ports are; `None`: not said.
+    pub ports: Option<PortMap<PortKind>>,
 }
 
-/// What is exchanged with one cycle time.
-#[derive(Clone, Debug)]
-pub struct Task {
-    /// Name for people.
-    pub name: String,
-    /// Cycle time.
-    pub cycle: Span,
-    /// SubDevices whose data are good or bad together.
-    pub sync_units: Vec<SyncUnit>,
-    /// Frames sent every cycle, in order.
-    pub frames: Vec<FramePlan>,
-}
-
-/// SubDevices of one task whose process data travel in datagrams of their own.
-#[derive(Clone, Debug)]
-pub struct SyncUnit {
-    /// Name for people.
-    pub name: String,
-    /// Who belongs to it.
-    pub devices: Vec<DeviceId>,
-}
-
-/// One cyclic frame.
-#[derive(Clone, Debug)]
-pub struct FramePlan {
-    /// Its datagrams, in order.
-    pub datagrams: Vec<DatagramPlan>,
-}
-
-impl FramePlan {
-    /// Size in bytes without padding and check sequence.
+impl DevicePlan {
+    /// A SubDevice without process data and mailbox that is driven to OP, at the default station
+    /// address of its number.
     #[must_use]
-    pub fn size(&self) -> usize {
-        frame_size(self.datagrams.iter().map(|datagram| datagram.len))
+    pub fn bare(id: DeviceId) -> Self {
+        Self {
+            id,
+            name: id.no().to_string(),
+            type_name: String::new(),
+            station: StationAddress(0x1000_u16.wrapping_add(id.no() as u16)),
+            identity: Identity::default(),
+            revision_rule: RevisionRule::default(),
+            mailbox: None,
+            sync_managers: Vec::new(),
+            fmmus: Vec::new(),
+            mailbox_state: None,
+            device_emulation: false,
+            target: AlState::Op,
+            start_up: Vec::new(),
+            outputs: 0..0,
+            inputs: 0..0,
+            settings: DeviceSettings::default(),
+            ebus_current_ma: None,
+            ports: None,
+        }
     }
 }
 
-/// One cyclic datagram.
-#[derive(Clone, Debug)]
-pub struct DatagramPlan {
-    /// What it asks.
-    pub command: Command,
-    /// Whom.
-    pub address: DatagramAddress,
-    /// Length of its data in bytes.
-    pub len: usize,
-    /// Index in [`Task::sync_units`]; `None` when it carries no process data.
-    pub sync_unit: Option<usize>,
-    /// Who owns which bytes; empty when it carries no process data.
-    pub ownership: Vec<Ownership>,
-}
-
-/// A range of a datagram's data and whose it is.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Ownership {
-    /// Whose.
-    pub device: DeviceId,
-    /// Outputs are written by the MainDevice, inputs come from the SubDevice.
-    pub direction: Direction,
-    /// Bytes within the datagram's data.
-    pub range: Range<usize>,
-    /// Where these bytes begin in the outputs or inputs of the process image.
-    pub image_at: usize,
-}
-
 impl Plan {
+    /// A plan without SubDevices, to be filled.
+    #[must_use]
+    pub const fn empty(tree: Tree) -> Self {
+        Self {
+            devices: Vec::new(),
+            tree,
+            tasks: Vec::new(),
+            outputs_len: 0,
+            inputs_len: 0,
+            variables: Vec::new(),
+        }
+    }
+
+    /// Whose clock all others follow: the one that was chosen, else the first with a clock that is used.
+    #[must_use]
+    pub fn reference_clock(&self) -> Option<DeviceId> {
+        let clocked = || self.devices.iter().filter(|device| device.settings.clock.is_some());
+        let chosen = |device: &&DevicePlan| device.settings.clock.is_some_and(|one| one.reference);
+        clocked().find(chosen).or_else(|| clocked().next()).map(|device| device.id)
+    }
+
     /// The plan of a SubDevice; `None` for an identity that is not of this plan.
     #[must_use]
     pub fn device(&self, id: DeviceId) -> Option<&DevicePlan> {

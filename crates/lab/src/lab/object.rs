@@ -1,7 +1,7 @@
 //! Objects of SubDevices, read by the MainDevice of the lab.
 
 use linesman_maindevice::Event;
-use linesman_maindevice::mailbox::SdoError;
+use linesman_maindevice::mailbox::MailboxFailure;
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::Span;
@@ -22,7 +22,7 @@ impl Lab {
         &mut self,
         id: DeviceId,
         object: ObjectAddress,
-    ) -> Result<Option<Result<Vec<u8>, SdoError>>, LabError> {
+    ) -> Result<Option<Result<Vec<u8>, MailboxFailure>>, LabError> {
         let (of, now) = (self.in_plan(id), self.now);
         let since = self.events.last().map(|(at, _)| *at);
         let before = self.events.iter().filter(|(at, _)| Some(*at) == since).count();

@@ -7,7 +7,7 @@
 //! ```
 //! A step takes as long as the answer does; `within` is not for it.
 
-use linesman_maindevice::mailbox::SdoError;
+use linesman_maindevice::mailbox::Why;
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 
@@ -76,15 +76,16 @@ impl Reading {
     /// Reads it and says what came instead.
     pub(super) fn check(&self, id: DeviceId, lab: &mut Lab) -> Result<(), String> {
         let result = lab.read_object(id, self.object).map_err(|error| error.to_string())?;
-        let fits = match (&self.outcome, &result) {
+        let why = result.as_ref().map(|result| result.as_ref().map_err(|error| &error.why));
+        let fits = match (&self.outcome, why) {
             (Outcome::Read, Some(Ok(_)))
-            | (Outcome::Refused, Some(Err(SdoError::Mailbox { .. })))
+            | (Outcome::Refused, Some(Err(Why::Mailbox { .. })))
             | (
                 Outcome::Unanswered,
-                Some(Err(SdoError::NoAnswer { .. } | SdoError::MailboxFull { .. })) | None,
+                Some(Err(Why::NoAnswer { .. } | Why::MailboxFull { .. })) | None,
             ) => true,
             (Outcome::Value(wanted), Some(Ok(found))) => wanted == found,
-            (Outcome::Aborted(wanted), Some(Err(SdoError::Aborted { code, .. }))) => {
+            (Outcome::Aborted(wanted), Some(Err(Why::Aborted { code, .. }))) => {
                 code.value() == *wanted
             }
             _ => false,

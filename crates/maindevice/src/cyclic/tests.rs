@@ -1,9 +1,10 @@
 //! Process data against frames made by hand: two SubDevices, one byte each way.
 
 use linesman_config::identity::RevisionRule;
-use linesman_config::plan::{PlanOptions, PlannedDevice};
+use linesman_config::plan::{DeviceSettings, OnWrongCounter, PlanOptions, PlannedDevice};
 use linesman_config::profile::{DeviceProfile, ProcessSyncManager};
 use linesman_proto::address::{DeviceId, Path, RegisterAddress, StationAddress};
+use linesman_proto::command::Command;
 use linesman_proto::ethernet::{MacAddress, SOURCE_MARK};
 use linesman_proto::port::Port;
 use linesman_proto::register::SmControl;
@@ -22,6 +23,7 @@ fn device() -> PlannedDevice {
         len: 1,
         control: SmControl::OUTPUTS,
         is_virtual: false,
+        bits: 0,
     };
     PlannedDevice {
         name: "both ways".to_owned(),
@@ -36,6 +38,8 @@ fn device() -> PlannedDevice {
             ..DeviceProfile::default()
         },
         target: AlState::Op,
+        start_up: Vec::new(),
+        settings: DeviceSettings::default(),
     }
 }
 
@@ -50,17 +54,23 @@ struct Fixture {
 
 impl Fixture {
     fn new() -> Self {
+        Self::of(&[device(), device()], None)
+    }
+
+    fn of(devices: &[PlannedDevice; 2], allowed: Option<u32>) -> Self {
         let seen =
             [SeenController::open_at(&[Port::A, Port::B]), SeenController::open_at(&[Port::A])];
         let tree = derive(&seen).unwrap();
-        let plan = Plan::build(&[device(), device()], tree, &PlanOptions::default()).unwrap();
+        let plan = Plan::build(devices, tree, &PlanOptions::default()).unwrap();
         let plan = Arc::new(plan);
         let line = Arc::new(Mutex::new(Line::new(&plan)));
         let sources = [MacAddress([0, 0, 0, 0, 0, 1]), MacAddress([0, 0, 0, 0, 0, 2])];
+        let mut exchange = Exchange::new(sources, false, Span::ms(10));
+        let cyclic = Cyclic::new(plan, Arc::clone(&line), &mut exchange, allowed, Instant::ZERO);
         Self {
-            cyclic: Cyclic::new(plan, Arc::clone(&line), Instant::ZERO),
+            cyclic,
             line,
-            exchange: Exchange::new(sources, false, Span::ms(10)),
+            exchange,
             statistics: Statistics::default(),
             events: Vec::new(),
             now: Instant::ZERO,
@@ -75,21 +85,39 @@ impl Fixture {
 
     /// One cycle: the frame as it is sent, and what comes back with these inputs and this counter.
     fn cycle(&mut self, inputs: [u8; 2], wkc: u8) -> Vec<u8> {
-        self.cyclic.refresh();
-        assert!(self.cyclic.send_due(self.now, &mut self.exchange, &mut self.statistics));
-        self.now += Span::ms(1);
-        let mut buffer = vec![0; 1514];
-        let (transmit, _) = self.exchange.poll_transmit(self.now, &mut buffer).unwrap();
-        let sent = buffer[..transmit.len].to_vec();
+        let sent = self.send();
         let mut back = sent.clone();
         back[6] |= SOURCE_MARK;
         // Two outputs from byte 26 on, two inputs behind them, then the counter.
         back[28..30].copy_from_slice(&inputs);
         back[30] = wkc;
         let Received::Complete(slot) = self.exchange.receive(Path::A, &back) else { panic!() };
-        let (reply, events) = (&self.exchange.slot(slot).reply, &mut self.events);
-        self.cyclic.received(0, 0, reply, &mut self.statistics, &mut |event| events.push(event));
+        let (withheld, events) = (self.exchange.slot(slot).withheld, &mut self.events);
+        let emit = &mut |event| events.push(event);
+        let statistics = &mut self.statistics;
+        self.cyclic.received(self.now, 0, withheld, &back, statistics, emit);
         sent
+    }
+
+    /// A cycle begins; the frame as it is sent.
+    fn send(&mut self) -> Vec<u8> {
+        self.cyclic.refresh();
+        let events = &mut self.events;
+        let emit = &mut |event| events.push(event);
+        let statistics = &mut self.statistics;
+        assert!(self.cyclic.send_due(self.now, &mut self.exchange, statistics, emit));
+        self.now += Span::ms(1);
+        let mut buffer = vec![0; 1514];
+        let (transmit, _) = self.exchange.poll_transmit(self.now, &mut buffer).unwrap();
+        buffer[..transmit.len].to_vec()
+    }
+
+    /// The frame that is out does not come back.
+    fn lose(&mut self) {
+        let slot = self.exchange.expire(self.now + Span::ms(1)).unwrap();
+        assert_eq!(self.exchange.slot(slot).state, crate::exchange::SlotState::GivenUp);
+        let events = &mut self.events;
+        self.cyclic.lost(0, &mut |event| events.push(event));
     }
 }
 
@@ -158,4 +186,101 @@ fn cycles_slept_through_are_left_out_on_the_grid() {
     fixture.cycle([0, 0], 0);
     assert_eq!(fixture.statistics.cycles_missed, 3);
     assert_eq!(fixture.cyclic.poll_timeout(), Some(Instant::ZERO + Span::ms(5)));
+}
+
+// proves: FRM-18 partial: per SubDevice
+#[test]
+fn inputs_are_cleared_where_that_was_chosen() {
+    let mut clearing = device();
+    clearing.settings.on_wrong_counter = OnWrongCounter::Clear;
+    let mut fixture = Fixture::of(&[device(), clearing], None);
+    fixture.reach(0);
+    fixture.reach(1);
+    fixture.cycle([1, 2], 6);
+    fixture.cycle([7, 8], 3);
+    assert_eq!(fixture.cyclic.inputs, [1, 0], "a wrong counter");
+    fixture.cycle([3, 4], 6);
+    assert_eq!(fixture.cyclic.inputs, [3, 4]);
+    fixture.send();
+    fixture.lose();
+    assert_eq!(fixture.cyclic.inputs, [3, 0], "a lost frame");
+    fixture.cycle([5, 6], 6);
+    lock(&fixture.line).set_found(DeviceId(1), Found::Lost);
+    fixture.cycle([7, 8], 3);
+    assert_eq!(fixture.cyclic.inputs, [7, 0], "known to be gone");
+}
+
+#[test]
+fn data_tell_how_old_they_are() {
+    let mut fixture = Fixture::new();
+    let quality = |fixture: &Fixture, id| {
+        let Quality { valid, updated_at } = fixture.cyclic.quality(DeviceId(id));
+        (valid, updated_at.map(|at| at.as_nanos() / 1_000_000))
+    };
+    assert_eq!(quality(&fixture, 0), (false, None));
+    fixture.reach(0);
+    fixture.reach(1);
+    assert_eq!(quality(&fixture, 0), (false, None), "nothing has come yet");
+    fixture.cycle([1, 2], 6);
+    assert_eq!([quality(&fixture, 0), quality(&fixture, 1)], [(true, Some(1)); 2]);
+    fixture.cycle([1, 2], 5);
+    assert_eq!([quality(&fixture, 0), quality(&fixture, 1)], [(false, Some(1)); 2]);
+    lock(&fixture.line).set_found(DeviceId(1), Found::Lost);
+    fixture.cycle([1, 2], 3);
+    assert_eq!(quality(&fixture, 0), (true, Some(3)));
+    assert_eq!(quality(&fixture, 1), (false, Some(1)), "as old as when it was seen last");
+    fixture.reach(1);
+    assert_eq!(quality(&fixture, 1), (false, Some(1)), "back, but not heard yet");
+    fixture.cycle([1, 2], 6);
+    assert_eq!(quality(&fixture, 1), (true, Some(4)));
+    fixture.send();
+    fixture.lose();
+    assert_eq!(quality(&fixture, 1), (false, Some(4)));
+}
+
+// proves: PLC-02 partial: at the interface of Rust
+#[test]
+fn each_frame_tells_how_it_went() {
+    let mut fixture = Fixture::new();
+    fixture.reach(0);
+    fixture.reach(1);
+    let status = |fixture: &Fixture| fixture.cyclic.frame_status(0, 0).unwrap();
+    fixture.cycle([1, 2], 6);
+    let good = status(&fixture);
+    assert_eq!((good.wrong_counter, good.not_sent), (0, 0));
+    fixture.cycle([1, 2], 3);
+    assert_eq!(status(&fixture).wrong_counter, 0x0001);
+    assert_eq!(status(&fixture).input_toggle & 1, good.input_toggle & 1, "nothing new");
+    fixture.cycle([1, 2], 6);
+    assert_ne!(status(&fixture).input_toggle & 1, good.input_toggle & 1);
+    fixture.send();
+    fixture.lose();
+    assert_eq!(status(&fixture).wrong_counter, FrameStatus::WHOLE);
+}
+
+#[test]
+fn outputs_of_a_late_application_are_not_sent_again_and_inputs_go_on() {
+    let mut fixture = Fixture::of(&[device(), device()], Some(1));
+    fixture.reach(0);
+    fixture.reach(1);
+    assert_eq!(fixture.cycle([0, 0], 6)[16], Command::Lrw.code(), "it has not begun yet");
+    fixture.cyclic.outputs.copy_from_slice(&[0x11, 0x22]);
+    fixture.cyclic.give_outputs(None);
+    for _ in 0..2 {
+        assert_eq!(fixture.cycle([1, 2], 6)[26..28], [0x11, 0x22], "one miss is allowed");
+    }
+    let late = fixture.cycle([3, 4], 2);
+    assert_eq!((late[16], &late[26..30]), (Command::Lrd.code(), &[0; 4][..]));
+    assert_eq!(fixture.cyclic.inputs, [3, 4]);
+    assert_eq!(fixture.cyclic.frame_status(0, 0).unwrap().not_sent, 0x0001);
+    assert_eq!(fixture.statistics.working_counter_errors, 0);
+    let Statistics { deadlines_missed, cycles_withheld, .. } = fixture.statistics;
+    assert_eq!((deadlines_missed, cycles_withheld), (2, 1));
+    fixture.cyclic.give_outputs(Some(0));
+    let back = fixture.cycle([5, 6], 6);
+    assert_eq!((back[16], &back[26..28]), (Command::Lrw.code(), &[0x11, 0x22][..]));
+    let told = |event: &Event| {
+        matches!(event, Event::OutputsWithheld { .. } | Event::OutputsResumed { .. })
+    };
+    assert_eq!(fixture.events.iter().filter(|event| told(event)).count(), 2);
 }

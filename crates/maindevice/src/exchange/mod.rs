@@ -3,23 +3,27 @@
 //! The engine keeps a slot for each frame that is out. The index bytes of a frame's datagrams carry
 //! its number: the first the low byte, the others the next one. A reply is matched by source
 //! address, number and shape; so a late reply (the slot was given up) and a duplicate (it was
-//! answered) are told from a lost frame and from frames of others. [`request`] is what procedures
-//! ask for. Two copies of a ring are merged datagram by datagram.
+//! answered) are told from a lost frame, from strays and from frames of others. [`request`] is what
+//! procedures ask for. Cyclic frames are [`prebuilt`]. Two copies of a ring are merged datagram by
+//! datagram.
 
 mod merge;
+pub(crate) mod prebuilt;
 mod queue;
 pub mod request;
 mod slot;
 
 use std::collections::VecDeque;
 
+use linesman_config::plan::FramePlan;
 use linesman_proto::address::Path;
-use linesman_proto::ethernet::{self, MAX_LEN, MacAddress};
-use linesman_proto::frame::{FrameBuilder, FrameView, MAX_DATAGRAM_DATA};
+use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, MAX_LEN, MIN_LEN, MacAddress, SOURCE_MARK};
+use linesman_proto::frame::{FrameBuilder, MAX_DATAGRAM_DATA};
 use linesman_proto::time::{Instant, Span};
 
 pub use request::{Access, ExchangeError, Reply, Request, Target};
 
+use prebuilt::{Prebuilt, Shaped};
 pub(crate) use queue::{Queued, Ticket};
 pub(crate) use slot::{Purpose, Slot, SlotState};
 
@@ -28,6 +32,15 @@ pub const MAX_ACYCLIC_DATAGRAMS: usize = 15;
 
 /// As many frames as the low byte of a frame's number can tell apart.
 const SLOTS: usize = 256;
+
+/// Offset of the source address in a frame.
+const SOURCE_AT: usize = 6;
+/// Offset of the byte whose upper half is the type in the EtherCAT header.
+const TYPE_AT: usize = 15;
+/// That type: datagrams.
+const DATAGRAMS: u8 = 1;
+/// Offset of the index byte of the first datagram.
+const FIRST_INDEX: usize = 17;
 
 /// A frame to be sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -51,18 +64,36 @@ pub(crate) enum Received {
     Late,
     /// A frame that had come back already.
     Duplicate,
+    /// One more copy of a cyclic frame that is sent more than once, after the first.
+    Spare(usize),
+    /// From our address, but nothing that is out: an unknown number, or other datagrams.
+    Stray,
+    /// A frame of ours without its end.
+    Truncated,
     /// Our own frame, as it was sent: not from the line.
     Echo,
-    /// Nothing that we have sent.
+    /// From another address, or no EtherCAT.
     Foreign,
+}
+
+/// Source address and EtherType of a frame as one number.
+type Origin = u64;
+
+fn origin(source: MacAddress) -> Origin {
+    let [a, b, c, d, e, f] = source.0;
+    let [g, h] = ETHERTYPE_ETHERCAT.to_be_bytes();
+    u64::from_le_bytes([a & !SOURCE_MARK, b, c, d, e, f, g, h])
 }
 
 /// The slots.
 #[derive(Debug)]
 pub(crate) struct Exchange {
     sources: [MacAddress; 2],
+    origins: [Origin; 2],
     paths: [bool; 2],
     slots: Vec<Slot>,
+    /// The frames of the running plan.
+    cyclic: Vec<Prebuilt>,
     /// Slots that are waiting, oldest first.
     waiting: Vec<usize>,
     outgoing: VecDeque<(usize, Path)>,
@@ -78,6 +109,8 @@ impl Exchange {
     pub(crate) fn new(sources: [MacAddress; 2], ring: bool, patience: Span) -> Self {
         Self {
             sources,
+            origins: sources.map(origin),
+            cyclic: Vec::new(),
             paths: [true, ring],
             slots: (0..SLOTS).map(|_| Slot::new()).collect(),
             waiting: Vec::with_capacity(SLOTS),
@@ -114,78 +147,102 @@ impl Exchange {
         !self.outgoing.is_empty()
     }
 
-    /// Packs queued datagrams into one frame and sends it.
-    pub(crate) fn send_acyclic(&mut self, now: Instant) {
+    /// Packs queued datagrams into one frame of at most `room` bytes, or of one datagram, and sends it.
+    pub(crate) fn send_acyclic(&mut self, now: Instant, room: usize) {
         if self.queue.is_empty() {
             return;
         }
-        let deadline = now + self.patience;
-        let mut queue = std::mem::take(&mut self.queue);
-        let sent = self.send(now, deadline, Purpose::Acyclic, |builder, slot, index| {
-            queue::pack(builder, &mut queue, slot.requests, MAX_ACYCLIC_DATAGRAMS, index);
-        });
-        self.queue = queue;
-        if sent.is_some() {
-            self.acyclic_out += 1;
-        }
-    }
-
-    /// Fills a frame and sends it by all cards. `None` when all slots are taken, or nothing was put
-    /// into it.
-    pub(crate) fn send(
-        &mut self,
-        now: Instant,
-        deadline: Instant,
-        purpose: Purpose,
-        fill: impl FnOnce(&mut FrameBuilder<'_>, &mut FillSlot<'_>, &dyn Fn(usize) -> u8),
-    ) -> Option<usize> {
-        let at = self.free_slot()?;
-        let number = self.number;
-        self.number = self.number.wrapping_add(1);
+        let Some((at, number)) = self.free_slot() else { return };
         let slot = &mut self.slots[at];
-        let mut sent = std::mem::take(&mut slot.sent);
-        sent.resize(MAX_LEN, 0);
+        slot.sent.resize(MAX_LEN, 0);
         slot.requests.clear();
-        let mut builder = FrameBuilder::new(&mut sent, self.sources[0]);
-        let index = move |datagram: usize| number.to_le_bytes()[usize::from(datagram > 0)];
-        fill(&mut builder, &mut FillSlot { requests: &mut slot.requests }, &index);
-        let empty = builder.is_empty();
+        let room = room.clamp(MIN_LEN, MAX_LEN);
+        let mut builder = FrameBuilder::new(&mut slot.sent, self.sources[0]);
+        let index = |datagram: usize| number.to_le_bytes()[usize::from(datagram > 0)];
+        let packed = &mut slot.requests;
+        queue::pack(&mut builder, &mut self.queue, packed, MAX_ACYCLIC_DATAGRAMS, room, index);
         let len = builder.finish();
-        sent.truncate(len);
-        slot.sent = sent;
-        if empty {
-            return None;
-        }
+        slot.sent.truncate(len);
         slot.cards.clear();
         slot.cards.extend(slot.requests.iter().map(|queued| queued.request.card));
+        self.acyclic_out += 1;
+        self.go(at, Purpose::Acyclic, now + self.patience, 1);
+    }
+
+    /// Takes over the frames of a plan. Those of the last one must have been abandoned.
+    pub(crate) fn prebuild(&mut self, frames: impl Iterator<Item = FramePlan>) {
+        self.cyclic = frames.map(|frame| Prebuilt::new(&frame, self.sources[0])).collect();
+    }
+
+    /// Sends a prebuilt frame by all cards, `times` times each, after `fill` has given it its
+    /// outputs. Whether it went: not when all slots are taken.
+    #[inline]
+    pub(crate) fn send_cyclic(
+        &mut self,
+        frame: usize,
+        deadline: Instant,
+        times: u8,
+        fill: impl FnOnce(&mut Prebuilt),
+    ) -> bool {
+        let Some((at, number)) = self.free_slot() else { return false };
+        let Some(prebuilt) = self.cyclic.get_mut(frame) else { return false };
+        if prebuilt.unsent > 0
+            && let Some(before) = prebuilt.slot
+        {
+            // Nobody has fetched the last one: it is overtaken, and was never on the line.
+            self.outgoing.retain(|(outgoing, _)| *outgoing != before);
+            self.retire(before, SlotState::Free);
+        }
+        let prebuilt = &mut self.cyclic[frame];
+        fill(prebuilt);
+        prebuilt.number(number);
+        prebuilt.slot = Some(at);
+        let copies = if self.paths[Path::B.index()] { 2 } else { 1 };
+        prebuilt.unsent = times * copies;
+        let slot = &mut self.slots[at];
+        slot.number = number;
+        slot.withheld = prebuilt.is_withheld();
+        self.go(at, Purpose::Cyclic { frame }, deadline, times);
+        true
+    }
+
+    /// A slot whose frame is ready goes out.
+    #[inline]
+    fn go(&mut self, at: usize, purpose: Purpose, deadline: Instant, times: u8) {
+        let slot = &mut self.slots[at];
         slot.state = SlotState::Waiting;
         slot.purpose = purpose;
-        slot.sent_at = now;
         slot.deadline = deadline;
         slot.outstanding = self.paths;
         slot.arrived = [false; 2];
+        slot.truncated = false;
+        slot.spares = [times - 1; 2];
         slot.reply.clear();
         self.waiting.push(at);
-        for path in Path::ALL {
-            if self.paths[path.index()] {
-                self.outgoing.push_back((at, path));
+        for _ in 0..times {
+            self.outgoing.push_back((at, Path::A));
+            if self.paths[Path::B.index()] {
+                self.outgoing.push_back((at, Path::B));
             }
         }
-        Some(at)
     }
 
-    fn free_slot(&mut self) -> Option<usize> {
+    /// A slot that is free, and the number of the frame in it.
+    #[inline]
+    fn free_slot(&mut self) -> Option<(usize, u32)> {
         for _ in 0..SLOTS {
-            let at = usize::from(self.number.to_le_bytes()[0]);
+            let number = self.number;
+            self.number = number.wrapping_add(1);
+            let at = usize::from(number.to_le_bytes()[0]);
             if self.slots[at].state != SlotState::Waiting {
-                return Some(at);
+                return Some((at, number));
             }
-            self.number = self.number.wrapping_add(1);
         }
         None
     }
 
     /// The next copy of a frame to be sent, as bytes in `buffer`, which must hold the longest frame.
+    #[inline]
     pub(crate) fn poll_transmit(
         &mut self,
         now: Instant,
@@ -193,46 +250,83 @@ impl Exchange {
     ) -> Option<(Transmit, Purpose)> {
         while let Some((at, path)) = self.outgoing.pop_front() {
             let slot = &self.slots[at];
-            let len = slot.sent.len();
+            let purpose = slot.purpose;
+            let bytes = match purpose {
+                Purpose::Cyclic { frame } => match self.cyclic.get_mut(frame) {
+                    Some(prebuilt) => {
+                        prebuilt.unsent = prebuilt.unsent.saturating_sub(1);
+                        prebuilt.bytes()
+                    }
+                    None => continue,
+                },
+                Purpose::Acyclic => &slot.sent,
+            };
+            let len = bytes.len();
             let Some(out) = buffer.get_mut(..len) else { continue };
-            out.copy_from_slice(&slot.sent);
+            out.copy_from_slice(bytes);
             if path == Path::B {
                 out[6..12].copy_from_slice(&self.sources[1].0);
             }
-            slot::mask(out, &slot.cards, path);
-            return Some((Transmit { at: now, path, len }, slot.purpose));
+            if purpose == Purpose::Acyclic {
+                slot::mask(out, &slot.cards, path);
+            }
+            return Some((Transmit { at: now, path, len }, purpose));
         }
         None
     }
 
     /// Takes a frame that arrived at card `path`.
+    #[inline]
     pub(crate) fn receive(&mut self, path: Path, frame: &[u8]) -> Received {
         let Some(sender) = self.sender(frame) else { return Received::Foreign };
-        let first = FrameView::parse(frame).ok().and_then(|view| view.datagrams().next());
-        let Some(Ok(first)) = first else { return Received::Foreign };
-        let at = usize::from(first.index());
+        let Some(first) = frame.get(FIRST_INDEX) else { return Received::Truncated };
+        let at = usize::from(*first);
         let slot = &mut self.slots[at];
-        if slot.state == SlotState::Free || frame.len() > MAX_LEN || !slot.matches(frame, sender) {
-            return Received::Foreign;
+        if slot.state == SlotState::Free || frame.len() > MAX_LEN {
+            return Received::Stray;
         }
-        let unmarked = ethernet::source(frame).is_some_and(|source| !source.is_marked());
-        if unmarked && sender == path && frame.starts_with(&slot.sent) && sender == Path::A {
+        let shaped = match slot.purpose {
+            Purpose::Cyclic { frame: prebuilt } => match self.cyclic.get(prebuilt) {
+                Some(prebuilt) => prebuilt.matches(frame, slot.number, slot.withheld),
+                None => Shaped::Otherwise,
+            },
+            Purpose::Acyclic => slot.matches(frame, sender),
+        };
+        match shaped {
+            Shaped::AsSent => {}
+            Shaped::Otherwise => return Received::Stray,
+            Shaped::CutOff => {
+                slot.truncated = true;
+                return Received::Truncated;
+            }
+        }
+        if frame[SOURCE_AT] & SOURCE_MARK == 0 && sender == path && self.is_echo(at, frame) {
             return Received::Echo;
         }
+        let copy = sender.index();
+        let slot = &mut self.slots[at];
         match slot.state {
-            SlotState::Free => return Received::Foreign,
+            SlotState::Waiting => {}
+            SlotState::Answered if slot.spares[copy] > 0 => {
+                slot.spares[copy] -= 1;
+                return Received::Spare(at);
+            }
+            SlotState::Free => return Received::Stray,
             SlotState::GivenUp => return Received::Late,
             SlotState::Answered => return Received::Duplicate,
-            SlotState::Waiting => {}
         }
-        let copy = sender.index();
         if slot.arrived[copy] || !slot.outstanding[copy] {
             return Received::Duplicate;
         }
         slot.arrived[copy] = true;
-        if self.paths[Path::B.index()] {
-            self.ring_intact = Some(path != sender);
+        if !self.paths[Path::B.index()] {
+            if slot.purpose == Purpose::Acyclic {
+                slot.reply.extend_from_slice(frame);
+            }
+            self.retire(at, SlotState::Answered);
+            return Received::Complete(at);
         }
+        self.ring_intact = Some(path != sender);
         if slot.reply.is_empty() {
             slot.reply.extend_from_slice(frame);
         } else {
@@ -246,18 +340,46 @@ impl Exchange {
         }
     }
 
+    /// Whether a frame is just as we have sent it.
+    fn is_echo(&self, at: usize, frame: &[u8]) -> bool {
+        let slot = &self.slots[at];
+        match slot.purpose {
+            Purpose::Acyclic => frame.starts_with(&slot.sent),
+            Purpose::Cyclic { frame: index } => {
+                (self.cyclic.get(index)).is_some_and(|prebuilt| frame.starts_with(prebuilt.bytes()))
+            }
+        }
+    }
+
+    /// Which of our cards has sent a frame, when it is one of datagrams.
+    #[inline]
     fn sender(&self, frame: &[u8]) -> Option<Path> {
-        let source = ethernet::source(frame)?;
-        let is = |path: &Path| {
-            let ours = self.sources[path.index()];
-            self.paths[path.index()] && (source == ours || source == ours.marked())
-        };
-        Path::ALL.into_iter().find(is)
+        let word = frame.get(SOURCE_AT..)?.first_chunk()?;
+        let origin = u64::from_le_bytes(*word);
+        // Controllers set one bit of the source address; those of our cards have it clear.
+        let origin = origin & !u64::from(SOURCE_MARK);
+        if frame.get(TYPE_AT)? >> 4 != DATAGRAMS {
+            return None;
+        }
+        if origin == self.origins[0] {
+            return Some(Path::A);
+        }
+        (self.paths[Path::B.index()] && origin == self.origins[1]).then_some(Path::B)
+    }
+
+    /// The whole answer of a slot: what came back last, or both copies merged.
+    #[inline]
+    pub(crate) fn answer<'a>(&'a self, at: usize, last: &'a [u8]) -> &'a [u8] {
+        let reply = &self.slots[at].reply;
+        if reply.is_empty() { last } else { reply }
     }
 
     fn retire(&mut self, at: usize, state: SlotState) {
         self.slots[at].state = state;
-        self.waiting.retain(|waiting| *waiting != at);
+        // Oldest first, and answers come in order: it is nearly always the first.
+        if let Some(place) = self.waiting.iter().position(|waiting| *waiting == at) {
+            self.waiting.remove(place);
+        }
         if self.slots[at].purpose == Purpose::Acyclic {
             self.acyclic_out = self.acyclic_out.saturating_sub(1);
         }
@@ -320,11 +442,6 @@ impl Exchange {
     pub(crate) fn poll_timeout(&self) -> Option<Instant> {
         self.waiting.iter().map(|at| self.slots[*at].deadline).min()
     }
-}
-
-/// The part of a slot that is filled along with its frame.
-pub(crate) struct FillSlot<'a> {
-    pub(crate) requests: &'a mut Vec<Queued>,
 }
 
 #[cfg(test)]

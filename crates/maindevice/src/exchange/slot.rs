@@ -7,6 +7,7 @@ use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, FrameView,
 use linesman_proto::time::Instant;
 
 use super::MAX_ACYCLIC_DATAGRAMS;
+use super::prebuilt::Shaped;
 use super::queue::Queued;
 
 /// Whose frame it is.
@@ -14,11 +15,9 @@ use super::queue::Queued;
 pub(crate) enum Purpose {
     /// Datagrams of procedures, listed in the slot.
     Acyclic,
-    /// A frame of the plan.
+    /// A prebuilt frame of the plan.
     Cyclic {
-        /// Index of the task.
-        task: usize,
-        /// Index of the frame within the task.
+        /// Its index among those of all tasks.
         frame: usize,
     },
 }
@@ -46,9 +45,16 @@ pub(crate) struct Slot {
     pub(crate) sent: Vec<u8>,
     /// The card that carries each datagram, where it is one only; empty when all go by both.
     pub(crate) cards: Vec<Option<Path>>,
-    /// What came back: the first copy, later with the second merged in.
+    /// What came back: the first copy, later with the second merged in. Empty for a cyclic frame
+    /// that has one copy only, which is read where it was received.
     pub(crate) reply: Vec<u8>,
-    pub(crate) sent_at: Instant,
+    /// The number of a cyclic frame, and whether its outputs were withheld.
+    pub(crate) number: u32,
+    pub(crate) withheld: bool,
+    /// It came back without its end.
+    pub(crate) truncated: bool,
+    /// Further copies of the same frame that each card has sent and that have not come back.
+    pub(crate) spares: [u8; 2],
     pub(crate) deadline: Instant,
     /// Copies by the card that sent them: on their way, or come back.
     pub(crate) outstanding: [bool; 2],
@@ -66,7 +72,10 @@ impl Slot {
             sent: Vec::with_capacity(MAX_LEN),
             cards: Vec::with_capacity(MAX_ACYCLIC_DATAGRAMS),
             reply: Vec::with_capacity(MAX_LEN),
-            sent_at: Instant::ZERO,
+            number: 0,
+            withheld: false,
+            truncated: false,
+            spares: [0; 2],
             deadline: Instant::MAX,
             outstanding: [false; 2],
             arrived: [false; 2],
@@ -76,14 +85,15 @@ impl Slot {
 
     /// Whether `reply` is a copy of this frame that card `sender` sent, come back from the line:
     /// the same datagrams with the same marks.
-    pub(crate) fn matches(&self, reply: &[u8], sender: Path) -> bool {
+    pub(super) fn matches(&self, reply: &[u8], sender: Path) -> Shaped {
         let (Ok(sent), Ok(came)) = (FrameView::parse(&self.sent), FrameView::parse(reply)) else {
-            return false;
+            return Shaped::Otherwise;
         };
         let mut came = came.datagrams();
         for (at, sent) in sent.datagrams().enumerate() {
-            let (Ok(sent), Some(Ok(came))) = (sent, came.next()) else { return false };
-            let Some(command) = sent.command() else { return false };
+            let (Ok(sent), Some(came)) = (sent, came.next()) else { return Shaped::Otherwise };
+            let Ok(came) = came else { return Shaped::CutOff };
+            let Some(command) = sent.command() else { return Shaped::Otherwise };
             let same = came.code() == as_sent_by(command, self.card(at), sender).code()
                 && came.index() == sent.index()
                 && came.offset() == sent.offset()
@@ -92,10 +102,10 @@ impl Slot {
                 && came.ado() == sent.ado()
                 && (command.increments_position() || came.adp() == sent.adp());
             if !same {
-                return false;
+                return Shaped::Otherwise;
             }
         }
-        came.next().is_none()
+        if came.next().is_none() { Shaped::AsSent } else { Shaped::Otherwise }
     }
 
     /// The card that alone carries a datagram.

@@ -24,7 +24,7 @@ fn read(station: u16, repeats: u8) -> Request {
 
 /// Sends all that is queued and gives the frames by card.
 fn transmit(exchange: &mut Exchange) -> Vec<(Path, Vec<u8>)> {
-    exchange.send_acyclic(NOW);
+    exchange.send_acyclic(NOW, MAX_LEN);
     let mut buffer = vec![0; MAX_LEN];
     let mut frames = Vec::new();
     while let Some((Transmit { path, len, .. }, _)) = exchange.poll_transmit(NOW, &mut buffer) {
@@ -86,7 +86,8 @@ fn lost_late_duplicate_foreign_and_echo() {
     assert_eq!(exchange.receive(Path::A, &other_source), Received::Foreign);
     let mut other_register = good.clone();
     other_register[20] = 0x34;
-    assert_eq!(exchange.receive(Path::A, &other_register), Received::Foreign);
+    assert_eq!(exchange.receive(Path::A, &other_register), Received::Stray);
+    assert_eq!(exchange.receive(Path::A, &good[..27]), Received::Truncated);
     assert_eq!(exchange.receive(Path::A, &good), Received::Complete(0));
     assert_eq!(exchange.receive(Path::A, &good), Received::Duplicate);
 

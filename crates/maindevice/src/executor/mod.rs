@@ -8,7 +8,7 @@ mod task;
 pub mod wire;
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
@@ -37,9 +37,44 @@ pub(crate) struct Answer {
     pub(crate) waker: Option<Waker>,
 }
 
+/// What tasks and the engine share, and what the engine may look at without its lock.
+pub(crate) struct Board {
+    shared: Mutex<Shared>,
+    /// Now, in ns.
+    now: AtomicU64,
+    /// When the first sleeper is to be woken, in ns.
+    first_timer: AtomicU64,
+    /// A task has changed something.
+    news: AtomicBool,
+    /// There are events.
+    events: AtomicBool,
+}
+
+impl Board {
+    /// For tasks: whatever they change is news for the engine.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Shared> {
+        self.news.store(true, Ordering::Relaxed);
+        lock(&self.shared)
+    }
+
+    pub(crate) fn now(&self) -> Instant {
+        Instant::from_nanos(self.now.load(Ordering::Relaxed))
+    }
+
+    /// Something was put among the events.
+    pub(crate) fn note_event(&self) {
+        self.events.store(true, Ordering::Relaxed);
+    }
+
+    /// Timers have changed.
+    pub(crate) fn note_timers(&self, shared: &Shared) {
+        let first = shared.timers.first_key_value().map_or(u64::MAX, |((at, _), _)| at.as_nanos());
+        self.first_timer.store(first, Ordering::Relaxed);
+    }
+}
+
 /// What tasks and the engine share.
 pub(crate) struct Shared {
-    pub(crate) now: Instant,
     /// Whether what card A sends arrives at card B.
     pub(crate) ring_intact: Option<bool>,
     pub(crate) next_ticket: u64,
@@ -52,7 +87,21 @@ pub(crate) struct Shared {
     pub(crate) events: VecDeque<Event>,
 }
 
-type Ready = Arc<Mutex<VecDeque<u64>>>;
+/// Tasks that want to be polled.
+#[derive(Default)]
+struct ReadyTasks {
+    queue: Mutex<VecDeque<u64>>,
+    any: AtomicBool,
+}
+
+impl ReadyTasks {
+    fn push(&self, id: u64) {
+        lock(&self.queue).push_back(id);
+        self.any.store(true, Ordering::Relaxed);
+    }
+}
+
+type Ready = Arc<ReadyTasks>;
 
 /// Wakes one task by putting it into the queue of those that are ready.
 struct TaskWaker {
@@ -69,7 +118,7 @@ impl Wake for TaskWaker {
 
     fn wake_by_ref(self: &Arc<Self>) {
         if !self.queued.swap(true, Ordering::Relaxed) {
-            lock(&self.ready).push_back(self.id);
+            self.ready.push(self.id);
         }
     }
 }
@@ -83,7 +132,7 @@ struct Task {
 
 /// The poller.
 pub(crate) struct Executor {
-    shared: Arc<Mutex<Shared>>,
+    board: Arc<Board>,
     ready: Ready,
     tasks: BTreeMap<u64, Task>,
     next_task: u64,
@@ -93,7 +142,6 @@ pub(crate) struct Executor {
 impl Executor {
     pub(crate) fn new() -> Self {
         let shared = Shared {
-            now: Instant::ZERO,
             ring_intact: None,
             next_ticket: 0,
             submitted: VecDeque::new(),
@@ -104,8 +152,15 @@ impl Executor {
             spawned: VecDeque::new(),
             events: VecDeque::new(),
         };
+        let board = Board {
+            shared: Mutex::new(shared),
+            now: AtomicU64::new(0),
+            first_timer: AtomicU64::new(u64::MAX),
+            news: AtomicBool::new(false),
+            events: AtomicBool::new(false),
+        };
         Self {
-            shared: Arc::new(Mutex::new(shared)),
+            board: Arc::new(board),
             ready: Ready::default(),
             tasks: BTreeMap::new(),
             next_task: 0,
@@ -114,13 +169,43 @@ impl Executor {
     }
 
     pub(crate) fn shared(&self) -> MutexGuard<'_, Shared> {
-        lock(&self.shared)
+        lock(&self.board.shared)
+    }
+
+    /// Whether tasks have changed something since this was asked last.
+    #[inline]
+    pub(crate) fn take_news(&self) -> bool {
+        self.board.news.load(Ordering::Relaxed) && self.board.news.swap(false, Ordering::Relaxed)
+    }
+
+    /// Tells the user of the MainDevice.
+    pub(crate) fn emit(&self, event: Event) {
+        self.shared().events.push_back(event);
+        self.note_event();
+    }
+
+    /// Something was put among the events.
+    pub(crate) fn note_event(&self) {
+        self.board.note_event();
+    }
+
+    /// The next thing to tell.
+    #[inline]
+    pub(crate) fn poll_event(&mut self) -> Option<Event> {
+        if !self.board.events.load(Ordering::Relaxed) {
+            return None;
+        }
+        let event = self.shared().events.pop_front();
+        if event.is_none() {
+            self.board.events.store(false, Ordering::Relaxed);
+        }
+        event
     }
 
     /// A wire for a new group of tasks.
     pub(crate) fn group(&mut self, repeats: u8) -> Wire {
         self.next_group += 1;
-        Wire::new(Arc::clone(&self.shared), Group(self.next_group), repeats)
+        Wire::new(Arc::clone(&self.board), Group(self.next_group), repeats)
     }
 
     /// Drops all tasks of a group; their requests are forgotten.
@@ -138,20 +223,30 @@ impl Executor {
     }
 
     /// Time has come to `now`: wakes whoever slept until then.
+    #[inline]
     pub(crate) fn advance(&mut self, now: Instant) {
-        let mut shared = lock(&self.shared);
-        shared.now = shared.now.max(now);
+        if now > self.board.now() {
+            self.board.now.store(now.as_nanos(), Ordering::Relaxed);
+        }
+        if now.as_nanos() >= self.board.first_timer.load(Ordering::Relaxed) {
+            self.wake_sleepers(now);
+        }
+    }
+
+    fn wake_sleepers(&mut self, now: Instant) {
+        let mut shared = lock(&self.board.shared);
         while let Some(first) = shared.timers.first_entry()
             && first.key().0 <= now
         {
             // Waking touches only the queue of those that are ready.
             first.remove().wake();
         }
+        self.board.note_timers(&shared);
     }
 
     /// The answer to a request.
     pub(crate) fn answer(&mut self, ticket: Ticket, result: Result<Reply, ExchangeError>) {
-        let mut shared = lock(&self.shared);
+        let mut shared = lock(&self.board.shared);
         let Some(answer) = shared.answers.get_mut(&ticket) else { return };
         answer.result = Some(result);
         let waker = answer.waker.take();
@@ -162,10 +257,18 @@ impl Executor {
     }
 
     /// Polls whoever is ready until nobody is.
+    #[inline]
     pub(crate) fn run(&mut self) {
+        let news = self.board.news.load(Ordering::Relaxed);
+        if news || self.ready.any.load(Ordering::Relaxed) {
+            self.run_all();
+        }
+    }
+
+    fn run_all(&mut self) {
         loop {
             self.adopt();
-            let Some(id) = lock(&self.ready).pop_front() else { break };
+            let Some(id) = lock(&self.ready.queue).pop_front() else { break };
             let Some(task) = self.tasks.get_mut(&id) else { continue };
             task.queued.store(false, Ordering::Relaxed);
             let waker = task.waker.clone();
@@ -176,6 +279,7 @@ impl Executor {
                 }
             }
         }
+        self.ready.any.store(false, Ordering::Relaxed);
     }
 
     fn adopt(&mut self) {
@@ -187,13 +291,15 @@ impl Executor {
             let ready = Arc::clone(&self.ready);
             let waker = Waker::from(Arc::new(TaskWaker { id, ready, queued: Arc::clone(&queued) }));
             self.tasks.insert(id, Task { group, future, waker, queued });
-            lock(&self.ready).push_back(id);
+            self.ready.push(id);
         }
     }
 
     /// When the first sleeper wants to be woken.
+    #[inline]
     pub(crate) fn poll_timeout(&self) -> Option<Instant> {
-        self.shared().timers.first_key_value().map(|((at, _), _)| *at)
+        let first = self.board.first_timer.load(Ordering::Relaxed);
+        (first != u64::MAX).then(|| Instant::from_nanos(first))
     }
 }
 

@@ -45,6 +45,14 @@ pub(crate) fn with_handle<T: Send + 'static>(
     (Box::pin(task), handle)
 }
 
+impl<T> Handle<T> {
+    /// What the task has given, once it has; to be asked again and again from outside.
+    #[must_use]
+    pub fn take(&self) -> Option<T> {
+        lock(&self.outcome).value.take()
+    }
+}
+
 impl<T> Future for Handle<T> {
     type Output = T;
 

@@ -2,27 +2,27 @@
 
 use std::future::Future;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::task::{Context, Poll};
 
 use linesman_proto::address::{RegisterAddress, WorkingCounter};
 use linesman_proto::time::{Instant, Span};
 
 use super::task::{Handle, Spawned, with_handle};
-use super::{Answer, Group, Shared, lock};
+use super::{Answer, Board, Group};
 use crate::event::Event;
 use crate::exchange::{ExchangeError, Reply, Request, Target, Ticket};
 
 /// The line as procedures see it. Clones mean the same line.
 #[derive(Clone)]
 pub struct Wire {
-    shared: Arc<Mutex<Shared>>,
+    shared: Arc<Board>,
     group: Group,
     repeats: u8,
 }
 
 impl Wire {
-    pub(crate) fn new(shared: Arc<Mutex<Shared>>, group: Group, repeats: u8) -> Self {
+    pub(crate) fn new(shared: Arc<Board>, group: Group, repeats: u8) -> Self {
         Self { shared, group, repeats }
     }
 
@@ -33,18 +33,18 @@ impl Wire {
     /// The present time.
     #[must_use]
     pub fn now(&self) -> Instant {
-        lock(&self.shared).now
+        self.shared.now()
     }
 
     /// Whether what card A sends arrives at card B; `None` with one card.
     #[must_use]
     pub fn ring_intact(&self) -> Option<bool> {
-        lock(&self.shared).ring_intact
+        self.shared.lock().ring_intact
     }
 
     /// Queues a datagram at once; await the result for its answer. Dropping it gives the answer up.
     pub fn submit(&self, request: Request) -> Exchanging {
-        let mut shared = lock(&self.shared);
+        let mut shared = self.shared.lock();
         let ticket = Ticket(shared.next_ticket);
         shared.next_ticket += 1;
         shared.submitted.push_back((ticket, request));
@@ -129,13 +129,14 @@ impl Wire {
         future: impl Future<Output = T> + Send + 'static,
     ) -> Handle<T> {
         let (future, handle) = with_handle(future);
-        lock(&self.shared).spawned.push_back(Spawned { group: self.group, future });
+        self.shared.lock().spawned.push_back(Spawned { group: self.group, future });
         handle
     }
 
     /// Tells the user of the MainDevice.
     pub fn emit(&self, event: Event) {
-        lock(&self.shared).events.push_back(event);
+        self.shared.lock().events.push_back(event);
+        self.shared.note_event();
     }
 }
 
@@ -147,7 +148,7 @@ impl std::fmt::Debug for Wire {
 
 /// The answer to a datagram, to be awaited.
 pub struct Exchanging {
-    shared: Arc<Mutex<Shared>>,
+    shared: Arc<Board>,
     ticket: Ticket,
 }
 
@@ -155,7 +156,7 @@ impl Future for Exchanging {
     type Output = Result<Reply, ExchangeError>;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
-        let mut shared = lock(&self.shared);
+        let mut shared = self.shared.lock();
         let Some(answer) = shared.answers.get_mut(&self.ticket) else { return Poll::Pending };
         match answer.result.take() {
             Some(result) => {
@@ -172,7 +173,7 @@ impl Future for Exchanging {
 
 impl Drop for Exchanging {
     fn drop(&mut self) {
-        let mut shared = lock(&self.shared);
+        let mut shared = self.shared.lock();
         if shared.answers.remove(&self.ticket).is_some() {
             shared.cancelled.push(self.ticket);
         }
@@ -181,7 +182,7 @@ impl Drop for Exchanging {
 
 /// A point in time, to be awaited.
 pub struct Sleep {
-    shared: Arc<Mutex<Shared>>,
+    shared: Arc<Board>,
     until: Instant,
     timer: Option<u64>,
 }
@@ -191,10 +192,12 @@ impl Future for Sleep {
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
         let until = self.until;
-        let shared = Arc::clone(&self.shared);
-        let mut shared = lock(&shared);
+        let board = Arc::clone(&self.shared);
+        if board.now() >= until {
+            return Poll::Ready(());
+        }
+        let mut shared = board.lock();
         let timer = match self.timer {
-            _ if shared.now >= until => return Poll::Ready(()),
             Some(timer) => timer,
             None => {
                 let timer = shared.next_timer;
@@ -204,6 +207,7 @@ impl Future for Sleep {
             }
         };
         shared.timers.insert((until, timer), context.waker().clone());
+        board.note_timers(&shared);
         Poll::Pending
     }
 }
@@ -211,7 +215,10 @@ impl Future for Sleep {
 impl Drop for Sleep {
     fn drop(&mut self) {
         if let Some(timer) = self.timer {
-            lock(&self.shared).timers.remove(&(self.until, timer));
+            let mut shared = self.shared.lock();
+            if shared.timers.remove(&(self.until, timer)).is_some() {
+                self.shared.note_timers(&shared);
+            }
         }
     }
 }

@@ -2,151 +2,44 @@
 //!
 //! Reference: ETG.1000.6, SDO; the messages are those of `proto::mailbox::coe`.
 
-use linesman_proto::address::DeviceId;
+use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::sdo::{Abort, Initial, Request, Response, Segment};
-use linesman_proto::mailbox::coe::{CoeError, Message, ObjectAddress};
-use linesman_proto::mailbox::error_reply::ErrorReplyCode;
-use linesman_proto::mailbox::{BufferTooSmall, MailboxType};
-use linesman_proto::time::Span;
+use linesman_proto::mailbox::coe::{CoeError, Message, ObjectAddress, ObjectIndex};
 
-use super::multiplexer::Multiplexer;
-use crate::exchange::ExchangeError;
-
-/// An SDO transfer that came to nothing.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum SdoError {
-    /// The SubDevice ended it.
-    #[error("SubDevice {} aborted access to {object}: {code}", id.no())]
-    Aborted {
-        /// Which.
-        id: DeviceId,
-        /// What was asked for.
-        object: ObjectAddress,
-        /// Why.
-        code: SdoAbortCode,
-    },
-    /// No answer came.
-    #[error(
-        "SubDevice {} did not answer the access to {object} within {patience}; its mailbox takes \
-         messages, so its software is slow or stuck", id.no()
-    )]
-    NoAnswer {
-        /// Which.
-        id: DeviceId,
-        /// What was asked for.
-        object: ObjectAddress,
-        /// How long it was waited for.
-        patience: Span,
-    },
-    /// It does not fetch what is written to its mailbox.
-    #[error("the mailbox of SubDevice {} stays full: its software does not read it", id.no())]
-    MailboxFull {
-        /// Which.
-        id: DeviceId,
-    },
-    /// It answers with a mailbox error.
-    #[error("SubDevice {} refuses the message: {}", id.no(), code.text())]
-    Mailbox {
-        /// Which.
-        id: DeviceId,
-        /// Why.
-        code: ErrorReplyCode,
-    },
-    /// It has no mailbox, or none is open in its state.
-    #[error("SubDevice {} has no open mailbox: it needs one, and a state from PREOP up", id.no())]
-    NotOpen {
-        /// Which.
-        id: DeviceId,
-    },
-    /// It answers something that does not belong there.
-    #[error("SubDevice {} answers the access to {object} with {found}", id.no())]
-    Protocol {
-        /// Which.
-        id: DeviceId,
-        /// What was asked for.
-        object: ObjectAddress,
-        /// What came.
-        found: String,
-    },
-    /// It cannot be reached.
-    #[error(transparent)]
-    Exchange(#[from] ExchangeError),
-    /// The message does not fit into its mailbox.
-    #[error(transparent)]
-    TooSmall(#[from] BufferTooSmall),
-}
-
-struct Transfer<'a, 'b> {
-    multiplexer: &'a mut Multiplexer<'b>,
-    object: ObjectAddress,
-    patience: Span,
-}
+use super::dialogue::Dialogue;
+use super::failure::{Step, Why};
 
 /// A transfer longer than this is not believed.
 const LONGEST: usize = 16 << 20;
 
 /// Fetches an object.
 pub(crate) async fn upload(
-    multiplexer: &mut Multiplexer<'_>,
+    dialogue: &mut Dialogue<'_>,
     object: ObjectAddress,
     complete: bool,
-    patience: Span,
-) -> Result<Vec<u8>, SdoError> {
-    let mut transfer = Transfer { multiplexer, object, patience };
-    let answer = transfer.ask(Request::Upload { object, complete }).await?;
-    let (mut data, size) = match response(&answer) {
-        Ok(Response::Upload { initial, .. }) => (initial.data().to_vec(), initial.size()),
-        other => return Err(transfer.unexpected(other)),
-    };
-    let size = usize::try_from(size).unwrap_or(LONGEST).min(LONGEST);
-    let mut toggle = false;
-    while data.len() < size {
-        let answer = transfer.ask(Request::UploadSegment { toggle }).await?;
-        let last = match response(&answer) {
-            Ok(Response::UploadSegment(segment)) if segment.toggle == toggle => {
-                data.extend_from_slice(segment.data);
-                segment.last || segment.data.is_empty()
-            }
-            other => return Err(transfer.unexpected(other)),
-        };
-        toggle = !toggle;
-        if last {
-            break;
-        }
-    }
-    Ok(data)
+) -> Result<Vec<u8>, Why> {
+    let mut transfer = Transfer { dialogue, object, complete };
+    let result = transfer.upload().await;
+    transfer.end(result).await
 }
 
 /// Brings an object.
 pub(crate) async fn download(
-    multiplexer: &mut Multiplexer<'_>,
+    dialogue: &mut Dialogue<'_>,
     object: ObjectAddress,
     complete: bool,
     data: &[u8],
-    patience: Span,
-) -> Result<(), SdoError> {
-    let mailbox_size = multiplexer.out_size();
-    let mut transfer = Transfer { multiplexer, object, patience };
-    let initial = Initial::of(data, mailbox_size);
-    let mut rest = data.get(initial.data().len()..).unwrap_or_default();
-    let answer = transfer.ask(Request::Download { object, complete, initial }).await?;
-    match response(&answer) {
-        Ok(Response::Download { .. }) => {}
-        other => return Err(transfer.unexpected(other)),
-    }
-    let mut toggle = false;
-    while !rest.is_empty() {
-        let segment = Segment::of(rest, toggle, mailbox_size);
-        rest = &rest[segment.data.len()..];
-        let answer = transfer.ask(Request::DownloadSegment(segment)).await?;
-        match response(&answer) {
-            Ok(Response::DownloadSegment { toggle: back }) if back == toggle => {}
-            other => return Err(transfer.unexpected(other)),
-        }
-        toggle = !toggle;
-    }
-    Ok(())
+) -> Result<(), Why> {
+    let mut transfer = Transfer { dialogue, object, complete };
+    let result = transfer.download(data).await;
+    transfer.end(result).await
+}
+
+struct Transfer<'a, 'b> {
+    dialogue: &'a mut Dialogue<'b>,
+    object: ObjectAddress,
+    complete: bool,
 }
 
 /// The SDO response in the data of a CoE message.
@@ -161,46 +54,172 @@ fn response(data: &[u8]) -> Result<Response<'_>, CoeError> {
     }
 }
 
+/// An answer, as messages name it.
+fn name(response: &Response<'_>) -> String {
+    match response {
+        Response::Download { object, .. } => format!("the answer to a download of {object}"),
+        Response::DownloadSegment { .. } => "the answer to a segment of a download".to_owned(),
+        Response::Upload { object, .. } => format!("the answer to an upload of {object}"),
+        Response::UploadSegment(_) => "a segment of an upload".to_owned(),
+    }
+}
+
+const TURNED: &str = "the toggle bit turned";
+
+fn wrong(expected: &'static str, found: impl Into<String>) -> Why {
+    Why::Protocol { expected, found: found.into() }
+}
+
 impl Transfer<'_, '_> {
-    /// Sends a request and waits for the message that answers it.
-    async fn ask(&mut self, request: Request<'_>) -> Result<Vec<u8>, SdoError> {
-        let until = self.multiplexer.now() + self.patience;
-        let message = Message::SdoRequest(request);
-        self.multiplexer.send(MailboxType::Coe, |body| message.write(body), until).await?;
-        let (id, object) = (self.multiplexer.id(), self.object);
-        loop {
-            let Some(data) = self.multiplexer.receive_coe(until).await? else {
-                return Err(SdoError::NoAnswer { id, object, patience: self.patience });
+    async fn upload(&mut self) -> Result<Vec<u8>, Why> {
+        let (object, complete) = (self.object, self.complete);
+        let expected = "the answer to an upload";
+        let answer = self
+            .ask(Request::Upload { object, complete }, expected, |answer| {
+                matches!(answer, Response::Upload { .. })
+            })
+            .await?;
+        let Ok(Response::Upload { initial, .. }) = response(&answer) else {
+            return Err(wrong(expected, "something else"));
+        };
+        let size = usize::try_from(initial.size()).unwrap_or(usize::MAX);
+        if size > LONGEST {
+            return Err(Why::TooLong { limit: LONGEST });
+        }
+        let mut data = initial.data().to_vec();
+        let (mut toggle, mut number) = (false, 0);
+        while data.len() < size {
+            number += 1;
+            self.dialogue.step = Step::Segment(number);
+            let expected = "a segment of the upload";
+            let answer = self
+                .ask(Request::UploadSegment { toggle }, expected, |answer| {
+                    matches!(answer, Response::UploadSegment(_))
+                })
+                .await?;
+            let Ok(Response::UploadSegment(segment)) = response(&answer) else {
+                return Err(wrong(expected, "something else"));
             };
+            if segment.toggle != toggle {
+                return Err(wrong(TURNED, "a segment with the toggle bit of the one before"));
+            }
+            data.extend_from_slice(segment.data);
+            if data.len() > size {
+                let found = format!("{} bytes, although {size} were announced", data.len());
+                return Err(wrong("no more than was announced", found));
+            }
+            if data.len() < size && (segment.last || segment.data.is_empty()) {
+                let found = format!("the end after {} of {size} bytes", data.len());
+                return Err(wrong("all that was announced", found));
+            }
+            toggle = !toggle;
+        }
+        Ok(data)
+    }
+
+    async fn download(&mut self, data: &[u8]) -> Result<(), Why> {
+        if data.len() > LONGEST {
+            return Err(Why::TooLong { limit: LONGEST });
+        }
+        let (object, complete) = (self.object, self.complete);
+        let mailbox_size = self.dialogue.multiplexer.out_size();
+        let initial = Initial::of(data, mailbox_size);
+        let mut rest = data.get(initial.data().len()..).unwrap_or_default();
+        self.ask(Request::Download { object, complete, initial }, "the answer", |answer| {
+            matches!(answer, Response::Download { .. })
+        })
+        .await?;
+        let (mut toggle, mut number) = (false, 0);
+        while !rest.is_empty() {
+            number += 1;
+            self.dialogue.step = Step::Segment(number);
+            let segment = Segment::of(rest, toggle, mailbox_size);
+            rest = &rest[segment.data.len()..];
+            let answer = self
+                .ask(Request::DownloadSegment(segment), "the answer to a segment", |answer| {
+                    matches!(answer, Response::DownloadSegment { .. })
+                })
+                .await?;
+            if !matches!(response(&answer), Ok(Response::DownloadSegment { toggle: back }) if back == toggle)
+            {
+                return Err(wrong(TURNED, "the toggle bit of the segment before"));
+            }
+            toggle = !toggle;
+        }
+        Ok(())
+    }
+
+    /// Sends a request and waits for the message that answers it.
+    async fn ask(
+        &mut self,
+        request: Request<'_>,
+        expected: &'static str,
+        fits: impl Fn(&Response<'_>) -> bool,
+    ) -> Result<Vec<u8>, Why> {
+        let message = Message::SdoRequest(request);
+        self.dialogue.say(MailboxType::Coe, |body| message.write(body)).await?;
+        loop {
+            let data = self.dialogue.hear(MailboxType::Coe).await?;
             match Message::parse(&data) {
-                Ok(Message::Abort(Abort { object: about, code, .. })) if about == object => {
-                    let code = SdoAbortCode(code);
-                    return Err(SdoError::Aborted { id, object, code });
+                Ok(Message::Abort(Abort { object, code })) if self.is_about(object) => {
+                    return Err(Why::Aborted { code: SdoAbortCode(code) });
                 }
+                // The late answer to a transfer that was given up, about another object.
                 Ok(Message::SdoResponse(
-                    Response::Upload { object: about, .. }
-                    | Response::Download { object: about, .. },
-                )) if about != object => {
-                    // The late answer to a transfer that was given up.
+                    Response::Upload { object, .. } | Response::Download { object, .. },
+                )) if !self.is_about(object) => {}
+                Ok(Message::SdoResponse(response)) if fits(&response) => return Ok(data),
+                // The same, about any object.
+                Ok(Message::SdoResponse(_)) if self.dialogue.multiplexer.may_be_late() => {}
+                Ok(Message::SdoResponse(response)) => {
+                    return Err(wrong(expected, name(&response)));
                 }
-                Ok(Message::SdoResponse(_)) => return Ok(data),
                 Ok(
                     Message::Abort(_)
                     | Message::Emergency(_)
                     | Message::SdoRequest(_)
                     | Message::Information(_)
                     | Message::Pdo { .. },
-                )
-                | Err(_) => {}
+                ) => {}
+                Err(error) => return Err(wrong(expected, error.to_string())),
             }
+            self.dialogue.multiplexer.unasked(MailboxType::Coe, data);
         }
     }
 
-    fn unexpected(&self, found: Result<Response<'_>, CoeError>) -> SdoError {
-        let found = match found {
-            Ok(response) => format!("{response:?}"),
-            Err(error) => error.to_string(),
+    /// Whether an answer that names an object is about ours. Which entry it names with complete
+    /// access is up to the SubDevice; some name none when they abort a segment.
+    fn is_about(&self, object: ObjectAddress) -> bool {
+        let segment = matches!(self.dialogue.step, Step::Segment(_));
+        object == self.object
+            || self.complete && object.index == self.object.index
+            || segment && object.index == ObjectIndex(0)
+    }
+
+    /// Tells the SubDevice when we give a transfer up that it goes on with.
+    async fn end<T>(&mut self, result: Result<T, Why>) -> Result<T, Why> {
+        let Err(why) = &result else { return result };
+        let code = match why {
+            Why::NoAnswer { .. } => SdoAbortCode::TIMEOUT,
+            Why::Protocol { expected, .. } if *expected == TURNED => SdoAbortCode::TOGGLE_BIT,
+            Why::TooLong { .. } => SdoAbortCode::OUT_OF_MEMORY,
+            Why::Protocol { .. } => SdoAbortCode::GENERAL_ERROR,
+            Why::Aborted { .. }
+            | Why::File { .. }
+            | Why::Mailbox { .. }
+            | Why::MailboxFull { .. }
+            | Why::Busy { .. }
+            | Why::NoMailbox
+            | Why::NotOpen
+            | Why::NotSpoken { .. }
+            | Why::TooSmall(_)
+            | Why::Exchange(_)
+            | Why::Abandoned => return result,
         };
-        SdoError::Protocol { id: self.multiplexer.id(), object: self.object, found }
+        let abort = Message::Abort(Abort { object: self.object, code: code.value() });
+        if matches!(self.dialogue.step, Step::Segment(_)) {
+            self.dialogue.mention(MailboxType::Coe, |body| abort.write(body)).await;
+        }
+        result
     }
 }

@@ -1,30 +1,38 @@
 //! Talking to the software of SubDevices.
 //!
 //! One multiplexer per SubDevice owns its mailbox: it counts messages, looks whether there is
-//! one to be fetched, fetches lost ones again, and hands them on by type. [`coe`] is one of its
-//! clients; jobs wait in a queue and are done one after another. Emergencies and messages that
-//! nobody asked for become events.
+//! one to be fetched, fetches lost ones again, and hands them on by type. `coe`, `information` and
+//! `foe` are its clients; errands ([`MailboxRequest`]) wait in a queue and are done one after
+//! another. Emergencies and messages that nobody asked for become events; what went wrong is kept
+//! ([`ProtocolErrors`]).
 
-pub mod coe;
+mod coe;
+pub(crate) mod dialogue;
+mod errand;
+mod failure;
+mod foe;
+mod information;
 pub(crate) mod multiplexer;
+mod protocol_errors;
 pub(crate) mod queue;
 
 use linesman_proto::address::DeviceId;
-use linesman_proto::time::Span;
 
-use crate::event::Event;
 use crate::executor::lock;
 use crate::supervisor::Context;
 
-pub use coe::SdoError;
+pub use errand::{Errand, MailboxRequest};
+pub use failure::{MailboxFailure, Step, Why};
+pub use protocol_errors::{ProtocolError, ProtocolErrors};
+
 use multiplexer::Multiplexer;
-pub(crate) use queue::{Job, Queues};
+pub(crate) use queue::{Job, Outcome, Queues};
 
 /// Serves the mailbox of one SubDevice; never ends.
 pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
     let plan = std::sync::Arc::clone(&context.plan);
     let Some(device) = plan.device(id) else { return };
-    let Some(mut multiplexer) = Multiplexer::new(&context, device) else { return };
+    let Some(mut multiplexer) = Multiplexer::new(&context.wire, device) else { return };
     let interval = context.options.mailbox_interval;
     let mut openings = 0;
     loop {
@@ -39,35 +47,22 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
             openings = now;
         }
         match job {
-            Some(job) if open => work(&context, &mut multiplexer, id, job).await,
-            Some(job) => refuse(&context, id, job),
+            Some(job) => work(&context, &mut multiplexer, job, open).await,
             None if open => multiplexer.drain().await,
             None => {}
         }
     }
 }
 
-async fn work(context: &Context, multiplexer: &mut Multiplexer<'_>, id: DeviceId, job: Job) {
-    let patience: Span = context.options.mailbox_patience;
-    let event = match job {
-        Job::Upload { object, complete } => {
-            let result = coe::upload(multiplexer, object, complete, patience).await;
-            Event::SdoUploaded { id, object, result }
-        }
-        Job::Download { object, complete, data } => {
-            let result = coe::download(multiplexer, object, complete, &data, patience).await;
-            Event::SdoDownloaded { id, object, result }
-        }
+async fn work(context: &Context, multiplexer: &mut Multiplexer, job: Job, open: bool) {
+    let outcome: Outcome = if open {
+        dialogue::perform(multiplexer, &job.request, context.options.mailbox_patience).await
+    } else {
+        let (id, errand) = (job.id, job.request.errand());
+        Err(MailboxFailure { id, errand, step: Step::Before, why: Why::NotOpen })
     };
-    context.wire.emit(event);
-}
-
-fn refuse(context: &Context, id: DeviceId, job: Job) {
-    let error = SdoError::NotOpen { id };
-    context.wire.emit(match job {
-        Job::Upload { object, .. } => Event::SdoUploaded { id, object, result: Err(error) },
-        Job::Download { object, .. } => Event::SdoDownloaded { id, object, result: Err(error) },
-    });
+    context.mailboxes.note(job.id, context.wire.now(), &job.request, &outcome);
+    job.done(outcome);
 }
 
 #[cfg(test)]

@@ -8,14 +8,13 @@ use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::mailbox::coe::Message as CoeMessage;
 use linesman_proto::mailbox::{self, Counter, Header, MailboxType, Message};
 use linesman_proto::register::{SYNC_MANAGER, SmActivate, SmPdiControl, SmStatus};
-use linesman_proto::sii::MailboxPair;
+use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::time::{Instant, Span};
 
-use super::SdoError;
+use super::failure::Why;
 use crate::event::Event;
 use crate::exchange::{ExchangeError, Request, Target};
 use crate::executor::Wire;
-use crate::supervisor::Context;
 
 const OUT: u16 = 0;
 const IN: u16 = 1;
@@ -32,34 +31,53 @@ fn byte_of(manager: u16, at: u16) -> RegisterAddress {
 }
 
 /// One mailbox.
-pub(crate) struct Multiplexer<'a> {
-    wire: &'a Wire,
+pub(crate) struct Multiplexer {
+    wire: Wire,
     id: DeviceId,
     target: Target,
     areas: MailboxPair,
-    sent: Counter,
+    protocols: Protocols,
+    /// Counter of the last message that was sent; `None` before the first.
+    sent: Option<Counter>,
     received: Counter,
+    /// A message was asked for again: what comes may be one that we have had.
+    fetched_again: bool,
+    /// An errand was given up whose answer may still come.
+    late: bool,
+    /// What came during this errand that is no message: how often, and the last of it in words.
+    rubbish: Option<(u32, String)>,
 }
 
-impl<'a> Multiplexer<'a> {
-    pub(crate) fn new(context: &'a Context, device: &DevicePlan) -> Option<Self> {
+impl Multiplexer {
+    /// `None` for a SubDevice without a mailbox.
+    pub(crate) fn new(wire: &Wire, device: &DevicePlan) -> Option<Self> {
+        let mailbox = device.mailbox?;
         Some(Self {
-            wire: &context.wire,
+            wire: wire.clone(),
             id: device.id,
             target: Target::Station(device.station),
-            areas: device.mailbox?.areas,
-            sent: Counter::NONE,
+            areas: mailbox.areas,
+            protocols: mailbox.protocols,
+            sent: None,
             received: Counter::NONE,
+            fetched_again: false,
+            late: false,
+            rubbish: None,
         })
     }
 
     /// The SubDevice begins anew, and so does counting.
     pub(crate) fn reset(&mut self) {
-        (self.sent, self.received) = (Counter::NONE, Counter::NONE);
+        (self.sent, self.received) = (None, Counter::NONE);
+        (self.fetched_again, self.late) = (false, false);
     }
 
     pub(crate) fn now(&self) -> Instant {
         self.wire.now()
+    }
+
+    pub(crate) async fn pause(&self, span: Span) {
+        self.wire.sleep(span).await;
     }
 
     pub(crate) fn id(&self) -> DeviceId {
@@ -71,34 +89,94 @@ impl<'a> Multiplexer<'a> {
         usize::from(self.areas.receive.size)
     }
 
-    /// Sends a message: `write` writes what follows the mailbox header.
+    /// Bytes a message to us may have.
+    pub(crate) fn in_size(&self) -> usize {
+        usize::from(self.areas.send.size)
+    }
+
+    /// Whether its SII says that it speaks a protocol. One that names none may speak any.
+    pub(crate) fn speaks(&self, kind: MailboxType) -> bool {
+        let bit = match kind {
+            MailboxType::Coe => Protocols::COE,
+            MailboxType::Foe => Protocols::FOE,
+            MailboxType::Error
+            | MailboxType::Aoe
+            | MailboxType::Eoe
+            | MailboxType::Soe
+            | MailboxType::Voe
+            | MailboxType::Reserved(_) => return true,
+        };
+        self.protocols == Protocols::default() || self.protocols.has(bit)
+    }
+
+    /// An errand begins. What is left of one that was given up is fetched first.
+    pub(crate) async fn begin(&mut self) {
+        self.rubbish = None;
+        if self.late {
+            self.drain().await;
+        }
+    }
+
+    /// An errand was given up.
+    pub(crate) fn failed(&mut self, why: &Why) {
+        self.late |= why.leaves_answer_behind();
+    }
+
+    /// Whether an answer may be that to an errand which was given up.
+    pub(crate) fn may_be_late(&self) -> bool {
+        self.late
+    }
+
+    /// What was waited for has come, though late.
+    pub(crate) fn all_late_ones_came(&mut self) {
+        self.late = false;
+    }
+
+    /// What came during this errand that is no message, in words.
+    pub(crate) fn rubbish(&self) -> Option<String> {
+        self.rubbish.as_ref().map(|(count, last)| match count {
+            1 => last.clone(),
+            count => format!("{count} times, last: {last}"),
+        })
+    }
+
+    fn found_rubbish(&mut self, what: String) {
+        let count = self.rubbish.as_ref().map_or(0, |(count, _)| *count);
+        self.rubbish = Some((count.saturating_add(1), what));
+    }
+
+    /// Sends a message: `write` writes what follows the mailbox header. False when the mailbox stays
+    /// full.
     pub(crate) async fn send(
         &mut self,
         kind: MailboxType,
         write: impl FnOnce(&mut [u8]) -> Result<usize, mailbox::BufferTooSmall>,
         until: Instant,
-    ) -> Result<(), SdoError> {
-        self.sent = self.sent.next();
+    ) -> Result<bool, Why> {
+        // The SubDevice may know the counter of somebody who spoke before us, and would take a message
+        // of the same one for a repetition: the first one is not counted.
+        let counter = self.sent.map_or(Counter::NONE, Counter::next);
         let mut buffer = vec![0; self.out_size()];
-        Header::new(kind, self.sent, 0).write_message(&mut buffer, write)?;
+        Header::new(kind, counter, 0).write_message(&mut buffer, write)?;
+        self.sent = Some(counter);
         let mut pause = FIRST_POLL;
         let mut uncertain = false;
         loop {
             let request = Request::write(self.target, self.areas.receive.offset, &buffer);
             match self.wire.submit(request).await {
-                Ok(reply) if reply.answered() => return Ok(()),
+                Ok(reply) if reply.answered() => return Ok(true),
                 // Full, unless the SubDevice does not answer at all. After a lost frame it is our own
                 // message that fills it.
                 Ok(_) => {
                     if self.is_full(OUT).await? && uncertain {
-                        return Ok(());
+                        return Ok(true);
                     }
                 }
                 Err(error @ ExchangeError::WorkingCounter { .. }) => return Err(error.into()),
                 Err(ExchangeError::NoReply { .. }) => uncertain = true,
             }
             if self.wire.now() >= until {
-                return Err(SdoError::MailboxFull { id: self.id });
+                return Ok(false);
             }
             self.wire.sleep(pause).await;
             pause = (pause * 2).min(SLOWEST_POLL);
@@ -110,18 +188,22 @@ impl<'a> Multiplexer<'a> {
         Ok(SmStatus(reply.bytes::<1>(0)[0]).mailbox_full())
     }
 
-    /// The next CoE message that answers somebody; everything else is handed on meanwhile.
-    pub(crate) async fn receive_coe(
+    /// The next message of a protocol that answers somebody; everything else is handed on meanwhile.
+    pub(crate) async fn receive(
         &mut self,
+        kind: MailboxType,
         until: Instant,
-    ) -> Result<Option<Vec<u8>>, SdoError> {
+    ) -> Result<Option<Vec<u8>>, Why> {
         let mut pause = FIRST_POLL;
         loop {
             if let Some(buffer) = self.fetch().await? {
-                if let Some(data) = self.dispatch(&buffer)? {
+                if let Some(data) = self.dispatch(&buffer, Some(kind))? {
                     return Ok(Some(data));
                 }
-                continue;
+                // A SubDevice that talks without end about other things is not listened to for ever.
+                if self.wire.now() < until {
+                    continue;
+                }
             }
             if self.wire.now() >= until {
                 return Ok(None);
@@ -136,11 +218,8 @@ impl<'a> Multiplexer<'a> {
         // A SubDevice that talks without end must not keep its jobs waiting.
         for _ in 0..16 {
             match self.fetch().await {
-                Ok(Some(buffer)) => {
-                    if let Ok(Some(data)) = self.dispatch(&buffer) {
-                        self.unasked(MailboxType::Coe, data);
-                    }
-                }
+                // Nobody waits for an error reply, either.
+                Ok(Some(buffer)) => drop(self.dispatch(&buffer, None)),
                 Ok(None) | Err(_) => return,
             }
         }
@@ -158,7 +237,10 @@ impl<'a> Multiplexer<'a> {
                 Ok(reply) if reply.answered() => {
                     let counter = Header::parse(&reply.data).map(|header| header.counter);
                     let counter = counter.unwrap_or_default();
-                    if counter.repeats(self.received) {
+                    // Only after a repeated fetch can it be one that we have had: a SubDevice that
+                    // does not count on is understood all the same.
+                    let again = std::mem::take(&mut self.fetched_again);
+                    if again && counter.repeats(self.received) {
                         return Ok(None);
                     }
                     self.received = counter;
@@ -170,6 +252,7 @@ impl<'a> Multiplexer<'a> {
                 // mailbox, the SubDevice is asked to put it in again.
                 Err(ExchangeError::NoReply { .. }) => {
                     if !self.is_full(IN).await? {
+                        self.fetched_again = true;
                         self.ask_for_repetition().await?;
                     }
                 }
@@ -197,46 +280,57 @@ impl<'a> Multiplexer<'a> {
         Ok(())
     }
 
-    /// Hands a message on by its type. CoE answers are returned.
-    fn dispatch(&self, buffer: &[u8]) -> Result<Option<Vec<u8>>, SdoError> {
+    /// Hands a message on by its type. What may be an answer of the protocol that is `wanted` is
+    /// returned.
+    fn dispatch(
+        &mut self,
+        buffer: &[u8],
+        wanted: Option<MailboxType>,
+    ) -> Result<Option<Vec<u8>>, Why> {
         let message = match Message::parse(buffer) {
             Ok(message) => message,
-            Err(_) => return Ok(None),
+            Err(error) => {
+                self.found_rubbish(error.to_string());
+                return Ok(None);
+            }
         };
-        match message.header.kind {
+        let kind = message.header.kind;
+        match kind {
             MailboxType::Coe => match CoeMessage::parse(message.data) {
                 Ok(CoeMessage::Emergency(emergency)) => {
                     self.wire.emit(Event::Emergency { id: self.id, emergency });
-                    Ok(None)
+                    return Ok(None);
                 }
                 Ok(
                     CoeMessage::SdoRequest(_)
                     | CoeMessage::SdoResponse(_)
                     | CoeMessage::Abort(_)
                     | CoeMessage::Information(_),
-                ) => Ok(Some(message.data.to_vec())),
-                Ok(CoeMessage::Pdo { .. }) | Err(_) => {
-                    self.unasked(MailboxType::Coe, message.data.to_vec());
-                    Ok(None)
-                }
+                ) if wanted == Some(kind) => return Ok(Some(message.data.to_vec())),
+                Ok(_) => {}
+                Err(error) => self.found_rubbish(error.to_string()),
             },
             MailboxType::Error => match mailbox::ErrorReply::parse(message.data) {
-                Ok(reply) => Err(SdoError::Mailbox { id: self.id, code: reply.code }),
-                Err(_) => Ok(None),
+                Ok(reply) if wanted.is_some() => return Err(Why::Mailbox { code: reply.code }),
+                Ok(_) => {}
+                Err(error) => self.found_rubbish(error.to_string()),
             },
-            kind @ (MailboxType::Aoe
+            MailboxType::Foe if wanted == Some(kind) => return Ok(Some(message.data.to_vec())),
+            MailboxType::Reserved(code) => {
+                self.found_rubbish(format!("a message of the reserved type {code}"));
+            }
+            MailboxType::Aoe
             | MailboxType::Eoe
             | MailboxType::Foe
             | MailboxType::Soe
-            | MailboxType::Voe
-            | MailboxType::Reserved(_)) => {
-                self.unasked(kind, message.data.to_vec());
-                Ok(None)
-            }
+            | MailboxType::Voe => {}
         }
+        self.unasked(kind, message.data.to_vec());
+        Ok(None)
     }
 
-    fn unasked(&self, kind: MailboxType, data: Vec<u8>) {
+    /// Tells of a message that nobody waits for.
+    pub(crate) fn unasked(&self, kind: MailboxType, data: Vec<u8>) {
         self.wire.emit(Event::Mailbox { id: self.id, kind, data });
     }
 }

@@ -1,4 +1,4 @@
-//! Jobs that wait for a SubDevice's mailbox.
+//! Errands that wait for a SubDevice's mailbox, and what came of them.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::future::Future;
@@ -7,24 +7,86 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 
 use linesman_proto::address::DeviceId;
-use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::time::Instant;
 
+use super::errand::MailboxRequest;
+use super::failure::{MailboxFailure, Step, Why};
+use super::protocol_errors::ProtocolErrors;
 use crate::executor::lock;
 use crate::executor::wire::Sleep;
 
-/// Something to be done through a mailbox.
+/// What came of an errand.
+pub(crate) type Outcome = Result<Vec<u8>, MailboxFailure>;
+
+/// Something to be done through a mailbox, and who waits for it.
 #[derive(Debug)]
-pub(crate) enum Job {
-    /// Fetch an object.
-    Upload { object: ObjectAddress, complete: bool },
-    /// Bring an object.
-    Download { object: ObjectAddress, complete: bool, data: Vec<u8> },
+pub(crate) struct Job {
+    pub(crate) id: DeviceId,
+    pub(crate) request: MailboxRequest,
+    slot: Arc<Mutex<Slot>>,
+}
+
+#[derive(Default, Debug)]
+struct Slot {
+    outcome: Option<Outcome>,
+    waker: Option<Waker>,
+}
+
+impl Job {
+    /// Tells what came of it.
+    pub(crate) fn done(self, outcome: Outcome) {
+        self.leave(outcome);
+    }
+
+    fn leave(&self, outcome: Outcome) {
+        let mut slot = lock(&self.slot);
+        slot.outcome.get_or_insert(outcome);
+        let waker = slot.waker.take();
+        drop(slot);
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+    }
+}
+
+impl Drop for Job {
+    /// A job that nobody does any more must not be waited for.
+    fn drop(&mut self) {
+        if lock(&self.slot).outcome.is_none() {
+            self.leave(Err(failure(self.id, &self.request, Why::Abandoned)));
+        }
+    }
+}
+
+fn failure(id: DeviceId, request: &MailboxRequest, why: Why) -> MailboxFailure {
+    MailboxFailure { id, errand: request.errand(), step: Step::Before, why }
+}
+
+/// The outcome of an errand, to be awaited.
+pub(crate) struct Pending {
+    slot: Arc<Mutex<Slot>>,
+}
+
+impl Future for Pending {
+    type Output = Outcome;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Outcome> {
+        let mut slot = lock(&self.slot);
+        match slot.outcome.take() {
+            Some(outcome) => Poll::Ready(outcome),
+            None => {
+                slot.waker = Some(context.waker().clone());
+                Poll::Pending
+            }
+        }
+    }
 }
 
 #[derive(Default, Debug)]
 struct Queue {
     jobs: VecDeque<Job>,
     waker: Option<Waker>,
+    errors: ProtocolErrors,
 }
 
 /// The queues of all SubDevices with a mailbox. Clones mean the same queues.
@@ -39,22 +101,44 @@ impl Queues {
         Self { queues: Arc::new(Mutex::new(queues)) }
     }
 
-    /// Adds a job; gives it back when the SubDevice has no mailbox.
-    pub(crate) fn push(&self, id: DeviceId, job: Job) -> Result<(), Job> {
+    /// Asks a SubDevice through its mailbox, behind those who asked before; await what comes of it.
+    pub(crate) fn ask(&self, id: DeviceId, request: MailboxRequest) -> Pending {
+        let slot = Arc::new(Mutex::new(Slot::default()));
+        let job = Job { id, request, slot: Arc::clone(&slot) };
         let mut queues = lock(&self.queues);
-        let Some(queue) = queues.get_mut(&id) else { return Err(job) };
+        let Some(queue) = queues.get_mut(&id) else {
+            drop(queues);
+            let none = failure(id, &job.request, Why::NoMailbox);
+            job.done(Err(none));
+            return Pending { slot };
+        };
         queue.jobs.push_back(job);
         let waker = queue.waker.take();
         drop(queues);
         if let Some(waker) = waker {
             waker.wake();
         }
-        Ok(())
+        Pending { slot }
     }
 
     /// The next job, or `None` when it is time to look into the mailbox.
     pub(crate) fn next(&self, id: DeviceId, sleep: Sleep) -> NextJob {
         NextJob { queues: self.clone(), id, sleep }
+    }
+
+    /// Notes how an access went.
+    pub(crate) fn note(&self, id: DeviceId, at: Instant, request: &MailboxRequest, how: &Outcome) {
+        if let Some(queue) = lock(&self.queues).get_mut(&id) {
+            match how {
+                Ok(_) => queue.errors.clean(request.errand().protocol()),
+                Err(failure) => queue.errors.failed(at, failure.clone()),
+            }
+        }
+    }
+
+    /// What went wrong in a mailbox; `None` for a SubDevice without one.
+    pub(crate) fn errors(&self, id: DeviceId) -> Option<ProtocolErrors> {
+        lock(&self.queues).get(&id).map(|queue| queue.errors.clone())
     }
 }
 

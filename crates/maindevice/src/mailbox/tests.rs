@@ -1,7 +1,9 @@
 //! SDO transfers against a SubDevice of a few lines: its mailbox is a buffer, its answers are bytes
 //! written down by hand.
 
+use std::pin::pin;
 use std::sync::{Arc, Mutex};
+use std::task::{Poll, Waker};
 
 use linesman_config::identity::RevisionRule;
 use linesman_config::plan::{DevicePlan, Plan};
@@ -15,6 +17,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
 
 use super::*;
+use crate::event::Event;
 use crate::exchange::{Reply, Request};
 use crate::executor::Executor;
 use crate::options::Options;
@@ -32,18 +35,12 @@ fn device() -> DevicePlan {
     let areas = MailboxPair::from_words([OUT, 32, IN, 32]);
     let protocols = Protocols(Protocols::COE);
     DevicePlan {
-        id: ID,
         name: "5".to_owned(),
         station: StationAddress(0x1005),
-        identity: linesman_proto::sii::Identity::default(),
         revision_rule: RevisionRule::Any,
-        mailbox: Some(Mailbox { areas, protocols, complete_access: false }),
-        sync_managers: Vec::new(),
-        fmmus: Vec::new(),
-        device_emulation: false,
+        mailbox: Some(Mailbox { areas, bootstrap: None, protocols, complete_access: false }),
         target: AlState::PreOp,
-        outputs: 0..0,
-        inputs: 0..0,
+        ..DevicePlan::bare(ID)
     }
 }
 
@@ -99,14 +96,14 @@ impl Scripted {
     }
 }
 
-/// Runs one job to its end; gives the last event.
-fn run(scripted: &mut Scripted, job: Job) -> Event {
+/// Runs one errand to its end; gives what came of it, and what was told meanwhile.
+fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>) {
     let mut executor = Executor::new();
     let wire = executor.group(0);
     let tree = linesman_proto::topology::derive(&[]).unwrap();
     let mut devices: Vec<DevicePlan> = (0..4).map(|_| device()).collect();
     devices.push(device());
-    let plan = Plan { devices, tree, tasks: Vec::new(), outputs_len: 0, inputs_len: 0 };
+    let plan = Plan { devices, ..Plan::empty(tree) };
     let mut line = Line::new(&plan);
     line.set_reached(ID, AlState::PreOp);
     let mailboxes = Queues::of([ID].into_iter());
@@ -118,9 +115,10 @@ fn run(scripted: &mut Scripted, job: Job) -> Event {
         options: Arc::new(Options::default()),
         mailboxes: mailboxes.clone(),
     };
-    mailboxes.push(ID, job).unwrap();
+    let mut pending = pin!(mailboxes.ask(ID, request));
     wire.spawn(serve_mailbox(context, ID));
     let mut now = Instant::ZERO;
+    let mut events = Vec::new();
     for _ in 0..100_000 {
         executor.run();
         let submitted = std::mem::take(&mut executor.shared().submitted);
@@ -129,9 +127,10 @@ fn run(scripted: &mut Scripted, job: Job) -> Event {
             executor.answer(ticket, Ok(reply));
         }
         executor.run();
-        let event = executor.shared().events.pop_front();
-        if let Some(event) = event {
-            return event;
+        events.extend(executor.shared().events.drain(..));
+        let mut context = std::task::Context::from_waker(Waker::noop());
+        if let Poll::Ready(outcome) = pending.as_mut().poll(&mut context) {
+            return (outcome, events);
         }
         if executor.shared().submitted.is_empty() {
             now = executor.poll_timeout().expect("somebody waits").max(now);
@@ -141,11 +140,9 @@ fn run(scripted: &mut Scripted, job: Job) -> Event {
     panic!("no end")
 }
 
-fn upload(scripted: &mut Scripted, index: u16) -> Result<Vec<u8>, SdoError> {
+fn upload(scripted: &mut Scripted, index: u16) -> Outcome {
     let object = ObjectAddress::new(index, 1);
-    let event = run(scripted, Job::Upload { object, complete: false });
-    let Event::SdoUploaded { result, .. } = event else { panic!("{event:?}") };
-    result
+    run(scripted, MailboxRequest::Upload { object, complete: false }).0
 }
 
 #[test]
@@ -172,9 +169,8 @@ fn a_download_in_segments() {
         &[0x00, 0x30, 0x30, 0, 0, 0, 0, 0, 0, 0],
     ]);
     let object = ObjectAddress::new(0x2000, 1);
-    let job = Job::Download { object, complete: false, data: whole.clone() };
-    let Event::SdoDownloaded { result, .. } = run(&mut scripted, job) else { panic!() };
-    result.unwrap();
+    let request = MailboxRequest::Download { object, complete: false, data: whole.clone() };
+    run(&mut scripted, request).0.unwrap();
     // 32 - 6 - 2 - 8 = 16 bytes in the first message, the other 24 need 23 + 1.
     assert_eq!(scripted.heard[0][..10], [0x00, 0x20, 0x21, 0x00, 0x20, 1, 40, 0, 0, 0]);
     assert_eq!(scripted.heard[0][10..], whole[..16]);
@@ -189,16 +185,17 @@ fn a_wrong_toggle_bit_ends_the_transfer() {
     let first = [&[0x00, 0x30, 0x41, 0x00, 0x20, 1, 50, 0, 0, 0][..], &[7; 16]].concat();
     let second = [&[0x00, 0x30, 0x10][..], &[7; 23]].concat();
     let error = upload(&mut Scripted::new(&[&first, &second]), 0x2000).unwrap_err();
-    assert!(matches!(error, SdoError::Protocol { .. }), "{error}");
+    assert!(matches!(error.why, Why::Protocol { .. }), "{error}");
 }
 
 #[test]
 fn an_emergency_in_between_becomes_an_event() {
     let emergency = [0x00, 0x10, 0x10, 0x43, 0x08, 1, 2, 3, 4, 5];
     let mut scripted = Scripted::new(&[&emergency]);
-    let job = Job::Upload { object: ObjectAddress::new(0x2000, 1), complete: false };
-    let Event::Emergency { id, emergency } = run(&mut scripted, job) else { panic!() };
-    assert_eq!((id, emergency.code, emergency.register.0), (ID, 0x4310, 8));
+    let object = ObjectAddress::new(0x2000, 1);
+    let (_, events) = run(&mut scripted, MailboxRequest::Upload { object, complete: false });
+    let [Event::Emergency { id, emergency }] = &events[..] else { panic!("{events:?}") };
+    assert_eq!((*id, emergency.code, emergency.register.0), (ID, 0x4310, 8));
 }
 
 #[test]
@@ -207,7 +204,7 @@ fn the_late_answer_to_another_question_is_not_taken() {
     let other = [0x00, 0x30, 0x43, 0x00, 0x30, 1, 1, 2, 3, 4];
     let error = upload(&mut Scripted::new(&[&other]), 0x2000).unwrap_err();
     let text = error.to_string();
-    assert!(matches!(error, SdoError::NoAnswer { .. }), "{text}");
+    assert!(matches!(error.why, Why::NoAnswer { .. }), "{text}");
     assert!(
         text.contains("SubDevice 5") && text.contains("0x2000:01") && text.contains("2 s"),
         "{text}"
@@ -218,6 +215,6 @@ fn the_late_answer_to_another_question_is_not_taken() {
 fn an_abort_carries_its_code() {
     let abort = [0x00, 0x20, 0x80, 0x00, 0x20, 1, 0x00, 0x00, 0x02, 0x06];
     let error = upload(&mut Scripted::new(&[&abort]), 0x2000).unwrap_err();
-    let SdoError::Aborted { code, .. } = error else { panic!("{error}") };
+    let Why::Aborted { code } = error.why else { panic!("{error}") };
     assert_eq!(code.value(), 0x0602_0000);
 }

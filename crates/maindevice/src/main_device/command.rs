@@ -12,8 +12,9 @@ use super::{MainDevice, Running};
 use crate::cyclic::Cyclic;
 use crate::event::Event;
 use crate::exchange::Target;
-use crate::executor::Wire;
-use crate::mailbox::{Job, Queues, SdoError};
+use crate::executor::{Handle, Wire, lock};
+use crate::mailbox::queue::Pending;
+use crate::mailbox::{MailboxRequest, ProtocolErrors, Queues};
 use crate::procedure::{look, scan, state};
 use crate::supervisor::{self, Context, Line};
 
@@ -65,7 +66,9 @@ impl MainDevice {
     pub fn start(&mut self, now: Instant, plan: Plan) {
         let wire = self.command();
         let plan = Arc::new(plan);
-        let line = Arc::new(Mutex::new(Line::new(&plan)));
+        let mut line = Line::new(&plan);
+        line.set_hold(self.options.hold_at);
+        let line = Arc::new(Mutex::new(line));
         let with_mailbox = plan.devices.iter().filter(|device| device.mailbox.is_some());
         let mailboxes = Queues::of(with_mailbox.map(|device| device.id));
         let context = Context {
@@ -77,9 +80,35 @@ impl MainDevice {
             mailboxes: mailboxes.clone(),
         };
         wire.spawn(supervisor::supervise(context));
-        let cyclic = Cyclic::new(Arc::clone(&plan), Arc::clone(&line), now);
+        let allowed = self.options.allowed_misses;
+        let (shared, known) = (Arc::clone(&plan), Arc::clone(&line));
+        let cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
         self.running = Some(Running { cyclic, plan, line, mailboxes });
         self.acyclic_left = self.options.frames_at_once;
+        self.handle_timeout(now);
+    }
+
+    /// Asks for a state of one SubDevice of the running plan, or of all; it is kept there from now on.
+    /// Ends in [`Event::TargetReached`], or in the event of the step that failed. False when no plan
+    /// runs, or it has no such SubDevice.
+    pub fn request_state(&mut self, now: Instant, id: Option<DeviceId>, state: AlState) -> bool {
+        let Some(running) = &self.running else { return false };
+        let mut line = lock(&running.line);
+        let asked = match id {
+            Some(id) => line.ask_for(id, state),
+            None => running.plan.devices.iter().all(|device| line.ask_for(device.id, state)),
+        };
+        drop(line);
+        self.handle_timeout(now);
+        asked
+    }
+
+    /// Lets SubDevices go beyond the state at which [`Options::hold_at`](crate::Options::hold_at)
+    /// holds them.
+    pub fn release(&mut self, now: Instant) {
+        if let Some(running) = &self.running {
+            lock(&running.line).set_hold(None);
+        }
         self.handle_timeout(now);
     }
 
@@ -124,6 +153,18 @@ impl MainDevice {
         wire
     }
 
+    /// Runs a procedure beside all else, in the gaps of the cycle; what it gives is fetched from the
+    /// handle. Commands do not end it.
+    pub fn perform<T, F>(&mut self, now: Instant, procedure: impl FnOnce(Wire) -> F) -> Handle<T>
+    where
+        T: Send + 'static,
+        F: Future<Output = T> + Send + 'static,
+    {
+        let handle = self.aside.spawn(procedure(self.aside.clone()));
+        self.handle_timeout(now);
+        handle
+    }
+
     /// One register access beside all else. Ends in [`Event::Probed`]; whoever sees the frames sees
     /// the answer there, too.
     pub fn probe(&mut self, now: Instant, request: ProbeRequest) {
@@ -147,10 +188,12 @@ impl MainDevice {
         object: ObjectAddress,
         complete: bool,
     ) {
-        if !self.queue_job(id, Job::Upload { object, complete }) {
-            let result = Err(SdoError::NotOpen { id });
-            self.aside.emit(Event::SdoUploaded { id, object, result });
-        }
+        let pending = self.ask(id, MailboxRequest::Upload { object, complete });
+        let wire = self.aside.clone();
+        self.aside.spawn(async move {
+            let result = pending.await;
+            wire.emit(Event::SdoUploaded { id, object, result });
+        });
         self.handle_timeout(now);
     }
 
@@ -163,17 +206,27 @@ impl MainDevice {
         complete: bool,
         data: &[u8],
     ) {
-        if !self.queue_job(id, Job::Download { object, complete, data: data.to_vec() }) {
-            let result = Err(SdoError::NotOpen { id });
-            self.aside.emit(Event::SdoDownloaded { id, object, result });
-        }
+        let data = data.to_vec();
+        let pending = self.ask(id, MailboxRequest::Download { object, complete, data });
+        let wire = self.aside.clone();
+        self.aside.spawn(async move {
+            let result = pending.await.map(|_| ());
+            wire.emit(Event::SdoDownloaded { id, object, result });
+        });
         self.handle_timeout(now);
     }
 
-    fn queue_job(&mut self, id: DeviceId, job: Job) -> bool {
-        match &self.running {
-            Some(running) => running.mailboxes.push(id, job).is_ok(),
-            None => false,
-        }
+    /// Asks a running SubDevice through its mailbox. Without a plan that runs nobody has one.
+    fn ask(&self, id: DeviceId, request: MailboxRequest) -> Pending {
+        let nobody = Queues::default();
+        let queues = self.running.as_ref().map_or(&nobody, |running| &running.mailboxes);
+        queues.ask(id, request)
+    }
+
+    /// What went wrong in the mailbox of a running SubDevice: the last error of each protocol until
+    /// its next clean access, and the history. `None` for a SubDevice without a mailbox.
+    #[must_use]
+    pub fn protocol_errors(&self, id: DeviceId) -> Option<ProtocolErrors> {
+        self.running.as_ref()?.mailboxes.errors(id)
     }
 }

@@ -5,10 +5,12 @@ mod command;
 use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::Plan;
-use linesman_proto::address::{Network, Path};
+use linesman_proto::address::{DeviceId, Network, Path, WorkingCounter};
+use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
+use linesman_proto::frame::size::{BYTE_NS, WIRE_OVERHEAD};
 use linesman_proto::time::Instant;
 
-use crate::cyclic::Cyclic;
+use crate::cyclic::{Cyclic, FrameStatus, Quality};
 use crate::event::Event;
 use crate::exchange::{
     Exchange, ExchangeError, Purpose, Queued, Received, Reply, SlotState, Ticket, Transmit,
@@ -17,7 +19,7 @@ use crate::executor::{Executor, Wire, lock};
 use crate::mailbox::Queues;
 use crate::options::Options;
 use crate::statistics::Statistics;
-use crate::supervisor::Line;
+use crate::supervisor::{BringUpTimes, Line};
 
 pub use command::ProbeRequest;
 
@@ -80,10 +82,13 @@ impl MainDevice {
     /// The next frame to be sent, written into `buffer`, which must hold 1514 bytes.
     pub fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
         self.executor.advance(now);
-        if let Some(running) = &mut self.running
-            && running.cyclic.send_due(now, &mut self.exchange, &mut self.statistics)
-        {
-            self.acyclic_left = self.options.frames_at_once;
+        if let Some(running) = &mut self.running {
+            let (exchange, statistics) = (&mut self.exchange, &mut self.statistics);
+            let shared = &self.executor;
+            let emit = &mut |event| shared.emit(event);
+            if running.cyclic.send_due(now, exchange, statistics, emit) {
+                self.acyclic_left = self.options.frames_at_once;
+            }
         }
         self.submit();
         if !self.exchange.has_outgoing() {
@@ -95,20 +100,40 @@ impl MainDevice {
         Some(transmit)
     }
 
-    /// Packs requests of procedures: beside a cycle so many frames each cycle.
+    /// Packs requests of procedures: beside a cycle so many frames each cycle, and none so long that
+    /// it would still hold the wire when the next cycle begins.
+    #[inline]
     fn send_acyclic(&mut self, now: Instant) {
         if !self.exchange.has_queued() || self.exchange.acyclic_out() >= self.options.frames_at_once
         {
             return;
         }
-        if self.running.is_some() {
+        let mut room = MAX_LEN;
+        // Beside process data so many a cycle; before, as fast as they come back.
+        let settled = |running: &&Running| lock(&running.line).all_have_been_reached();
+        if let Some(running) = self.running.as_ref().filter(settled) {
             let Some(left) = self.acyclic_left.checked_sub(1) else { return };
+            if let Some(next_at) = running.cyclic.poll_timeout() {
+                let until = next_at.since(now).as_nanos() / BYTE_NS;
+                room = (until as usize).saturating_sub(WIRE_OVERHEAD).min(MAX_LEN);
+                // Too late in this cycle, unless the cycle is too short for any frame at all.
+                if room < MIN_LEN && self.acyclic_left < self.options.frames_at_once {
+                    return;
+                }
+            }
             self.acyclic_left = left;
         }
-        self.exchange.send_acyclic(now);
+        self.exchange.send_acyclic(now, room);
     }
 
+    #[inline]
     fn submit(&mut self) {
+        if self.executor.take_news() {
+            self.submit_news();
+        }
+    }
+
+    fn submit_news(&mut self) {
         let mut shared = self.executor.shared();
         let submitted = std::mem::take(&mut shared.submitted);
         let cancelled = std::mem::take(&mut shared.cancelled);
@@ -130,15 +155,23 @@ impl MainDevice {
         match self.exchange.receive(path, frame) {
             Received::Complete(slot) => {
                 self.statistics.frames_received += 1;
-                self.complete(slot);
+                self.complete(now, slot, frame);
             }
+            Received::Spare(slot) => {
+                self.statistics.frames_spare += 1;
+                self.complete_spare(now, slot, frame);
+            }
+            Received::Stray => self.statistics.frames_stray += 1,
+            Received::Truncated => self.statistics.frames_truncated += 1,
             Received::FirstCopy => self.statistics.frames_received += 1,
             Received::Late => self.statistics.frames_late += 1,
             Received::Duplicate => self.statistics.frames_duplicate += 1,
             Received::Foreign => self.statistics.frames_foreign += 1,
             Received::Echo => {}
         }
-        self.watch_ring();
+        if self.options.ring {
+            self.watch_ring();
+        }
         self.work();
     }
 
@@ -149,6 +182,8 @@ impl MainDevice {
             shared.ring_intact = ring_intact;
             if let Some(intact) = ring_intact {
                 shared.events.push_back(Event::Ring { intact });
+                drop(shared);
+                self.executor.note_event();
             }
         }
     }
@@ -159,7 +194,7 @@ impl MainDevice {
         self.executor.advance(now);
         while let Some(slot) = self.exchange.expire(now) {
             if self.exchange.slot(slot).state == SlotState::Answered {
-                self.complete(slot);
+                self.complete(now, slot, &[]);
             } else {
                 self.give_up(slot);
             }
@@ -176,20 +211,20 @@ impl MainDevice {
         }
     }
 
-    /// All that comes back of a frame is back.
-    fn complete(&mut self, slot: usize) {
+    /// All that comes back of a frame is back; `last` is what came back last.
+    fn complete(&mut self, now: Instant, slot: usize, last: &[u8]) {
         match self.exchange.slot(slot).purpose {
-            Purpose::Cyclic { task, frame } => {
+            Purpose::Cyclic { frame } => {
                 let Some(running) = &mut self.running else { return };
-                let reply = &self.exchange.slot(slot).reply;
-                let shared = &self.executor;
-                running.cyclic.received(task, frame, reply, &mut self.statistics, &mut |event| {
-                    shared.shared().events.push_back(event);
-                });
+                let reply = self.exchange.answer(slot, last);
+                let withheld = self.exchange.slot(slot).withheld;
+                let (shared, statistics) = (&self.executor, &mut self.statistics);
+                let emit = &mut |event| shared.emit(event);
+                running.cyclic.received(now, frame, withheld, reply, statistics, emit);
             }
             Purpose::Acyclic => {
                 let requests = self.exchange.take_requests(slot);
-                let replies = replies(&self.exchange.slot(slot).reply);
+                let replies = replies(self.exchange.answer(slot, last));
                 for (queued, reply) in requests.into_iter().zip(replies) {
                     self.executor.answer(queued.ticket, Ok(reply));
                 }
@@ -197,14 +232,23 @@ impl MainDevice {
         }
     }
 
+    /// One more copy of a cyclic frame: taken only when the first was not good.
+    fn complete_spare(&mut self, now: Instant, slot: usize, last: &[u8]) {
+        let Purpose::Cyclic { frame } = self.exchange.slot(slot).purpose else { return };
+        if !self.options.ring && self.running.as_ref().is_some_and(|one| one.cyclic.is_bad(frame)) {
+            self.complete(now, slot, last);
+        }
+    }
+
     fn give_up(&mut self, slot: usize) {
-        self.statistics.frames_lost += 1;
+        // One that came back without its end has been counted as that.
+        self.statistics.frames_lost += u64::from(!self.exchange.slot(slot).truncated);
         match self.exchange.slot(slot).purpose {
-            Purpose::Cyclic { task, .. } => {
+            Purpose::Cyclic { frame } => {
                 self.statistics.cyclic_lost += 1;
                 let Some(running) = &mut self.running else { return };
                 let shared = &self.executor;
-                running.cyclic.lost(task, &mut |event| shared.shared().events.push_back(event));
+                running.cyclic.lost(frame, &mut |event| shared.emit(event));
             }
             Purpose::Acyclic => {
                 for queued in self.exchange.take_requests(slot) {
@@ -235,9 +279,16 @@ impl MainDevice {
             .min()
     }
 
+    /// When the next cyclic frames are due.
+    #[inline]
+    #[must_use]
+    pub fn poll_cycle_timeout(&self) -> Option<Instant> {
+        self.running.as_ref().and_then(|running| running.cyclic.poll_timeout())
+    }
+
     /// What has happened, oldest first.
     pub fn poll_event(&mut self) -> Option<Event> {
-        self.executor.shared().events.pop_front()
+        self.executor.poll_event()
     }
 
     // ---- what is there ----
@@ -257,15 +308,73 @@ impl MainDevice {
         })
     }
 
-    /// The outputs of the process image; empty unless a plan is running.
+    /// What bringing up the running plan took so far; `None` unless one is running.
+    #[must_use]
+    pub fn bring_up_times(&self) -> Option<BringUpTimes> {
+        self.running.as_ref().and_then(|running| lock(&running.line).times().cloned())
+    }
+
+    /// The outputs of the process image; empty unless a plan is running. Asking for them counts as
+    /// giving all of them anew (see [`Options::allowed_misses`]).
+    #[inline]
     pub fn outputs_mut(&mut self) -> &mut [u8] {
-        self.running.as_mut().map_or(&mut [], |running| &mut running.cyclic.outputs)
+        self.running.as_mut().map_or(&mut [], |running| {
+            running.cyclic.give_outputs(None);
+            &mut running.cyclic.outputs
+        })
+    }
+
+    /// The same, but only those of one task count as given anew.
+    #[inline]
+    pub fn outputs_of_task_mut(&mut self, task: usize) -> &mut [u8] {
+        self.running.as_mut().map_or(&mut [], |running| {
+            running.cyclic.give_outputs(Some(task));
+            &mut running.cyclic.outputs
+        })
     }
 
     /// The inputs of the process image as they last came back whole; empty unless a plan is running.
+    #[inline]
     #[must_use]
     pub fn inputs(&self) -> &[u8] {
         self.running.as_ref().map_or(&[], |running| &running.cyclic.inputs)
+    }
+
+    /// Whether all frames of a task's cycle have come back, or were given up, since this was asked
+    /// last: the moment for an application that works on fresh inputs.
+    #[inline]
+    pub fn take_exchanged(&mut self, task: usize) -> bool {
+        self.running.as_mut().is_some_and(|running| running.cyclic.take_exchanged(task))
+    }
+
+    /// When the next cycle of a task begins; `None` unless the running plan has it.
+    #[must_use]
+    pub fn next_cycle(&self, task: usize) -> Option<Instant> {
+        self.running.as_ref()?.cyclic.next_cycle(task)
+    }
+
+    /// How good the process data of a SubDevice are, and how old.
+    #[must_use]
+    pub fn quality(&self, id: DeviceId) -> Quality {
+        self.running.as_ref().map_or_else(Quality::default, |running| running.cyclic.quality(id))
+    }
+
+    /// How a cyclic frame went the last time; `None` unless the running plan has it.
+    #[must_use]
+    pub fn frame_status(&self, task: usize, frame: usize) -> Option<FrameStatus> {
+        self.running.as_ref()?.cyclic.frame_status(task, frame)
+    }
+
+    /// How many SubDevices answered the last cyclic broadcast read.
+    #[must_use]
+    pub fn responding(&self) -> Option<WorkingCounter> {
+        self.running.as_ref()?.cyclic.responding()
+    }
+
+    /// The running plan.
+    #[must_use]
+    pub fn plan(&self) -> Option<&Plan> {
+        self.running.as_ref().map(|running| &*running.plan)
     }
 
     /// What has been sent and received.

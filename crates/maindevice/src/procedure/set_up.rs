@@ -1,57 +1,62 @@
 //! What a SubDevice is told before a step: SyncManagers and FMMUs.
 //!
 //! Reference: ETG.1000.6; the order is that of public MainDevices. Watchdogs keep the times the
-//! SubDevice has.
+//! SubDevice has unless others are chosen.
 
-use linesman_config::plan::DevicePlan;
-use linesman_proto::address::RegisterAddress;
+use linesman_config::plan::{DevicePlan, WatchdogSettings};
+use linesman_proto::address::{RegisterAddress, WorkingCounter};
 use linesman_proto::register::{
     self, EscInformation, FMMU, FmmuConfig, SII_ACCESS_ECAT, SYNC_MANAGER, SmControl,
     SyncManagerConfig,
 };
+use linesman_proto::sii::MailboxPair;
 
-use crate::exchange::{ExchangeError, Target};
+use crate::exchange::{ExchangeError, Request, Target};
 use crate::executor::Wire;
 
 /// The SyncManagers that serve a mailbox: 0 takes what the MainDevice writes, 1 gives.
 #[must_use]
-pub fn mailbox_sync_managers(device: &DevicePlan) -> Option<[SyncManagerConfig; 2]> {
-    let areas = device.mailbox?.areas;
-    Some([
-        SyncManagerConfig::enabled(
-            areas.receive.offset,
-            areas.receive.size,
-            SmControl::MAILBOX_OUT,
-        ),
-        SyncManagerConfig::enabled(areas.send.offset, areas.send.size, SmControl::MAILBOX_IN),
-    ])
+pub fn mailbox_sync_managers(areas: MailboxPair) -> [SyncManagerConfig; 2] {
+    let MailboxPair { receive, send } = areas;
+    [
+        SyncManagerConfig::enabled(receive.offset, receive.size, SmControl::MAILBOX_OUT),
+        SyncManagerConfig::enabled(send.offset, send.size, SmControl::MAILBOX_IN),
+    ]
 }
 
-/// Before INIT to PREOP: nothing left of an earlier run, the mailbox set up, the EEPROM offered to
-/// the SubDevice.
+/// Before INIT to PREOP, or to BOOT: nothing left of an earlier run, the mailbox set up, the EEPROM
+/// offered to the SubDevice.
 ///
 /// # Errors
 /// [`ExchangeError`] when it does not answer.
-pub async fn before_pre_op(wire: &Wire, device: &DevicePlan) -> Result<(), ExchangeError> {
+pub async fn before_mailbox(
+    wire: &Wire,
+    device: &DevicePlan,
+    areas: Option<MailboxPair>,
+) -> Result<(), ExchangeError> {
     let target = Target::Station(device.station);
     let reply =
         wire.read_one(target, register::ESC_TYPE.address, EscInformation::LEN as u16).await?;
     let information = EscInformation::from_bytes(reply.bytes(0));
-    let fixed = information.features.fixed_configuration();
-    if !fixed {
+    let mailbox = areas.map(mailbox_sync_managers).unwrap_or_default();
+    let mut managers: Vec<u8> = mailbox.iter().flat_map(|manager| manager.to_bytes()).collect();
+    if information.features.fixed_configuration() {
+        managers.truncate(if areas.is_some() { managers.len() } else { 0 });
+    } else {
+        managers.resize(usize::from(information.sync_managers.min(16)) * SyncManagerConfig::LEN, 0);
         let fmmus = usize::from(information.fmmus.min(16)) * FmmuConfig::LEN;
-        write(wire, target, FMMU.address, &vec![0; fmmus]).await?;
-        for index in 0..u16::from(information.sync_managers.min(16)) {
-            clear_sync_manager(wire, target, index).await?;
-        }
+        // While a SyncManager is on, its other bytes are locked; off it is when the frame has ended.
+        let off = (SYNC_MANAGER.address, vec![0; managers.len()]);
+        write_all(wire, target, vec![(FMMU.address, vec![0; fmmus]), off]).await?;
     }
-    if let Some(managers) = mailbox_sync_managers(device) {
-        for (manager, index) in managers.into_iter().zip(0..) {
-            set_sync_manager(wire, target, index, manager).await?;
-        }
+    let mut writes = vec![(SYNC_MANAGER.address, managers)];
+    if let Some((index, fmmu)) = &device.mailbox_state
+        && let Some(address) = FMMU.at(u16::from(*index))
+    {
+        writes.push((address, fmmu.to_bytes().to_vec()));
     }
-    wire.write_one(target, SII_ACCESS_ECAT.address, &[1]).await?;
-    Ok(())
+    writes.push((SII_ACCESS_ECAT.address, vec![1]));
+    write_all(wire, target, writes).await
 }
 
 /// Before PREOP to SAFEOP: where process data lie, and how they are guarded.
@@ -59,47 +64,56 @@ pub async fn before_pre_op(wire: &Wire, device: &DevicePlan) -> Result<(), Excha
 /// # Errors
 /// [`ExchangeError`] when it does not answer.
 pub async fn before_safe_op(wire: &Wire, device: &DevicePlan) -> Result<(), ExchangeError> {
+    const ACTIVATE: u16 = 6;
     let target = Target::Station(device.station);
+    let (mut off, mut on) = (Vec::new(), Vec::new());
     for (index, manager) in &device.sync_managers {
-        clear_sync_manager(wire, target, u16::from(*index)).await?;
-        set_sync_manager(wire, target, u16::from(*index), *manager).await?;
+        let Some(address) = SYNC_MANAGER.at(u16::from(*index)) else { continue };
+        // It may be on, of an earlier try.
+        off.push((RegisterAddress(address.0 + ACTIVATE), vec![0]));
+        on.push((address, manager.to_bytes().to_vec()));
     }
     for (index, fmmu) in &device.fmmus {
         if let Some(address) = FMMU.at(u16::from(*index)) {
-            write(wire, target, address, &fmmu.to_bytes()).await?;
+            on.push((address, fmmu.to_bytes().to_vec()));
         }
     }
-    Ok(())
+    let WatchdogSettings { divider, pdi, process_data } = device.settings.watchdog;
+    let watchdogs = [
+        (register::WATCHDOG_DIVIDER, divider),
+        (register::WATCHDOG_TIME_PDI, pdi),
+        (register::WATCHDOG_TIME_PROCESS_DATA, process_data),
+    ];
+    on.extend(
+        watchdogs.into_iter().filter_map(|(register, value)| {
+            Some((register.address, value?.to_le_bytes().to_vec()))
+        }),
+    );
+    write_all(wire, target, off).await?;
+    write_all(wire, target, on).await
 }
 
-async fn set_sync_manager(
+/// Writes in order, as many as fit to a frame. When one was not taken, or a frame was lost, all are
+/// written once more, each when the one before has been taken: what comes late must not undo what
+/// belongs behind it.
+pub(crate) async fn write_all(
     wire: &Wire,
     target: Target,
-    index: u16,
-    manager: SyncManagerConfig,
+    writes: Vec<(RegisterAddress, Vec<u8>)>,
 ) -> Result<(), ExchangeError> {
-    match SYNC_MANAGER.at(index) {
-        Some(address) => write(wire, target, address, &manager.to_bytes()).await,
-        None => Ok(()),
+    let writes: Vec<_> = writes.into_iter().filter(|(_, bytes)| !bytes.is_empty()).collect();
+    let sent: Vec<_> = (writes.iter())
+        .map(|(address, bytes)| wire.submit(Request::write(target, *address, bytes)))
+        .collect();
+    let mut all_taken = true;
+    for reply in sent {
+        all_taken &= reply.await.is_ok_and(|reply| reply.wkc == WorkingCounter(1));
     }
-}
-
-/// Switches a SyncManager off, then clears it: while it is on, its other bytes cannot be written.
-async fn clear_sync_manager(wire: &Wire, target: Target, index: u16) -> Result<(), ExchangeError> {
-    const ACTIVATE: u16 = 6;
-    let Some(address) = SYNC_MANAGER.at(index) else { return Ok(()) };
-    write(wire, target, RegisterAddress(address.0 + ACTIVATE), &[0]).await?;
-    write(wire, target, address, &[0; SyncManagerConfig::LEN]).await
-}
-
-async fn write(
-    wire: &Wire,
-    target: Target,
-    address: RegisterAddress,
-    bytes: &[u8],
-) -> Result<(), ExchangeError> {
-    if bytes.is_empty() {
+    if all_taken {
         return Ok(());
     }
-    wire.write_one(target, address, bytes).await.map(|_| ())
+    for (address, bytes) in &writes {
+        wire.write_one(target, *address, bytes).await?;
+    }
+    Ok(())
 }

@@ -22,7 +22,10 @@ const DATA_AT: usize = (SII_DATA.address.0 - SII_CONTROL_STATUS.address.0) as us
 
 /// How long a controller may be busy: it may be loading the first words after power-on.
 const BUSY_LIMIT: Span = Span::ms(500);
-const POLL_AFTER: Span = Span::us(200);
+/// Between two looks whether a command is done, at first.
+const POLL_AFTER: Span = Span::us(20);
+/// Later.
+const SLOWEST_POLL: Span = Span::ms(1);
 /// How long the SubDevice's processor may keep the EEPROM once it was asked for.
 const RELEASE_LIMIT: Span = Span::ms(20);
 const ATTEMPTS: u32 = 5;
@@ -83,7 +86,7 @@ pub enum SiiAccessError {
 /// # Errors
 /// [`SiiAccessError`].
 pub async fn read_image(wire: &Wire, target: Target) -> Result<Image, SiiAccessError> {
-    let session = Session::open(wire, target).await?;
+    let mut session = Session::open(wire, target).await?;
     let mut reader = Reader::new();
     let read = async {
         while let Some(words) = reader.needs() {
@@ -103,7 +106,7 @@ pub async fn read_image(wire: &Wire, target: Target) -> Result<Image, SiiAccessE
 /// # Errors
 /// [`SiiAccessError`].
 pub async fn read_identity(wire: &Wire, target: Target) -> Result<Identity, SiiAccessError> {
-    let session = Session::open(wire, target).await?;
+    let mut session = Session::open(wire, target).await?;
     let outcome = session.identity().await;
     session.close().await;
     outcome
@@ -114,6 +117,10 @@ struct Session<'a> {
     target: Target,
     /// It was the SubDevice's before and is to be given back.
     give_back: bool,
+    /// How long the last command took: the next one is not asked for before.
+    took: Span,
+    /// The last command is known to be done, without error.
+    idle: bool,
 }
 
 impl<'a> Session<'a> {
@@ -122,7 +129,7 @@ impl<'a> Session<'a> {
         let failed = |error| SiiAccessError::Exchange { target, error };
         let owner = wire.read_one(target, access, 2).await.map_err(failed)?;
         let give_back = owner.bytes::<2>(0)[0] & 1 != 0;
-        let session = Self { wire, target, give_back };
+        let session = Self { wire, target, give_back, took: Span::ZERO, idle: false };
         if give_back {
             wire.write_one(target, access, &[0]).await.map_err(failed)?;
         }
@@ -148,7 +155,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    async fn identity(&self) -> Result<Identity, SiiAccessError> {
+    async fn identity(&mut self) -> Result<Identity, SiiAccessError> {
         let mut bytes = Vec::with_capacity(16);
         while bytes.len() < 16 {
             let word = WordAddress(VENDOR_ID.0 + bytes.len() as u32 / 2);
@@ -167,21 +174,31 @@ impl<'a> Session<'a> {
     }
 
     /// Four or eight bytes from `word` on.
-    async fn read(&self, word: WordAddress) -> Result<Vec<u8>, SiiAccessError> {
+    async fn read(&mut self, word: WordAddress) -> Result<Vec<u8>, SiiAccessError> {
         let mut status = SiiControl::default();
         for attempt in 0..ATTEMPTS {
             if attempt > 0 {
                 self.wire.sleep(RETRY_AFTER).await;
             }
-            let before = self.idle(word).await?;
-            if SiiControl(before.word(0)).command_failed() {
-                self.command(SiiCommand::None, word).await?;
+            if !std::mem::take(&mut self.idle) {
+                let before = self.idle(word).await?;
+                if SiiControl(before.word(0)).command_failed() {
+                    self.command(SiiCommand::None, word).await?;
+                }
             }
             self.command(SiiCommand::Read, word).await?;
+            let began = self.wire.now();
+            // Most of what the one before took is surely not enough.
+            let sure = Span::ns(self.took.as_nanos() / 8 * 7);
+            if sure >= POLL_AFTER {
+                self.wire.sleep(sure).await;
+            }
             let reply = self.idle(word).await?;
             status = SiiControl(reply.word(0));
             let answered = u32::from_le_bytes(reply.bytes(ADDRESS_AT)) == word.value();
             if answered && !status.command_failed() {
+                self.took = self.wire.now().since(began).min(SLOWEST_POLL);
+                self.idle = true;
                 let end = DATA_AT + status.read_len();
                 return Ok(reply.data.get(DATA_AT..end).unwrap_or_default().to_vec());
             }
@@ -207,6 +224,7 @@ impl<'a> Session<'a> {
     async fn idle(&self, word: WordAddress) -> Result<Reply, SiiAccessError> {
         let target = self.target;
         let limit = self.wire.now() + BUSY_LIMIT;
+        let mut pause = POLL_AFTER;
         loop {
             let reply = self
                 .wire
@@ -220,7 +238,8 @@ impl<'a> Session<'a> {
             if self.wire.now() >= limit {
                 return Err(SiiAccessError::Busy { target, word, status: status.0 });
             }
-            self.wire.sleep(POLL_AFTER).await;
+            self.wire.sleep(pause).await;
+            pause = (pause + Span::ns(pause.as_nanos() / 4)).min(SLOWEST_POLL);
         }
     }
 }

@@ -4,6 +4,7 @@
 //! takes the next one only when the SubDevice has fetched the last, so a repeated request may count
 //! nothing although the first one is being worked on. The AL status alone tells.
 
+use linesman_config::start_up::StartUpCommand;
 use linesman_proto::register::{self, AlControl, AlStatus};
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::Span;
@@ -11,6 +12,7 @@ use linesman_proto::time::Span;
 use super::look::{AL_LEN, al_of};
 use crate::exchange::{ExchangeError, Target};
 use crate::executor::Wire;
+use crate::supervisor::StartUpError;
 
 /// A step was not made.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -36,6 +38,14 @@ pub enum StepError {
         /// Where it is.
         status: AlStatus,
     },
+    /// It does not take a command that belongs to the step.
+    #[error("start-up command {command}: {error}")]
+    StartUp {
+        /// Which command.
+        command: Box<StartUpCommand>,
+        /// What failed.
+        error: Box<StartUpError>,
+    },
 }
 
 /// A step.
@@ -51,8 +61,13 @@ pub struct Step {
 
 const FIRST_POLL: Span = Span::us(500);
 const SLOWEST_POLL: Span = Span::ms(10);
-/// A request that was not taken is written again after so many looks at the status.
-const WRITE_AGAIN_AFTER: u32 = 20;
+/// A request that was not taken is written again after so long.
+const WRITE_AGAIN_AFTER: Span = Span::ms(50);
+/// The status is looked at again after this part of the time that has passed, so that at most that
+/// much is waited in vain; at first with every frame.
+const POLL_PART: u64 = 8;
+/// Shorter waits than a frame takes are none.
+const SHORTEST_POLL: Span = Span::us(20);
 
 /// How long an acknowledgement may take.
 const ACKNOWLEDGE_LIMIT: Span = Span::ms(500);
@@ -75,15 +90,17 @@ pub async fn request(wire: &Wire, target: Target, step: Step) -> Result<(), Step
     // INIT is heard even when an error stands; the bit does no harm there and clears it.
     let acknowledge = to == AlState::Init && !emulated;
     let control = AlControl::request(to).with_error_acknowledge(acknowledge).to_bytes();
-    let until = wire.now() + limit;
-    let mut pause = FIRST_POLL;
-    let mut looks = 0;
+    let began = wire.now();
+    let until = began + limit;
+    let mut write_at = began;
     loop {
-        if looks % WRITE_AGAIN_AFTER == 0 {
+        let now = wire.now();
+        // A register takes its value when the frame has ended: the status needs a frame of its own.
+        if now >= write_at {
             let sent = wire.write(target, register::AL_CONTROL.address, &control).await?;
-            looks += u32::from(sent.answered());
-        } else {
-            looks += 1;
+            if sent.answered() {
+                write_at = now + WRITE_AGAIN_AFTER;
+            }
         }
         let (status, code) = read(wire, target).await?;
         // We never write the error bit to a controller with device emulation, so it does not mirror
@@ -94,11 +111,14 @@ pub async fn request(wire: &Wire, target: Target, step: Step) -> Result<(), Step
         if status.state() == StateValue::Known(to) {
             return Ok(());
         }
-        if wire.now() >= until {
+        let now = wire.now();
+        if now >= until {
             return Err(StepError::TimedOut { to, status });
         }
-        wire.sleep(pause).await;
-        pause = (pause * 2).min(SLOWEST_POLL);
+        let pause = Span::ns(now.since(began).as_nanos() / POLL_PART).min(SLOWEST_POLL);
+        if pause >= SHORTEST_POLL {
+            wire.sleep(pause).await;
+        }
     }
 }
 

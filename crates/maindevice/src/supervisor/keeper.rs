@@ -3,21 +3,21 @@
 use linesman_config::plan::DevicePlan;
 use linesman_proto::address::DeviceId;
 use linesman_proto::register::{self, AlStatus, DlStatus, ErrorCounters};
-use linesman_proto::state::transition::next_step;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 
+use super::drive::Failed;
+use super::times::Phase;
 use super::{CALM, Context, Found, lose};
 use crate::event::Event;
 use crate::exchange::{Reply, Target};
 use crate::executor::lock;
 use crate::procedure::look::{AL_LEN, al_of};
-use crate::procedure::set_up;
-use crate::procedure::state::{self, StepError};
+use crate::procedure::state::StepError;
 
 /// What is known of the SubDevice, so that only changes are told.
 #[derive(Default)]
-struct Known {
+pub(super) struct Known {
     al: Option<(AlStatus, AlStatusCode)>,
     dl: Option<DlStatus>,
     counters: Option<ErrorCounters>,
@@ -27,77 +27,108 @@ struct Known {
 enum Trouble {
     Lost,
     Fell,
+    /// Another state is wanted than before.
+    Redirected,
 }
 
 /// A SubDevice that stayed well for so long starts with short waits again.
 const FORGIVEN_AFTER: Span = Span::s(10);
 
-struct Keeper<'a> {
-    context: &'a Context,
-    device: &'a DevicePlan,
+pub(super) struct Keeper<'a> {
+    pub(super) context: &'a Context,
+    pub(super) device: &'a DevicePlan,
     known: Known,
     backoff: Span,
+    /// How often a state had been asked for when it was lost.
+    requests_at_loss: u32,
 }
 
 /// Keeps one SubDevice at its target; never ends.
 pub(crate) async fn keep(context: Context, id: DeviceId) {
     let plan = std::sync::Arc::clone(&context.plan);
     let Some(device) = plan.device(id) else { return };
-    let mut keeper =
-        Keeper { context: &context, device, known: Known::default(), backoff: Span::ZERO };
+    let mut keeper = Keeper {
+        context: &context,
+        device,
+        known: Known::default(),
+        backoff: Span::ZERO,
+        requests_at_loss: 0,
+    };
     loop {
         let restarted = keeper.until_found().await;
         keeper.while_there(restarted).await;
+        keeper.requests_at_loss = lock(&context.line).requests(id);
         lose(&context, id);
     }
 }
 
 impl Keeper<'_> {
-    fn target(&self) -> Target {
+    pub(super) fn target(&self) -> Target {
         Target::Station(self.device.station)
+    }
+
+    /// The state in which it shall be now.
+    pub(super) fn wanted(&self) -> AlState {
+        lock(&self.context.line).wanted(self.device.id)
+    }
+
+    /// Notes how long a phase took that began then.
+    pub(super) fn note(&self, phase: Phase, began: Instant) {
+        let took = self.context.wire.now().since(began);
+        lock(&self.context.line).note_time(self.device.id, phase, took);
     }
 
     async fn until_found(&self) -> bool {
         loop {
             let seen = self.context.alerts();
-            if let Found::There { restarted } = lock(&self.context.line).found(self.device.id) {
-                return restarted;
+            let found = lock(&self.context.line).found(self.device.id);
+            match found {
+                Found::There { restarted } if self.may_be_set_up() => return restarted,
+                Found::There { .. } | Found::Lost | Found::Unknown => {}
             }
             self.context.nap(seen, Span::s(1)).await;
         }
+    }
+
+    /// Whether it may be brought up: for the first time always, later unless that is left to the user.
+    fn may_be_set_up(&self) -> bool {
+        let line = lock(&self.context.line);
+        let lost_before = line.losses(self.device.id) > 0;
+        let asked = line.requests(self.device.id) > self.requests_at_loss;
+        !lost_before || asked || self.context.options.reinitialise
     }
 
     /// Drives and watches until the SubDevice is lost.
     async fn while_there(&mut self, mut set_up_anew: bool) {
         loop {
             let began = self.context.wire.now();
-            match self.drive(set_up_anew).await {
+            let reached = match self.drive(set_up_anew).await {
                 Ok(()) => {
                     set_up_anew = false;
-                    self.reached();
+                    self.reached()
                 }
-                Err(StepError::Gone(_)) => return,
-                Err(StepError::Refused { to, status, code }) => {
-                    let id = self.device.id;
-                    self.learn_state(status, code);
-                    self.context.wire.emit(Event::Refused { id, to, status, code });
+                Err(failed) => {
+                    let Some(status) = self.tell(failed) else { return };
                     if !self.wait_before_retry(status).await {
                         return;
                     }
                     continue;
                 }
-                Err(StepError::TimedOut { to, status }) => {
-                    let id = self.device.id;
-                    self.context.wire.emit(Event::StepTimedOut { id, to, status });
-                    if !self.wait_before_retry(status).await {
-                        return;
-                    }
-                    continue;
-                }
-            }
-            match self.watch().await {
+            };
+            match self.watch(reached).await {
                 Trouble::Lost => return,
-                Trouble::Fell => {}
+                Trouble::Redirected => {
+                    lock(&self.context.line).set_moving(self.device.id, None);
+                    continue;
+                }
+                Trouble::Fell => {
+                    let Some((status, code)) = self.known.al else { return };
+                    let (id, from) = (self.device.id, reached);
+                    self.context.wire.emit(Event::AbnormalState { id, from, status, code });
+                    if !self.context.options.restore_states && !self.wait_for_request().await {
+                        return;
+                    }
+                }
             }
             lock(&self.context.line).set_moving(self.device.id, None);
             let well_for = self.context.wire.now().since(began);
@@ -114,6 +145,46 @@ impl Keeper<'_> {
         }
     }
 
+    /// Tells of a step that was not made. `None` when the SubDevice does not answer any more.
+    fn tell(&mut self, failed: Failed) -> Option<AlStatus> {
+        let Failed { from, to, error } = failed;
+        let (id, wire) = (self.device.id, &self.context.wire);
+        match error {
+            StepError::Gone(_) => None,
+            StepError::Refused { to, status, code } => {
+                self.learn_state(status, code);
+                wire.emit(Event::Refused { id, from, to, status, code });
+                Some(status)
+            }
+            StepError::TimedOut { to, status } => {
+                wire.emit(Event::StepTimedOut { id, from, to, status });
+                Some(status)
+            }
+            StepError::StartUp { command, error } => {
+                let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
+                wire.emit(Event::StartUpFailed { id, to, status, command, error });
+                Some(status)
+            }
+        }
+    }
+
+    /// Watches a SubDevice that is left in the state it has fallen to until another one is asked
+    /// for. False when it got lost.
+    async fn wait_for_request(&mut self) -> bool {
+        let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
+        lock(&self.context.line).set_moving(self.device.id, status.state().state());
+        let before = lock(&self.context.line).requests(self.device.id);
+        while lock(&self.context.line).requests(self.device.id) == before {
+            let seen = self.context.alerts();
+            self.context.nap(seen, self.context.options.watch_interval).await;
+            if !self.read().await {
+                return false;
+            }
+            self.context.wire.sleep(CALM).await;
+        }
+        true
+    }
+
     /// Waits, longer each time, and goes on watching. False when the SubDevice got lost.
     async fn wait_before_retry(&mut self, status: AlStatus) -> bool {
         let [first, longest] = self.context.options.retry_after;
@@ -121,7 +192,11 @@ impl Keeper<'_> {
         self.backoff = (wait * 2).min(longest);
         lock(&self.context.line).set_moving(self.device.id, status.state().state());
         let until = self.context.wire.now() + wait;
-        while self.context.wire.now() < until {
+        let before = lock(&self.context.line).requests(self.device.id);
+        // Whoever asks for a state now does not want to wait.
+        while self.context.wire.now() < until
+            && lock(&self.context.line).requests(self.device.id) == before
+        {
             self.context.wire.sleep(self.context.options.watch_interval.min(wait)).await;
             if !self.read().await {
                 return false;
@@ -130,70 +205,22 @@ impl Keeper<'_> {
         true
     }
 
-    fn reached(&mut self) {
-        let (id, state) = (self.device.id, self.device.target);
+    fn reached(&mut self) -> AlState {
+        let id = self.device.id;
         let mut line = lock(&self.context.line);
+        let state = line.wanted(id);
         line.set_reached(id, state);
-        let all = line.have_all_reached() && line.set_all_reached();
+        let all = line.have_all_reached() && line.set_all_reached(self.context.wire.now());
         drop(line);
         self.context.wire.emit(Event::TargetReached { id, state });
         if all {
             self.context.wire.emit(Event::AllReached);
         }
-    }
-
-    /// Goes from wherever the SubDevice is to its target.
-    async fn drive(&mut self, anew: bool) -> Result<(), StepError> {
-        let (context, device) = (self.context, self.device);
-        let (wire, target) = (&context.wire, self.target());
-        let (status, code) = state::read(wire, target).await?;
-        self.learn_state(status, code);
-        if status.error() {
-            state::acknowledge(wire, target, status, device.device_emulation).await?;
-        }
-        let mut current = match status.state() {
-            StateValue::Known(AlState::Boot) | StateValue::Unknown(_) => None,
-            StateValue::Known(state) => Some(state).filter(|_| !anew),
-        };
-        loop {
-            lock(&context.line).set_moving(device.id, current);
-            let next = match current {
-                None => AlState::Init,
-                Some(current) => match next_step(current, device.target) {
-                    Some(next) => next,
-                    None => return Ok(()),
-                },
-            };
-            match (current, next) {
-                (Some(AlState::Init), AlState::PreOp) => {
-                    set_up::before_pre_op(wire, device).await?;
-                }
-                (Some(AlState::PreOp), AlState::SafeOp) => {
-                    set_up::before_safe_op(wire, device).await?;
-                }
-                (
-                    None
-                    | Some(
-                        AlState::Init
-                        | AlState::Boot
-                        | AlState::PreOp
-                        | AlState::SafeOp
-                        | AlState::Op,
-                    ),
-                    AlState::Init | AlState::Boot | AlState::PreOp | AlState::SafeOp | AlState::Op,
-                ) => {}
-            }
-            let from = current.unwrap_or(AlState::Op);
-            let limit = context.options.state_timeouts.of(from, next);
-            let step = state::Step { to: next, limit, emulated: device.device_emulation };
-            state::request(wire, target, step).await?;
-            self.learn_state(AlStatus::new(next), AlStatusCode::NO_ERROR);
-            current = Some(next);
-        }
+        state
     }
 
     /// Reads at intervals, and at once after an alert, until something is wrong.
-    async fn watch(&mut self) -> Trouble {
+    async fn watch(&mut self, reached: AlState) -> Trouble {
         let id = self.device.id;
         loop {
             let seen = self.context.alerts();
@@ -201,8 +228,12 @@ impl Keeper<'_> {
             if lock(&self.context.line).found(id) == Found::Lost || !self.read().await {
                 return Trouble::Lost;
             }
-            let at_target = self.known.al.is_some_and(|(status, _)| {
-                status.state() == StateValue::Known(self.device.target) && !status.error()
+            let status = self.known.al.map(|(status, _)| status);
+            if reached != self.wanted() {
+                return Trouble::Redirected;
+            }
+            let at_target = status.is_some_and(|status| {
+                status.state() == StateValue::Known(reached) && !status.error()
             });
             if !at_target {
                 return Trouble::Fell;
@@ -246,7 +277,7 @@ impl Keeper<'_> {
         true
     }
 
-    fn learn_state(&mut self, status: AlStatus, code: AlStatusCode) {
+    pub(super) fn learn_state(&mut self, status: AlStatus, code: AlStatusCode) {
         // The code means something with the error bit only.
         let code = if status.error() { code } else { AlStatusCode::NO_ERROR };
         if self.known.al.replace((status, code)) != Some((status, code)) {

@@ -4,15 +4,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
 use std::pin::Pin;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 
-use linesman_config::plan::Plan;
 use linesman_config::plan::expect::{Presence, Served};
+use linesman_config::plan::{DevicePlan, Plan};
 use linesman_proto::address::{DeviceId, Path, WorkingCounter};
 use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, OredStates};
+use linesman_proto::time::{Instant, Span};
 
+use super::times::{BringUpTimes, Phase};
 use crate::executor::lock;
 use crate::executor::wire::Sleep;
 
@@ -43,13 +46,20 @@ struct Live {
     /// How often its mailbox was opened: each time both ends begin to count anew.
     openings: u32,
     mailbox: bool,
+    /// How far it is to be driven; what the plan says unless asked for otherwise.
+    target: Option<AlState>,
+    /// How often a state was asked for.
+    requests: u32,
+    /// How often it was lost.
+    losses: u32,
 }
 
 /// The SubDevices of a network as they are.
 #[derive(Debug, Default)]
 pub(crate) struct Line {
     devices: Vec<Live>,
-    version: u64,
+    /// Shared, so that the cycle sees without a lock whether anything has changed.
+    version: Arc<AtomicU64>,
     alerts: u64,
     /// Naps that an alert ends, in the order in which they began.
     waiting: BTreeMap<u64, Waker>,
@@ -63,18 +73,29 @@ pub(crate) struct Line {
     all_reached: bool,
     /// Who was found that the plan does not have, or not there: told once.
     strangers: BTreeSet<(Option<DeviceId>, Identity)>,
+    /// No SubDevice goes beyond it for the time being.
+    hold: Option<AlState>,
+    times: Option<BringUpTimes>,
 }
 
 impl Line {
     pub(crate) fn new(plan: &Plan) -> Self {
         let count = plan.devices.len();
         let changed = (0..count as u32).map(DeviceId).collect();
-        Self { devices: vec![Live::default(); count], changed, ..Self::default() }
+        let live = |device: &DevicePlan| Live { target: Some(device.target), ..Live::default() };
+        let devices = plan.devices.iter().map(live).collect();
+        let times = Some(BringUpTimes::new(count));
+        Self { devices, changed, times, ..Self::default() }
     }
 
     /// Changes whenever presence or "settled" changes.
     pub(crate) fn version(&self) -> u64 {
-        self.version
+        self.version.load(Ordering::Relaxed)
+    }
+
+    /// The same, to be looked at without the line.
+    pub(crate) fn live_version(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.version)
     }
 
     /// Who serves process data, of those for whom that has changed since the last call: `least` those
@@ -117,8 +138,12 @@ impl Line {
             Found::Lost => true,
             Found::There { .. } | Found::Unknown => false,
         };
-        let (openings, reached) = (live.openings, live.reached);
-        *live = Live { found, settled, openings, reached, ..Live::default() };
+        let losses = live.losses + u32::from(found == Found::Lost && before != Found::Lost);
+        // What was seen and asked for outlives a loss; what it serves does not.
+        let Live { openings, reached, target, requests, .. } = *live;
+        let new =
+            Live { found, settled, openings, reached, target, requests, losses, ..Live::default() };
+        *live = new;
         self.set_at_target(id, false);
         before
     }
@@ -141,7 +166,8 @@ impl Line {
     fn set(&mut self, id: DeviceId, state: Option<AlState>, settled: bool, reached: bool) {
         let Some(live) = self.live(id) else { return };
         live.served = state.is_some_and(AlState::has_inputs);
-        let mailbox = state.is_some_and(AlState::has_mailbox);
+        // In BOOT there is another mailbox, for files only.
+        let mailbox = state.is_some_and(|state| state.has_mailbox() && state != AlState::Boot);
         live.openings += u32::from(mailbox && !live.mailbox);
         live.mailbox = mailbox;
         live.settled = settled;
@@ -161,7 +187,7 @@ impl Line {
     }
 
     fn changes(&mut self, id: DeviceId) {
-        self.version += 1;
+        self.version.fetch_add(1, Ordering::Relaxed);
         self.changed.push(id);
     }
 
@@ -176,8 +202,88 @@ impl Line {
     }
 
     /// Notes that all have reached their targets; true the first time.
-    pub(crate) fn set_all_reached(&mut self) -> bool {
+    pub(crate) fn set_all_reached(&mut self, now: Instant) -> bool {
+        if let Some(times) = &mut self.times {
+            times.reached.get_or_insert(now);
+        }
         !std::mem::replace(&mut self.all_reached, true)
+    }
+
+    /// Whether all have been at their targets at once.
+    pub(crate) fn all_have_been_reached(&self) -> bool {
+        self.all_reached
+    }
+
+    /// The state in which a SubDevice shall be now.
+    pub(crate) fn wanted(&self, id: DeviceId) -> AlState {
+        let target = self.devices.get(id.index()).and_then(|live| live.target);
+        let target = target.unwrap_or(AlState::Init);
+        match self.hold {
+            // BOOT and INIT are no further than any other state.
+            Some(hold) if target != AlState::Boot && target.bits() > hold.bits() => hold,
+            Some(_) | None => target,
+        }
+    }
+
+    /// Asks for a state of a SubDevice, whatever the plan says. False when there is no such SubDevice.
+    pub(crate) fn ask_for(&mut self, id: DeviceId, state: AlState) -> bool {
+        let Some(live) = self.live(id) else { return false };
+        live.target = Some(state);
+        live.requests += 1;
+        self.all_reached = false;
+        self.alert();
+        true
+    }
+
+    /// Nobody goes beyond `hold`; `None`: everybody to the target.
+    pub(crate) fn set_hold(&mut self, hold: Option<AlState>) {
+        self.hold = hold;
+        self.all_reached = false;
+        self.alert();
+    }
+
+    /// How often a state of a SubDevice was asked for.
+    pub(crate) fn requests(&self, id: DeviceId) -> u32 {
+        self.devices.get(id.index()).map_or(0, |live| live.requests)
+    }
+
+    /// How often a SubDevice was lost.
+    pub(crate) fn losses(&self, id: DeviceId) -> u32 {
+        self.devices.get(id.index()).map_or(0, |live| live.losses)
+    }
+
+    /// Notes what a phase of a SubDevice took.
+    pub(crate) fn note_time(&mut self, id: DeviceId, phase: Phase, took: Span) {
+        if let Some(times) = &mut self.times {
+            times.note(id, phase, took);
+        }
+    }
+
+    /// Notes what a phase of the whole network took, of the first bring-up.
+    pub(crate) fn note_network_time(&mut self, phase: Phase, took: Span) {
+        if let Some(times) = self.times.as_mut().filter(|times| times.reached.is_none()) {
+            times.network.push((phase, took));
+        }
+    }
+
+    /// A SubDevice is brought up anew.
+    pub(crate) fn forget_times(&mut self, id: DeviceId) {
+        if let Some(times) = self.times.as_mut().and_then(|times| times.devices.get_mut(id.index()))
+        {
+            times.phases.clear();
+        }
+    }
+
+    /// Bringing up begins.
+    pub(crate) fn begin_times(&mut self, now: Instant) {
+        if let Some(times) = &mut self.times {
+            times.began = now;
+        }
+    }
+
+    /// What bringing up took so far.
+    pub(crate) fn times(&self) -> Option<&BringUpTimes> {
+        self.times.as_ref()
     }
 
     /// Notes a stranger, in the place of a planned SubDevice or elsewhere; true the first time.

@@ -12,10 +12,11 @@ use linesman_proto::register::STATION_ADDRESS;
 use linesman_proto::sii::Identity;
 
 use super::align::align;
+use super::times::Phase;
 use super::{Context, Found, find, lose};
 use crate::event::Event;
 use crate::exchange::Target;
-use crate::executor::lock;
+use crate::executor::{Wire, lock};
 use crate::procedure::look::{self, LookError};
 use crate::procedure::{address, sii};
 
@@ -34,18 +35,19 @@ struct Seen {
 /// [`LookError`] when the line is silent.
 pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), LookError> {
     let wire = &context.wire;
+    let began = wire.now();
     let (places, _) = look::places(wire, context.network).await?;
     if from_scratch {
         // Addresses of an earlier run must not meet those of the plan.
         let _ = wire.write(Target::All, STATION_ADDRESS.address, &[0; 2]).await;
     }
-    let reads: Vec<_> = (places.iter())
-        .map(|place| wire.read(*place, STATION_ADDRESS.address, STATION_ADDRESS.len))
-        .collect();
-    let mut stations = Vec::with_capacity(reads.len());
-    for read in reads {
-        stations.push(read.await.map_or(StationAddress(0), |reply| StationAddress(reply.word(0))));
-    }
+    let stations = if from_scratch {
+        vec![StationAddress(0); places.len()]
+    } else {
+        stations(wire, &places).await
+    };
+    context.note(Phase::Count, began);
+    let began = wire.now();
     let mut uses: BTreeMap<StationAddress, u32> = BTreeMap::new();
     for station in &stations {
         *uses.entry(*station).or_default() += 1;
@@ -86,7 +88,20 @@ pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), 
             lose(context, device.id);
         }
     }
+    context.note(Phase::Identify, began);
     Ok(())
+}
+
+/// The station addresses that controllers have; 0 for one that does not answer.
+async fn stations(wire: &Wire, places: &[Target]) -> Vec<StationAddress> {
+    let reads: Vec<_> = (places.iter())
+        .map(|place| wire.read(*place, STATION_ADDRESS.address, STATION_ADDRESS.len))
+        .collect();
+    let mut stations = Vec::with_capacity(reads.len());
+    for read in reads {
+        stations.push(read.await.map_or(StationAddress(0), |reply| StationAddress(reply.word(0))));
+    }
+    stations
 }
 
 /// Identifies unknown controllers, of which the plan has these.
@@ -126,16 +141,24 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
             context.wire.emit(Event::UnplannedDevice { position, found });
         }
     }
+    let mut giving = Vec::with_capacity(pairs.len());
     for (at, of) in pairs {
         let (id, found) = (planned[of], identities[at]);
         match differs(id, &found) {
-            None => give_address(context, seen[at].place, id).await,
+            None => {
+                let (context, place) = (context.clone(), seen[at].place);
+                let wire = context.wire.clone();
+                giving.push(wire.spawn(async move { give_address(&context, place, id).await }));
+            }
             Some(mismatch) if lock(&context.line).add_stranger(Some(id), found) => {
                 let expected = context.plan.devices[id.index()].identity;
                 context.wire.emit(Event::WrongDevice { id, mismatch, expected, found });
             }
             Some(_told) => {}
         }
+    }
+    for given in giving {
+        given.await;
     }
 }
 

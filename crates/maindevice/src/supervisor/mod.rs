@@ -5,16 +5,19 @@
 //! out; [`supervise`] starts them and looks for those that are lost. [`mod@line`] is what they know.
 
 mod align;
+mod drive;
 pub(crate) mod keeper;
 pub(crate) mod line;
 mod locate;
+mod start_up;
+pub(crate) mod times;
 
 use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::Plan;
 use linesman_proto::address::{DeviceId, Network};
 use linesman_proto::register;
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 
 use crate::event::Event;
 use crate::exchange::Target;
@@ -23,6 +26,8 @@ use crate::options::Options;
 use crate::procedure::look::AL_LEN;
 
 pub(crate) use line::{Found, Line, Nap};
+pub use start_up::StartUpError;
+pub use times::{BringUpTimes, DeviceTimes, Phase};
 
 /// What keepers share.
 #[derive(Clone)]
@@ -41,6 +46,11 @@ impl Context {
         Nap { line: Arc::clone(&self.line), seen, sleep: self.wire.sleep(span), place: None }
     }
 
+    /// Notes how long a phase of the whole network took that began then.
+    pub(crate) fn note(&self, phase: Phase, began: Instant) {
+        lock(&self.line).note_network_time(phase, self.wire.now().since(began));
+    }
+
     pub(crate) fn alerts(&self) -> u64 {
         lock(&self.line).alerts()
     }
@@ -55,6 +65,7 @@ pub(crate) const CALM: Span = Span::ms(5);
 
 /// Runs a network according to its plan; never ends.
 pub(crate) async fn supervise(context: Context) {
+    lock(&context.line).begin_times(context.wire.now());
     while locate::locate(&context, true).await.is_err() {
         // The whole line is silent.
         for device in &context.plan.devices {

@@ -8,21 +8,12 @@ use super::*;
 fn line(devices: usize) -> Line {
     let tree = linesman_proto::topology::derive(&[]).unwrap();
     let device = |id| linesman_config::plan::DevicePlan {
-        id: DeviceId(id),
-        name: String::new(),
-        station: linesman_proto::address::StationAddress(0x1001),
-        identity: linesman_proto::sii::Identity::default(),
         revision_rule: linesman_config::identity::RevisionRule::Any,
-        mailbox: None,
-        sync_managers: Vec::new(),
-        fmmus: Vec::new(),
         device_emulation: true,
-        target: AlState::Op,
-        outputs: 0..0,
-        inputs: 0..0,
+        ..linesman_config::plan::DevicePlan::bare(DeviceId(id))
     };
     let devices = (0..devices as u32).map(device).collect();
-    Line::new(&Plan { devices, tree, tasks: Vec::new(), outputs_len: 0, inputs_len: 0 })
+    Line::new(&Plan { devices, ..Plan::empty(tree) })
 }
 
 #[test]

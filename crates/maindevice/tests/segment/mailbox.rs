@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, Fate};
 use linesman_maindevice::Event;
-use linesman_maindevice::mailbox::SdoError;
+use linesman_maindevice::mailbox::{MailboxFailure, Why};
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
@@ -28,7 +28,7 @@ pub(crate) fn upload(
     name: &str,
     index: u16,
     subindex: u8,
-) -> Result<Vec<u8>, SdoError> {
+) -> Result<Vec<u8>, MailboxFailure> {
     get(bench, name, ObjectAddress::new(index, subindex), false)
 }
 
@@ -37,7 +37,7 @@ pub(crate) fn get(
     name: &str,
     object: ObjectAddress,
     complete: bool,
-) -> Result<Vec<u8>, SdoError> {
+) -> Result<Vec<u8>, MailboxFailure> {
     let id = bench.id(name);
     bench.device.sdo_upload(bench.now, id, object, complete);
     assert!(bench.run_until(Span::s(5), |event| matches!(event, Event::SdoUploaded { .. })));
@@ -56,7 +56,7 @@ pub(crate) fn put(
     index: u16,
     subindex: u8,
     data: &[u8],
-) -> Result<(), SdoError> {
+) -> Result<(), MailboxFailure> {
     let (id, object) = (bench.id(name), ObjectAddress::new(index, subindex));
     bench.device.sdo_download(bench.now, id, object, false, data);
     assert!(bench.run_until(Span::s(5), |event| matches!(event, Event::SdoDownloaded { .. })));
@@ -85,7 +85,7 @@ fn a_setting_is_written_and_read_back() {
     put(&mut bench, "M1", 0x8010, 2, &[0xE8, 0x03]).unwrap();
     assert_eq!(upload(&mut bench, "M1", 0x8010, 2).unwrap(), [0xE8, 0x03]);
     let error = put(&mut bench, "M1", 0x8010, 2, &[0xFF, 0xFF]).unwrap_err();
-    assert!(matches!(error, SdoError::Aborted { .. }), "{error}");
+    assert!(matches!(error.why, Why::Aborted { .. }), "{error}");
 }
 
 // proves: SW-10 partial: text and code of an abort; complete access unsupported is not tried
@@ -106,7 +106,7 @@ fn who_has_no_mailbox_says_so() {
     let mut bench = Bench::new(PLANT);
     bench.start(AlState::Op);
     let error = upload(&mut bench, "K1", 0x1018, 1).unwrap_err();
-    assert!(error.to_string().contains("SubDevice 1 has no open mailbox"), "{error}");
+    assert!(error.to_string().contains("it has no mailbox"), "{error}");
 }
 
 #[test]

@@ -10,3 +10,4 @@ mod run;
 mod scan;
 mod soak;
 mod software;
+mod start_up;

@@ -9,7 +9,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
 use super::firmware::{Firmware, SampleAgain};
-use super::signal::Signals;
+use super::signal::{SignalId, Signals};
 use super::trouble::Trouble;
 use crate::controller::{Pdi, SiiRequest, SyncSignal};
 
@@ -101,6 +101,10 @@ impl Firmware for EmulatedSii {
 
     fn sample_again(&self, pdi: &Pdi<'_>) -> SampleAgain {
         self.inner.sample_again(pdi)
+    }
+
+    fn listens_to(&self) -> Vec<SignalId> {
+        self.inner.listens_to()
     }
 
     fn slow_down(&mut self, takes: Option<Span>) {

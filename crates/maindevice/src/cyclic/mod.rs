@@ -1,0 +1,453 @@
+//! The cyclic exchange of process data: a plain engine that allocates nothing once it runs.
+//!
+//! Each task of the plan sends its frames when its cycle begins. What comes back is judged datagram
+//! by datagram against the expected working counter, which follows from who is present; inputs are
+//! taken over only when it holds. What a SubDevice adds while it changes its state is not known: its
+//! SyncManagers are on before it gives data. Until it has arrived the expectation is a range, so that
+//! one SubDevice that comes back, or is stuck, does not stop the inputs of all others.
+//!
+//! [`run`] copies, [`datagram`] judges, [`quality`] tells how good and how old data are,
+//! [`application`] sees to it that old outputs are not sent as fresh ones.
+
+mod application;
+mod datagram;
+mod quality;
+mod run;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use linesman_config::plan::expect::Presence;
+use linesman_config::plan::{Plan, Role};
+use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::sii::Direction;
+use linesman_proto::state::{AlState, OredStates};
+use linesman_proto::time::{Instant, Span};
+
+use self::application::Application;
+use self::datagram::{Datagram, clear_lost};
+use self::quality::Share;
+use self::run::Run;
+use crate::event::Event;
+use crate::exchange::Exchange;
+use crate::exchange::prebuilt::data_offsets;
+use crate::executor::lock;
+use crate::statistics::Statistics;
+use crate::supervisor::Line;
+
+pub use self::quality::{FrameStatus, Quality};
+
+/// One frame of the plan.
+#[derive(Debug)]
+struct Frame {
+    task: usize,
+    /// Its number within the task.
+    number: usize,
+    /// How often it is sent at once.
+    times: u8,
+    /// Where outputs go into it.
+    outputs: Vec<Run>,
+    datagrams: Vec<Datagram>,
+    /// Bits of the datagrams that carry outputs.
+    carries: u16,
+    /// Which version of the line's state its expectations are made of.
+    version: Option<u64>,
+    /// It is on its way.
+    out: bool,
+    status: FrameStatus,
+}
+
+/// Frames of a task that leave together.
+#[derive(Debug)]
+struct Departure {
+    task: usize,
+    next_at: Instant,
+    cycle: Span,
+    /// The cycle of the task begins with it.
+    begins: bool,
+    frames: Vec<usize>,
+}
+
+#[derive(Debug)]
+struct TaskState {
+    /// Frames lost in a row.
+    lost: u64,
+    /// Frames that are on their way.
+    out: u32,
+    /// The last of them has come back, or was given up.
+    exchanged: bool,
+    application: Application,
+}
+
+/// The engine.
+#[derive(Debug)]
+pub(crate) struct Cyclic {
+    plan: Arc<Plan>,
+    line: Arc<Mutex<Line>>,
+    /// The version of the line's state, to be looked at without a lock.
+    live: Arc<AtomicU64>,
+    tasks: Vec<TaskState>,
+    departures: Vec<Departure>,
+    frames: Vec<Frame>,
+    /// When the first departure is due.
+    next_at: Instant,
+    /// Who surely serves process data, and who may.
+    least: Presence,
+    most: Presence,
+    /// Which version of the line's state that is.
+    version: u64,
+    /// What the last broadcast read brought.
+    responding: Option<(WorkingCounter, u8)>,
+    shares: Vec<Share>,
+    pub(crate) outputs: Vec<u8>,
+    pub(crate) inputs: Vec<u8>,
+}
+
+impl Cyclic {
+    /// Gives its frames to the exchange, and begins at `now`.
+    pub(crate) fn new(
+        plan: Arc<Plan>,
+        line: Arc<Mutex<Line>>,
+        exchange: &mut Exchange,
+        allowed_misses: Option<u32>,
+        now: Instant,
+    ) -> Self {
+        exchange.prebuild(plan.tasks.iter().flat_map(|task| task.frames.iter().cloned()));
+        let (mut frames, mut departures) = (Vec::new(), Vec::<Departure>::new());
+        for (index, task) in plan.tasks.iter().enumerate() {
+            let earliest = task.frames.iter().map(|frame| frame.ahead).max().unwrap_or_default();
+            let latest = task.frames.iter().map(|frame| frame.ahead).min().unwrap_or_default();
+            for (number, planned) in task.frames.iter().enumerate() {
+                let next_at = now + earliest.saturating_sub(planned.ahead);
+                let same = |one: &&mut Departure| one.task == index && one.next_at == next_at;
+                match departures.iter_mut().find(same) {
+                    Some(departure) => departure.frames.push(frames.len()),
+                    None => departures.push(Departure {
+                        task: index,
+                        next_at,
+                        cycle: task.cycle.max(Span::ns(1)),
+                        begins: planned.ahead == latest,
+                        frames: vec![frames.len()],
+                    }),
+                }
+                frames.push(Frame::new(&plan, index, number));
+            }
+        }
+        let task = |_| TaskState {
+            lost: 0,
+            out: 0,
+            exchanged: false,
+            application: Application::new(allowed_misses),
+        };
+        let live = lock(&line).live_version();
+        let mut cyclic = Self {
+            tasks: plan.tasks.iter().map(task).collect(),
+            departures,
+            frames,
+            next_at: now,
+            least: Presence::none(plan.devices.len()),
+            most: Presence::none(plan.devices.len()),
+            version: u64::MAX,
+            responding: None,
+            shares: quality::shares(&plan),
+            outputs: vec![0; plan.outputs_len],
+            inputs: vec![0; plan.inputs_len],
+            plan,
+            line,
+            live,
+        };
+        cyclic.next_at = cyclic.earliest();
+        cyclic.refresh();
+        cyclic
+    }
+
+    fn earliest(&self) -> Instant {
+        self.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX)
+    }
+
+    /// Takes over who is present, if that has changed.
+    #[inline]
+    pub(crate) fn refresh(&mut self) {
+        if self.live.load(Ordering::Relaxed) != self.version {
+            let mut line = lock(&self.line);
+            self.version = line.version();
+            line.take_changes(&mut self.least, &mut self.most);
+        }
+    }
+
+    /// When the next frames are due.
+    #[inline]
+    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+        (self.next_at != Instant::MAX).then_some(self.next_at)
+    }
+
+    /// The application gives its outputs: all of them, or those of one task.
+    #[inline]
+    pub(crate) fn give_outputs(&mut self, task: Option<usize>) {
+        match task {
+            Some(task) => self.tasks.get_mut(task).into_iter().for_each(|t| t.application.give()),
+            None => self.tasks.iter_mut().for_each(|task| task.application.give()),
+        }
+    }
+
+    /// Whether all frames of a task have come back, or were given up, since this was asked last.
+    #[inline]
+    pub(crate) fn take_exchanged(&mut self, task: usize) -> bool {
+        self.tasks.get_mut(task).is_some_and(|task| std::mem::replace(&mut task.exchanged, false))
+    }
+
+    /// When the next cycle of a task begins.
+    pub(crate) fn next_cycle(&self, task: usize) -> Option<Instant> {
+        let begins = |one: &&Departure| one.task == task && one.begins;
+        self.departures.iter().find(begins).map(|one| one.next_at)
+    }
+
+    /// Sends the frames of all tasks whose cycle has begun. Returns whether any had.
+    pub(crate) fn send_due(
+        &mut self,
+        now: Instant,
+        exchange: &mut Exchange,
+        statistics: &mut Statistics,
+        events: &mut impl FnMut(Event),
+    ) -> bool {
+        if now < self.next_at {
+            return false;
+        }
+        let Self { departures, tasks, frames, outputs, .. } = self;
+        for departure in departures {
+            if departure.next_at > now {
+                continue;
+            }
+            departure.next_at += departure.cycle;
+            let mut behind = 0;
+            if departure.next_at <= now {
+                // Cycles that were slept through are left out, not caught up: the grid stays.
+                behind = now.since(departure.next_at).as_nanos() / departure.cycle.as_nanos() + 1;
+                departure.next_at += departure.cycle * behind;
+            }
+            let Some(task) = tasks.get_mut(departure.task) else { continue };
+            if departure.begins {
+                statistics.cycles += 1;
+                statistics.cycles_missed += behind;
+                let judged = task.application.begin_cycle();
+                statistics.deadlines_missed += u64::from(judged.missed);
+                statistics.cycles_withheld += u64::from(judged.withheld);
+                if judged.changed {
+                    let task = departure.task;
+                    events(match judged.withheld {
+                        true => Event::OutputsWithheld { task },
+                        false => Event::OutputsResumed { task },
+                    });
+                }
+            }
+            let withheld = task.application.is_withheld();
+            let deadline = now + departure.cycle;
+            for index in &departure.frames {
+                let Some(frame) = frames.get_mut(*index) else { continue };
+                let sent = exchange.send_cyclic(*index, deadline, frame.times, |prebuilt| {
+                    prebuilt.withhold(withheld);
+                    if withheld {
+                        run::clear_frame(&frame.outputs, prebuilt.bytes_mut());
+                    } else {
+                        run::fill(&frame.outputs, outputs, prebuilt.bytes_mut());
+                    }
+                });
+                frame.status.not_sent = match (sent, withheld) {
+                    (false, _) => FrameStatus::WHOLE,
+                    (true, true) => frame.carries,
+                    (true, false) => 0,
+                };
+                statistics.cyclic_unsent += u64::from(!sent);
+                task.out += u32::from(sent && !std::mem::replace(&mut frame.out, sent));
+            }
+        }
+        self.next_at = self.earliest();
+        true
+    }
+
+    /// A frame came back.
+    pub(crate) fn received(
+        &mut self,
+        now: Instant,
+        index: usize,
+        withheld: bool,
+        reply: &[u8],
+        statistics: &mut Statistics,
+        events: &mut impl FnMut(Event),
+    ) {
+        self.refresh();
+        let Self { plan, line, tasks, frames, inputs, least, most, shares, .. } = self;
+        let Some(frame) = frames.get_mut(index) else { return };
+        let (task, number) = (frame.task, frame.number);
+        let Some(state) = tasks.get_mut(task) else { return };
+        state.came(&mut frame.out);
+        if state.lost > 0 {
+            let lost = std::mem::take(&mut state.lost);
+            if lost >= LOST_IS_NEWS {
+                events(Event::CyclicFramesBack { task, lost });
+                lock(line).alert();
+            }
+        }
+        if frame.version != Some(self.version) {
+            frame.version = Some(self.version);
+            frame.take_over(plan, index, least, most, shares, inputs);
+        }
+        frame.status.wrong_counter = 0;
+        for (at, datagram) in frame.datagrams.iter_mut().enumerate() {
+            let Some(wkc) = datagram.counter(reply) else { return };
+            let bit = FrameStatus::bit(at);
+            if datagram.role != Role::ProcessData {
+                if datagram.role == Role::Presence {
+                    let states = reply.get(datagram.data_at).copied().unwrap_or(0);
+                    if self.responding != Some((wkc, states)) {
+                        self.responding = Some((wkc, states));
+                        watch_line(line, wkc, states, events);
+                    }
+                }
+                datagram.good = true;
+                frame.status.input_toggle ^= bit;
+                continue;
+            }
+            let expected = datagram.expected(withheld);
+            if expected.fits(wkc) {
+                datagram.take(now, reply, inputs);
+                frame.status.input_toggle ^= bit;
+                if datagram.told.take().is_some() {
+                    events(Event::WorkingCounterGood { task, frame: number, datagram: at });
+                }
+                continue;
+            }
+            statistics.working_counter_errors += 1;
+            frame.status.wrong_counter |= bit;
+            datagram.refuse(inputs);
+            if datagram.told != Some(wkc) {
+                datagram.told = Some(wkc);
+                let expected = wkc.clamp(expected.least, expected.most);
+                let (frame, received) = (number, wkc);
+                events(Event::WorkingCounter { task, frame, datagram: at, expected, received });
+                lock(line).alert();
+            }
+        }
+    }
+
+    /// A frame did not come back.
+    pub(crate) fn lost(&mut self, index: usize, events: &mut impl FnMut(Event)) {
+        let Some(frame) = self.frames.get_mut(index) else { return };
+        frame.status.wrong_counter = FrameStatus::WHOLE;
+        for datagram in &mut frame.datagrams {
+            datagram.refuse(&mut self.inputs);
+        }
+        let task = frame.task;
+        let Some(state) = self.tasks.get_mut(task) else { return };
+        state.came(&mut frame.out);
+        state.lost += 1;
+        if state.lost == LOST_IS_NEWS {
+            events(Event::CyclicFramesLost { task });
+            lock(&self.line).alert();
+        }
+    }
+
+    /// Whether the last answer of a frame was not as it should be.
+    pub(crate) fn is_bad(&self, index: usize) -> bool {
+        self.frames.get(index).is_some_and(|frame| frame.status.wrong_counter != 0)
+    }
+
+    /// How good the process data of a SubDevice are.
+    pub(crate) fn quality(&self, id: DeviceId) -> Quality {
+        let Some(share) = self.shares.get(id.index()) else { return Quality::default() };
+        share.quality(&self.least, id, |frame, at| {
+            let datagram = self.frames.get(frame).and_then(|frame| frame.datagrams.get(at));
+            datagram.map_or((false, None, 0), |one| (one.good, one.good_at, one.receipts))
+        })
+    }
+
+    /// How a frame of a task went the last time.
+    pub(crate) fn frame_status(&self, task: usize, number: usize) -> Option<FrameStatus> {
+        let frame = self.frames.iter().find(|one| one.task == task && one.number == number);
+        frame.map(|frame| frame.status)
+    }
+
+    /// How many answered the last broadcast read of the cycle.
+    pub(crate) fn responding(&self) -> Option<WorkingCounter> {
+        self.responding.map(|(count, _)| count)
+    }
+}
+
+impl TaskState {
+    /// One of its frames is on its way no longer.
+    #[inline]
+    fn came(&mut self, out: &mut bool) {
+        if std::mem::replace(out, false) {
+            self.out = self.out.saturating_sub(1);
+            self.exchanged |= self.out == 0;
+        }
+    }
+}
+
+impl Frame {
+    fn new(plan: &Plan, task: usize, number: usize) -> Self {
+        let planned = &plan.tasks[task].frames[number];
+        let (mut outputs, mut datagrams, mut carries) = (Vec::new(), Vec::new(), 0);
+        for (at, (one, data_at)) in planned.datagrams.iter().zip(data_offsets(planned)).enumerate()
+        {
+            for owned in one.ownership.iter().filter(|one| one.direction == Direction::Outputs) {
+                run::push(&mut outputs, owned, data_at);
+                carries |= FrameStatus::bit(at);
+            }
+            datagrams.push(Datagram::new(plan, one, data_at));
+        }
+        Self {
+            task,
+            number,
+            times: planned.repeats.saturating_add(1),
+            outputs,
+            datagrams,
+            carries,
+            version: None,
+            out: false,
+            status: FrameStatus::default(),
+        }
+    }
+
+    /// Takes over who serves process data.
+    fn take_over(
+        &mut self,
+        plan: &Plan,
+        index: usize,
+        least: &Presence,
+        most: &Presence,
+        shares: &mut [Share],
+        inputs: &mut [u8],
+    ) {
+        let planned = plan.tasks.get(self.task).and_then(|task| task.frames.get(self.number));
+        let Some(planned) = planned else { return };
+        for (at, (datagram, one)) in self.datagrams.iter_mut().zip(&planned.datagrams).enumerate() {
+            let last = Some((datagram.good_at, datagram.receipts));
+            for owned in &one.ownership {
+                let Some(share) = shares.get_mut(owned.device.index()) else { continue };
+                // Who has inputs is told by the first datagram with some; who has none, by any.
+                let first = share.datagrams.iter().find(|one| one.2);
+                let mine = first.map_or(true, |one| (one.0, one.1) == (index, at));
+                let stopped = mine && share.serve(least.of(owned.device).inputs, last);
+                if stopped {
+                    clear_lost(plan, one, owned.device, inputs);
+                }
+            }
+            datagram.refresh(one, least, most);
+        }
+    }
+}
+
+/// So many cyclic frames lost in a row are more than an accident.
+const LOST_IS_NEWS: u64 = 3;
+
+/// The broadcast read of the AL status tells how many are there and whether all is as it shall be.
+fn watch_line(line: &Mutex<Line>, wkc: WorkingCounter, states: u8, events: &mut impl FnMut(Event)) {
+    let states: OredStates = AlState::from_or(states);
+    if let Some(before) = lock(line).broadcast(wkc, states) {
+        events(Event::Responding { before, now: wkc });
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! Events in words: what is written to a log or a terminal.
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::register::AlStatus;
+use linesman_proto::state::{AlState, AlStatusCode};
+
+use super::Event;
+
+impl Event {
+    /// What happened to a SubDevice's states, in one line or a few; nothing for all other events.
+    /// `name` gives the name of a SubDevice.
+    ///
+    /// A refused step is a pair of lines: where the SubDevice was to go and where it is, then what was
+    /// read and what was expected.
+    #[must_use]
+    pub fn state_lines(&self, name: impl Fn(DeviceId) -> String) -> Vec<String> {
+        match self {
+            Self::Refused { id, from, to, status, code } => {
+                let reason = format!(", AL {code}");
+                let action = code.explain().actions.first().copied();
+                let mut lines = pair(&name(*id), *from, *to, *status, &reason);
+                lines.extend(action.map(|action| format!("{}: {action}", name(*id))));
+                lines
+            }
+            Self::StepTimedOut { id, from, to, status } => {
+                pair(&name(*id), *from, *to, *status, ", no error reported: its time is up")
+            }
+            Self::StartUpFailed { id, to, status, command, error } => {
+                let name = name(*id);
+                let transition = command.transition;
+                vec![
+                    format!("{name}: {}", aborted(*to, *status)),
+                    format!("{name}: {transition} failed at start-up command {command}: {error}"),
+                ]
+            }
+            Self::AbnormalState { id, from, status, code } => {
+                let reason = reason(*status, *code);
+                let to = status.state();
+                vec![format!("{}: abnormal state change (from {from} to {to}){reason}", name(*id))]
+            }
+            Self::TargetReached { id, state } => vec![format!("{}: {state} reached", name(*id))],
+            Self::DeviceLost { id } => vec![format!("{}: does not answer", name(*id))],
+            Self::DeviceBack { id, restarted } => {
+                let how = if *restarted { "restarted" } else { "as it was" };
+                vec![format!("{}: answers again, {how}", name(*id))]
+            }
+            Self::WrongDevice { id, mismatch, expected, found } => {
+                let [expected, found] = [expected, found].map(linesman_config::identity::text);
+                vec![format!(
+                    "{}: another device is there: {mismatch} differs (expected {expected}; found \
+                     {found}); it is left alone",
+                    name(*id)
+                )]
+            }
+            Self::UnplannedDevice { position, found } => {
+                let found = linesman_config::identity::text(found);
+                vec![format!("position {position}: a device that is not planned ({found})")]
+            }
+            Self::Looked(_)
+            | Self::LookFailed(_)
+            | Self::Scanned(_)
+            | Self::ScanFailed(_)
+            | Self::DeviceState { .. }
+            | Self::AllReached
+            | Self::Responding { .. }
+            | Self::Ring { .. }
+            | Self::Counters { .. }
+            | Self::Links { .. }
+            | Self::WorkingCounter { .. }
+            | Self::WorkingCounterGood { .. }
+            | Self::CyclicFramesLost { .. }
+            | Self::CyclicFramesBack { .. }
+            | Self::Emergency { .. }
+            | Self::Mailbox { .. }
+            | Self::SdoUploaded { .. }
+            | Self::SdoDownloaded { .. }
+            | Self::Probed { .. }
+            | Self::OutputsWithheld { .. }
+            | Self::OutputsResumed { .. }
+            | Self::Stopped => Vec::new(),
+        }
+    }
+}
+
+fn aborted(to: AlState, status: AlStatus) -> String {
+    format!("state change aborted (requested {to}, back to {})", status.state())
+}
+
+/// The two lines of a step that was not made.
+fn pair(
+    name: &str,
+    from: Option<AlState>,
+    to: AlState,
+    status: AlStatus,
+    reason: &str,
+) -> Vec<String> {
+    let step = match from {
+        Some(from) => format!("{from} to {to}"),
+        None => format!("change to {to}"),
+    };
+    let (read, expected) = (status.value(), AlStatus::new(to).value());
+    vec![
+        format!("{name}: {}", aborted(to, status)),
+        format!("{name}: {step} failed, read 0x{read:04X}, expected 0x{expected:04X}{reason}"),
+    ]
+}
+
+fn reason(status: AlStatus, code: AlStatusCode) -> String {
+    if status.error() { format!(", AL {code}") } else { String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(event: &Event) -> Vec<String> {
+        event.state_lines(|id| format!("SubDevice {}", id.no()))
+    }
+
+    // proves: SW-02
+    #[test]
+    fn a_refused_step_is_the_pair_of_the_sources() {
+        let event = Event::Refused {
+            id: DeviceId(2),
+            from: Some(AlState::Init),
+            to: AlState::PreOp,
+            status: AlStatus(0x0011),
+            code: AlStatusCode(0x0014),
+        };
+        let lines = lines(&event);
+        assert_eq!(
+            lines[..2],
+            [
+                "SubDevice 3: state change aborted (requested PREOP, back to INIT)",
+                "SubDevice 3: INIT to PREOP failed, read 0x0011, expected 0x0002, AL 0x0014 no valid \
+                 firmware",
+            ]
+        );
+        assert!(lines[2].len() > 20, "and what to do: {}", lines[2]);
+    }
+
+    #[test]
+    fn leaving_a_state_on_its_own_is_abnormal() {
+        let event = Event::AbnormalState {
+            id: DeviceId(0),
+            from: AlState::Op,
+            status: AlStatus(0x0014),
+            code: AlStatusCode(0x001B),
+        };
+        assert_eq!(
+            lines(&event),
+            [
+                "SubDevice 1: abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_step_whose_time_is_up_says_what_was_read() {
+        let event = Event::StepTimedOut {
+            id: DeviceId(0),
+            from: None,
+            to: AlState::Init,
+            status: AlStatus(0x0008),
+        };
+        let lines = lines(&event);
+        assert!(lines[0].ends_with("(requested INIT, back to OP)"), "{lines:?}");
+        assert!(
+            lines[1].contains("change to INIT failed, read 0x0008, expected 0x0001"),
+            "{lines:?}"
+        );
+    }
+}

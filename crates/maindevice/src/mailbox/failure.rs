@@ -1,0 +1,235 @@
+//! An errand through a mailbox that came to nothing: who, doing what, at which step, why, what to do.
+
+use std::fmt;
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::mailbox::abort_code::SdoAbortCode;
+use linesman_proto::mailbox::error_reply::ErrorReplyCode;
+use linesman_proto::mailbox::foe::FoeErrorCode;
+use linesman_proto::mailbox::{BufferTooSmall, MailboxType};
+use linesman_proto::time::Span;
+
+use super::errand::Errand;
+use crate::exchange::ExchangeError;
+
+/// An errand that came to nothing.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MailboxFailure {
+    /// Whose mailbox.
+    pub id: DeviceId,
+    /// What was to be done.
+    pub errand: Errand,
+    /// How far it had come.
+    pub step: Step,
+    /// Why it came to nothing.
+    pub why: Why,
+}
+
+/// How far an errand had come.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Step {
+    /// Nothing had been sent.
+    #[default]
+    Before,
+    /// The request.
+    Request,
+    /// A segment of an object, from 1.
+    Segment(u32),
+    /// A fragment of a description, from 1.
+    Fragment(u32),
+    /// A packet of a file, from 1.
+    Packet(u32),
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Before => f.write_str("before the request"),
+            Self::Request => f.write_str("the request"),
+            Self::Segment(number) => write!(f, "segment {number}"),
+            Self::Fragment(number) => write!(f, "fragment {number}"),
+            Self::Packet(number) => write!(f, "packet {number}"),
+        }
+    }
+}
+
+/// Why an errand came to nothing.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Why {
+    /// The SubDevice ended the SDO transfer, or refused a question about its dictionary.
+    Aborted {
+        /// Its reason.
+        code: SdoAbortCode,
+    },
+    /// It refused a file.
+    File {
+        /// Its reason.
+        code: FoeErrorCode,
+        /// What it says about it; may be empty.
+        text: String,
+    },
+    /// It answers with an error of the mailbox itself.
+    Mailbox {
+        /// Its reason.
+        code: ErrorReplyCode,
+    },
+    /// No answer came.
+    NoAnswer {
+        /// How long it was waited for.
+        patience: Span,
+        /// What came instead that is no message, in words.
+        rubbish: Option<String>,
+    },
+    /// It does not fetch what is written to its mailbox.
+    MailboxFull {
+        /// How long it was tried.
+        patience: Span,
+    },
+    /// It says "busy" for ever.
+    Busy {
+        /// For how long.
+        patience: Span,
+        /// What it says it does; may be empty.
+        text: String,
+    },
+    /// It has no mailbox.
+    NoMailbox,
+    /// Its mailbox is not open in the state that it is in.
+    NotOpen,
+    /// It does not speak the protocol.
+    NotSpoken {
+        /// Which.
+        protocol: MailboxType,
+    },
+    /// It answers something that does not belong there.
+    Protocol {
+        /// What was expected.
+        expected: &'static str,
+        /// What came.
+        found: String,
+    },
+    /// More would come than is believed, or taken.
+    TooLong {
+        /// How many bytes.
+        limit: usize,
+    },
+    /// The message does not fit into its mailbox.
+    TooSmall(BufferTooSmall),
+    /// It cannot be reached.
+    Exchange(ExchangeError),
+    /// The MainDevice was told to do something else meanwhile.
+    Abandoned,
+}
+
+impl Why {
+    /// What to do about it, in one sentence without a full stop; empty where there is nothing to
+    /// advise.
+    #[must_use]
+    pub fn advice(&self) -> &'static str {
+        match self {
+            Self::Aborted { code } => code.explain().action,
+            Self::File { code, .. } => code.action(),
+            Self::Mailbox { code: ErrorReplyCode::UnsupportedProtocol } => {
+                "ask the SubDevice for what it speaks: its SII says which protocols"
+            }
+            Self::Mailbox { .. } | Self::Protocol { .. } => {
+                "take a capture of the mailbox messages and show it to the maker of the SubDevice"
+            }
+            Self::NoAnswer { .. } => {
+                "its software is slow or stuck: look at the SubDevice's display and diagnosis \
+                 history, then switch it off and on"
+            }
+            Self::MailboxFull { .. } => {
+                "its software does not run: switch the SubDevice off and on, else replace it"
+            }
+            Self::Busy { .. } => "wait until the SubDevice is done, then repeat",
+            Self::NoMailbox => "choose a SubDevice that has a mailbox (`linesman scan -v`)",
+            Self::NotOpen => "take it to PREOP first (`linesman state`)",
+            Self::NotSpoken { .. } => "choose a SubDevice that speaks it (`linesman scan -v`)",
+            Self::TooLong { .. } => "check that it is the right object or file",
+            Self::TooSmall(_) => "use a shorter name, or a smaller piece",
+            Self::Exchange(_) => "look at the line with `linesman diagnose`",
+            Self::Abandoned => "ask again",
+        }
+    }
+
+    /// Whether the SubDevice itself has said no: its mailbox works, but what was asked does not suit.
+    #[must_use]
+    pub const fn is_refusal(&self) -> bool {
+        matches!(self, Self::Aborted { .. } | Self::File { .. } | Self::Mailbox { .. })
+    }
+
+    /// Whether an answer may still come, so that it must not be taken for that to another question.
+    pub(crate) const fn leaves_answer_behind(&self) -> bool {
+        matches!(
+            self,
+            Self::NoAnswer { .. }
+                | Self::MailboxFull { .. }
+                | Self::Busy { .. }
+                | Self::Protocol { .. }
+                | Self::TooLong { .. }
+                | Self::Exchange(_)
+        )
+    }
+}
+
+impl fmt::Display for Why {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Aborted { code } => write!(f, "the SubDevice aborts, {code}"),
+            Self::File { code, text } if text.is_empty() => write!(f, "{code}"),
+            Self::File { code, text } => write!(f, "{code}; it says: {text}"),
+            Self::Mailbox { code } => write!(f, "the SubDevice refuses the message, {code}"),
+            Self::NoAnswer { patience, rubbish } => {
+                write!(f, "no answer within {patience}, although its mailbox takes messages")?;
+                rubbish.iter().try_for_each(|rubbish| write!(f, "; what came is none: {rubbish}"))
+            }
+            Self::MailboxFull { patience } => {
+                write!(f, "its mailbox stays full for {patience}: nobody reads what is written")
+            }
+            Self::Busy { patience, text } if text.is_empty() => {
+                write!(f, "it says it is busy for {patience}")
+            }
+            Self::Busy { patience, text } => {
+                write!(f, "it says it is busy for {patience}: {text}")
+            }
+            Self::NoMailbox => f.write_str("it has no mailbox"),
+            Self::NotOpen => f.write_str("its mailbox is not open; that takes PREOP or higher"),
+            Self::NotSpoken { protocol } => write!(f, "it does not speak {protocol}"),
+            Self::Protocol { expected, found } => write!(f, "expected {expected}, came {found}"),
+            Self::TooLong { limit } => write!(f, "more than {limit} bytes"),
+            Self::TooSmall(error) => error.fmt(f),
+            Self::Exchange(error) => error.fmt(f),
+            Self::Abandoned => f.write_str("the MainDevice was told to do something else"),
+        }
+    }
+}
+
+impl From<ExchangeError> for Why {
+    fn from(error: ExchangeError) -> Self {
+        Self::Exchange(error)
+    }
+}
+
+impl From<BufferTooSmall> for Why {
+    fn from(error: BufferTooSmall) -> Self {
+        Self::TooSmall(error)
+    }
+}
+
+impl fmt::Display for MailboxFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { id, errand, step, why } = self;
+        write!(f, "SubDevice {}, {errand}", id.no())?;
+        if !matches!(step, Step::Before | Step::Request) {
+            write!(f, ", {step}")?;
+        }
+        write!(f, ": {why}")?;
+        match why.advice().trim_end_matches('.') {
+            "" => Ok(()),
+            advice => write!(f, ". Do: {advice}"),
+        }
+    }
+}
+
+impl std::error::Error for MailboxFailure {}

@@ -1,0 +1,266 @@
+//! A socket in the file system through which a running program is asked: a line of JSON each way.
+//!
+//! A connection may carry one request after another. Threads of their own talk to those who ask; what
+//! is asked is done by the one thread that runs the line, between two frames. What may be asked, and
+//! what is answered, is the business of a [`Protocol`].
+
+use std::fs;
+use std::io::{self, BufRead as _, BufReader, Lines, Read as _, Write as _};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
+use std::thread;
+use std::time::Duration;
+
+use linesman_link::socket::Bell;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Longest request in bytes.
+const MOST: u64 = 64 * 1024;
+/// Bytes that are read and thrown away behind a request that is too long.
+const RUBBISH: u64 = 16 * 1024 * 1024;
+/// How long the other side may take to read an answer.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Requests that may wait for the thread that does them.
+const WAITING: usize = 16;
+/// Connections at a time.
+const CLIENTS: usize = 32;
+
+/// What is asked and answered.
+pub(crate) trait Protocol: Send + Sync + 'static {
+    /// What can be asked.
+    type Request: DeserializeOwned + Clone + Send;
+    /// What is answered.
+    type Answer: Serialize + Send;
+    /// Who is asked, for messages: `segment`.
+    const WHO: &'static str;
+    /// A request, for messages.
+    const EXAMPLE: &'static str;
+    /// How long an answer may take.
+    const PATIENCE: Duration;
+
+    /// Why a request was not done.
+    fn refusal(&self, why: String) -> Self::Answer;
+
+    /// Keeps a connection to itself from here on, instead of answering. Says whether it has.
+    fn keep(
+        &self,
+        request: &Self::Request,
+        answer: &Self::Answer,
+        stream: &UnixStream,
+    ) -> io::Result<bool>;
+}
+
+/// The socket. It is removed at the end.
+pub(crate) struct Desk<P: Protocol> {
+    path: PathBuf,
+    requests: Receiver<Asked<P>>,
+}
+
+/// A request, and who waits for its answer.
+pub(crate) struct Asked<P: Protocol> {
+    pub(crate) request: P::Request,
+    reply: Sender<P::Answer>,
+}
+
+impl<P: Protocol> Asked<P> {
+    pub(crate) fn answer(self, answer: P::Answer) {
+        // Whoever asked may have lost patience.
+        let _ = self.reply.send(answer);
+    }
+}
+
+/// What a connection's thread needs.
+struct Clerk<P: Protocol> {
+    requests: SyncSender<Asked<P>>,
+    bell: Bell,
+    protocol: P,
+    clients: AtomicUsize,
+}
+
+impl<P: Protocol> Desk<P> {
+    /// Begins to listen at `path`. What an earlier run left there is replaced. `bell` wakes the
+    /// thread that calls [`Desk::poll`].
+    ///
+    /// # Errors
+    /// When somebody listens there already, something else is there, or the system refuses.
+    pub(crate) fn open(path: &Path, bell: Bell, protocol: P) -> io::Result<Self> {
+        if fs::symlink_metadata(path).is_ok() {
+            make_room(path, P::WHO)?;
+        }
+        let listener = UnixListener::bind(path)?;
+        hand_over(path);
+        let (requests, receiver) = mpsc::sync_channel(WAITING);
+        let clerk = Clerk { requests, bell, protocol, clients: AtomicUsize::default() };
+        let clerk = Arc::new(clerk);
+        // It ends with the process: nothing hangs on it.
+        thread::spawn(move || {
+            for stream in listener.incoming().flatten() {
+                let clerk = Arc::clone(&clerk);
+                // Whoever asked and went away needs no answer; a thread that cannot be had is as
+                // good as a full house.
+                let _ = thread::Builder::new().spawn(move || clerk.welcome(&stream));
+            }
+        });
+        Ok(Self { path: path.to_owned(), requests: receiver })
+    }
+
+    /// The next request.
+    pub(crate) fn poll(&self) -> Option<Asked<P>> {
+        self.requests.try_recv().ok()
+    }
+}
+
+impl<P: Protocol> Drop for Desk<P> {
+    fn drop(&mut self) {
+        // It may be gone already.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+/// Started with sudo, the socket belongs to whoever called it: asking needs no privilege.
+fn hand_over(path: &Path) {
+    let number = |name| std::env::var(name).ok().and_then(|text| text.parse().ok());
+    if let (Some(user), Some(group)) = (number("SUDO_UID"), number("SUDO_GID")) {
+        // Where that is refused it stays root's, and asking needs sudo as well.
+        let _ = std::os::unix::fs::chown(path, Some(user), Some(group));
+    }
+}
+
+/// Removes the socket of a run that ended without doing so.
+fn make_room(path: &Path, who: &str) -> io::Result<()> {
+    use std::os::unix::fs::FileTypeExt as _;
+    if UnixStream::connect(path).is_ok() {
+        let what = format!("another {who} listens there");
+        return Err(io::Error::new(io::ErrorKind::AddrInUse, what));
+    }
+    if !fs::symlink_metadata(path)?.file_type().is_socket() {
+        let what = "there is a file that is no socket";
+        return Err(io::Error::new(io::ErrorKind::AlreadyExists, what));
+    }
+    fs::remove_file(path)
+}
+
+impl<P: Protocol> Clerk<P> {
+    /// Serves one connection, if there are not too many.
+    fn welcome(&self, stream: &UnixStream) -> io::Result<()> {
+        let others = self.clients.fetch_add(1, Ordering::Relaxed);
+        let served = if others < CLIENTS {
+            self.serve(stream)
+        } else {
+            self.refuse(stream, format!("{CLIENTS} connections are open: close one"))
+        };
+        self.clients.fetch_sub(1, Ordering::Relaxed);
+        served
+    }
+
+    fn refuse(&self, stream: &UnixStream, why: String) -> io::Result<()> {
+        reply(stream, &self.protocol.refusal(why))
+    }
+
+    /// One request after another, until there is no more.
+    fn serve(&self, stream: &UnixStream) -> io::Result<()> {
+        stream.set_write_timeout(Some(PATIENCE))?;
+        let mut lines = BufReader::new(stream);
+        loop {
+            let mut line = Vec::new();
+            let len = lines.by_ref().take(MOST + 1).read_until(b'\n', &mut line)?;
+            if len == 0 {
+                return Ok(());
+            }
+            if len as u64 > MOST {
+                self.refuse(stream, format!("the request is longer than {MOST} bytes"))?;
+                // Whoever still writes would be cut off, and not read why.
+                stream.set_read_timeout(Some(PATIENCE))?;
+                return io::copy(&mut lines.take(RUBBISH), &mut io::sink()).map(drop);
+            }
+            if line.iter().all(u8::is_ascii_whitespace) {
+                continue;
+            }
+            match serde_json::from_slice::<P::Request>(&line) {
+                Ok(request) => {
+                    let answer = self.relay(request.clone());
+                    if self.protocol.keep(&request, &answer, stream)? {
+                        return Ok(());
+                    }
+                    reply(stream, &answer)?;
+                }
+                Err(error) => {
+                    let example = P::EXAMPLE;
+                    self.refuse(
+                        stream,
+                        format!(
+                            "the request cannot be read: {error}; expected one line of JSON such \
+                             as {example}"
+                        ),
+                    )?;
+                }
+            }
+        }
+    }
+
+    /// Asks the thread that runs the line.
+    fn relay(&self, request: P::Request) -> P::Answer {
+        let (reply, answer) = mpsc::channel();
+        let asked = self.requests.try_send(Asked { request, reply });
+        self.bell.ring();
+        let (who, seconds) = (P::WHO, P::PATIENCE.as_secs());
+        match asked {
+            Ok(()) => answer.recv_timeout(P::PATIENCE).unwrap_or_else(|_| {
+                self.protocol
+                    .refusal(format!("the {who} gave no answer within {seconds} s: ask again"))
+            }),
+            Err(_) => self
+                .protocol
+                .refusal(format!("too many requests at once, or the {who} has ended: ask again")),
+        }
+    }
+}
+
+fn reply<T: Serialize>(mut stream: &UnixStream, answer: &T) -> io::Result<()> {
+    let mut text = serde_json::to_string(answer)?;
+    text.push('\n');
+    stream.write_all(text.as_bytes())
+}
+
+/// Asks whoever listens at `path`; gives the line that is answered.
+///
+/// # Errors
+/// When nobody listens there, or nothing is answered in time.
+pub(crate) fn ask_line<Q: Serialize>(
+    path: &Path,
+    request: &Q,
+    patience: Duration,
+) -> io::Result<String> {
+    let mut lines = send(path, request, Some(patience + PATIENCE))?;
+    let mut line = String::new();
+    lines.read_line(&mut line)?;
+    Ok(line)
+}
+
+/// Asks, and gives line after line until the other side ends.
+///
+/// # Errors
+/// When nobody listens there.
+pub(crate) fn ask_lines<Q: Serialize>(
+    path: &Path,
+    request: &Q,
+) -> io::Result<Lines<BufReader<UnixStream>>> {
+    Ok(send(path, request, None)?.lines())
+}
+
+fn send<Q: Serialize>(
+    path: &Path,
+    request: &Q,
+    patience: Option<Duration>,
+) -> io::Result<BufReader<UnixStream>> {
+    let mut stream = UnixStream::connect(path)?;
+    stream.set_read_timeout(patience)?;
+    let mut text = serde_json::to_string(request)?;
+    text.push('\n');
+    stream.write_all(text.as_bytes())?;
+    Ok(BufReader::new(stream))
+}

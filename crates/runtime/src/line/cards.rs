@@ -1,0 +1,141 @@
+//! A card, or two at the ends of a ring.
+
+use linesman_diagnosis::HostObservation;
+use linesman_link::clock::{HostClock, tighten_timers};
+use linesman_link::error::LinkError;
+use linesman_link::socket::{Batch, Bell, RawSocket, SocketOptions, Waitable, Waker, wait_any};
+use linesman_proto::address::Path;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Arrived, Line};
+use crate::host_watch::HostWatch;
+
+/// Frames fetched in one call.
+const BATCH: usize = 64;
+
+/// The cards of a MainDevice.
+pub struct Cards {
+    clock: HostClock,
+    cards: Vec<Card>,
+    batch: Batch,
+    waker: Waker,
+    /// So long before a deadline it no longer sleeps but looks again and again.
+    spin: Span,
+}
+
+struct Card {
+    socket: RawSocket,
+    watch: HostWatch,
+    path: Path,
+}
+
+impl Cards {
+    /// Opens the cards; nothing is sent.
+    ///
+    /// # Errors
+    /// When an interface cannot be used.
+    pub fn open(names: &[String], clock: HostClock) -> Result<Self, LinkError> {
+        tighten_timers();
+        let open = |(path, name): (Path, &String)| {
+            Ok(Card {
+                socket: RawSocket::open(name, &SocketOptions::default())?,
+                watch: HostWatch::open(name, path, &clock)?,
+                path,
+            })
+        };
+        let cards: Result<Vec<Card>, LinkError> =
+            Path::ALL.into_iter().zip(names).map(open).collect();
+        let waker = Waker::new().map_err(|source| LinkError::System {
+            interface: names.join("+"),
+            doing: "making a way to be woken",
+            source,
+        })?;
+        Ok(Self { clock, cards: cards?, batch: Batch::new(BATCH), waker, spin: Span::ZERO })
+    }
+
+    /// Looks again and again for so long before each deadline, instead of sleeping up to it: the
+    /// thread must have a CPU of its own, else it keeps others from working.
+    pub fn set_spin(&mut self, spin: Span) {
+        self.spin = spin;
+    }
+
+    /// What wakes the thread that waits.
+    #[must_use]
+    pub fn bell(&self) -> Bell {
+        self.waker.bell()
+    }
+
+    /// How many cards there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.cards.len()
+    }
+
+    /// The clock of the run.
+    #[must_use]
+    pub const fn clock(&self) -> &HostClock {
+        &self.clock
+    }
+}
+
+impl Line for Cards {
+    #[inline]
+    fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    fn receive(&mut self, taken: &mut dyn FnMut(Arrived<'_>)) -> Result<usize, LinkError> {
+        let Self { clock, cards, batch, .. } = self;
+        let mut count = 0;
+        for card in cards {
+            count += card.socket.recv_batch(batch, clock)?;
+            for frame in batch.iter() {
+                let (at, path) = (frame.at, card.path);
+                taken(Arrived { at, path, bytes: frame.bytes, truncated: frame.truncated });
+            }
+        }
+        Ok(count)
+    }
+
+    fn send(&mut self, path: Path, frame: &[u8]) -> Result<(), LinkError> {
+        let Some(card) = self.cards.get_mut(path.index()) else { return Ok(()) };
+        // The host watch tells of what was refused; the MainDevice sends it again.
+        let _sent = card.socket.send_batch([frame])?;
+        Ok(())
+    }
+
+    fn look_at_host(&mut self, tell: &mut dyn FnMut(&HostObservation)) -> Result<(), LinkError> {
+        let now = self.clock.now();
+        for card in &mut self.cards {
+            if now < card.watch.due() {
+                continue;
+            }
+            let counters = card.socket.counters()?;
+            card.watch.poll(now, counters)?.iter().for_each(&mut *tell);
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, deadline: Instant) -> Result<(), LinkError> {
+        let sleep_until = deadline.before(self.spin);
+        if sleep_until <= self.clock.now() {
+            return Ok(());
+        }
+        let waker: &dyn Waitable = &self.waker;
+        match self.cards.as_slice() {
+            [a, b, ..] => {
+                wait_any([&a.socket as &dyn Waitable, &b.socket, waker], &self.clock, sleep_until)
+            }
+            [a] => wait_any([&a.socket as &dyn Waitable, waker], &self.clock, sleep_until),
+            [] => wait_any([waker], &self.clock, sleep_until),
+        }?;
+        self.waker.take();
+        Ok(())
+    }
+
+    fn note_late(&mut self, late: Span) {
+        for card in &mut self.cards {
+            card.watch.note_wake(late);
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Where the frames of a MainDevice go: to cards, or to a virtual segment in this process.
+
+pub mod cards;
+pub mod segment;
+
+use linesman_diagnosis::HostObservation;
+use linesman_link::error::LinkError;
+use linesman_proto::address::Path;
+use linesman_proto::time::{Instant, Span};
+
+pub use cards::Cards;
+pub use segment::{Pace, VirtualLine};
+
+/// A frame that has come back.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrived<'a> {
+    /// When it was seen.
+    pub at: Instant,
+    /// At which card.
+    pub path: Path,
+    /// Its bytes, without check sequence.
+    pub bytes: &'a [u8],
+    /// Its end is missing because it was longer than any frame may be.
+    pub truncated: bool,
+}
+
+/// A line, and the clock that it is driven by.
+pub trait Line {
+    /// Now.
+    fn now(&self) -> Instant;
+
+    /// Takes in what has come back; gives how many frames that were.
+    ///
+    /// # Errors
+    /// When an interface vanished, was switched off, or the kernel refuses something else.
+    fn receive(&mut self, taken: &mut dyn FnMut(Arrived<'_>)) -> Result<usize, LinkError>;
+
+    /// Sends a frame. What a full queue refuses is lost, and counted by the host.
+    ///
+    /// # Errors
+    /// As [`receive`](Self::receive).
+    fn send(&mut self, path: Path, frame: &[u8]) -> Result<(), LinkError>;
+
+    /// Tells what the host noticed since it was asked last, if it is time to look.
+    ///
+    /// # Errors
+    /// As [`receive`](Self::receive).
+    fn look_at_host(&mut self, tell: &mut dyn FnMut(&HostObservation)) -> Result<(), LinkError>;
+
+    /// Waits until a frame comes, somebody rings, or `deadline`.
+    ///
+    /// # Errors
+    /// When the kernel refuses to wait.
+    fn wait(&mut self, deadline: Instant) -> Result<(), LinkError>;
+
+    /// A deadline of the MainDevice was met so late.
+    fn note_late(&mut self, late: Span);
+}
