@@ -76,7 +76,7 @@ pub(crate) fn access(
     write: Option<Vec<u8>>,
 ) -> Result<Vec<u8>, String> {
     let mut result = Err(String::new());
-    for _ in 0..20 {
+    for _ in 0..400 {
         result = access_once(lab, station, register, len, write.clone());
         if result.is_ok() {
             break;

@@ -1,7 +1,9 @@
 //! What is behind the controller of a described device.
 
 use linesman_proto::address::RegisterAddress;
-use linesman_proto::sii::{Direction, Identity, Protocols, SyncManagerKind};
+use linesman_proto::sii::{
+    Direction, General, Identification, Identity, Protocols, SyncManagerKind,
+};
 
 use super::DescribedType;
 use super::channel::{Driven, Taken};
@@ -129,6 +131,7 @@ fn processor(
         bootstrap: bootstrap.is_present().then_some(bootstrap),
         times: if layout.axis.is_some() { ResponseTimes::DRIVE } else { ResponseTimes::TERMINAL },
         bus: BusAccess::of(described.image.sync_managers().iter().map(|one| one.start)),
+        unit_alone: described.image.op_modes().any(|mode| mode.assign_activate & 0x0700 == 0x0100),
     });
     processor.with_files(files)
 }
@@ -233,5 +236,16 @@ fn emulated(
         }
     }
     let [outputs, inputs] = areas;
-    Emulated::new(outputs, inputs).with_words(words)
+    // One of the words may be the switch that tells which of several alike it is.
+    let way = described.image.general().map(General::identification);
+    let switch = match way {
+        Some(Identification::Memory(at)) => words.iter().find(|word| word.at == at),
+        Some(Identification::AlStatus | Identification::None) | None => None,
+    };
+    let switch = switch.map(|word| word.signal);
+    let device = Emulated::new(outputs, inputs).with_words(words);
+    match switch {
+        Some(switch) => device.with_coding_switch(switch),
+        None => device,
+    }
 }

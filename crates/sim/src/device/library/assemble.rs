@@ -105,6 +105,7 @@ fn with_processor(
         bootstrap: Some(image::bootstrap(spec)),
         times: processor.times,
         bus: BusAccess::Words,
+        unit_alone: false,
     };
     Box::new(Processor::new(description).with_files(file::files(spec)))
 }

@@ -100,6 +100,9 @@ pub struct Description {
     pub times: ResponseTimes,
     /// How its software reaches memory, where its bus has 16 bits.
     pub bus: BusAccess,
+    /// It takes a clock unit that is on and makes neither SYNC0 nor SYNC1 (0x0981 is 0x01) as no
+    /// synchronisation at all. Others refuse that.
+    pub unit_alone: bool,
 }
 
 /// A device with a processor.
@@ -293,7 +296,8 @@ impl Processor {
         check::modules(&self.dictionary)?;
         self.check_areas(pdi, &areas)?;
         let outputs = areas.len(Direction::Outputs) > 0;
-        self.synchronisation.set_up(&mut self.dictionary, outputs, pdi)?;
+        let alone = self.description.unit_alone;
+        self.synchronisation.set_up(&mut self.dictionary, outputs, alone, pdi)?;
         self.process_data = areas;
         Ok(())
     }
