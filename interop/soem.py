@@ -26,9 +26,10 @@ def main():
         complete, wkc, inputs = exchange(master, send, asked)
         state = "OP" if master.state_check(pysoem.OP_STATE, 50_000) == pysoem.OP_STATE else states(master)
         clocks = clocks.told() if clocks else None
+        shared = shared_addresses(master)
         stop(master)
         peer.report(
-            devices=devices, names=names, state=state, mapped=mapped,
+            devices=devices, names=names, state=state, mapped=mapped, shared=shared,
             wkc=wkc, cycles=asked.cycles, complete=complete, rounds=inputs, clocks=clocks,
         )
     finally:
@@ -79,6 +80,20 @@ def exchange(master, send, asked):
             time.sleep(max(0.0, due - time.monotonic()))
         inputs.append([slave.input.hex() for slave in master.slaves])
     return complete, expected, inputs
+
+
+def shared_addresses(master):
+    """Positions of SubDevices whose outputs and inputs begin at the same logical address."""
+    shared = []
+    for position, slave in enumerate(master.slaves):
+        starts = {}
+        for fmmu in range(2):
+            entry = slave._fprd(0x0600 + 16 * fmmu, 16, 20_000)
+            # The direction: 2 is for outputs, 1 for inputs.
+            starts[entry[11]] = entry[:4]
+        if starts.get(1) is not None and starts.get(1) == starts.get(2):
+            shared.append(position)
+    return shared
 
 
 def stop(master):

@@ -46,7 +46,9 @@ pub(crate) fn beside_segment(script: &str) -> Option<Run> {
     }
     let directory = TempDir::new().expect("a temporary directory");
     let path: PathBuf = directory.path().join("plant.toml");
-    std::fs::write(&path, plant("live", 3).to_toml()).expect("a file can be written");
+    let mut file = plant("live", 3);
+    file.devices[2].group = Some("outputs".to_owned());
+    std::fs::write(&path, file.to_toml()).expect("a file can be written");
     let mut command = in_namespace(&format!("{BENCH}{script}"));
     command.env("LINESMAN", PROGRAM).env("PLANT", &path).env("DIRECTORY", directory.path());
     Some(run(&mut command))
