@@ -22,6 +22,7 @@ on = "K1.B"
 name = "O1"
 type = "EL2008"
 on = "I1.B"
+group = "outputs"
 "#;
 
 /// A virtual cable from `near0` to `far0`, with a segment on the far end while the script runs.

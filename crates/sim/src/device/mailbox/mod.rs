@@ -89,6 +89,11 @@ impl Mailbox {
         *self = Self::new(self.response_time, self.protocols);
     }
 
+    /// The next message has this counter: the device sent others before.
+    pub fn count_from(&mut self, next: Counter) {
+        self.outbox.count_from(next);
+    }
+
     /// Tells the MainDevice of an error on the device's own account, as soon as there is room.
     pub fn report(&mut self, emergency: Emergency) {
         if self.emergencies.len() < UNTOLD {
