@@ -5,10 +5,10 @@
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::{SmControl, SmMode};
-use linesman_proto::time::Span;
 use linesman_proto::sii::{
     Direction, FmmuUsage, Image, MailboxPair, OpMode, PortKind, Protocols, SyncManagerKind,
 };
+use linesman_proto::time::Span;
 
 /// A SyncManager for process data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -64,7 +64,8 @@ impl Pdos {
     fn of(device: &DevicePlan) -> Self {
         let mut pdos = Self::default();
         for command in &device.start_up {
-            let StartUpAction::CoeDownload { object, complete_access, data } = &command.action else {
+            let StartUpAction::CoeDownload { object, complete_access, data } = &command.action
+            else {
                 continue;
             };
             let index = object.index.0;

@@ -104,7 +104,10 @@ impl Plan {
                     self.name(first),
                     -least
                 ),
-                advice: format!("insert a power feed terminal (EL94xx) before {}", self.name(first)),
+                advice: format!(
+                    "insert a power feed terminal (EL94xx) before {}",
+                    self.name(first)
+                ),
             });
         }
     }
@@ -154,15 +157,21 @@ impl Plan {
             .iter()
             .filter(|(_, manager)| manager.control.direction() == SmDirection::MainDeviceWrites);
         let mut outputs = outputs.map(|(_, manager)| manager.control).peekable();
-        let Some(task) = self.task_of(device.id).filter(|_| outputs.peek().is_some()) else { return };
+        let Some(task) = self.task_of(device.id).filter(|_| outputs.peek().is_some()) else {
+            return;
+        };
         let chosen = device.settings.watchdog;
         if !outputs.any(|control| control.watchdog()) || chosen.process_data == Some(0) {
             doubts.push(Doubt {
                 severity: Severity::Info,
                 name: "no-watchdog",
                 device: Some(device.id),
-                text: format!("{} keeps its outputs when the MainDevice stops: no watchdog", device.name),
-                advice: "switch its process data watchdog on, unless the device guards itself".to_owned(),
+                text: format!(
+                    "{} keeps its outputs when the MainDevice stops: no watchdog",
+                    device.name
+                ),
+                advice: "switch its process data watchdog on, unless the device guards itself"
+                    .to_owned(),
             });
             return;
         }

@@ -125,14 +125,21 @@ impl ClockChoice {
     ///
     /// # Errors
     /// A mode that its description does not have.
-    pub(super) fn settings(&self, modes: &[ClockMode], cycle: Span) -> Result<ClockSettings, String> {
+    pub(super) fn settings(
+        &self,
+        modes: &[ClockMode],
+        cycle: Span,
+    ) -> Result<ClockSettings, String> {
         let mode = match &self.mode {
             None => ClockMode::default(),
-            Some(name) => modes.iter().find(|mode| mode.name == *name).cloned().ok_or_else(|| {
-                let names: Vec<_> = modes.iter().map(|mode| format!("`{}`", mode.name)).collect();
-                let has = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-                format!("clock: its description has no mode `{name}`; it has {has}")
-            })?,
+            Some(name) => {
+                modes.iter().find(|mode| mode.name == *name).cloned().ok_or_else(|| {
+                    let names: Vec<_> =
+                        modes.iter().map(|mode| format!("`{}`", mode.name)).collect();
+                    let has = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                    format!("clock: its description has no mode `{name}`; it has {has}")
+                })?
+            }
         };
         let us = |us: u32| Span::us(u64::from(us));
         let sync0_cycle = self.sync0_cycle_us.map_or_else(|| mode.sync0_cycle(cycle), us);
@@ -157,7 +164,9 @@ impl ClockChoice {
 }
 
 /// Watchdogs of a device: `watchdog = { … }`; what is not said stays as the device has it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(deny_unknown_fields)]
 pub struct WatchdogChoice {
     /// Divider (0x0400) in units of 40 ns, less 2; 2498 makes steps of 100 µs.

@@ -4,15 +4,11 @@
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::SmControl;
-use linesman_proto::sii::{
-    Direction, FmmuUsage, MailboxPair, PortKind, Protocols,
-};
+use linesman_proto::sii::{Direction, FmmuUsage, MailboxPair, PortKind, Protocols};
 use serde::{Deserialize, Serialize};
 
 use crate::esi::device::{letters, physics};
-use crate::profile::{
-    DeviceProfile, Mailbox, MappedEntry, MappedPdo, ProcessSyncManager,
-};
+use crate::profile::{DeviceProfile, Mailbox, MappedEntry, MappedPdo, ProcessSyncManager};
 
 /// A type of device.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]

@@ -30,11 +30,10 @@ use serde::{Deserialize, Serialize};
 use crate::attachment::Attachment;
 use crate::inventory::Inventory;
 
-pub use choice::{
-    ClockChoice, Mapping, Network, ProjectTask, StartUpEntry, WatchdogChoice,
-};
+pub use choice::{ClockChoice, Mapping, Network, ProjectTask, StartUpEntry, WatchdogChoice};
 pub use description::{
-    DescribedEntry, DescribedMailbox, DescribedPdo, DescribedSyncManager, Description, FmmuWord, Way,
+    DescribedEntry, DescribedMailbox, DescribedPdo, DescribedSyncManager, Description, FmmuWord,
+    Way,
 };
 pub use device::ProjectDevice;
 pub use resolve::{Described, Lookup, ResolveError, Resolved};
@@ -221,7 +220,8 @@ impl Project {
             let station = device.station(DeviceId(id)).0;
             if let Some(other) = stations.insert(station, &device.name) {
                 let whose = format!("device `{}`", device.name);
-                let reason = format!("station address 0x{station:04X} is that of `{other}` already");
+                let reason =
+                    format!("station address 0x{station:04X} is that of `{other}` already");
                 return Err(ProjectError::Value { whose, reason });
             }
             device.check()?;

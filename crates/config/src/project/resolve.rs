@@ -228,7 +228,10 @@ fn map(
         pdo.entries = mapping.entries.iter().map(MappedEntry::from).collect();
         let entries = mapping.entries.iter().map(|entry| {
             let bits = u8::try_from(entry.bits).map_err(|_| {
-                format!("mapping: PDO 0x{:04X} has an entry of {} bits, at most 255", mapping.pdo, entry.bits)
+                format!(
+                    "mapping: PDO 0x{:04X} has an entry of {} bits, at most 255",
+                    mapping.pdo, entry.bits
+                )
             })?;
             let [low, high] = entry.index.to_le_bytes();
             Ok(vec![bits, entry.subindex, low, high])
@@ -250,8 +253,7 @@ fn assign(
     start_up: &mut Vec<StartUpCommand>,
 ) -> Result<(), String> {
     let Some(wanted) = &device.pdos else { return Ok(()) };
-    let all: Vec<MappedPdo> =
-        profile.pdos.drain(..).chain(profile.spare_pdos.drain(..)).collect();
+    let all: Vec<MappedPdo> = profile.pdos.drain(..).chain(profile.spare_pdos.drain(..)).collect();
     let by_default = |direction| {
         let managers = profile.process.iter().find(|manager| manager.direction == direction);
         managers.map(|manager| manager.index)
@@ -272,9 +274,8 @@ fn assign(
                 Direction::Outputs => managers[0],
                 Direction::Inputs => managers[1],
             };
-            pdo.sync_manager = manager.ok_or_else(|| {
-                format!("pdos: there is no SyncManager for PDO 0x{index:04X}")
-            })?;
+            pdo.sync_manager = manager
+                .ok_or_else(|| format!("pdos: there is no SyncManager for PDO 0x{index:04X}"))?;
         }
         profile.pdos.push(pdo);
     }

@@ -39,7 +39,9 @@ pub enum PlanFileError {
         source: std::io::Error,
     },
     /// It is too long for what it should be.
-    #[error("{path}: {len} bytes, expected a project (TOML) or a network configuration (ENI). Do: check the path")]
+    #[error(
+        "{path}: {len} bytes, expected a project (TOML) or a network configuration (ENI). Do: check the path"
+    )]
     TooLong {
         /// Which.
         path: String,
@@ -82,7 +84,9 @@ pub enum PlanFileError {
         source: Box<ResolveError>,
     },
     /// Descriptions cannot be read.
-    #[error("{path}: esi = \"{folder}\": {reason}. Do: name a folder of XML files, or one of them, relative to the project")]
+    #[error(
+        "{path}: esi = \"{folder}\": {reason}. Do: name a folder of XML files, or one of them, relative to the project"
+    )]
     Descriptions {
         /// Of which project.
         path: String,
@@ -117,13 +121,14 @@ impl PlanFile {
             let at = error.utf8_error().valid_up_to();
             PlanFileError::NoText { path: shown.clone(), at }
         })?;
-        let project = Project::parse(&text).map_err(|source| {
-            PlanFileError::Project { path: shown.clone(), source: Box::new(source) }
+        let project = Project::parse(&text).map_err(|source| PlanFileError::Project {
+            path: shown.clone(),
+            source: Box::new(source),
         })?;
         let mut library = library_of(&project, path, &shown)?;
-        let plan = project.plan(&mut |device| library.find(device)).map_err(|source| {
-            PlanFileError::Resolve { path: shown, source: Box::new(source) }
-        })?;
+        let plan = project
+            .plan(&mut |device| library.find(device))
+            .map_err(|source| PlanFileError::Resolve { path: shown, source: Box::new(source) })?;
         let notes = library.take_notes();
         Ok(Self { name: project.name.clone(), plan, project: Some(project), notes })
     }

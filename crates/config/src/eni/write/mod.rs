@@ -10,8 +10,8 @@ mod slave;
 mod transition;
 
 use self::cyclic::Image;
-use crate::xml_writer::Xml;
 use crate::plan::Plan;
+use crate::xml_writer::Xml;
 
 /// The file of a plan.
 #[must_use]

@@ -10,13 +10,13 @@ use linesman_proto::topology::End;
 
 use super::cyclic::Image;
 use super::transition::{Init, Target, command};
-use crate::xml_writer::{Xml, hex};
 use crate::eni::OWN;
 use crate::esi::device::letters;
 use crate::identity::RevisionRule;
 use crate::plan::{DevicePlan, Plan};
 use crate::profile::Mailbox;
 use crate::start_up::StartUpAction;
+use crate::xml_writer::{Xml, hex};
 
 /// Longest wait for a state, in ms.
 const PATIENCE_MS: u32 = 10_000;

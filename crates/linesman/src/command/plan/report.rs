@@ -1,8 +1,8 @@
 //! A plan as JSON, `linesman.plan/1`.
 
 use linesman_config::plan::{
-    DatagramPlan, DevicePlan, Doubt, FramePlan, IoAt, PathView, Plan, Presence, Role, Severity, Task,
-    expect,
+    DatagramPlan, DevicePlan, Doubt, FramePlan, IoAt, PathView, Plan, Presence, Role, Severity,
+    Task, expect,
 };
 use linesman_proto::address::DeviceId;
 use linesman_proto::frame::builder::DatagramAddress;
@@ -345,9 +345,7 @@ fn frame_report(
     let datagrams = frame.datagrams.iter().map(|datagram| {
         let (logical, address, register) = match datagram.address {
             DatagramAddress::Logical(logical) => (Some(logical.0), None, None),
-            DatagramAddress::Physical(address, register) => {
-                (None, Some(address), Some(register.0))
-            }
+            DatagramAddress::Physical(address, register) => (None, Some(address), Some(register.0)),
         };
         let unit = datagram.sync_unit.and_then(|unit| task.sync_units.get(unit));
         let owners = datagram.ownership.iter().map(|owned| OwnerReport {

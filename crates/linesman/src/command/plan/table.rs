@@ -22,7 +22,10 @@ pub(super) fn text(file: &PlanFile, doubts: &[Doubt], verbose: bool, output: &Ou
         plan.inputs_len
     ));
     text.push_str(&frames(plan, output));
-    text.push_str(&format!("\nCyclic frames take {:.2} % of the wire's time.\n", plan.load_percent()));
+    text.push_str(&format!(
+        "\nCyclic frames take {:.2} % of the wire's time.\n",
+        plan.load_percent()
+    ));
     if verbose {
         text.push('\n');
         text.push_str(&devices(plan, output));
@@ -48,7 +51,14 @@ pub(super) fn text(file: &PlanFile, doubts: &[Doubt], verbose: bool, output: &Ou
 
 fn frames(plan: &Plan, output: &Output) -> String {
     let headings = [
-        "Frame", "Cmd", "Addr", "Len", "WC", "Sync unit", "Cycle (ms)", "Utilization (%)",
+        "Frame",
+        "Cmd",
+        "Addr",
+        "Len",
+        "WC",
+        "Sync unit",
+        "Cycle (ms)",
+        "Utilization (%)",
         "Size / duration (µs)",
     ];
     let mut table = Table::new(&headings, output.paint());
