@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, demo, diagnose, explain, fault, interfaces, lab, scan, schema, sim,
+    completion, demo, diagnose, explain, fault, interfaces, lab, run, scan, schema, sim,
 };
 use crate::version::VERSION;
 
@@ -54,6 +54,8 @@ pub(crate) enum Command {
     Interfaces(interfaces::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
     Explain(explain::Arguments),
+    /// Drive a line: bring it up, exchange process data, watch it, stop it cleanly
+    Run(run::Arguments),
     /// Virtual segments on real interfaces, for any MainDevice
     Sim(sim::Arguments),
     /// Break, heal and watch a segment that runs on real interfaces
@@ -71,6 +73,7 @@ impl Command {
     pub(crate) fn wants_json(&self) -> bool {
         match self {
             Self::Scan(arguments) => arguments.json,
+            Self::Run(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,

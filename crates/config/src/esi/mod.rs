@@ -4,6 +4,7 @@
 //! image that the maker programs into it. A file holds hundreds of devices, and one that cannot be
 //! understood is no cause to refuse the others: each is a result of its own.
 
+pub mod assignment;
 pub mod clock;
 pub mod device;
 pub mod dictionary;
@@ -20,7 +21,8 @@ pub(crate) mod encoding;
 pub(crate) mod value;
 pub(crate) mod xml;
 
-pub use clock::EsiOpMode;
+pub use assignment::Assigned;
+pub use clock::{EsiModePdo, EsiModeSyncManager, EsiOpMode};
 pub use device::EsiDevice;
 pub use dictionary::{EsiObject, EsiObjectEntry};
 pub use eeprom::EsiEeprom;
@@ -28,7 +30,7 @@ pub use error::EsiError;
 pub use find::{FindError, Selection};
 pub use mailbox::EsiMailbox;
 pub use module::{EsiModule, EsiSlots};
-pub use pdo::{EsiEntry, EsiPdo};
+pub use pdo::{EsiEntry, EsiOversampling, EsiPdo};
 pub use sync_manager::{EsiFmmu, EsiSyncManager};
 
 use self::xml::Element;

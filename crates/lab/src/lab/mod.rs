@@ -7,6 +7,7 @@
 mod error;
 mod exchange;
 mod object;
+mod register;
 mod truth;
 
 use std::collections::{BTreeMap, VecDeque};

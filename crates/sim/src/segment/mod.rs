@@ -12,6 +12,7 @@ mod identification;
 mod late;
 pub mod plug;
 mod ready;
+mod signal_wires;
 mod turn;
 
 use std::collections::{BTreeMap, BTreeSet};
