@@ -29,6 +29,9 @@ class Kind:
         self.low, self.lost_bits, self.axis = low, lost_bits, axis
         self.wkc = 2 * bool(outputs or axis) + bool(inputs or axis) if wkc is None else wkc
 
+    def both_ways(self):
+        return self.axis or bool(self.outputs and self.inputs)
+
     def is_digital(self):
         return any(channels and channels[3] == 1 for channels in (self.outputs, self.inputs))
 

@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, demo, diagnose, explain, fault, foe, history, interfaces, lab, reg, scan, schema,
-    sdo, sii, sim, state,
+    completion, demo, diagnose, explain, fault, foe, history, interfaces, lab, plan, reg, run,
+    scan, schema, sdo, sii, sim, state,
 };
 use crate::version::VERSION;
 
@@ -51,6 +51,8 @@ pub(crate) enum Command {
     Scan(scan::Arguments),
     /// What is wrong with a line: where, why, and what to do
     Diagnose(diagnose::Arguments),
+    /// What follows from a project or ENI file: frames, load, E-bus budget, clocks, doubts
+    Plan(plan::Arguments),
     /// Network cards: link, driver, suitability, EtherCAT seen
     Interfaces(interfaces::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
@@ -67,6 +69,8 @@ pub(crate) enum Command {
     Sii(sii::Arguments),
     /// Registers of a SubDevice's controller: read, write
     Reg(reg::Arguments),
+    /// Drive a line: bring it up, exchange process data, watch it, stop it cleanly
+    Run(run::Arguments),
     /// Virtual segments on real interfaces, for any MainDevice
     Sim(sim::Arguments),
     /// Break, heal and watch a segment that runs on real interfaces
@@ -84,6 +88,8 @@ impl Command {
     pub(crate) fn wants_json(&self) -> bool {
         match self {
             Self::Scan(arguments) => arguments.json,
+            Self::Plan(arguments) => arguments.json,
+            Self::Run(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,

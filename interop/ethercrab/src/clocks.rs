@@ -24,6 +24,7 @@ pub(crate) async fn run(interface: &str, asked: &Asked, sync0_period: Duration) 
     let maindevice = &crate::open(interface)?;
     let mut group = crate::scan(maindevice).await?;
     let found = rounds::found(&group, maindevice);
+    rounds::be_patient(&group, maindevice).await?;
     let mut in_step = Vec::new();
     for (position, mut subdevice) in group.iter_mut(maindevice).enumerate() {
         let modes = subdevice.sdo_read::<u16>(MODES.0, MODES.1).await.unwrap_or(0);

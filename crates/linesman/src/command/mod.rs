@@ -10,7 +10,9 @@ pub(crate) mod foe;
 pub(crate) mod history;
 pub(crate) mod interfaces;
 pub(crate) mod lab;
+pub(crate) mod plan;
 pub(crate) mod reg;
+pub(crate) mod run;
 pub(crate) mod scan;
 pub(crate) mod schema;
 pub(crate) mod sdo;
@@ -29,6 +31,8 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
     match command {
         Command::Demo(arguments) => demo::run(&arguments, output),
         Command::Lab(arguments) => lab::run(&arguments, output),
+        Command::Run(arguments) => run::run(&arguments, output),
+        Command::Plan(arguments) => plan::run(&arguments, output),
         Command::Scan(arguments) => scan::run(&arguments, output),
         Command::Diagnose(arguments) => diagnose::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),

@@ -12,6 +12,7 @@ use schemars::{Schema, schema_for};
 use super::diagnose::follow::EventReport;
 use super::interfaces;
 use super::lab::replay::ReplayReport;
+use super::plan::report::PlanReport;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
 use super::{foe, history, reg, service, sii, state};
@@ -36,6 +37,8 @@ pub(crate) enum Name {
     Project,
     /// What was read with another tool (TOML), for `diagnose`
     Observations,
+    /// `plan --json`
+    Plan,
     /// `scan --json`
     Scan,
     /// `diagnose --json`
@@ -87,6 +90,7 @@ fn schema(name: Name) -> Schema {
         Name::Segment => schema_for!(SegmentFile),
         Name::Project => schema_for!(Project),
         Name::Observations => schema_for!(ObservationFile),
+        Name::Plan => schema_for!(PlanReport),
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),

@@ -246,7 +246,7 @@ impl Core {
         if let Some((at, value)) = self.coding_switch
             && usize::from(at.0) + 2 <= self.memory.len()
         {
-            self.memory.put(usize::from(at.0), &value.to_le_bytes());
+            self.memory.copy_in(usize::from(at.0), &value.to_le_bytes());
         }
     }
 

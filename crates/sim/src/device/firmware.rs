@@ -9,7 +9,7 @@ use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
-use super::signal::Signals;
+use super::signal::{SignalId, Signals};
 use super::trouble::Trouble;
 use crate::controller::{Pdi, SyncSignal};
 
@@ -20,7 +20,7 @@ pub enum SampleAgain {
     NextFrame,
     /// With the first frame from this instant on.
     From(Instant),
-    /// Once any signal has another value.
+    /// Once any of the signals that it listens to has another value.
     OnceSignalsChange,
 }
 
@@ -54,6 +54,12 @@ pub trait Firmware: Debug + Send {
     /// anew. Who does not know says "with the next frame".
     fn sample_again(&self, _pdi: &Pdi<'_>) -> SampleAgain {
         SampleAgain::NextFrame
+    }
+
+    /// The signals on which what it samples depends, for one that says
+    /// [`SampleAgain::OnceSignalsChange`].
+    fn listens_to(&self) -> Vec<SignalId> {
+        Vec::new()
     }
 
     /// Whether it plays the EEPROM (S1 11.2.4): then it answers
@@ -107,6 +113,10 @@ pub trait Firmware: Debug + Send {
     /// The processor crashed and has started anew, without its controller: registers stay, what the
     /// software knew is forgotten.
     fn reboot(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
+
+    /// Its software reads the SII itself on the way to PREOP: it needs the MainDevice to leave the
+    /// EEPROM to it (0x0500, bit 0), and refuses with 0x0050 otherwise.
+    fn read_sii(&mut self) {}
 
     /// The value of its identification, as somebody sets it at its switches. False when it has no
     /// way of its own to tell it; then it goes into the station alias.

@@ -162,6 +162,11 @@ impl World {
         (links + nodes) * 2
     }
 
+    /// An upper bound of the time that a frame of no length takes through all of it, twice.
+    pub(crate) fn round(&self) -> Span {
+        self.round
+    }
+
     // ---- names ----
 
     pub(crate) fn id(&self, node: usize) -> DeviceId {
@@ -181,16 +186,32 @@ impl World {
     // ---- time ----
 
     /// Makes all changes that a frame of `frame_time` which enters at `now` can meet.
+    #[inline]
     pub(crate) fn look_ahead(&mut self, now: Instant, frame_time: Span) {
+        let until = now + self.round + frame_time;
+        if self.is_uneventful() {
+            self.horizon = self.horizon.max(until);
+            return;
+        }
         self.strangers_until(now);
-        self.change_until(now + self.round + frame_time);
+        self.change_until(until);
         if !self.noisy.is_empty() {
             self.forget_noise(now - MEMORY);
         }
     }
 
+    /// Whether nothing is going to change, no stranger sends and no noise lies in wait.
+    #[inline]
+    fn is_uneventful(&self) -> bool {
+        self.running.is_empty()
+            && self.agenda.is_empty()
+            && self.noisy.is_empty()
+            && self.strangers.next_at().is_none()
+    }
+
     /// Strangers send what they send until `now`: each frame as if somebody looked at its time, so
     /// that it is all the same who looks and when.
+    #[inline]
     fn strangers_until(&mut self, now: Instant) {
         /// Longer than the frame of any stranger.
         const FRAME: Span = Span::us(20);
@@ -220,18 +241,27 @@ impl World {
     }
 
     /// Brings everything to `now`.
+    #[inline]
     pub(crate) fn advance(&mut self, now: Instant) {
-        self.strangers_until(now);
-        self.change_until(now);
+        if self.is_uneventful() {
+            self.horizon = self.horizon.max(now);
+        } else {
+            self.strangers_until(now);
+            self.change_until(now);
+        }
         self.touch_due(now);
     }
 
     /// Makes all changes up to and at an instant.
+    #[inline]
     fn change_until(&mut self, until: Instant) {
-        if self.running.is_empty() && self.agenda.next_at().is_none() {
-            self.horizon = self.horizon.max(until);
-            return;
+        if !self.running.is_empty() || !self.agenda.is_empty() {
+            self.make_changes(until);
         }
+        self.horizon = self.horizon.max(until);
+    }
+
+    fn make_changes(&mut self, until: Instant) {
         loop {
             let due = self.agenda.next_at().filter(|at| *at <= until);
             let fault = self.next_fault().filter(|(at, _)| *at <= until);
@@ -246,7 +276,6 @@ impl World {
                 }
             }
         }
-        self.horizon = self.horizon.max(until);
     }
 
     /// Which running fault does something first, and when.
@@ -324,7 +353,7 @@ impl World {
     /// What lies on the way of frames changes at an instant that may be ahead.
     pub(super) fn way_changes(&mut self, at: Instant) {
         self.changed_at = self.changed_at.max(at);
-        self.direct.forget_routes();
+        self.forget_ways();
     }
 
     // ---- blame ----
