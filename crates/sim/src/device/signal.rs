@@ -152,6 +152,12 @@ impl Signals {
         }
     }
 
+    /// Whether a signal has changed that was not told of.
+    #[inline]
+    pub(crate) fn has_fresh(&self) -> bool {
+        !self.fresh.is_empty()
+    }
+
     /// A signal that has changed since it was last told of; each is told once.
     #[inline]
     pub(crate) fn take_fresh(&mut self) -> Option<SignalId> {

@@ -162,9 +162,12 @@ impl Segment {
     /// Frames of strangers arrive as all others do.
     #[inline]
     fn fetch_strangers(&mut self) {
-        if !self.world.strangers_came_back() {
-            return;
+        if self.world.strangers_came_back() {
+            self.take_strangers();
         }
+    }
+
+    fn take_strangers(&mut self) {
         for (at, path, frame) in self.world.take_strangers() {
             self.strange.insert(frame.number);
             self.arrivals.push(at, path, frame);
@@ -306,6 +309,13 @@ impl Segment {
     }
 
     // ---- what there is ----
+
+    /// Longer than a frame is on its way through all of it and back, whatever way it takes, without
+    /// its own duration.
+    #[must_use]
+    pub fn longest_way(&self) -> Span {
+        self.world.round()
+    }
 
     /// What the segment is called.
     #[must_use]
