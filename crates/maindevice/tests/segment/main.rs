@@ -10,3 +10,4 @@ mod scan;
 mod soak;
 mod software;
 mod start_up;
+mod wire_faults;
