@@ -43,9 +43,12 @@ enum Command {
         seconds: u64,
     },
     /// Run the foreign MainDevices against the virtual segment (root, Linux)
-    Interop,
     /// Measure Linesman beside other MainDevices: start to OP, CPU per cycle (root, Linux)
     BenchPeers,
+    Interop {
+        /// Only the checks whose names contain one of these
+        names: Vec<String>,
+    },
 }
 
 fn main() -> ExitCode {
@@ -68,7 +71,7 @@ fn run(command: Command) -> Result<bool> {
         Command::Features { check } => features::run(&root, check),
         Command::Fuzz { seconds } => test::run(&root, &test::Options::only("fuzz", Some(seconds))),
         Command::BenchPeers => test::run(&root, &test::Options::only("bench-peers", None)),
-        Command::Interop => test::run(&root, &test::Options::only("interop", None)),
+        Command::Interop { names } => test::run(&root, &test::Options::interop(names)),
     }
 }
 
