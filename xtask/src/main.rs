@@ -42,7 +42,10 @@ enum Command {
         seconds: u64,
     },
     /// Run the foreign MainDevices against the virtual segment (root, Linux)
-    Interop,
+    Interop {
+        /// Only the checks whose names contain one of these
+        names: Vec<String>,
+    },
 }
 
 fn main() -> ExitCode {
@@ -64,7 +67,7 @@ fn run(command: Command) -> Result<bool> {
         Command::Tidy => tidy::run(&root),
         Command::Features { check } => features::run(&root, check),
         Command::Fuzz { seconds } => test::run(&root, &test::Options::only("fuzz", Some(seconds))),
-        Command::Interop => test::run(&root, &test::Options::only("interop", None)),
+        Command::Interop { names } => test::run(&root, &test::Options::interop(names)),
     }
 }
 

@@ -38,12 +38,20 @@ pub(crate) struct Options {
     /// How many plants the demo draws
     #[arg(long, value_name = "N", default_value_t = 10)]
     demo_seeds: u64,
+    /// Only the interop checks whose names contain one of these
+    #[arg(long, value_name = "NAME")]
+    checks: Vec<String>,
 }
 
 impl Options {
     /// One step alone.
     pub(crate) fn only(step: &str, fuzz_seconds: Option<u64>) -> Self {
         Self { only: vec![step.to_owned()], fuzz_seconds, ..Self::default() }
+    }
+
+    /// The step with foreign MainDevices alone, and of it only the checks with these names.
+    pub(crate) fn interop(checks: Vec<String>) -> Self {
+        Self { checks, ..Self::only("interop", None) }
     }
 }
 

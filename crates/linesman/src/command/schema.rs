@@ -12,6 +12,7 @@ use schemars::{Schema, schema_for};
 use super::diagnose::follow::EventReport;
 use super::interfaces;
 use super::lab::replay::ReplayReport;
+use super::plan::report::PlanReport;
 use super::scan::report::Scan;
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
@@ -34,6 +35,8 @@ pub(crate) enum Name {
     Project,
     /// What was read with another tool (TOML), for `diagnose`
     Observations,
+    /// `plan --json`
+    Plan,
     /// `scan --json`
     Scan,
     /// `diagnose --json`
@@ -69,6 +72,7 @@ fn schema(name: Name) -> Schema {
         Name::Segment => schema_for!(SegmentFile),
         Name::Project => schema_for!(Project),
         Name::Observations => schema_for!(ObservationFile),
+        Name::Plan => schema_for!(PlanReport),
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),

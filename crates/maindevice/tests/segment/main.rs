@@ -2,6 +2,7 @@
 
 mod bench;
 mod described;
+mod library;
 mod mailbox;
 mod ring;
 mod robust;

@@ -1,13 +1,15 @@
 //! What each fault does to frames and counters.
 
 use linesman_config::fault::FaultName;
-use linesman_proto::address::Path;
+use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::command::Command;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Span;
+use linesman_sim::controller::WatchdogKind;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{FaultEntry, OneOrMany, SegmentFile};
+use linesman_sim::truth::{Effect, Entry};
 
 use super::rig::{Bench, PLANT, at, frame};
 
@@ -569,4 +571,35 @@ fn a_link_that_negotiates_while_one_pair_breaks_comes_up_again() {
             bench.assert_audit();
         }
     }
+}
+
+/// Outputs that stop coming let a watchdog run out: its counter moves with an entry of the log.
+#[test]
+fn a_watchdog_that_runs_out_is_in_the_log() {
+    let mut bench = Bench::plant();
+    let output = at(0u16.wrapping_sub(2), 0x0F00);
+    // SyncManager 0 of T3: one byte of outputs, watched.
+    let guard = [0x00, 0x0F, 1, 0, 0x44, 0, 1, 0];
+    bench.send(Command::Apwr, at(0u16.wrapping_sub(2), 0x0800), &guard).unwrap();
+    bench.send(Command::Apwr, output, &[1]).unwrap();
+    bench.wait(Span::ms(300));
+    let count = |bench: &Bench| {
+        let controller = bench.segment.controller(bench.id("T3")).unwrap();
+        controller.register(RegisterAddress(0x0442))
+    };
+    assert_eq!(count(&bench), 1);
+    bench.assert_audit();
+    let expired = bench.segment.truth().entries().iter().find_map(|entry| match entry {
+        Entry::Effect {
+            fault: None, effect: Effect::WatchdogExpired { kind, silence }, ..
+        } => Some((*kind, *silence)),
+        Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
+    });
+    let (kind, silence) = expired.expect("an entry");
+    assert_eq!(kind, WatchdogKind::ProcessData);
+    assert!((Span::ms(100)..Span::ms(101)).contains(&silence), "{silence}");
+    bench.send(Command::Apwr, output, &[1]).unwrap();
+    bench.wait(Span::ms(300));
+    assert_eq!(count(&bench), 2);
+    bench.assert_audit();
 }
