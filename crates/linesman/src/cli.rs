@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, demo, diagnose, explain, fault, interfaces, lab, run, scan, schema, sim,
+    completion, demo, diagnose, explain, fault, interfaces, lab, plan, run, scan, schema, sim,
 };
 use crate::version::VERSION;
 
@@ -50,6 +50,8 @@ pub(crate) enum Command {
     Scan(scan::Arguments),
     /// What is wrong with a line: where, why, and what to do
     Diagnose(diagnose::Arguments),
+    /// What follows from a project or ENI file: frames, load, E-bus budget, clocks, doubts
+    Plan(plan::Arguments),
     /// Network cards: link, driver, suitability, EtherCAT seen
     Interfaces(interfaces::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
@@ -73,6 +75,7 @@ impl Command {
     pub(crate) fn wants_json(&self) -> bool {
         match self {
             Self::Scan(arguments) => arguments.json,
+            Self::Plan(arguments) => arguments.json,
             Self::Run(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Fault(arguments) => arguments.json,

@@ -257,6 +257,17 @@ pub(crate) fn physics(letters: &str) -> Result<PortMap<PortKind>, String> {
     Ok(ports)
 }
 
+/// The letters that stand for ports: `Y` for one of whatever kind with a cable, `-` for none.
+pub(crate) fn letters(ports: &PortMap<PortKind>) -> String {
+    let letter = |kind: &PortKind| match kind {
+        PortKind::None => '-',
+        PortKind::Mii | PortKind::Other(_) => 'Y',
+        PortKind::EBus => 'K',
+        PortKind::FastHotConnect => 'H',
+    };
+    ports.0.iter().map(letter).collect()
+}
+
 fn about(info: &Element, device: &mut EsiDevice) -> Result<(), EsiError> {
     if let Some(electrical) = info.child("Electrical") {
         device.ebus_current_ma = electrical.child_number("EBusCurrent")?;

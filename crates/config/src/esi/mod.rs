@@ -11,11 +11,13 @@ pub mod dictionary;
 pub mod eeprom;
 pub mod error;
 pub mod find;
+pub mod header;
 pub mod image;
 pub mod mailbox;
 pub mod module;
 pub mod pdo;
 pub mod sync_manager;
+pub mod write;
 
 pub(crate) mod encoding;
 pub(crate) mod value;

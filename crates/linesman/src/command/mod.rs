@@ -8,6 +8,7 @@ pub(crate) mod explain;
 pub(crate) mod fault;
 pub(crate) mod interfaces;
 pub(crate) mod lab;
+pub(crate) mod plan;
 pub(crate) mod run;
 pub(crate) mod scan;
 pub(crate) mod schema;
@@ -24,6 +25,7 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::Demo(arguments) => demo::run(&arguments, output),
         Command::Lab(arguments) => lab::run(&arguments, output),
         Command::Run(arguments) => run::run(&arguments, output),
+        Command::Plan(arguments) => plan::run(&arguments, output),
         Command::Scan(arguments) => scan::run(&arguments, output),
         Command::Diagnose(arguments) => diagnose::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
