@@ -12,6 +12,7 @@ from bench import FAR, NEAR, parse
 from harness import LINESMAN, Skip, check, names
 
 # What the configurations that come with it are: file, vendor, product.
+CYCLE_US = 4_000
 DEVICES = [
     ("freedom-k64f", 0x79A, 0xDEFEDE),
     ("xmc4800", 0x1337, 0x4800),
@@ -37,6 +38,24 @@ def linesman_scans_and_diagnoses_another_emulator(line):
         diagnosis = parse(out, err)
         assert status == 0 and diagnosis["verdict"] == "healthy", (status, diagnosis["verdict"], names(diagnosis))
         assert diagnosis["network"]["devices"] == len(DEVICES), diagnosis["network"]
+
+
+@check
+def linesman_runs_another_emulator(line):
+    """To OP, and process data that come back."""
+    with Emulator(line):
+        command = [LINESMAN, "run", "--on", NEAR, "--seconds", 3, "--cycle-us", CYCLE_US, "--json"]
+        status, out, err = line.run(line.near, *command)
+        run = parse(out, err)
+        # 1: it ran, and there was something to tell of the line, such as a host that was late.
+        assert status in (0, 1) and run["schema"] == "linesman.run/1", f"status {status}: {err[-600:]}"
+        assert run["reached_ns"] is not None and run["responding"] == len(DEVICES), run
+        assert [device["target"] for device in run["devices"]] == ["OP"] * len(DEVICES), run["devices"]
+        assert all(device["valid"] for device in run["devices"]), run["devices"]
+        counts = run["counts"]
+        assert counts["working_counter_errors"] == 0 and counts["frames_stray"] == 0, counts
+        back = counts["cyclic_sent"] - counts["cyclic_lost"]
+        assert counts["cyclic_sent"] > 300 and back > counts["cyclic_sent"] * 0.8, counts
 
 
 class Emulator:

@@ -5,6 +5,7 @@ use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
 use linesman_runtime::control::message::{Faults, Request, SignalTable};
 use linesman_runtime::journal::TruthEvent;
+use linesman_runtime::run::report::RunReport;
 use linesman_runtime::serve::report::Status as SimStatus;
 use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
@@ -57,6 +58,8 @@ pub(crate) enum Name {
     Truth,
     /// A line that the control socket of `sim` takes
     Control,
+    /// `run --json`
+    Run,
     /// `interfaces --json`
     Interfaces,
     /// `state --json`
@@ -100,6 +103,7 @@ fn schema(name: Name) -> Schema {
         Name::Sim => schema_for!(SimStatus),
         Name::Truth => schema_for!(TruthEvent),
         Name::Control => schema_for!(Request),
+        Name::Run => schema_for!(RunReport),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::States => schema_for!(state::Report),
         Name::Sdo => schema_for!(ReadReport),

@@ -196,7 +196,7 @@ fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>
             return (outcome, events);
         }
         if executor.shared().submitted.is_empty() {
-            now = executor.poll_timeout().expect("somebody waits").max(now);
+            now = executor.first_timer().max(now);
             executor.advance(now);
         }
     }
