@@ -257,7 +257,7 @@ class Capture:
         for interface in (NEAR, NEAR_B):
             file = self.bench.path(f"{interface}.pcap")
             process = self.bench.start(
-                self.bench.near, "tcpdump", "-i", interface, "-B", 16384, "-U", "--immediate-mode", "-Z", "root", "-w", file,
+                self.bench.near, "tcpdump", "-i", interface, "-B", 65536, "-U", "--immediate-mode", "-Z", "root", "-w", file,
                 "ether proto 0x88a4",
             )
             # It says so once it listens.

@@ -23,6 +23,7 @@ HELD = {"I1.5": 1, "I1.7": 1}
 # A drive is switched on and moved: controlword, target, and what the statusword says then under the mask 0x6F.
 DRIVE = [(0x06, 0, 0x21), (0x07, 0, 0x23), (0x0F, 0, 0x27), (0x0F, 500, 0x27)]
 CSP = 8
+CYCLES = 800
 
 
 @check
@@ -37,7 +38,7 @@ def soem_drives_devices_from_descriptions_of_their_makers(line):
         images = line.path("rounds.json")
         images.write_text(str([{place: data.hex() for place, data in one.items()} for one in rounds]).replace("'", '"'))
         with Watch(segment) as watch:
-            result = SOEM.run(line, NEAR, 800, CYCLE_US, images)
+            result = SOEM.run(line, NEAR, CYCLES, CYCLE_US, images, "axes")
         found = [tuple(device[:2]) for device in result["devices"]]
         assert found == [identity for *_, identity in DEVICES], found
         ran(result)

@@ -10,7 +10,7 @@ from plant import Plant
 
 CLOCKS = Plant(HERE / "dc.toml")
 # SYNC0 comes rarer than frames, so that a busy host does not miss it.
-CYCLES, CYCLE_US, SYNC0 = 800, 4_000, "sync0=20000000"
+CYCLES, CYCLE_US, SYNC0 = 800, 4_000, "sync0=40000000"
 SETTLED_NS = 100
 # How far a quartz of the tree is off at most.
 PPM = 50

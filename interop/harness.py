@@ -37,7 +37,7 @@ class Client:
         if self.name == "ethercrab":
             if not os.access(ETHERCRAB, os.X_OK):
                 raise Skip("ETHERCRAB_PEER is not built")
-            return [ETHERCRAB]
+            return ["env", "RUST_BACKTRACE=0", ETHERCRAB]
         module = {"soem": "pysoem", "kickcat": "kickcat"}[self.name]
         if importlib.util.find_spec(module) is None:
             raise Skip(f"{module} is not installed")
@@ -45,13 +45,12 @@ class Client:
 
     def run(self, line, *arguments, script=None, seconds=60):
         """Runs it on the near end; gives the object it prints."""
-        quiet = ("env", "RUST_BACKTRACE=0")
-        status, out, err = line.run(line.near, *quiet, *self.command(script), *arguments, seconds=seconds)
+        status, out, err = line.run(line.near, *self.command(script), *arguments, seconds=seconds)
         assert status == 0, f"status {status}: {err[-600:]}"
         # Some stacks print words of their own before.
         return parse(out.strip().splitlines()[-1] if out.strip() else out, err)
 
-    def exchange(self, line, plant, rounds, cycles=CYCLES, *options, on=NEAR, cycle_us=CYCLE_US, seconds=90):
+    def exchange(self, line, plant, rounds, cycles=CYCLES, *options, on=NEAR, cycle_us=CYCLE_US, seconds=240):
         """Takes a plant to OP and writes these rounds of values."""
         return self.run(line, on, cycles, cycle_us, rounds_file(line, plant, rounds), *options, seconds=seconds)
 

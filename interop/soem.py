@@ -19,6 +19,9 @@ def main():
         devices = [[slave.man, slave.id, slave.rev] for slave in master.slaves]
         names = [slave.name for slave in master.slaves]
         clocks = soem_clocks.Clocks(master, asked.sync0_ns) if asked.sync0_ns else None
+        be_patient(master)
+        if asked.axes:
+            tell_axes(master, asked.cycle_s)
         mapped, send = configure(master, asked.overlap)
         if clocks:
             clocks.align(send)
@@ -26,7 +29,7 @@ def main():
         complete, wkc, inputs = exchange(master, send, asked)
         state = "OP" if master.state_check(pysoem.OP_STATE, 50_000) == pysoem.OP_STATE else states(master)
         clocks = clocks.told() if clocks else None
-        shared = shared_addresses(master)
+        shared = shared_addresses(master) if asked.overlap else []
         stop(master)
         peer.report(
             devices=devices, names=names, state=state, mapped=mapped, shared=shared,
@@ -34,6 +37,25 @@ def main():
         )
     finally:
         master.close()
+
+
+def be_patient(master):
+    """The watchdog of outputs waits three seconds: the host may be busy with other things."""
+    for slave in master.slaves:
+        slave._fpwr(0x0420, (30_000).to_bytes(2, "little"), 20_000)
+
+
+def tell_axes(master, cycle_s):
+    """0x60C2: value and power of ten of the time from one target to the next."""
+    for slave in master.slaves:
+        # SyncManager 0 in mailbox mode: there is somebody to be told.
+        if slave._fprd(0x0804, 1, 20_000)[0] & 0x03 != 0x02:
+            continue
+        try:
+            slave.sdo_write(0x60C2, 1, round(cycle_s * 1000).to_bytes(1, "little"))
+            slave.sdo_write(0x60C2, 2, (-3).to_bytes(1, "little", signed=True))
+        except (pysoem.SdoError, pysoem.MailboxError, pysoem.WkcError):
+            continue
 
 
 def configure(master, overlap=False):

@@ -29,6 +29,9 @@ class Clocks:
         self.exchange(send, 50)
         self.before = self.differences()
         self.exchange(send, ALIGNING)
+        # Before OP: there, whoever reads objects does not exchange, and drives complain of that.
+        slaves = [self.master.slaves[place] for place in self.in_step]
+        self.modes = [int.from_bytes(slave.sdo_read(0x1C33, 1), "little") for slave in slaves]
 
     def exchange(self, send, cycles):
         for _ in range(cycles):
@@ -44,7 +47,7 @@ class Clocks:
             "clocked": self.clocked, "in_step": self.in_step, "before": self.before, "after": self.differences(),
             "delays": [register(slaves[place], 0x0928, 4) for place in self.clocked],
             "speeds": [register(slaves[place], 0x0932, 2) for place in self.clocked],
-            "modes": [int.from_bytes(slaves[place].sdo_read(0x1C33, 1), "little") for place in self.in_step],
+            "modes": self.modes,
         }
 
 

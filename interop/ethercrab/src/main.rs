@@ -5,13 +5,16 @@ mod loss;
 mod objects;
 mod rounds;
 mod services;
+mod speed;
 
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
 use ethercrab::std::{ethercat_now, tx_rx_task};
 use ethercrab::subdevice_group::PreOp;
-use ethercrab::{DefaultLock, MainDevice, MainDeviceConfig, PduStorage, SubDeviceGroup, Timeouts};
+use ethercrab::{
+    DefaultLock, MainDevice, MainDeviceConfig, PduStorage, RetryBehaviour, SubDeviceGroup, Timeouts,
+};
 
 const FRAMES_MAX: usize = 16;
 const DATA_MAX: usize = PduStorage::element_size(1100);
@@ -66,7 +69,9 @@ fn open(interface: &str) -> Result<MainDevice<'static>> {
         state_transition: Duration::from_secs(10),
         ..Timeouts::default()
     };
-    let maindevice = MainDevice::new(pdus, timeouts, MainDeviceConfig::default());
+    let configuration =
+        MainDeviceConfig { retry_behaviour: RetryBehaviour::Count(20), ..Default::default() };
+    let maindevice = MainDevice::new(pdus, timeouts, configuration);
     smol::spawn(tx_rx_task(interface, transmit, receive).context(interface.to_owned())?).detach();
     Ok(maindevice)
 }

@@ -116,14 +116,13 @@ fn those_who_are_no_neighbours_are_told_of_apart() {
 fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
     let mut watch = watch();
     let status = AlStatus::new(AlState::Init).with_error(true);
-    let refused =
-        Event::Refused {
-            id: DeviceId(1),
-            from: Some(AlState::Init),
-            to: AlState::PreOp,
-            status,
-            code: AlStatusCode(0x0014),
-        };
+    let refused = Event::Refused {
+        id: DeviceId(1),
+        from: Some(AlState::Init),
+        to: AlState::PreOp,
+        status,
+        code: AlStatusCode(0x0014),
+    };
     watch.handle_event(at(1), &refused);
     let lines = texts(&mut watch);
     assert_eq!(

@@ -2,6 +2,7 @@
 
 mod bench;
 mod described;
+mod library;
 mod mailbox;
 mod ring;
 mod robust;
@@ -10,3 +11,4 @@ mod scan;
 mod soak;
 mod software;
 mod start_up;
+mod wire_faults;
