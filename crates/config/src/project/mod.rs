@@ -179,6 +179,15 @@ impl Project {
         Self { name: name.to_owned(), esi, network, tasks, devices, ring }
     }
 
+    /// Whether it says more than who is where, and what that is: tasks, settings, descriptions of makers.
+    #[must_use]
+    pub fn chooses(&self) -> bool {
+        !self.esi.is_empty()
+            || !self.tasks.is_empty()
+            || self.network != Network::default()
+            || self.devices.iter().any(ProjectDevice::chooses)
+    }
+
     /// Whether what refers to something refers to something that is there, and numbers make sense.
     fn check(&self) -> Result<(), ProjectError> {
         let value = |whose: String, reason: &str| {

@@ -1,5 +1,6 @@
 //! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
 
+mod planned;
 mod told;
 
 use std::path::{Path, PathBuf};
@@ -32,8 +33,8 @@ use crate::output::Output;
                   steadily as this host lets it, and says so."
 )]
 pub(crate) struct Arguments {
-    /// The project (TOML); without one, what is there is run as it is
-    #[arg(value_name = "PROJECT.toml")]
+    /// A project (TOML) or a network configuration (ENI, XML); without one, what is there is run as it is
+    #[arg(value_name = "PROJECT.toml|ENI.xml")]
     file: Option<PathBuf>,
     /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
     #[arg(long, value_name = "WHERE")]
@@ -78,19 +79,24 @@ fn state(word: &str) -> Result<AlState, String> {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selector: Selector = arguments.on.parse()?;
     let lasts = lasts(arguments.seconds)?;
+    let planned = arguments.file.as_deref().map(planned::planned).transpose()?.flatten();
     let project = match &arguments.file {
-        Some(path) => Some((path.as_path(), files::project(path)?)),
-        None => None,
+        Some(path) if planned.is_none() => Some((path.as_path(), files::project(path)?)),
+        Some(_) | None => None,
     };
     let choices = Choices { target: arguments.to, cycle: arguments.cycle_us.map(Span::us) };
-    let title = match &project {
-        Some((path, project)) => {
+    let title = match (&project, &planned, &arguments.file) {
+        (Some((path, project)), _, _) => {
             format!("{} SubDevices of {}", project.devices.len(), path.display())
         }
-        None => "what is there".to_owned(),
+        (None, Some(file), Some(path)) => {
+            format!("{} SubDevices of {}", file.plan.devices.len(), path.display())
+        }
+        (None, _, _) => "what is there".to_owned(),
     };
+    let known = planned.as_ref().and_then(|file| file.project.clone());
     let setup = (!arguments.no_diagnosis).then(|| Setup {
-        project: project.as_ref().map(|(_, project)| project.clone()),
+        project: project.as_ref().map(|(_, project)| project.clone()).or(known),
         source: arguments.on.clone(),
         ..Setup::default()
     });
@@ -102,9 +108,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         allowed_misses: None,
         diagnose: setup,
     };
-    let wanted = match project {
-        Some((_, project)) => choices.project(project),
-        None => choices.as_found(),
+    let wanted = match (project, planned) {
+        (Some((_, project)), _) => choices.project(project),
+        (None, Some(file)) => planned::wanted(file, choices),
+        (None, None) => choices.as_found(),
     };
     let stop = driven::stop()?;
     let said = format!(
