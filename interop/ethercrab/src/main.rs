@@ -5,6 +5,7 @@ mod loss;
 mod objects;
 mod rounds;
 mod services;
+mod speed;
 
 use std::time::Duration;
 

@@ -549,6 +549,30 @@ fn old_counters_are_no_fault() {
     assert_eq!(bench.counters(), ["K1.A physical 3", "K1 pdi 1"]);
 }
 
+#[test]
+fn a_link_that_negotiates_while_one_pair_breaks_comes_up_again() {
+    // The negotiation of both ends is cut short by one end that loses its signal; the other goes on
+    // alone, whoever is healed first.
+    for place in ["maindevice-K1.A", "maindevice>K1.A", "K1.A>maindevice", "K1.C-K6.A", "K6.A>K1.C"]
+    {
+        let link = if place.contains("K6") { "K1.C-K6.A" } else { "maindevice-K1.A" };
+        for (pause, far) in [(100, "without-link"), (100, "with-link"), (5_000, "without-link")] {
+            let mut bench = Bench::plant();
+            let open = bench.inject(&FaultEntry::new(FaultName::LinkOpen).at(link));
+            bench.wait(Span::ms(500));
+            bench.heal(open);
+            bench.wait(Span::ms(100));
+            let entry = FaultEntry::new(FaultName::FalseLink).at(place).with("far", far);
+            let hole = bench.inject(&entry);
+            bench.wait(Span::ms(pause));
+            bench.heal(hole);
+            bench.wait(Span::s(15));
+            assert_eq!(bench.count(), Some(8), "{place}, {pause} ms, {far}");
+            bench.assert_audit();
+        }
+    }
+}
+
 /// Outputs that stop coming let a watchdog run out: its counter moves with an entry of the log.
 #[test]
 fn a_watchdog_that_runs_out_is_in_the_log() {
