@@ -19,8 +19,6 @@ import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 NEAR, FAR = "veth0", "veth1"
-# In front of a command that a busy host must not keep waiting.
-BEFORE_OTHERS = ["nice", "-n", "-19"]
 # The second cable, for the other end of a ring.
 NEAR_B, FAR_B = "veth2", "veth3"
 
@@ -259,7 +257,7 @@ class Capture:
         for interface in (NEAR, NEAR_B):
             file = self.bench.path(f"{interface}.pcap")
             process = self.bench.start(
-                self.bench.near, *BEFORE_OTHERS, "tcpdump", "-i", interface, "-B", 65536, "-U", "--immediate-mode", "-Z", "root", "-w", file,
+                self.bench.near, "tcpdump", "-i", interface, "-B", 65536, "-U", "--immediate-mode", "-Z", "root", "-w", file,
                 "ether proto 0x88a4",
             )
             # It says so once it listens.

@@ -9,9 +9,10 @@ import pathlib
 import time
 
 from bench import FAR, NEAR, parse
-from harness import LINESMAN, Skip, check, names
+from harness import Skip, check, linesman, names
 
 # What the configurations that come with it are: file, vendor, product.
+CYCLE_US = 4_000
 DEVICES = [
     ("freedom-k64f", 0x79A, 0xDEFEDE),
     ("xmc4800", 0x1337, 0x4800),
@@ -23,7 +24,7 @@ DEVICES = [
 @check
 def linesman_scans_and_diagnoses_another_emulator(line):
     with Emulator(line):
-        status, out, err = line.run(line.near, LINESMAN, "scan", NEAR, "--json")
+        status, out, err = linesman(line, "scan", NEAR, "--json")
         assert status == 0, f"scan: status {status}: {err[-600:]}"
         scan = parse(out, err)
         found = [(device["vendor_id"], device["product_code"]) for device in scan["devices"]]
@@ -33,10 +34,28 @@ def linesman_scans_and_diagnoses_another_emulator(line):
             entry = next(port for port in device["ports"] if port["port"] == "A")
             before = {"no": device["no"] - 1, "port": "B" if device["no"] > 1 else "A"}
             assert entry["to"] == before, (device["no"], entry)
-        status, out, err = line.run(line.near, LINESMAN, "diagnose", NEAR, "--seconds", 2, "--json")
+        status, out, err = linesman(line, "diagnose", NEAR, "--seconds", 2, "--json")
         diagnosis = parse(out, err)
         assert status == 0 and diagnosis["verdict"] == "healthy", (status, diagnosis["verdict"], names(diagnosis))
         assert diagnosis["network"]["devices"] == len(DEVICES), diagnosis["network"]
+
+
+@check
+def linesman_runs_another_emulator(line):
+    """To OP, and process data that come back."""
+    with Emulator(line):
+        arguments = ["--on", NEAR, "--seconds", 3, "--cycle-us", CYCLE_US, "--json"]
+        status, out, err = linesman(line, "run", *arguments)
+        run = parse(out, err)
+        # 1: it ran, and there was something to tell of the line, such as a host that was late.
+        assert status in (0, 1) and run["schema"] == "linesman.run/1", f"status {status}: {err[-600:]}"
+        assert run["reached_ns"] is not None and run["responding"] == len(DEVICES), run
+        assert [device["target"] for device in run["devices"]] == ["OP"] * len(DEVICES), run["devices"]
+        assert all(device["valid"] for device in run["devices"]), run["devices"]
+        counts = run["counts"]
+        assert counts["working_counter_errors"] == 0 and counts["frames_stray"] == 0, counts
+        back = counts["cyclic_sent"] - counts["cyclic_lost"]
+        assert counts["cyclic_sent"] > 300 and back > counts["cyclic_sent"] * 0.8, counts
 
 
 class Emulator:

@@ -1,7 +1,7 @@
 """What every foreign MainDevice written in Python does with its result.
 
-A peer is run as `PEER.py INTERFACE[+INTERFACE] CYCLES CYCLE_US ROUNDS.json [sync0=NS] [overlap] [axes]`. It takes the line to
-OP, exchanges process data for CYCLES cycles, an equal part of them for each round, and prints one JSON object:
+A peer is run as `PEER.py INTERFACE[+INTERFACE] CYCLES CYCLE_US ROUNDS.json [sync0=NS] [overlap] [axes]`. It takes the line
+to OP, exchanges process data for CYCLES cycles, an equal part of them for each round, and prints one JSON object:
 
     devices   what the scan found: [vendor, product, revision] or what this stack can tell
     state     the state reached by all

@@ -192,7 +192,9 @@ class Plant:
             status, mode, actual, _, error = struct.unpack("<Hbxii H".replace(" ", ""), bytes.fromhex(image[position]))
             _, target, state = DRIVE_ROUNDS[number]
             target *= position
-            told = f"round {number + 1}, drive at {position}: status 0x{status:04X}, mode {mode}, at {actual}, error 0x{error:04X}"
+            told = (
+                f"round {number + 1}, drive at {position}: status 0x{status:04X}, mode {mode}, at {actual}, error 0x{error:04X}"
+            )
             assert status & 0x6F == state, f"{told}; expected status 0x{state:02X} under 0x6F"
             assert abs(actual - target) <= 100, f"{told}; expected position {target}"
             assert state != 0x27 or mode == CSP, told

@@ -104,9 +104,9 @@ fn access_once(
     let now = lab.now();
     lab.main_mut().probe(now, request.clone());
     let answer = |lab: &Lab| {
-        lab.events().iter().skip(before).find_map(|(_, event)| match event {
-            Event::Probed { request: about, result } if *about == request => Some(result.clone()),
-            _ => None,
+        lab.events().iter().skip(before).find_map(|(_, event)| {
+            let Event::Probed { request: about, result } = event else { return None };
+            (*about == request).then(|| result.clone())
         })
     };
     lab.run_while(Span::ms(50), Span::us(50), |lab| answer(lab).is_some())

@@ -148,9 +148,9 @@ fn write(lab: &mut Lab, index: u16, subindex: u8, data: &[u8]) -> Result<(), Str
     let (before, now) = (lab.events().len(), lab.now());
     lab.main_mut().sdo_download(now, id, object, false, data);
     let done = |lab: &Lab| {
-        lab.events().iter().skip(before).find_map(|(_, event)| match event {
-            Event::SdoDownloaded { result, .. } => Some(result.clone()),
-            _ => None,
+        lab.events().iter().skip(before).find_map(|(_, event)| {
+            let Event::SdoDownloaded { result, .. } = event else { return None };
+            Some(result.clone())
         })
     };
     lab.run_while(Span::s(5), Span::us(100), |lab| done(lab).is_some()).expect("time passes");
