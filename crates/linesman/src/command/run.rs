@@ -13,8 +13,8 @@ use linesman_diagnosis::report::Verdict;
 use linesman_link::clock::HostClock;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
-use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
+use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{
     self as running, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
 };
