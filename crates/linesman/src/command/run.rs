@@ -5,13 +5,19 @@ mod told;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 
+use linesman_config::eni::Eni;
+use linesman_config::plan::Plan;
+use linesman_config::project::Project;
 use linesman_diagnosis::Setup;
 use linesman_diagnosis::report::Verdict;
 use linesman_link::clock::HostClock;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
-use linesman_runtime::run::{self as running, Choices, Ended, Idle, RealTime, RunOptions, Wanted};
+use linesman_runtime::plan_file::PlanFile;
+use linesman_runtime::run::{
+    self as running, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
+};
 use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
 use linesman_runtime::wiring::Wiring;
@@ -23,6 +29,9 @@ use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
 
+/// Longest ENI file that is read, in bytes.
+const MOST: u64 = 256 * 1024 * 1024;
+
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 #[command(
@@ -32,8 +41,9 @@ use crate::output::Output;
                   steadily as this host lets it, and says so."
 )]
 pub(crate) struct Arguments {
-    /// The project (TOML); without one, what is there is run as it is
-    #[arg(value_name = "PROJECT.toml")]
+    /// The project (TOML), or a configuration of another tool (ENI); without one, what is there is run
+    /// as it is
+    #[arg(value_name = "PROJECT.toml|ENI.xml")]
     file: Option<PathBuf>,
     /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
     #[arg(long, value_name = "WHERE")]
@@ -59,6 +69,13 @@ pub(crate) struct Arguments {
     /// Look again and again for so many microseconds before each cycle, instead of sleeping up to it
     #[arg(long, value_name = "US", default_value_t = 0)]
     spin_us: u64,
+    /// Another program is the application: it sees the process image in this file, such as
+    /// /dev/shm/machine
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
+    /// How many cycles in a row that program may give no outputs before they are withheld
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "image")]
+    misses: u32,
     /// Do not judge the line meanwhile
     #[arg(long)]
     no_diagnosis: bool,
@@ -78,19 +95,25 @@ fn state(word: &str) -> Result<AlState, String> {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selector: Selector = arguments.on.parse()?;
     let lasts = lasts(arguments.seconds)?;
-    let project = match &arguments.file {
-        Some(path) => Some((path.as_path(), files::project(path)?)),
-        None => None,
+    let source = match &arguments.file {
+        Some(path) => Source::read(path)?,
+        None => Source::AsFound,
     };
     let choices = Choices { target: arguments.to, cycle: arguments.cycle_us.map(Span::us) };
-    let title = match &project {
-        Some((path, project)) => {
+    let title = match (&source, &arguments.file) {
+        (Source::Project(project), Some(path)) => {
             format!("{} SubDevices of {}", project.devices.len(), path.display())
         }
-        None => "what is there".to_owned(),
+        (Source::Planned(plan), Some(path)) => {
+            format!("{} SubDevices of {}", plan.devices.len(), path.display())
+        }
+        _ => "what is there".to_owned(),
     };
     let setup = (!arguments.no_diagnosis).then(|| Setup {
-        project: project.as_ref().map(|(_, project)| project.clone()),
+        project: match &source {
+            Source::Project(project) => Some((**project).clone()),
+            Source::AsFound | Source::Planned(_) => None,
+        },
         source: arguments.on.clone(),
         ..Setup::default()
     });
@@ -99,13 +122,15 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         leave: arguments.leave,
         lasts,
         real_time: None,
-        allowed_misses: None,
+        allowed_misses: arguments.image.is_some().then_some(arguments.misses),
         diagnose: setup,
     };
-    let wanted = match project {
-        Some((_, project)) => choices.project(project),
-        None => choices.as_found(),
+    let wanted = match source {
+        Source::Project(project) => choices.project(*project),
+        Source::Planned(plan) => Wanted::Plan(plan),
+        Source::AsFound => choices.as_found(),
     };
+    let application = arguments.image.clone();
     let stop = driven::stop()?;
     let said = format!(
         "Drives {title} on {} to {}; Ctrl-C stops it: outputs to zero, all back to {}.",
@@ -124,18 +149,51 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             });
             let options =
                 with_source(options, real_time, HostClock::start().started_at().rfc3339());
-            drive(line, names.len() > 1, wanted, &options, &stop, &said, arguments.json, output)
+            drive(
+                line,
+                names.len() > 1,
+                wanted,
+                &options,
+                application,
+                &stop,
+                &said,
+                arguments.json,
+                output,
+            )
         }
         Selector::Segment(path) => {
             let line = virtual_line(path, lasts.is_some())?;
             stop.rings(&line.bell()).map_err(no_bell)?;
             let ring = line.count() > 1;
-            drive(line, ring, wanted, &options, &stop, &said, arguments.json, output)
+            drive(line, ring, wanted, &options, application, &stop, &said, arguments.json, output)
         }
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             let reason = format!("`{selector}`: nothing can be driven there");
             Err(Failure::new(reason, "name a network card, `--on eth0`, or `--on sim:plant.toml`"))
         }
+    }
+}
+
+/// What is to be run.
+enum Source {
+    AsFound,
+    Project(Box<Project>),
+    Planned(Box<Plan>),
+}
+
+impl Source {
+    fn read(path: &Path) -> Result<Self, Failure> {
+        let bytes = files::bytes(path, "a project or an ENI file", MOST)?;
+        if !Eni::is_one(&bytes) {
+            let project = files::project(path)?;
+            // One that chooses more than who is where is planned from what it says.
+            if project.chooses() {
+                return Ok(Self::Planned(Box::new(PlanFile::open(path)?.plan)));
+            }
+            return Ok(Self::Project(Box::new(project)));
+        }
+        let eni = Eni::parse(&bytes).map_err(|error| files::in_file(path, &error))?;
+        Ok(Self::Planned(Box::new(eni.plan)))
     }
 }
 
@@ -179,6 +237,7 @@ fn drive<L: Line + Send>(
     ring: bool,
     wanted: Wanted,
     options: &RunOptions,
+    image: Option<PathBuf>,
     stop: &Stop,
     said: &str,
     json: bool,
@@ -188,7 +247,10 @@ fn drive<L: Line + Send>(
     teller.line(said, output);
     let (notes, told) = mpsc::channel();
     let ended = std::thread::scope(|scope| {
-        let work = move || running::run(line, ring, wanted, Idle, options, stop, notes);
+        let work = move || match image {
+            None => running::run(line, ring, wanted, Idle, options, stop, notes),
+            Some(path) => running::run(line, ring, wanted, Shared::at(path), options, stop, notes),
+        };
         let thread = scope.spawn(work);
         for note in told {
             teller.note(&note, output);

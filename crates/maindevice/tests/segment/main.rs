@@ -11,3 +11,4 @@ mod scan;
 mod soak;
 mod software;
 mod start_up;
+mod wire_faults;

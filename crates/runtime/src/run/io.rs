@@ -19,6 +19,14 @@ pub enum Next {
 /// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
 /// sent.
 pub trait Application {
+    /// The line is about to be started: the process image has so many bytes of inputs and outputs.
+    ///
+    /// # Errors
+    /// Why it cannot be started.
+    fn begin(&mut self, _inputs: usize, _outputs: usize) -> Result<(), String> {
+        Ok(())
+    }
+
     /// One cycle: inputs are those that have just come back, outputs leave with the next frames.
     fn cycle(&mut self, io: &mut Io<'_>) -> Next;
 
@@ -53,6 +61,8 @@ pub struct Io<'a> {
     pub(crate) main: &'a mut MainDevice,
     pub(crate) now: Instant,
     pub(crate) missed: u64,
+    pub(crate) withheld: bool,
+    pub(crate) old: bool,
 }
 
 impl Io<'_> {
@@ -64,7 +74,7 @@ impl Io<'_> {
 
     /// Sets an output.
     pub fn set<T: Value>(&mut self, output: Output<T>, value: T) {
-        output.set(self.main.outputs_mut(), value);
+        output.set(self.main.image_mut(), value);
     }
 
     /// All inputs as bytes, laid out as the plan says.
@@ -75,12 +85,25 @@ impl Io<'_> {
 
     /// All outputs as bytes, laid out as the plan says.
     pub fn outputs_mut(&mut self) -> &mut [u8] {
-        self.main.outputs_mut()
+        self.main.image_mut()
     }
 
-    /// Says that the outputs are to stay as they are on purpose: they count as given anew.
-    pub fn keep_outputs(&mut self) {
-        self.main.outputs_mut();
+    /// The same, for a look at them; they count as given anew only if
+    /// [`outputs_are_old`](Self::outputs_are_old) is not called.
+    pub(crate) fn outputs_unchanged(&mut self) -> &mut [u8] {
+        self.main.image_mut()
+    }
+
+    /// Says that nobody has given outputs in this cycle. Otherwise an application that returns in time
+    /// counts as having given them, changed or not.
+    pub fn outputs_are_old(&mut self) {
+        self.old = true;
+    }
+
+    /// Whether outputs are withheld because they were not given in time.
+    #[must_use]
+    pub const fn is_withheld(&self) -> bool {
+        self.withheld
     }
 
     /// How good the process data of a SubDevice are, and how old.

@@ -111,6 +111,10 @@ pub struct Operator<A> {
 
 impl<A: Application> Operator<A> {
     fn start(&mut self, now: Instant, plan: Plan, main: &mut MainDevice) {
+        if let Err(why) = self.application.begin(plan.inputs_len, plan.outputs_len) {
+            self.failure = Some(RunError::Plan(why));
+            return;
+        }
         self.io_at = plan.tasks.first().map(|task| task.io_at).unwrap_or_default();
         let plan = Arc::new(plan);
         self.note(Note::Planned(Arc::clone(&plan)));
@@ -143,8 +147,12 @@ impl<A: Application> Operator<A> {
             return;
         }
         let missed = main.statistics().cycles_missed;
-        if self.application.cycle(&mut Io { main, now, missed }) == Next::Stop {
+        let mut io = Io { main, now, missed, withheld: self.withheld, old: false };
+        if self.application.cycle(&mut io) == Next::Stop {
             self.ended = true;
+        }
+        if !io.old && !self.application.is_idle() {
+            main.outputs_mut();
         }
     }
 }
@@ -212,6 +220,51 @@ impl<A: Application> Audience for Operator<A> {
     #[inline]
     fn late(&mut self, late: Span) {
         self.lateness.note(late);
+    }
+}
+
+/// Finds out what is on a line: it gets station addresses, and keeps its states.
+///
+/// # Errors
+/// When it does not answer, or the interface fails.
+pub fn scan<L: Line>(line: L, ring: bool, stop: &Stop) -> Result<Inventory, RunError> {
+    let mut driver = Driver::new(line, Options { ring, ..Options::default() });
+    let mut scanning = Scanning { begun: false, result: None };
+    let until = driver.now() + SCAN_PATIENCE;
+    driver.run(until, stop, &mut scanning)?;
+    let ended = "the scan was ended before it was done. Do: scan again";
+    scanning.result.unwrap_or_else(|| Err(RunError::Scan(ended.to_owned())))
+}
+
+/// Waits for the one result.
+struct Scanning {
+    begun: bool,
+    result: Option<Result<Inventory, RunError>>,
+}
+
+impl Audience for Scanning {
+    fn frame(&mut self, _: &FrameSeen<'_>) {}
+
+    fn host(&mut self, _: &HostObservation) {}
+
+    fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
+        if let Event::Scanned(inventory) = event {
+            self.result = Some(Ok(*inventory));
+        } else if let Event::ScanFailed(error) = event {
+            self.result = Some(Err(RunError::Scan(error.to_string())));
+        }
+    }
+
+    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
+        if !std::mem::replace(&mut self.begun, true) {
+            // It looks, with nothing but reads, before it writes.
+            main.scan(now);
+        }
+        self.result.is_none()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
     }
 }
 
