@@ -139,10 +139,15 @@ pub(crate) fn refuse_to_overwrite(path: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes a file that is not there yet.
+/// Writes a text file that is not there yet.
 pub(crate) fn write_new(path: &Path, what: &str, text: &str) -> Result<(), Failure> {
+    write_new_bytes(path, what, text.as_bytes())
+}
+
+/// Writes a file that is not there yet.
+pub(crate) fn write_new_bytes(path: &Path, what: &str, bytes: &[u8]) -> Result<(), Failure> {
     refuse_to_overwrite(path)?;
-    fs::write(path, text).map_err(|error| {
+    fs::write(path, bytes).map_err(|error| {
         let reason = format!("{}: writing {what}: {error}", path.display());
         Failure::new(reason, "check the rights of the directory and its free space")
     })

@@ -15,6 +15,8 @@ use super::interfaces;
 use super::lab::replay::ReplayReport;
 use super::plan::report::PlanReport;
 use super::scan::report::Scan;
+use super::sdo::report::{ListReport, ReadReport};
+use super::{foe, history, reg, service, sii, state};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::output::Output;
@@ -60,6 +62,22 @@ pub(crate) enum Name {
     Run,
     /// `interfaces --json`
     Interfaces,
+    /// `state --json`
+    States,
+    /// `sdo … read|write --json`
+    Sdo,
+    /// `sdo … list|info --json`
+    Objects,
+    /// `history --json`
+    History,
+    /// `foe --json`
+    File,
+    /// `sii --json`
+    Sii,
+    /// `reg --json`
+    Registers,
+    /// What services print with --json when the SubDevice refuses
+    Refusal,
     /// What every command with --json prints when nothing could be judged
     Error,
 }
@@ -87,6 +105,14 @@ fn schema(name: Name) -> Schema {
         Name::Control => schema_for!(Request),
         Name::Run => schema_for!(RunReport),
         Name::Interfaces => schema_for!(interfaces::Report),
+        Name::States => schema_for!(state::Report),
+        Name::Sdo => schema_for!(ReadReport),
+        Name::Objects => schema_for!(ListReport),
+        Name::History => schema_for!(history::Report),
+        Name::File => schema_for!(foe::Report),
+        Name::Sii => schema_for!(sii::Report),
+        Name::Registers => schema_for!(reg::Report),
+        Name::Refusal => schema_for!(service::RefusalReport),
         Name::Error => schema_for!(ErrorReport),
     }
 }

@@ -74,6 +74,7 @@ impl Event {
             | Self::Mailbox { .. }
             | Self::SdoUploaded { .. }
             | Self::SdoDownloaded { .. }
+            | Self::Served { .. }
             | Self::Probed { .. }
             | Self::OutputsWithheld { .. }
             | Self::OutputsResumed { .. }

@@ -18,6 +18,7 @@ use crate::exchange::{
 use crate::executor::{Executor, Wire, lock};
 use crate::mailbox::Queues;
 use crate::options::Options;
+use crate::service::Attended;
 use crate::statistics::Statistics;
 use crate::supervisor::{BringUpTimes, Line};
 
@@ -40,6 +41,9 @@ pub struct MainDevice {
     /// Probes, which outlive commands.
     aside: Wire,
     running: Option<Running>,
+    /// SubDevices that are served without being driven.
+    attended: Option<Attended>,
+    next_service: u64,
     /// How many frames of procedures may still go out in this cycle.
     acyclic_left: usize,
 }
@@ -67,6 +71,8 @@ impl MainDevice {
             control: None,
             aside,
             running: None,
+            attended: None,
+            next_service: 0,
             acyclic_left: 0,
         }
     }
