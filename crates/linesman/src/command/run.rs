@@ -16,6 +16,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
+use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{
     self as running, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
 };
@@ -112,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         (Source::Project(project), Some(path)) => {
             format!("{} SubDevices of {}", project.devices.len(), path.display())
         }
-        (Source::Eni(plan), Some(path)) => {
+        (Source::Planned(plan), Some(path)) => {
             format!("{} SubDevices of {}", plan.devices.len(), path.display())
         }
         _ => "what is there".to_owned(),
@@ -120,7 +121,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let setup = (!arguments.no_diagnosis).then(|| Setup {
         project: match &source {
             Source::Project(project) => Some((**project).clone()),
-            Source::AsFound | Source::Eni(_) => None,
+            Source::AsFound | Source::Planned(_) => None,
         },
         source: arguments.on.clone(),
         ..Setup::default()
@@ -135,7 +136,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     };
     let wanted = match source {
         Source::Project(project) => choices.project(*project),
-        Source::Eni(plan) => Wanted::Plan(plan),
+        Source::Planned(plan) => Wanted::Plan(plan),
         Source::AsFound => choices.as_found(),
     };
     let began = HostClock::start().started_at();
@@ -199,17 +200,22 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 enum Source {
     AsFound,
     Project(Box<Project>),
-    Eni(Box<Plan>),
+    Planned(Box<Plan>),
 }
 
 impl Source {
     fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = files::bytes(path, "a project or an ENI file", MOST)?;
         if !Eni::is_one(&bytes) {
-            return Ok(Self::Project(Box::new(files::project(path)?)));
+            let project = files::project(path)?;
+            // One that chooses more than who is where is planned from what it says.
+            if project.chooses() {
+                return Ok(Self::Planned(Box::new(PlanFile::open(path)?.plan)));
+            }
+            return Ok(Self::Project(Box::new(project)));
         }
         let eni = Eni::parse(&bytes).map_err(|error| files::in_file(path, &error))?;
-        Ok(Self::Eni(Box::new(eni.plan)))
+        Ok(Self::Planned(Box::new(eni.plan)))
     }
 }
 
