@@ -7,7 +7,8 @@ use linesman_proto::state::{AlState, AlStatusCode};
 use super::Event;
 
 impl Event {
-    /// What happened to a SubDevice's states, in one line or a few; nothing for all other events.
+    /// What happened to a SubDevice's states, in one line or a few; nothing for all other events, which
+    /// [`watch`](crate::watch) has words for.
     /// `name` gives the name of a SubDevice.
     ///
     /// A refused step is a pair of lines: where the SubDevice was to go and where it is, then what was
@@ -39,11 +40,6 @@ impl Event {
                 vec![format!("{}: abnormal state change (from {from} to {to}){reason}", name(*id))]
             }
             Self::TargetReached { id, state } => vec![format!("{}: {state} reached", name(*id))],
-            Self::DeviceLost { id } => vec![format!("{}: does not answer", name(*id))],
-            Self::DeviceBack { id, restarted } => {
-                let how = if *restarted { "restarted" } else { "as it was" };
-                vec![format!("{}: answers again, {how}", name(*id))]
-            }
             Self::WrongDevice { id, mismatch, expected, found } => {
                 let [expected, found] = [expected, found].map(linesman_config::identity::text);
                 vec![format!(
@@ -61,6 +57,8 @@ impl Event {
             | Self::Scanned(_)
             | Self::ScanFailed(_)
             | Self::DeviceState { .. }
+            | Self::DeviceLost { .. }
+            | Self::DeviceBack { .. }
             | Self::AllReached
             | Self::Responding { .. }
             | Self::Ring { .. }

@@ -127,12 +127,11 @@ fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
     let lines = texts(&mut watch);
     assert_eq!(
         lines[0],
-        "'Term 65 (EL1002)' (1016): state change aborted (requested 'PREOP', back to 'INIT')."
+        "'Term 65 (EL1002)' (1016): state change aborted (requested PREOP, back to INIT)"
     );
     assert!(
         lines[1].starts_with(
-            "'Term 65 (EL1002)' (1016): 'INIT to PREOP' failed! Error: 'check device state for PREOP'. AL Status \
-             '0x0011' read and '0x0002' expected. AL Status Code '0x0014 - "
+            "'Term 65 (EL1002)' (1016): INIT to PREOP failed, read 0x0011, expected 0x0002, AL 0x0014 "
         ),
         "{}",
         lines[1]
@@ -151,7 +150,7 @@ fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
     let lines = texts(&mut watch);
     assert!(
         lines[0].starts_with(
-            "'Term 66 (EL2004)' (1017): abnormal state change (from 'OP' to 'SAFEOP') with code 0x1b"
+            "'Term 66 (EL2004)' (1017): abnormal state change (from OP to SAFEOP), AL 0x001B"
         ),
         "{lines:?}"
     );

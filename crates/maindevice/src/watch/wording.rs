@@ -3,12 +3,9 @@
 //! Reference: the message texts of the sources (`facts` 3.2): state change aborted, abnormal state
 //! change, communication interrupted and re-established, SDO abort, frames missed.
 
-use linesman_config::identity;
 use linesman_config::plan::Plan;
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
-use linesman_proto::register::AlStatus;
-use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::Instant;
 
 use super::{EntryKind, LogEntry, Severity, Watch};
@@ -27,66 +24,33 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
     };
     let line = |severity, kind, text: String| LogEntry { at, severity, kind, device: None, text };
     match event {
-        Event::AbnormalState { id, from, status, code } => {
-            let reason = match *code {
-                AlStatusCode::NO_ERROR => String::new(),
-                code => format!(" with code 0x{:02x} ({})", code.value(), code.explain().name),
-            };
-            let text =
-                format!(": abnormal state change (from '{from}' to '{}'){reason}", status.state());
-            vec![about(*id, Severity::Error, EntryKind::AbnormalState, text)]
+        Event::AbnormalState { id, .. } => {
+            states(at, event, plan, Some(*id), Severity::Error, EntryKind::AbnormalState)
         }
-        Event::TargetReached { id, state } => {
-            vec![about(*id, Severity::Info, EntryKind::State, format!(" is in '{state}'"))]
+        Event::Refused { id, .. }
+        | Event::StepTimedOut { id, .. }
+        | Event::StartUpFailed { id, .. } => {
+            states(at, event, plan, Some(*id), Severity::Error, EntryKind::StateAborted)
+        }
+        Event::TargetReached { id, .. } => {
+            states(at, event, plan, Some(*id), Severity::Info, EntryKind::State)
+        }
+        Event::WrongDevice { id, .. } => {
+            states(at, event, plan, Some(*id), Severity::Error, EntryKind::Identity)
+        }
+        Event::UnplannedDevice { .. } => {
+            states(at, event, plan, None, Severity::Warning, EntryKind::Identity)
         }
         Event::AllReached => vec![line(
             Severity::Info,
             EntryKind::State,
             format!("all {} SubDevices have reached their states", plan.devices.len()),
         )],
-        Event::Refused { id, from, to, status, code } => {
-            let details = failed(*from, *to, *status, Some(*code));
-            [aborted(*to, *status), details]
-                .map(|text| about(*id, Severity::Error, EntryKind::StateAborted, text))
-                .into()
-        }
-        Event::StepTimedOut { id, from, to, status } => {
-            let details = failed(*from, *to, *status, None);
-            [aborted(*to, *status), details]
-                .map(|text| about(*id, Severity::Error, EntryKind::StateAborted, text))
-                .into()
-        }
-        Event::StartUpFailed { id, to, status, command, error } => {
-            let what = match command.comment.as_str() {
-                "" => String::new(),
-                comment => format!(" ({comment})"),
-            };
-            let details = format!(": start-up command{what}: {error}");
-            [aborted(*to, *status), details]
-                .map(|text| about(*id, Severity::Error, EntryKind::StateAborted, text))
-                .into()
-        }
         Event::DeviceBack { id, restarted } => {
             let how = if *restarted { ", after a restart" } else { "" };
             let text = format!(" Communication re-established{how}");
             vec![about(*id, Severity::Info, EntryKind::Communication, text)]
         }
-        Event::WrongDevice { id, mismatch, expected, found } => {
-            let text = format!(
-                ": another {mismatch}: expected {}, found {}",
-                identity::text(expected),
-                identity::text(found)
-            );
-            vec![about(*id, Severity::Error, EntryKind::Identity, text)]
-        }
-        Event::UnplannedDevice { position, found } => vec![line(
-            Severity::Warning,
-            EntryKind::Identity,
-            format!(
-                "a SubDevice that the plan does not have at position {position}: {}",
-                identity::text(found)
-            ),
-        )],
         Event::Responding { before, now } => {
             let severity = if now < before { Severity::Warning } else { Severity::Info };
             let text = format!("{now} SubDevices answer, {before} did before");
@@ -218,31 +182,17 @@ pub(super) fn clocks(at: Instant, apart: bool) -> LogEntry {
     LogEntry { at, severity, kind: EntryKind::Clock, device: None, text: text.into() }
 }
 
-/// Where a SubDevice is left after a step that came to nothing.
-fn aborted(to: AlState, status: AlStatus) -> String {
-    format!(": state change aborted (requested '{to}', back to '{}').", status.state())
-}
-
-/// What was asked and what was read.
-fn failed(
-    from: Option<AlState>,
-    to: AlState,
-    status: AlStatus,
-    code: Option<AlStatusCode>,
-) -> String {
-    let from = from.map_or_else(|| status.state().to_string(), |from| from.to_string());
-    let code = match code {
-        Some(code) => {
-            format!(" AL Status Code '0x{:04x} - {}'", code.value(), code.explain().name)
-        }
-        None => " It did not answer in time, and gives no code.".into(),
-    };
-    format!(
-        ": '{from} to {to}' failed! Error: 'check device state for {to}'. AL Status '0x{:04x}' read and \
-         '0x{:04x}' expected.{code}",
-        status.0,
-        AlStatus::new(to).0
-    )
+/// What [`Event::state_lines`] has words for.
+fn states(
+    at: Instant,
+    event: &Event,
+    plan: &Plan,
+    device: Option<DeviceId>,
+    severity: Severity,
+    kind: EntryKind,
+) -> Vec<LogEntry> {
+    let lines = event.state_lines(|id| name(plan, id));
+    lines.into_iter().map(|text| LogEntry { at, severity, kind, device, text }).collect()
 }
 
 /// `'Term 5 (EL3154)' (1005)`.
