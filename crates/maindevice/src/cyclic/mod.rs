@@ -427,7 +427,7 @@ impl Frame {
                 let Some(share) = shares.get_mut(owned.device.index()) else { continue };
                 // Who has inputs is told by the first datagram with some; who has none, by any.
                 let first = share.datagrams.iter().find(|one| one.2);
-                let mine = first.map_or(true, |one| (one.0, one.1) == (index, at));
+                let mine = first.is_none_or(|one| (one.0, one.1) == (index, at));
                 let stopped = mine && share.serve(least.of(owned.device).inputs, last);
                 if stopped {
                     clear_lost(plan, one, owned.device, inputs);

@@ -45,7 +45,19 @@ pub(crate) const fn withheld(command: Command) -> Command {
     match command {
         Command::Lrw => Command::Lrd,
         Command::Lwr => Command::Nop,
-        other => other,
+        Command::Nop
+        | Command::Aprd
+        | Command::Apwr
+        | Command::Aprw
+        | Command::Fprd
+        | Command::Fpwr
+        | Command::Fprw
+        | Command::Brd
+        | Command::Bwr
+        | Command::Brw
+        | Command::Lrd
+        | Command::Armw
+        | Command::Frmw => command,
     }
 }
 

@@ -36,7 +36,13 @@ pub(crate) async fn perform(
         let until = multiplexer.now();
         let patience = match protocol {
             MailboxType::Foe => patience.max(FILE_PATIENCE),
-            _ => patience,
+            MailboxType::Error
+            | MailboxType::Aoe
+            | MailboxType::Eoe
+            | MailboxType::Coe
+            | MailboxType::Soe
+            | MailboxType::Voe
+            | MailboxType::Reserved(_) => patience,
         };
         let mut dialogue = Dialogue { multiplexer, step, patience, until };
         let result = dialogue.go(request).await;

@@ -12,10 +12,13 @@ use crate::eni::sub_device::fmmus_of;
 use crate::plan::{DatagramPlan, DevicePlan, IoAt, PathView, Plan, Presence, Role, expect};
 use crate::xml_writer::Xml;
 
+/// Whose data a datagram carries.
+type Owners = Vec<(DeviceId, Direction)>;
+
 /// Where the data of each datagram lie in the file's process image: one behind the other.
 pub(super) struct Image {
     /// Logical address and first byte of each logical datagram.
-    logical: Vec<(Range<u64>, usize, Vec<(DeviceId, Direction)>)>,
+    logical: Vec<(Range<u64>, usize, Owners)>,
     /// First byte of every datagram.
     starts: Vec<usize>,
     len: usize,
