@@ -60,6 +60,10 @@ pub(crate) enum Name {
     Control,
     /// `run --json`
     Run,
+    /// A line that the control socket of `run` takes
+    ServiceRequest,
+    /// What it answers
+    Service,
     /// `interfaces --json`
     Interfaces,
     /// `state --json`
@@ -104,6 +108,8 @@ fn schema(name: Name) -> Schema {
         Name::Truth => schema_for!(TruthEvent),
         Name::Control => schema_for!(Request),
         Name::Run => schema_for!(RunReport),
+        Name::ServiceRequest => schema_for!(linesman_runtime::service::message::Request),
+        Name::Service => schema_for!(linesman_runtime::service::message::Answer),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::States => schema_for!(state::Report),
         Name::Sdo => schema_for!(ReadReport),
