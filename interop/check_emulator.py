@@ -9,7 +9,7 @@ import pathlib
 import time
 
 from bench import FAR, NEAR, parse
-from harness import LINESMAN, Skip, check, names
+from harness import Skip, check, linesman, names
 
 # What the configurations that come with it are: file, vendor, product.
 CYCLE_US = 4_000
@@ -24,7 +24,7 @@ DEVICES = [
 @check
 def linesman_scans_and_diagnoses_another_emulator(line):
     with Emulator(line):
-        status, out, err = line.run(line.near, LINESMAN, "scan", NEAR, "--json")
+        status, out, err = linesman(line, "scan", NEAR, "--json")
         assert status == 0, f"scan: status {status}: {err[-600:]}"
         scan = parse(out, err)
         found = [(device["vendor_id"], device["product_code"]) for device in scan["devices"]]
@@ -34,7 +34,7 @@ def linesman_scans_and_diagnoses_another_emulator(line):
             entry = next(port for port in device["ports"] if port["port"] == "A")
             before = {"no": device["no"] - 1, "port": "B" if device["no"] > 1 else "A"}
             assert entry["to"] == before, (device["no"], entry)
-        status, out, err = line.run(line.near, LINESMAN, "diagnose", NEAR, "--seconds", 2, "--json")
+        status, out, err = linesman(line, "diagnose", NEAR, "--seconds", 2, "--json")
         diagnosis = parse(out, err)
         assert status == 0 and diagnosis["verdict"] == "healthy", (status, diagnosis["verdict"], names(diagnosis))
         assert diagnosis["network"]["devices"] == len(DEVICES), diagnosis["network"]
@@ -44,8 +44,8 @@ def linesman_scans_and_diagnoses_another_emulator(line):
 def linesman_runs_another_emulator(line):
     """To OP, and process data that come back."""
     with Emulator(line):
-        command = [LINESMAN, "run", "--on", NEAR, "--seconds", 3, "--cycle-us", CYCLE_US, "--json"]
-        status, out, err = line.run(line.near, *command)
+        arguments = ["--on", NEAR, "--seconds", 3, "--cycle-us", CYCLE_US, "--json"]
+        status, out, err = linesman(line, "run", *arguments)
         run = parse(out, err)
         # 1: it ran, and there was something to tell of the line, such as a host that was late.
         assert status in (0, 1) and run["schema"] == "linesman.run/1", f"status {status}: {err[-600:]}"

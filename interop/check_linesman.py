@@ -4,7 +4,7 @@ import sys
 import time
 
 from bench import FAR, HERE, NEAR, Segment, Watch, parse
-from harness import CYCLE_US, CYCLES, LINE, LINESMAN, SOEM, check, names, ran
+from harness import CYCLE_US, CYCLES, LINE, LINESMAN, SOEM, check, linesman, names, ran
 from plant import VENDOR
 
 # The source address SOEM sends from.
@@ -39,7 +39,7 @@ def a_listener_beside_soem_sees_the_line_cut(line):
 @check
 def linesman_scans_the_same_line(line):
     with Segment(line, LINESMAN, LINE.file):
-        status, out, err = line.run(line.near, LINESMAN, "scan", NEAR, "--json")
+        status, out, err = linesman(line, "scan", NEAR, "--json")
         assert status == 0, f"status {status}: {err[-600:]}"
         scan = parse(out, err)
         assert scan["schema"] == "linesman.scan/1", scan["schema"]
@@ -56,7 +56,7 @@ def linesman_scans_the_same_line(line):
 @check
 def linesman_judges_the_idle_line_healthy(line):
     with Segment(line, LINESMAN, LINE.file):
-        status, out, err = line.run(line.near, LINESMAN, "diagnose", NEAR, "--seconds", 2, "--json")
+        status, out, err = linesman(line, "diagnose", NEAR, "--seconds", 2, "--json")
         diagnosis = parse(out, err)
         assert status == 0, f"status {status}, {diagnosis['verdict']}: {names(diagnosis)}"
         assert diagnosis["schema"] == "linesman.diagnosis/1"

@@ -48,8 +48,7 @@ def be_patient(master):
 def tell_axes(master, cycle_s):
     """0x60C2: value and power of ten of the time from one target to the next."""
     for slave in master.slaves:
-        # SyncManager 0 in mailbox mode: there is somebody to be told.
-        if slave._fprd(0x0804, 1, 20_000)[0] & 0x03 != 0x02:
+        if not soem_clocks.has_mailbox(slave):
             continue
         try:
             slave.sdo_write(0x60C2, 1, round(cycle_s * 1000).to_bytes(1, "little"))

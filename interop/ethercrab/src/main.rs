@@ -12,9 +12,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow, bail};
 use ethercrab::std::{ethercat_now, tx_rx_task};
 use ethercrab::subdevice_group::PreOp;
-use ethercrab::{
-    DefaultLock, MainDevice, MainDeviceConfig, PduStorage, RetryBehaviour, SubDeviceGroup, Timeouts,
-};
+use ethercrab::{DefaultLock, MainDevice, MainDeviceConfig, PduStorage, SubDeviceGroup, Timeouts};
 
 const FRAMES_MAX: usize = 16;
 const DATA_MAX: usize = PduStorage::element_size(1100);
@@ -60,18 +58,17 @@ fn micros(text: &str) -> Result<Duration> {
 fn open(interface: &str) -> Result<MainDevice<'static>> {
     let (transmit, receive, pdus) =
         STORAGE.try_split().map_err(|()| anyhow!("the storage is split already"))?;
-    // The host is no real-time system, and may be busy: what is tried is the line, not the host.
+    // The host is no real-time system, and may be busy: what is tried is the line, not the host. Frames are never sent
+    // again: of two copies that come back the second one would end the task that receives.
     let timeouts = Timeouts {
-        pdu: Duration::from_millis(200),
-        eeprom: Duration::from_secs(1),
-        mailbox_echo: Duration::from_secs(1),
-        mailbox_response: Duration::from_secs(2),
+        pdu: Duration::from_secs(3),
+        eeprom: Duration::from_secs(8),
+        mailbox_echo: Duration::from_secs(8),
+        mailbox_response: Duration::from_secs(8),
         state_transition: Duration::from_secs(10),
         ..Timeouts::default()
     };
-    let configuration =
-        MainDeviceConfig { retry_behaviour: RetryBehaviour::Count(20), ..Default::default() };
-    let maindevice = MainDevice::new(pdus, timeouts, configuration);
+    let maindevice = MainDevice::new(pdus, timeouts, MainDeviceConfig::default());
     smol::spawn(tx_rx_task(interface, transmit, receive).context(interface.to_owned())?).detach();
     Ok(maindevice)
 }
