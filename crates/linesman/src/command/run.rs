@@ -16,7 +16,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
 use linesman_runtime::run::{
-    self as running, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
+    self as running, Beside, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
 };
 use linesman_runtime::selector::Selector;
 use linesman_runtime::service::ServiceDesk;
@@ -271,9 +271,10 @@ fn drive<L: Line + Send>(
     teller.line(said, output);
     let (notes, told) = mpsc::channel();
     let ended = std::thread::scope(|scope| {
+        let beside = Beside { stop, notes, desk };
         let work = move || match image {
-            None => running::run(line, ring, wanted, Idle, options, stop, notes),
-            Some(path) => running::run(line, ring, wanted, Shared::at(path), options, stop, notes),
+            None => running::run(line, ring, wanted, Idle, options, beside),
+            Some(path) => running::run(line, ring, wanted, Shared::at(path), options, beside),
         };
         let thread = scope.spawn(work);
         for note in told {
