@@ -195,18 +195,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             stop.rings(&line.bell()).map_err(no_bell)?;
             let desk = desk(arguments.control.as_deref(), line.bell())?;
             let ring = line.count() > 1;
-            drive(
-                line,
-                ring,
-                wanted,
-                &options,
-                application,
-                desk,
-                &stop,
-                &said,
-                teller,
-                output,
-            )
+            drive(line, ring, wanted, &options, application, desk, &stop, &said, teller, output)
         }
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             let reason = format!("`{selector}`: nothing can be driven there");
