@@ -42,9 +42,9 @@ enum Command {
         #[arg(long, default_value_t = 300)]
         seconds: u64,
     },
-    /// Run the foreign MainDevices against the virtual segment (root, Linux)
     /// Measure Linesman beside other MainDevices: start to OP, CPU per cycle (root, Linux)
     BenchPeers,
+    /// Run the foreign MainDevices against the virtual segment (root, Linux)
     Interop {
         /// Only the checks whose names contain one of these
         names: Vec<String>,

@@ -13,7 +13,7 @@ use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
 use linesman_runtime::listen::is_driven;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::run::{
-    self as running, Application, Choices, MakePlan, RealTime, RunOptions, Wanted,
+    self as running, Application, Beside, Choices, MakePlan, RealTime, RunOptions, Wanted,
 };
 use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
@@ -199,8 +199,8 @@ impl Segment {
         let (notes, _) = mpsc::channel();
         let wanted = Wanted::Plan(Box::new(plan));
         let line = self.line.line();
-        let ended =
-            running::run(line, self.ring, wanted, application, &options, &self.stop, notes)?;
+        let beside = Beside { stop: &self.stop, notes, desk: None };
+        let ended = running::run(line, self.ring, wanted, application, &options, beside)?;
         match ended.error {
             Some(error) => Err(error.into()),
             None => Ok(ended.report),

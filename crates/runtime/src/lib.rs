@@ -23,5 +23,6 @@ pub mod record;
 pub mod run;
 pub mod selector;
 pub mod serve;
+pub mod service;
 pub mod stop;
 pub mod wiring;

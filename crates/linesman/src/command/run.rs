@@ -12,15 +12,17 @@ use linesman_config::project::Project;
 use linesman_diagnosis::Setup;
 use linesman_diagnosis::report::Verdict;
 use linesman_link::clock::HostClock;
+use linesman_link::socket::Bell;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
 use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{
-    self as running, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
+    self as running, Beside, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
 };
 use linesman_runtime::selector::Selector;
+use linesman_runtime::service::ServiceDesk;
 use linesman_runtime::stop::Stop;
 use linesman_runtime::wiring::Wiring;
 
@@ -82,6 +84,9 @@ pub(crate) struct Arguments {
     /// How many cycles in a row that program may give no outputs before they are withheld
     #[arg(long, value_name = "N", default_value_t = 10, requires = "image")]
     misses: u32,
+    /// Open a socket for service commands beside the run; it is there once the line is being driven
+    #[arg(long, value_name = "SOCKET")]
+    control: Option<PathBuf>,
     /// Do not judge the line meanwhile
     #[arg(long)]
     no_diagnosis: bool,
@@ -164,6 +169,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let mut line = Cards::open(names, HostClock::start())?;
             line.set_spin(Span::us(arguments.spin_us));
             stop.rings(&line.bell()).map_err(no_bell)?;
+            let desk = desk(arguments.control.as_deref(), line.bell())?;
             let real_time = Some(RealTime {
                 priority: (arguments.priority > 0).then_some(arguments.priority),
                 cpu: arguments.cpu,
@@ -177,6 +183,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
                 wanted,
                 &options,
                 application,
+                desk,
                 &stop,
                 &said,
                 teller,
@@ -186,8 +193,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Selector::Segment(path) => {
             let line = virtual_line(path, lasts.is_some())?;
             stop.rings(&line.bell()).map_err(no_bell)?;
+            let desk = desk(arguments.control.as_deref(), line.bell())?;
             let ring = line.count() > 1;
-            drive(line, ring, wanted, &options, application, &stop, &said, teller, output)
+            drive(line, ring, wanted, &options, application, desk, &stop, &said, teller, output)
         }
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             let reason = format!("`{selector}`: nothing can be driven there");
@@ -221,6 +229,16 @@ impl Source {
 
 fn no_bell(error: std::io::Error) -> Failure {
     Failure::new(format!("listening for Ctrl-C: {error}"), "")
+}
+
+/// The socket for services, if one is wanted.
+fn desk(path: Option<&Path>, bell: Bell) -> Result<Option<ServiceDesk>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    let desk = ServiceDesk::open(path, bell).map_err(|error| {
+        let reason = format!("{}: opening the socket: {error}", path.display());
+        Failure::new(reason, "name a path where nothing is, in a folder that you may write to")
+    })?;
+    Ok(Some(desk))
 }
 
 /// The diagnosis learns by which clock times are given.
@@ -260,6 +278,7 @@ fn drive<L: Line + Send>(
     wanted: Wanted,
     options: &RunOptions,
     image: Option<PathBuf>,
+    desk: Option<ServiceDesk>,
     stop: &Stop,
     said: &str,
     mut teller: Teller,
@@ -268,9 +287,10 @@ fn drive<L: Line + Send>(
     teller.line(said, output);
     let (notes, told) = mpsc::channel();
     let ended = std::thread::scope(|scope| {
+        let beside = Beside { stop, notes, desk };
         let work = move || match image {
-            None => running::run(line, ring, wanted, Idle, options, stop, notes),
-            Some(path) => running::run(line, ring, wanted, Shared::at(path), options, stop, notes),
+            None => running::run(line, ring, wanted, Idle, options, beside),
+            Some(path) => running::run(line, ring, wanted, Shared::at(path), options, beside),
         };
         let thread = scope.spawn(work);
         loop {

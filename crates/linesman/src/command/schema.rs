@@ -63,6 +63,10 @@ pub(crate) enum Name {
     Log,
     /// `run --json`
     Run,
+    /// A line that the control socket of `run` takes
+    ServiceRequest,
+    /// What it answers
+    Service,
     /// `interfaces --json`
     Interfaces,
     /// `state --json`
@@ -108,6 +112,8 @@ fn schema(name: Name) -> Schema {
         Name::Control => schema_for!(Request),
         Name::Log => schema_for!(LogReport),
         Name::Run => schema_for!(RunReport),
+        Name::ServiceRequest => schema_for!(linesman_runtime::service::message::Request),
+        Name::Service => schema_for!(linesman_runtime::service::message::Answer),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::States => schema_for!(state::Report),
         Name::Sdo => schema_for!(ReadReport),

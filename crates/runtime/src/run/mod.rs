@@ -14,7 +14,9 @@ pub mod tap;
 pub mod wanted;
 
 pub use io::{Application, Idle, Io, Next};
-pub use operator::{Ended, MakePlan, Note, Operator, RunError, RunOptions, Wanted, run, scan};
+pub use operator::{
+    Beside, Ended, MakePlan, Note, Operator, RunError, RunOptions, Wanted, run, scan,
+};
 pub use real_time::RealTime;
 pub use shared::Shared;
 pub use wanted::Choices;

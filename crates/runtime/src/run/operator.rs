@@ -19,6 +19,7 @@ use super::tap::{Tap, tap};
 use crate::drive::{Audience, Driver};
 use crate::line::Line;
 use crate::serve::lateness::Lateness;
+use crate::service::ServiceDesk;
 use crate::stop::Stop;
 
 /// How long a scan of a line may take.
@@ -107,6 +108,10 @@ pub struct Operator<A> {
     leaving: bool,
     withheld: bool,
     scan_until: Instant,
+    desk: Option<ServiceDesk>,
+    begun_at: Instant,
+    granted: Granted,
+    on: String,
 }
 
 impl<A: Application> Operator<A> {
@@ -134,6 +139,37 @@ impl<A: Application> Operator<A> {
             Ok(plan) => self.start(now, plan, main),
             Err(why) => self.failure = Some(RunError::Plan(why)),
         }
+    }
+
+    /// How the run goes.
+    fn report(&self, now: Instant, main: &MainDevice) -> RunReport {
+        let (devices, frames) = match &self.plan {
+            Some(plan) => of_plan(plan, main, now),
+            None => (Vec::new(), Vec::new()),
+        };
+        let left_out = self.tap.as_ref().map_or(0, Tap::left_out);
+        RunReport {
+            schema: SCHEMA.to_owned(),
+            error: None,
+            on: self.on.clone(),
+            time_ns: now.since(self.begun_at).as_nanos(),
+            reached_ns: self.reached_at.map(|at| at.since(self.begun_at).as_nanos()),
+            settled: main.is_settled(),
+            outputs_withheld: self.withheld,
+            devices,
+            frames,
+            responding: main.responding().map(|count| count.0),
+            counts: Counts::of(&main.statistics(), left_out),
+            lateness: self.lateness.report(),
+            host: (&self.granted).into(),
+        }
+    }
+
+    /// Takes what is asked for through the socket.
+    fn attend(&mut self, now: Instant, main: &mut MainDevice) {
+        let Some(mut desk) = self.desk.take() else { return };
+        desk.turn(now, main, |main| self.report(now, main));
+        self.desk = Some(desk);
     }
 
     /// Calls the application when it is its turn.
@@ -182,6 +218,12 @@ impl<A: Application> Audience for Operator<A> {
             Event::OutputsWithheld { .. } => self.withheld = true,
             Event::OutputsResumed { .. } => self.withheld = false,
             Event::Stopped => self.ended = true,
+            Event::Served { ticket, result, .. } => {
+                if let Some(desk) = &mut self.desk {
+                    desk.served(*ticket, result);
+                }
+                return;
+            }
             _ => {}
         }
         self.note(Note::Event(now, Box::new(event)));
@@ -207,6 +249,7 @@ impl<A: Application> Audience for Operator<A> {
                 "the scan was not done after 60 s. Do: look at the line with `linesman scan`";
             self.failure = Some(RunError::Scan(words.to_owned()));
         }
+        self.attend(now, main);
         if self.plan.is_some() && !self.leaving {
             self.call(now, main);
         }
@@ -278,6 +321,16 @@ pub struct Ended {
     pub error: Option<RunError>,
 }
 
+/// Who has a say in a run, and who is told.
+pub struct Beside<'a> {
+    /// The wish to stop.
+    pub stop: &'a Stop,
+    /// What happens.
+    pub notes: Sender<Note>,
+    /// Services for single SubDevices, asked for through a socket.
+    pub desk: Option<ServiceDesk>,
+}
+
 /// Runs a line until its time is over, `stop`, or the application has enough; then stops it: outputs
 /// to zero, SubDevices back to where they shall be left.
 ///
@@ -289,9 +342,9 @@ pub fn run<L: Line, A: Application>(
     wanted: Wanted,
     application: A,
     options: &RunOptions,
-    stop: &Stop,
-    notes: Sender<Note>,
+    beside: Beside<'_>,
 ) -> Result<Ended, RunError> {
+    let Beside { stop, notes, desk } = beside;
     let is_virtual = options.real_time.is_none();
     let (tap, judging) = match &options.diagnose {
         None => (None, None),
@@ -306,6 +359,7 @@ pub fn run<L: Line, A: Application>(
     let allowed_misses = options.allowed_misses.filter(|_| !application.is_idle());
     let settings = Options { ring, allowed_misses, ..Options::default() };
     let mut driver = Driver::new(line, settings);
+    let begun = driver.now();
     let mut operator = Operator {
         wanted: Some(wanted),
         application,
@@ -321,11 +375,15 @@ pub fn run<L: Line, A: Application>(
         leaving: false,
         withheld: false,
         scan_until: Instant::MAX,
+        desk,
+        begun_at: begun,
+        granted,
+        on: options.on.clone(),
     };
-    let begun = driver.now();
     let until = options.lasts.map_or(Instant::MAX, |lasts| begun + lasts);
     let ran = driver.run(until, stop, &mut operator);
-    let mut report = report(&operator, &mut driver, begun, &granted, &options.on);
+    let now = driver.now();
+    let mut report = operator.report(now, driver.main_mut());
     let error = match (operator.failure.take(), ran) {
         (Some(failure), _) => Some(failure),
         (None, Err(error)) => Some(error.into()),
@@ -364,34 +422,4 @@ fn leave<L: Line, A: Application>(
     let now = driver.now();
     driver.main_mut().stop(now, to);
     driver.run(now + LEAVE_PATIENCE, &nobody, operator)
-}
-
-fn report<L: Line, A: Application>(
-    operator: &Operator<A>,
-    driver: &mut Driver<L>,
-    begun: Instant,
-    granted: &Granted,
-    on: &str,
-) -> RunReport {
-    let now = driver.now();
-    let main = driver.main_mut();
-    let (devices, frames) = match &operator.plan {
-        Some(plan) => of_plan(plan, main, now),
-        None => (Vec::new(), Vec::new()),
-    };
-    RunReport {
-        schema: SCHEMA.to_owned(),
-        error: None,
-        on: on.to_owned(),
-        time_ns: now.since(begun).as_nanos(),
-        reached_ns: operator.reached_at.map(|at| at.since(begun).as_nanos()),
-        settled: main.is_settled(),
-        outputs_withheld: operator.withheld,
-        devices,
-        frames,
-        responding: main.responding().map(|count| count.0),
-        counts: Counts::of(&main.statistics(), operator.tap.as_ref().map_or(0, Tap::left_out)),
-        lateness: operator.lateness.report(),
-        host: granted.into(),
-    }
 }

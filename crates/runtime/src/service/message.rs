@@ -33,12 +33,26 @@ pub enum Request {
 /// A service. Bytes are hexadecimal, lowest first: `"0a00"`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(tag = "what", rename_all = "kebab-case")]
-#[allow(missing_docs, reason = "the fields are those of Service and MailboxRequest, explained there")]
+#[allow(
+    missing_docs,
+    reason = "the fields are those of Service and MailboxRequest, explained there"
+)]
 pub enum Asked {
     /// Fetch an object.
-    Upload { index: u16, subindex: u8, #[serde(default)] complete: bool },
+    Upload {
+        index: u16,
+        subindex: u8,
+        #[serde(default)]
+        complete: bool,
+    },
     /// Bring an object.
-    Download { index: u16, subindex: u8, #[serde(default)] complete: bool, data: String },
+    Download {
+        index: u16,
+        subindex: u8,
+        #[serde(default)]
+        complete: bool,
+        data: String,
+    },
     /// Which objects there are.
     ObjectList { list: u16 },
     /// What an object is.
@@ -46,9 +60,18 @@ pub enum Asked {
     /// What an entry is.
     DescribeEntry { index: u16, subindex: u8, values: u8 },
     /// Fetch a file.
-    ReadFile { name: String, #[serde(default)] password: u32 },
+    ReadFile {
+        name: String,
+        #[serde(default)]
+        password: u32,
+    },
     /// Bring a file.
-    WriteFile { name: String, #[serde(default)] password: u32, data: String },
+    WriteFile {
+        name: String,
+        #[serde(default)]
+        password: u32,
+        data: String,
+    },
     /// Look at its state.
     State,
     /// Take it to a state, by its number: 1, 2, 3, 4 or 8.
@@ -60,7 +83,10 @@ pub enum Asked {
     /// Write registers.
     WriteRegister { address: u16, data: String },
     /// Read the EEPROM.
-    ReadSii { #[serde(default)] whole: bool },
+    ReadSii {
+        #[serde(default)]
+        whole: bool,
+    },
     /// Write words of the EEPROM.
     WriteSii { word: u32, data: String },
 }
@@ -193,9 +219,12 @@ impl Asked {
     /// What is wrong with the request.
     pub(crate) fn service(self) -> Result<Service, String> {
         Ok(match self {
-            Self::Upload { index, subindex, complete } => Service::Mailbox(
-                MailboxRequest::Upload { object: ObjectAddress::new(index, subindex), complete },
-            ),
+            Self::Upload { index, subindex, complete } => {
+                Service::Mailbox(MailboxRequest::Upload {
+                    object: ObjectAddress::new(index, subindex),
+                    complete,
+                })
+            }
             Self::Download { index, subindex, complete, data } => {
                 let (object, data) = (ObjectAddress::new(index, subindex), from_hex(&data)?);
                 Service::Mailbox(MailboxRequest::Download { object, complete, data })
@@ -223,10 +252,9 @@ impl Asked {
             Self::ReadRegister { address, len } => {
                 Service::ReadRegister { address: RegisterAddress(address), len }
             }
-            Self::WriteRegister { address, data } => Service::WriteRegister {
-                address: RegisterAddress(address),
-                data: from_hex(&data)?,
-            },
+            Self::WriteRegister { address, data } => {
+                Service::WriteRegister { address: RegisterAddress(address), data: from_hex(&data)? }
+            }
             Self::ReadSii { whole } => Service::ReadSii { whole },
             Self::WriteSii { word, data } => {
                 Service::WriteSii { at: WordAddress(word), data: from_hex(&data)? }

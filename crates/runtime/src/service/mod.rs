@@ -14,8 +14,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use linesman_link::socket::Bell;
-use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_maindevice::MainDevice;
+use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 
