@@ -33,6 +33,16 @@ impl Event {
                     format!("{name}: {transition} failed at start-up command {command}: {error}"),
                 ]
             }
+            Self::ClocksSet { reference } => {
+                vec![format!("clocks set; station {reference} is the reference clock")]
+            }
+            Self::ClocksNotSet { error } => vec![format!("clocks not set: {error}")],
+            Self::ClockOff { id, to, difference, limit, patience } => vec![format!(
+                "{}: not taken to {to}: its clock is {difference} off the reference clock after \
+                 {patience}, expected {limit} at most; check that cyclic frames carry the time of \
+                 the reference clock, and the SubDevice's quartz (0x0932)",
+                name(*id)
+            )],
             Self::AbnormalState { id, from, status, code } => {
                 let reason = reason(*status, *code);
                 let to = status.state();

@@ -1,6 +1,7 @@
 //! A MainDevice on a virtual segment, in virtual time.
 
 mod bench;
+mod clocks;
 mod described;
 mod mailbox;
 mod ring;
