@@ -5,7 +5,9 @@
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::{SmControl, SmMode};
-use linesman_proto::sii::{Direction, Image, MailboxPair, PortKind, Protocols, SyncManagerKind};
+use linesman_proto::sii::{
+    Direction, FmmuUsage, Image, MailboxPair, PortKind, Protocols, SyncManagerKind,
+};
 
 /// A SyncManager for process data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -22,6 +24,19 @@ pub struct ProcessSyncManager {
     pub control: SmControl,
     /// There is no such SyncManager: FMMUs map registers of the controller.
     pub is_virtual: bool,
+    /// Bits of `len` that are used; 0 when all are.
+    pub bits: u16,
+}
+
+impl ProcessSyncManager {
+    /// Bits that are used.
+    #[must_use]
+    pub fn used_bits(&self) -> u32 {
+        match self.bits {
+            0 => u32::from(self.len) * 8,
+            bits => u32::from(bits),
+        }
+    }
 }
 
 /// The mailbox and the SyncManagers that serve it.
@@ -56,6 +71,48 @@ pub struct DeviceProfile {
     pub ebus_current_ma: Option<i16>,
     /// What its ports are; `None`: not said.
     pub ports: Option<PortMap<PortKind>>,
+    /// PDOs that are assigned to SyncManagers, in the order of their data.
+    pub pdos: Vec<MappedPdo>,
+    /// What its FMMUs are meant for, in their order; empty when nothing is said.
+    pub fmmus: Vec<FmmuUsage>,
+}
+
+/// A PDO as it is assigned.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MappedPdo {
+    /// The SyncManager it is assigned to.
+    pub sync_manager: u8,
+    /// Which way it flows.
+    pub direction: Direction,
+    /// Index of its mapping object.
+    pub index: u16,
+    /// Its name; may be empty.
+    pub name: String,
+    /// What it consists of.
+    pub entries: Vec<MappedEntry>,
+}
+
+/// A piece of a PDO.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MappedEntry {
+    /// Index of its object; 0 for padding.
+    pub index: u16,
+    /// Its subindex.
+    pub subindex: u8,
+    /// Its bits.
+    pub bits: u16,
+    /// Its name; may be empty.
+    pub name: String,
+    /// Its type by its name in ETG.2000; empty where nothing is said.
+    pub data_type: String,
+}
+
+impl MappedPdo {
+    /// Its length.
+    #[must_use]
+    pub fn bits(&self) -> u32 {
+        self.entries.iter().map(|entry| u32::from(entry.bits)).sum()
+    }
 }
 
 impl DeviceProfile {
@@ -78,6 +135,8 @@ impl DeviceProfile {
             device_emulation: image.configuration.device_emulation(),
             ebus_current_ma: image.ebus_current_ma(),
             ports: general.map(|general| general.ports),
+            pdos: mapped_pdos(image),
+            fmmus: image.fmmu_usages().to_vec(),
         }
     }
 
@@ -107,12 +166,41 @@ fn process_sync_managers(image: &Image) -> Vec<ProcessSyncManager> {
             if control.mode() == SmMode::Mailbox && image.mailbox().is_some() {
                 return None;
             }
-            let mapped = image.pdo_bits(index, direction).div_ceil(8);
+            let mapped = image.pdo_bits(index, direction);
             // Some images bear no PDOs; then the record's own length is all there is.
             let has_pdos = image.pdos(direction).next().is_some();
-            let len = if has_pdos { u16::try_from(mapped).ok()? } else { record.length };
+            let len =
+                if has_pdos { u16::try_from(mapped.div_ceil(8)).ok()? } else { record.length };
+            let bits = if has_pdos { u16::try_from(mapped).unwrap_or(0) } else { 0 };
             let (start, is_virtual) = (record.start, record.enable.is_virtual());
-            Some(ProcessSyncManager { index, direction, start, len, control, is_virtual })
+            Some(ProcessSyncManager { index, direction, start, len, control, is_virtual, bits })
         })
         .collect()
+}
+
+/// PDOs that the image assigns to SyncManagers.
+fn mapped_pdos(image: &Image) -> Vec<MappedPdo> {
+    let text = |at| image.text(at).unwrap_or_default().to_owned();
+    let both = [Direction::Outputs, Direction::Inputs];
+    let all = both.into_iter().flat_map(|direction| {
+        image.pdos(direction).filter_map(move |pdo| Some((direction, pdo.sync_manager?, pdo)))
+    });
+    all.map(|(direction, sync_manager, pdo)| MappedPdo {
+        sync_manager,
+        direction,
+        index: pdo.index,
+        name: text(pdo.name),
+        entries: pdo
+            .entries
+            .iter()
+            .map(|entry| MappedEntry {
+                index: entry.index,
+                subindex: entry.subindex,
+                bits: u16::from(entry.bits),
+                name: text(entry.name),
+                data_type: entry.data_type().name().unwrap_or_default().to_owned(),
+            })
+            .collect(),
+    })
+    .collect()
 }

@@ -94,6 +94,7 @@ impl Command {
 
     /// The command with this code on the wire; `None` for the reserved codes 15..=255.
     #[must_use]
+    #[inline]
     pub const fn from_code(code: u8) -> Option<Self> {
         if (code as usize) < Self::ALL.len() { Some(Self::ALL[code as usize]) } else { None }
     }
@@ -152,6 +153,7 @@ impl Command {
 
     /// The command's row of the table.
     #[must_use]
+    #[inline]
     pub const fn effect(self) -> Effect {
         use Addressing::{Broadcast, Logical, None, Position, Station};
         const fn row(addressing: Addressing, reads: bool, writes: bool) -> Effect {
@@ -178,12 +180,14 @@ impl Command {
 
     /// Whom it means.
     #[must_use]
+    #[inline]
     pub const fn addressing(self) -> Addressing {
         self.effect().addressing
     }
 
     /// Whether every controller that processes it adds one to ADP, addressed or not.
     #[must_use]
+    #[inline]
     pub const fn increments_position(self) -> bool {
         matches!(self.addressing(), Addressing::Position | Addressing::Broadcast)
     }

@@ -76,6 +76,7 @@ pub enum Wrapping {
 /// Finds the EtherCAT data of an Ethernet frame: the wrapping, and the offset of the two-byte
 /// EtherCAT header. `None` when the frame carries something else or ends before it.
 #[must_use]
+#[inline]
 pub fn locate(frame: &[u8]) -> Option<(Wrapping, usize)> {
     let mut at = 12;
     let mut tagged = false;
@@ -108,6 +109,7 @@ fn locate_udp(frame: &[u8], ip: usize) -> Option<(Wrapping, usize)> {
     matches.then_some((Wrapping::Udp, udp + 8))
 }
 
+#[inline]
 fn read_be(frame: &[u8], at: usize) -> Option<u16> {
     Some(u16::from_be_bytes([*frame.get(at)?, *frame.get(at + 1)?]))
 }

@@ -18,24 +18,28 @@ impl Instant {
 
     /// The point `nanos` ns after the start of the run.
     #[must_use]
+    #[inline]
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
     /// Nanoseconds since the start of the run.
     #[must_use]
+    #[inline]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
 
     /// Time passed since `earlier`; zero when `earlier` is in fact later.
     #[must_use]
+    #[inline]
     pub const fn since(self, earlier: Self) -> Span {
         Span(self.0.saturating_sub(earlier.0))
     }
 
     /// This point moved back by `span`, not beyond the start of the run.
     #[must_use]
+    #[inline]
     pub const fn before(self, span: Span) -> Self {
         Self(self.0.saturating_sub(span.0))
     }
@@ -51,6 +55,7 @@ impl Span {
 
     /// `nanos` nanoseconds.
     #[must_use]
+    #[inline]
     pub const fn ns(nanos: u64) -> Self {
         Self(nanos)
     }
@@ -75,6 +80,7 @@ impl Span {
 
     /// The length in nanoseconds.
     #[must_use]
+    #[inline]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
@@ -87,6 +93,7 @@ impl Span {
 
     /// This length less `other`, not below zero.
     #[must_use]
+    #[inline]
     pub const fn saturating_sub(self, other: Self) -> Self {
         Self(self.0.saturating_sub(other.0))
     }
@@ -94,12 +101,14 @@ impl Span {
 
 impl Add<Span> for Instant {
     type Output = Self;
+    #[inline]
     fn add(self, span: Span) -> Self {
         Self(self.0.saturating_add(span.0))
     }
 }
 
 impl AddAssign<Span> for Instant {
+    #[inline]
     fn add_assign(&mut self, span: Span) {
         *self = *self + span;
     }
@@ -107,6 +116,7 @@ impl AddAssign<Span> for Instant {
 
 impl Sub<Span> for Instant {
     type Output = Self;
+    #[inline]
     fn sub(self, span: Span) -> Self {
         self.before(span)
     }
@@ -114,12 +124,14 @@ impl Sub<Span> for Instant {
 
 impl Add for Span {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self(self.0.saturating_add(other.0))
     }
 }
 
 impl AddAssign for Span {
+    #[inline]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
@@ -127,6 +139,7 @@ impl AddAssign for Span {
 
 impl Mul<u64> for Span {
     type Output = Self;
+    #[inline]
     fn mul(self, factor: u64) -> Self {
         Self(self.0.saturating_mul(factor))
     }

@@ -26,6 +26,7 @@ pub struct WireFrame {
 impl WireFrame {
     /// Time from the first bit of the preamble to the last bit of the check sequence.
     #[must_use]
+    #[inline]
     pub fn duration(&self) -> Span {
         let len = self.bytes.len().max(MIN_LEN) + PREAMBLE_LEN + FCS_LEN;
         Span::ns(len as u64 * BYTE_NS)
@@ -57,6 +58,7 @@ pub struct Damage {
 impl Damage {
     /// Whether a receiver would accept the frame.
     #[must_use]
+    #[inline]
     pub const fn is_intact(self) -> bool {
         !self.fcs_bad && !self.marked && !self.cut_off
     }

@@ -215,6 +215,10 @@ fn names(element: &Element) -> Result<Vec<(u32, String)>, EsiError> {
 /// What its ports are: attribute `Physics`, a letter for each from A on, a blank for one that is not
 /// there; else `Info/Port`. `Y` is for cables, `K` the E-bus; `H` is a fast hot connect port.
 fn ports(element: &Element) -> Result<PortMap<PortKind>, EsiError> {
+    // White space at the ends of an attribute stands for ports, too.
+    if let Some(letters) = element.raw("Physics").filter(|text| !text.trim().is_empty()) {
+        return physics(letters).map_err(|reason| element.error(reason));
+    }
     let mut ports = PortMap::default();
     let mut put = |place: usize, kind| match ports.0.get_mut(place) {
         Some(port) => {
@@ -223,23 +227,6 @@ fn ports(element: &Element) -> Result<PortMap<PortKind>, EsiError> {
         }
         None => Err(element.error("more than four ports")),
     };
-    // White space at the ends of an attribute stands for ports, too.
-    if let Some(physics) = element.raw("Physics").filter(|text| !text.trim().is_empty()) {
-        for (place, letter) in physics.chars().enumerate() {
-            let kind = match letter {
-                'Y' | 'y' | 'L' => PortKind::Mii,
-                'K' | 'k' => PortKind::EBus,
-                'H' | 'h' => PortKind::FastHotConnect,
-                ' ' | '-' => PortKind::None,
-                other => {
-                    let reason = format!("Physics \"{physics}\": '{other}', expected Y, K or H");
-                    return Err(element.error(reason));
-                }
-            };
-            put(place, kind)?;
-        }
-        return Ok(ports);
-    }
     let listed = element.child("Info").into_iter().flat_map(|info| info.children("Port"));
     for (place, port) in listed.enumerate() {
         let kind = match port.child_text("Type") {
@@ -248,6 +235,24 @@ fn ports(element: &Element) -> Result<PortMap<PortKind>, EsiError> {
             _ => PortKind::None,
         };
         put(place, kind)?;
+    }
+    Ok(ports)
+}
+
+/// The ports that the letters of `Physics` stand for.
+pub(crate) fn physics(letters: &str) -> Result<PortMap<PortKind>, String> {
+    let mut ports = PortMap::default();
+    for (place, letter) in letters.chars().enumerate() {
+        let kind = match letter {
+            'Y' | 'y' | 'L' => PortKind::Mii,
+            'K' | 'k' => PortKind::EBus,
+            'H' | 'h' => PortKind::FastHotConnect,
+            ' ' | '-' => PortKind::None,
+            other => {
+                return Err(format!("Physics \"{letters}\": '{other}', expected Y, K or H"));
+            }
+        };
+        *ports.0.get_mut(place).ok_or("more than four ports")? = kind;
     }
     Ok(ports)
 }

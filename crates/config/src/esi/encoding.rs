@@ -11,7 +11,7 @@ const DECLARATION: usize = 200;
 
 /// The text of a file. Bytes that are not of their encoding become replacement characters: they are
 /// found in comments and translated names of working files.
-pub(super) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, EsiError> {
+pub(crate) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, EsiError> {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         return Ok(encoding.decode_without_bom_handling(&bytes[mark..]).0);
     }

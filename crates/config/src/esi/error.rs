@@ -13,12 +13,12 @@ pub struct EsiError {
 }
 
 impl EsiError {
-    pub(super) fn new(line: u32, element: &str, reason: impl Into<String>) -> Self {
+    pub(crate) fn new(line: u32, element: &str, reason: impl Into<String>) -> Self {
         Self { line, element: element.to_owned(), reason: reason.into() }
     }
 
     /// The same, seen from the element around it.
-    pub(super) fn within(mut self, outer: &str) -> Self {
+    pub(crate) fn within(mut self, outer: &str) -> Self {
         self.element = format!("{outer}/{}", self.element);
         self
     }

@@ -16,9 +16,9 @@ pub mod module;
 pub mod pdo;
 pub mod sync_manager;
 
-mod encoding;
-mod value;
-mod xml;
+pub(crate) mod encoding;
+pub(crate) mod value;
+pub(crate) mod xml;
 
 pub use clock::EsiOpMode;
 pub use device::EsiDevice;

@@ -3,7 +3,7 @@
 //! Reference: ETG.2000, HexDecValue: `#x1A00`, or decimal.
 
 /// A number: decimal, `#x1A00`, or `0x1A00`, as some tools write it.
-pub(super) fn number<T: TryFrom<i64>>(text: &str) -> Result<T, String> {
+pub(crate) fn number<T: TryFrom<i64>>(text: &str) -> Result<T, String> {
     let text = text.trim();
     let (minus, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
@@ -23,7 +23,7 @@ pub(super) fn number<T: TryFrom<i64>>(text: &str) -> Result<T, String> {
 }
 
 /// Yes or no.
-pub(super) fn flag(text: &str) -> Result<bool, String> {
+pub(crate) fn flag(text: &str) -> Result<bool, String> {
     match text.trim() {
         "1" | "true" | "True" | "TRUE" => Ok(true),
         "0" | "false" | "False" | "FALSE" | "" => Ok(false),
@@ -32,7 +32,7 @@ pub(super) fn flag(text: &str) -> Result<bool, String> {
 }
 
 /// Bytes, two digits each; white space between them does not count.
-pub(super) fn bytes(text: &str) -> Result<Vec<u8>, String> {
+pub(crate) fn bytes(text: &str) -> Result<Vec<u8>, String> {
     let digits: Vec<u32> = text
         .chars()
         .filter(|letter| !letter.is_whitespace())
@@ -46,7 +46,7 @@ pub(super) fn bytes(text: &str) -> Result<Vec<u8>, String> {
 }
 
 /// The beginning of a text, for messages.
-pub(super) fn shortened(text: &str) -> String {
+pub(crate) fn shortened(text: &str) -> String {
     const LETTERS: usize = 40;
     let mut short: String = text.trim().chars().take(LETTERS).collect();
     if text.trim().chars().count() > LETTERS {

@@ -30,68 +30,68 @@ const IGNORED: [&str; 7] = [
 
 /// An element with everything in it.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Element {
-    pub(super) name: String,
+pub(crate) struct Element {
+    pub(crate) name: String,
     /// Where it begins, from 1.
-    pub(super) line: u32,
+    pub(crate) line: u32,
     attributes: Vec<(String, String)>,
     text: String,
-    pub(super) children: Vec<Element>,
+    pub(crate) children: Vec<Element>,
 }
 
 impl Element {
     /// Its text, without white space around it.
-    pub(super) fn text(&self) -> &str {
+    pub(crate) fn text(&self) -> &str {
         self.text.trim()
     }
 
     /// An attribute, without white space around it.
-    pub(super) fn attribute(&self, name: &str) -> Option<&str> {
+    pub(crate) fn attribute(&self, name: &str) -> Option<&str> {
         self.raw(name).map(str::trim)
     }
 
     /// An attribute as it is written.
-    pub(super) fn raw(&self, name: &str) -> Option<&str> {
+    pub(crate) fn raw(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str())
     }
 
     /// The first child of this name.
-    pub(super) fn child(&self, name: &str) -> Option<&Self> {
+    pub(crate) fn child(&self, name: &str) -> Option<&Self> {
         self.children.iter().find(|child| child.name == name)
     }
 
     /// All children of this name.
-    pub(super) fn children<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Self> {
+    pub(crate) fn children<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Self> {
         self.children.iter().filter(move |child| child.name == name)
     }
 
     /// The child at the end of a path such as `Info/Electrical`.
-    pub(super) fn at(&self, path: &str) -> Option<&Self> {
+    pub(crate) fn at(&self, path: &str) -> Option<&Self> {
         path.split('/').try_fold(self, |element, name| element.child(name))
     }
 
     /// The text of a child; empty when it is not there.
-    pub(super) fn child_text(&self, name: &str) -> &str {
+    pub(crate) fn child_text(&self, name: &str) -> &str {
         self.child(name).map_or("", Self::text)
     }
 
-    pub(super) fn error(&self, reason: impl Into<String>) -> EsiError {
+    pub(crate) fn error(&self, reason: impl Into<String>) -> EsiError {
         EsiError::new(self.line, &self.name, reason)
     }
 
     /// Its text as a number.
-    pub(super) fn number<T: TryFrom<i64>>(&self) -> Result<T, EsiError> {
+    pub(crate) fn number<T: TryFrom<i64>>(&self) -> Result<T, EsiError> {
         value::number(self.text()).map_err(|reason| self.error(reason))
     }
 
     /// The text of a child as a number; `None` when it is not there or empty.
-    pub(super) fn child_number<T: TryFrom<i64>>(&self, name: &str) -> Result<Option<T>, EsiError> {
+    pub(crate) fn child_number<T: TryFrom<i64>>(&self, name: &str) -> Result<Option<T>, EsiError> {
         let child = self.child(name).filter(|child| !child.text().is_empty());
         child.map(Self::number).transpose().map_err(|error| error.within(&self.name))
     }
 
     /// An attribute as a number; `None` when it is not there or empty.
-    pub(super) fn attribute_number<T: TryFrom<i64>>(
+    pub(crate) fn attribute_number<T: TryFrom<i64>>(
         &self,
         name: &str,
     ) -> Result<Option<T>, EsiError> {
@@ -101,7 +101,7 @@ impl Element {
     }
 
     /// An attribute as yes or no; no when it is not there.
-    pub(super) fn flag(&self, name: &str) -> Result<bool, EsiError> {
+    pub(crate) fn flag(&self, name: &str) -> Result<bool, EsiError> {
         let Some(text) = self.attribute(name) else { return Ok(false) };
         value::flag(text)
             .map_err(|reason| EsiError::new(self.line, &format!("{}@{name}", self.name), reason))
@@ -109,7 +109,7 @@ impl Element {
 
     /// The text in the language of `locale` (1033 is English), else that without a language, else the
     /// first.
-    pub(super) fn in_language<'a>(&'a self, name: &'a str, locale: &str) -> &'a str {
+    pub(crate) fn in_language<'a>(&'a self, name: &'a str, locale: &str) -> &'a str {
         let all = || self.children(name);
         let wanted = all().find(|child| child.attribute("LcId") == Some(locale));
         let plain = || all().find(|child| child.attribute("LcId").is_none());
@@ -118,11 +118,11 @@ impl Element {
 }
 
 /// Takes an element with the names of what is around it.
-pub(super) type Found<'a> = dyn FnMut(&[String], Element) -> Result<(), EsiError> + 'a;
+pub(crate) type Found<'a> = dyn FnMut(&[String], Element) -> Result<(), EsiError> + 'a;
 
 /// Goes through a file. Elements whose path is in `containers` are only walked through; every other
 /// one within them is handed to `found`, with the names of what is around it.
-pub(super) fn walk(
+pub(crate) fn walk(
     text: &str,
     containers: &dyn Fn(&[String]) -> bool,
     found: &mut Found<'_>,

@@ -156,6 +156,14 @@ impl Plan {
         }
     }
 
+    /// Whose clock all others follow: the one that was chosen, else the first with a clock that is used.
+    #[must_use]
+    pub fn reference_clock(&self) -> Option<DeviceId> {
+        let clocked = || self.devices.iter().filter(|device| device.settings.clock.is_some());
+        let chosen = |device: &&DevicePlan| device.settings.clock.is_some_and(|one| one.reference);
+        clocked().find(chosen).or_else(|| clocked().next()).map(|device| device.id)
+    }
+
     /// The plan of a SubDevice; `None` for an identity that is not of this plan.
     #[must_use]
     pub fn device(&self, id: DeviceId) -> Option<&DevicePlan> {

@@ -23,6 +23,7 @@ fn device() -> PlannedDevice {
         len: 1,
         control: SmControl::OUTPUTS,
         is_virtual: false,
+        bits: 0,
     };
     PlannedDevice {
         name: "both ways".to_owned(),

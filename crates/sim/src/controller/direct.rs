@@ -41,22 +41,18 @@ pub(crate) struct Manner {
 
 /// Until when sampling again would change nothing.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sampling {
-    again: SampleAgain,
-    /// [`Signals::edition`] at the last sample.
-    seen: u64,
-}
+pub(super) struct Sampling(SampleAgain);
 
 impl Default for Sampling {
     fn default() -> Self {
-        Self { again: SampleAgain::NextFrame, seen: 0 }
+        Self(SampleAgain::NextFrame)
     }
 }
 
 impl Sampling {
     /// Something happened: the next frame samples.
     pub(super) fn renew(&mut self) {
-        self.again = SampleAgain::NextFrame;
+        self.0 = SampleAgain::NextFrame;
     }
 }
 
@@ -128,29 +124,35 @@ impl Controller {
 
     // ---- sampling ----
 
-    /// From when on sampling could change anything, as long as signals stay as they are and nothing
-    /// happens to the controller; [`Instant::MAX`] for never.
+    /// From when on sampling could change anything, as long as nothing happens to the controller and
+    /// none of the signals changes that it listens to; [`Instant::MAX`] for never.
     #[inline]
-    pub(crate) fn wants_sample(&self, signals: &Signals) -> Instant {
+    pub(crate) fn wants_sample(&self) -> Instant {
         if self.core.processor_stuck {
             return Instant::MAX;
         }
-        match self.sampling.again {
+        match self.sampling.0 {
             SampleAgain::NextFrame => Instant::ZERO,
             SampleAgain::From(from) => from,
-            SampleAgain::OnceSignalsChange if self.sampling.seen == signals.edition() => {
-                Instant::MAX
-            }
-            SampleAgain::OnceSignalsChange => Instant::ZERO,
+            SampleAgain::OnceSignalsChange => Instant::MAX,
         }
+    }
+
+    /// Whether it waits for a signal to change before it samples again.
+    pub(crate) fn waits_for_signals(&self) -> bool {
+        self.sampling.0 == SampleAgain::OnceSignalsChange
+    }
+
+    /// A signal has changed that it listens to.
+    pub(crate) fn hear(&mut self) {
+        self.sampling.renew();
     }
 
     /// A frame begins at `at`: the device behind samples its inputs.
     pub(crate) fn sample(&mut self, at: Instant, signals: &mut Signals) {
         let mut pdi = Pdi { core: &mut self.core, signals, now: at };
         self.firmware.sample(at, &mut pdi);
-        let again = self.firmware.sample_again(&pdi);
-        self.sampling = Sampling { again, seen: signals.edition() };
+        self.sampling = Sampling(self.firmware.sample_again(&pdi));
         self.core.rescheduled = true;
     }
 
@@ -185,6 +187,12 @@ impl Controller {
         if std::mem::take(&mut self.core.rescheduled) {
             self.reschedule();
         }
+    }
+
+    /// A short read without effect of whose answer only the OR with that of others counts.
+    #[inline]
+    pub(crate) fn peek(&self, read: &PlainRead, gathered: &mut u64) -> Answer {
+        read.peek(&self.core, gathered)
     }
 
     /// A read without effect.

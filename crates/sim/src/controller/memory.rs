@@ -115,6 +115,7 @@ impl Memory {
         self.registers[at(register)] = value;
     }
 
+    #[inline]
     pub(super) fn u16(&self, register: &Register) -> u16 {
         u16::from_le_bytes(self.array(at(register)))
     }
@@ -140,10 +141,9 @@ impl Memory {
     }
 
     /// `N` bytes from `address`, which must be a register's: those are always there.
+    #[inline]
     pub(super) fn array<const N: usize>(&self, address: usize) -> [u8; N] {
-        let mut array = [0; N];
-        array.copy_from_slice(&self.registers[address..address + N]);
-        array
+        self.registers[address..].first_chunk().copied().unwrap_or([0; N])
     }
 
     /// Puts bytes into registers.
@@ -178,6 +178,8 @@ impl Rights {
     pub(super) const CONDITIONAL: u8 = 1 << 2;
     /// What is written is not what it holds then: a write is a command.
     pub(super) const LIVE: u8 = 1 << 3;
+    /// [`Rights::READ`] for each byte of a word.
+    pub(super) const ANY_READ: u64 = u64::from_ne_bytes([Self::READ; 8]);
 
     pub(super) fn of(hardware: &Hardware, units: ClockUnits) -> Self {
         let mut rights = [0; RAM];
@@ -187,6 +189,12 @@ impl Rights {
 
     pub(super) fn byte(&self, address: usize) -> u8 {
         self.0[address]
+    }
+
+    /// Those of eight bytes, the first lowest.
+    #[inline]
+    pub(super) fn word(&self, address: usize) -> u64 {
+        self.0[address..].first_chunk().copied().map_or(0, u64::from_le_bytes)
     }
 
     /// Whether any byte of the range has one of these rights.

@@ -26,6 +26,8 @@ const PLAIN: [Range<usize>; 7] = [
 #[derive(Clone, Debug)]
 pub(crate) struct PlainRead {
     range: Range<usize>,
+    /// One bit for each bit of a word that it reads; 0 when it reads more than a word.
+    mask: u64,
     /// Events that go away with this read. While one stands the read is not without effect.
     clears: u16,
 }
@@ -57,7 +59,29 @@ impl PlainRead {
         if touches(&range, &r::AL_STATUS) {
             clears |= EcatEvents::AL_STATUS.0;
         }
-        Some(Self { range, clears })
+        let mask = if len > 8 { 0 } else { u64::MAX >> (64 - 8 * len) };
+        Some(Self { range, mask, clears })
+    }
+
+    /// Whether it reads no more than a word of 8 bytes: [`PlainRead::peek`] can be used.
+    #[inline]
+    pub(crate) fn is_short(&self) -> bool {
+        self.mask != 0
+    }
+
+    /// Reads from a controller and ORs its bytes into a word, the first lowest.
+    #[inline]
+    pub(super) fn peek(&self, core: &Core, gathered: &mut u64) -> Answer {
+        // What is plain ends far below the RAM: there is a whole word of registers.
+        let word = u64::from_le_bytes(core.memory.array(self.range.start)) & self.mask;
+        if core.rights.word(self.range.start) & self.mask & Rights::ANY_READ == 0 {
+            return Answer::Nothing;
+        }
+        if self.clears != 0 && core.memory.u16(&r::ECAT_EVENT_REQUEST) & self.clears != 0 {
+            return Answer::Effect;
+        }
+        *gathered |= word;
+        Answer::Read
     }
 
     /// Reads from a controller, or ORs its bytes in.

@@ -145,6 +145,12 @@ impl Firmware for Emulated {
         if guards.any(buffered) { SampleAgain::NextFrame } else { SampleAgain::OnceSignalsChange }
     }
 
+    fn listens_to(&self) -> Vec<SignalId> {
+        let inputs = self.inputs.iter().flat_map(|area| &area.signals).copied();
+        let stamped = self.time_stamps.signals();
+        inputs.chain(self.words.iter().map(|word| word.signal)).chain(stamped).collect()
+    }
+
     fn identify(&mut self, id: u16, signals: &mut Signals) -> bool {
         if let Some(signal) = self.coding_switch {
             signals.set(signal, i32::from(id));

@@ -8,8 +8,8 @@ use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
-use super::firmware::Firmware;
-use super::signal::Signals;
+use super::firmware::{Firmware, SampleAgain};
+use super::signal::{SignalId, Signals};
 use super::trouble::Trouble;
 use crate::controller::{Pdi, SiiRequest, SyncSignal};
 
@@ -97,6 +97,14 @@ impl Firmware for EmulatedSii {
 
     fn sample(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.inner.sample(now, pdi);
+    }
+
+    fn sample_again(&self, pdi: &Pdi<'_>) -> SampleAgain {
+        self.inner.sample_again(pdi)
+    }
+
+    fn listens_to(&self) -> Vec<SignalId> {
+        self.inner.listens_to()
     }
 
     fn synchronises(&self) -> bool {

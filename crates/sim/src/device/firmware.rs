@@ -9,7 +9,7 @@ use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
-use super::signal::Signals;
+use super::signal::{SignalId, Signals};
 use super::trouble::Trouble;
 use crate::controller::{Pdi, SyncSignal};
 
@@ -20,7 +20,7 @@ pub enum SampleAgain {
     NextFrame,
     /// With the first frame from this instant on.
     From(Instant),
-    /// Once any signal has another value.
+    /// Once any of the signals that it listens to has another value.
     OnceSignalsChange,
 }
 
@@ -54,6 +54,12 @@ pub trait Firmware: Debug + Send {
     /// anew. Who does not know says "with the next frame".
     fn sample_again(&self, _pdi: &Pdi<'_>) -> SampleAgain {
         SampleAgain::NextFrame
+    }
+
+    /// The signals on which what it samples depends, for one that says
+    /// [`SampleAgain::OnceSignalsChange`].
+    fn listens_to(&self) -> Vec<SignalId> {
+        Vec::new()
     }
 
     /// Whether it plays the EEPROM (S1 11.2.4): then it answers

@@ -15,16 +15,27 @@ impl SignalId {
 ///
 /// A digital signal is 0 or 1; what the number of an analogue one means (digits, mV, …) is agreed
 /// between the devices that share it.
-#[derive(Clone, PartialEq, Eq, Default, Debug)]
+#[derive(Clone, Default, Debug)]
 pub struct Signals {
     values: Vec<Option<i32>>,
     /// When each changed last.
     changed: Vec<Instant>,
     /// When what happens now happens.
     now: Instant,
-    /// Counts changes of values.
-    edition: u64,
+    /// Signals that changed since they were last asked for, each once.
+    fresh: Vec<SignalId>,
+    /// Whether a signal is among them.
+    is_fresh: Vec<bool>,
 }
+
+/// Who was told of a change already is no property of a signal.
+impl PartialEq for Signals {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.values, &self.changed, self.now) == (&other.values, &other.changed, other.now)
+    }
+}
+
+impl Eq for Signals {}
 
 impl Signals {
     /// `count` signals, all 0 and driven by nothing.
@@ -34,7 +45,8 @@ impl Signals {
             values: vec![None; count],
             changed: vec![Instant::ZERO; count],
             now: Instant::ZERO,
-            edition: 0,
+            fresh: Vec::new(),
+            is_fresh: vec![false; count],
         }
     }
 
@@ -42,6 +54,7 @@ impl Signals {
     pub fn add(&mut self) -> SignalId {
         self.values.push(None);
         self.changed.push(Instant::ZERO);
+        self.is_fresh.push(false);
         SignalId((self.values.len() - 1) as u32)
     }
 
@@ -69,7 +82,6 @@ impl Signals {
             && *slot != Some(value)
         {
             *slot = Some(value);
-            self.edition += 1;
             self.note_change(signal);
         }
     }
@@ -79,7 +91,6 @@ impl Signals {
         if let Some(slot) = self.values.get_mut(signal.0 as usize)
             && slot.take().is_some()
         {
-            self.edition += 1;
             self.note_change(signal);
         }
     }
@@ -100,12 +111,21 @@ impl Signals {
         if let Some(changed) = self.changed.get_mut(signal.0 as usize) {
             *changed = self.now;
         }
+        if let Some(is_fresh) = self.is_fresh.get_mut(signal.0 as usize)
+            && !std::mem::replace(is_fresh, true)
+        {
+            self.fresh.push(signal);
+        }
     }
 
-    /// A number that changes whenever any signal does.
-    #[must_use]
-    pub fn edition(&self) -> u64 {
-        self.edition
+    /// A signal that has changed since it was last told of; each is told once.
+    #[inline]
+    pub(crate) fn take_fresh(&mut self) -> Option<SignalId> {
+        let signal = self.fresh.pop()?;
+        if let Some(is_fresh) = self.is_fresh.get_mut(signal.0 as usize) {
+            *is_fresh = false;
+        }
+        Some(signal)
     }
 
     /// Its value, if anything has driven it yet: a wire that nothing is connected to says nothing.
@@ -139,8 +159,10 @@ mod tests {
         assert_eq!(signals.changed_at(added), Instant::ZERO, "the same value is no change");
         signals.at(later).release(added);
         assert_eq!((signals.driven(added), signals.changed_at(added)), (None, later));
+        assert_eq!((signals.take_fresh(), signals.take_fresh()), (Some(added), None));
         signals.set(SignalId(9), 1);
         signals.release(SignalId(9));
+        assert_eq!(signals.take_fresh(), None);
         assert_eq!(signals.value(SignalId(9)), 0, "a signal that leads nowhere reads low");
     }
 }

@@ -1,6 +1,6 @@
 //! From a file to a segment.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use linesman_config::attachment::Attachment;
 use linesman_config::project::{ProjectError, Ring};
@@ -11,7 +11,6 @@ use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
-use super::arrivals::Arrivals;
 use super::turn::turn;
 use super::{DeviceInfo, Segment, exchange, identification};
 use crate::controller::{Controller, ControllerKinds, LocalClock};
@@ -168,28 +167,14 @@ fn assemble(
     }
     world.plug_noise =
         PlugNoise::new(file.noise_at_link_up.unwrap_or(0.0), seed.stream("plug noise"));
-    let nodes: BTreeMap<DeviceId, usize> =
-        placed.iter().enumerate().map(|(node, one)| (one.id, node)).collect();
     let current = |one: &Placed| one.planned.kind.ebus_current_ma();
     let mut segment = Segment {
         supplies: file.supplies.clone(),
         ebus_ma: placed.iter().map(current).collect(),
         fed_anew: placed.iter().map(|one| one.planned.fed_anew).collect(),
         groups: exchange::groups(file, &placed),
-        name: file.name.clone(),
-        tree,
-        world,
         seed,
-        devices,
-        nodes,
-        names,
-        now: Instant::ZERO,
-        arrivals: Arrivals::default(),
-        unplugged: BTreeMap::new(),
-        strange: BTreeSet::new(),
-        spare: Vec::new(),
-        waiting: super::late::Waiting::default(),
-        tally: super::FrameTally::default(),
+        ..Segment::of_world(&file.name, tree, world, devices, names)
     };
     if file.old_counters {
         age(&mut segment);

@@ -60,14 +60,10 @@ pub(crate) struct Card {
     pub(super) lateness: Lateness,
     /// Changes of the carrier that are known, in the order of time.
     carrier: Vec<(Instant, bool)>,
-    /// Frames that the host keeps back before it sends them, in the order of time.
-    delays: VecDeque<(Instant, Span, FaultId)>,
     /// Frames that the host loses after they came back, in the order of time.
     drops: VecDeque<(Instant, FaultId)>,
     /// When the last frame has left.
     pub(crate) sent_until: Instant,
-    /// When a frame that was kept back has left.
-    pub(crate) kept_until: Instant,
 }
 
 impl Default for Card {
@@ -80,10 +76,8 @@ impl Default for Card {
             silent: Vec::new(),
             lateness: Lateness::default(),
             carrier: Vec::new(),
-            delays: VecDeque::new(),
             drops: VecDeque::new(),
             sent_until: Instant::ZERO,
-            kept_until: Instant::ZERO,
         }
     }
 }
@@ -93,19 +87,8 @@ impl Card {
         self.carrier.push((at, up));
     }
 
-    pub(crate) fn delay_next(&mut self, from: Instant, by: Span, fault: FaultId) {
-        self.delays.push_back((from, by, fault));
-    }
-
     pub(crate) fn drop_next(&mut self, from: Instant, fault: FaultId) {
         self.drops.push_back((from, fault));
-    }
-
-    /// How long a frame that is sent at `now` is kept back, if it is.
-    #[inline]
-    pub(crate) fn delayed(&mut self, now: Instant) -> Option<(Span, FaultId)> {
-        let (_, by, fault) = self.delays.pop_front_if(|(from, ..)| *from <= now)?;
-        Some((by, fault))
     }
 
     /// Who makes the host lose a frame that arrives at `now`, if anyone does.
@@ -116,10 +99,11 @@ impl Card {
 
     /// A fault is healed: what still waits for a frame goes with it.
     pub(crate) fn disarm(&mut self, fault: FaultId) {
-        self.delays.retain(|(.., by)| *by != fault);
+        self.delay_no_more(fault);
         self.drops.retain(|(_, by)| *by != fault);
     }
 
+    #[inline]
     pub(crate) fn has_carrier(&self, at: Instant) -> bool {
         let known = self.carrier.iter().rev().find(|(since, _)| *since <= at);
         known.map_or(self.counts.carrier, |(_, up)| *up)
@@ -141,13 +125,21 @@ impl Card {
     }
 
     /// Whose doing it is that it sends nothing at an instant.
+    #[inline]
     pub(crate) fn silenced_by(&self, at: Instant) -> Option<FaultId> {
         let silent = self.silent.iter().find(|(from, until, _)| (*from..*until).contains(&at));
         silent.map(|(_, _, fault)| *fault)
     }
 
     /// Makes the changes of the carrier up to `now`.
+    #[inline]
     pub(crate) fn settle(&mut self, now: Instant) {
+        if !self.carrier.is_empty() {
+            self.change_carrier(now);
+        }
+    }
+
+    fn change_carrier(&mut self, now: Instant) {
         let due = self.carrier.partition_point(|(at, _)| *at <= now);
         for (_, up) in self.carrier.drain(..due) {
             if self.counts.carrier != up {

@@ -1,23 +1,30 @@
 //! Frames that a card sends later than it was told to: a busy host, a queue.
+//!
+//! A host keeps back a single frame now and then, or all of them by so much for a while. Either way
+//! the frame waits in the card, those behind it wait with it, and it goes on its way when it leaves.
 
 use std::collections::VecDeque;
 
 use linesman_proto::address::Path;
+use linesman_proto::ethernet::MIN_LEN;
 use linesman_proto::frame::size::BYTE_NS;
 use linesman_proto::time::{Instant, Span};
 
 use super::Segment;
 use super::card::Card;
+use crate::frame::{FCS_LEN, PREAMBLE_LEN};
 use crate::truth::{Effect, FaultId, Place};
 
-/// Preamble, check sequence and gap between frames, in bytes.
-const AROUND_FRAME: u64 = 24;
+/// The gap between two frames on the line, in bytes (IEEE 802.3).
+const GAP: usize = 12;
 
 /// How late a card is.
 #[derive(Clone, Default, Debug)]
 pub(super) struct Lateness {
-    /// From when on by how much, in the order of time, and whose doing it is.
-    known: Vec<(Instant, Span, FaultId)>,
+    /// From when on all frames by how much, in the order of time, and whose doing it is.
+    all: Vec<(Instant, Span, FaultId)>,
+    /// Single frames: the next from an instant on, by how much, and whose doing it is.
+    single: VecDeque<(Instant, Span, FaultId)>,
     /// When the last frame that was kept back has left.
     busy_until: Instant,
 }
@@ -29,51 +36,73 @@ pub(super) struct Waiting(VecDeque<(Instant, Path, Vec<u8>)>);
 impl Card {
     /// From `at` on frames leave later.
     pub(crate) fn make_late(&mut self, at: Instant, by: Span, fault: FaultId) {
-        self.lateness.known.push((at, by, fault));
+        self.lateness.all.push((at, by, fault));
+    }
+
+    /// The next frame from `at` on leaves later.
+    pub(crate) fn delay_next(&mut self, at: Instant, by: Span, fault: FaultId) {
+        self.lateness.single.push_back((at, by, fault));
     }
 
     /// A fault is over: frames leave in time again.
     pub(crate) fn be_in_time(&mut self, at: Instant, fault: FaultId) {
-        if self.lateness.known.last().is_some_and(|(_, _, by)| *by == fault) {
-            self.lateness.known.push((at, Span::ZERO, fault));
+        if self.lateness.all.last().is_some_and(|(_, _, by)| *by == fault) {
+            self.lateness.all.push((at, Span::ZERO, fault));
         }
     }
 
-    /// Whether its frames have ever left late.
-    fn is_late(&self) -> bool {
-        !self.lateness.known.is_empty()
+    /// A fault is healed: what still waits for a frame goes with it.
+    pub(super) fn delay_no_more(&mut self, fault: FaultId) {
+        self.lateness.single.retain(|(.., by)| *by != fault);
     }
 
-    /// When a frame leaves that is sent at `now`, if not at once, and who keeps it back. None
-    /// overtakes another.
-    fn keeps_back(&mut self, now: Instant, bytes: usize) -> Option<(Instant, FaultId)> {
+    /// Whether a frame that is sent at `now` may have to wait.
+    #[inline]
+    fn is_late(&self, now: Instant) -> bool {
+        let Lateness { all, single, busy_until } = &self.lateness;
+        !all.is_empty() || !single.is_empty() || *busy_until > now
+    }
+
+    /// When a frame leaves that is sent at `now`, if not at once, and who keeps it back, unless it
+    /// only waits for the one before it. None overtakes another.
+    fn keeps_back(&mut self, now: Instant, bytes: usize) -> Option<(Instant, Option<FaultId>)> {
         let lateness = &mut self.lateness;
-        let passed = lateness.known.partition_point(|(from, _, _)| *from <= now);
-        lateness.known.drain(..passed.saturating_sub(1));
-        let (_, by, fault) = *lateness.known.first().filter(|(from, _, _)| *from <= now)?;
-        let leaves = (now + by).max(lateness.busy_until);
+        let passed = lateness.all.partition_point(|(from, ..)| *from <= now);
+        lateness.all.drain(..passed.saturating_sub(1));
+        let all = lateness.all.first().copied();
+        let single = lateness.single.pop_front_if(|(from, ..)| *from <= now);
+        let late =
+            all.into_iter().chain(single).filter(|(from, by, _)| *from <= now && *by > Span::ZERO);
+        let most = late.max_by_key(|(_, by, _)| *by);
+        let leaves = most.map_or(now, |(_, by, _)| now + by).max(lateness.busy_until);
         if leaves <= now {
             return None;
         }
-        lateness.busy_until = leaves + Span::ns((bytes as u64 + AROUND_FRAME) * BYTE_NS);
-        Some((leaves, fault))
+        let len = PREAMBLE_LEN + bytes.max(MIN_LEN) + FCS_LEN + GAP;
+        lateness.busy_until = leaves + Span::ns(len as u64 * BYTE_NS);
+        Some((leaves, most.map(|(.., fault)| fault)))
     }
 }
 
 impl Segment {
     /// Keeps a frame back if its card is late; true if so.
+    #[inline]
     pub(super) fn keep_back(&mut self, now: Instant, path: Path, frame: &[u8]) -> bool {
-        if self.world.running.is_empty() && !self.world.cards[path.index()].is_late() {
-            return false;
-        }
+        let late = !self.world.running.is_empty() || self.world.cards[path.index()].is_late(now);
+        late && self.keep_back_late(now, path, frame)
+    }
+
+    fn keep_back_late(&mut self, now: Instant, path: Path, frame: &[u8]) -> bool {
         // What happens up to now is known before.
         self.world.look_ahead(now, Span::ZERO);
         let Some((leaves, fault)) = self.world.cards[path.index()].keeps_back(now, frame.len())
         else {
             return false;
         };
-        let effect = Effect::FrameHeldBack { by: leaves.since(now) };
-        self.world.truth.effect(now, Some(fault), Place::Host(path), effect);
+        if fault.is_some() {
+            let effect = Effect::FrameHeldBack { by: leaves.since(now) };
+            self.world.truth.effect(now, fault, Place::Host(path), effect);
+        }
         let waiting = &mut self.waiting.0;
         let before = waiting.iter().take_while(|(other, _, _)| *other <= leaves).count();
         waiting.insert(before, (leaves, path, frame.to_vec()));
@@ -81,6 +110,7 @@ impl Segment {
     }
 
     /// Sends what was kept back until now.
+    #[inline]
     pub(super) fn send_kept_back(&mut self, now: Instant) {
         while self.waiting.0.front().is_some_and(|(leaves, _, _)| *leaves <= now) {
             if let Some((leaves, path, frame)) = self.waiting.0.pop_front() {

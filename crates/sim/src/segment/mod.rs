@@ -123,7 +123,8 @@ impl Segment {
         bytes.resize(frame.len().max(MIN_LEN), 0);
         self.world.frames += 1;
         let frame = WireFrame { bytes, damage: Damage::default(), number: self.world.frames };
-        self.world.look_ahead(now, frame.duration());
+        let duration = frame.duration();
+        self.world.look_ahead(now, duration);
         self.world.advance(now);
         self.fetch_strangers();
         let card = &mut self.world.cards[path.index()];
@@ -141,7 +142,12 @@ impl Segment {
         }
         card.counts.tx_frames += 1;
         self.tally.sent += 1;
-        let leaves = self.leaves(path, now, &frame);
+        // Another's frame may be on the line.
+        let leaves = self.world.behind_strangers(path, now);
+        if leaves > now {
+            self.world.look_ahead(leaves, duration);
+        }
+        self.world.cards[path.index()].sent_until = leaves + duration;
         let mut traveller = Traveller::new(frame);
         match self.world.carry(path, leaves, &mut traveller) {
             Outcome::Arrived(path, at) => self.arrivals.push(at, path, traveller.frame),
@@ -152,29 +158,12 @@ impl Segment {
         }
     }
 
-    /// When a frame leaves its card that is sent now: a host may keep it back, another's frame may be
-    /// on the line. A frame that was kept back keeps those behind it back, too.
-    fn leaves(&mut self, path: Path, now: Instant, frame: &WireFrame) -> Instant {
-        let card = &mut self.world.cards[path.index()];
-        let mut leaves = now;
-        if let Some((by, fault)) = card.delayed(now) {
-            leaves = now + by;
-            card.kept_until = leaves + frame.duration();
-            let effect = Effect::FrameHeldBack { by };
-            self.world.truth.effect(now, Some(fault), Place::Host(path), effect);
-        } else {
-            leaves = leaves.max(card.kept_until);
-        }
-        leaves = self.world.behind_strangers(path, leaves);
-        if leaves > now {
-            self.world.look_ahead(leaves, frame.duration());
-        }
-        self.world.cards[path.index()].sent_until = leaves + frame.duration();
-        leaves
-    }
-
     /// Frames of strangers arrive as all others do.
+    #[inline]
     fn fetch_strangers(&mut self) {
+        if !self.world.strangers_came_back() {
+            return;
+        }
         for (at, path, frame) in self.world.take_strangers() {
             self.strange.insert(frame.number);
             self.arrivals.push(at, path, frame);
@@ -185,12 +174,11 @@ impl Segment {
     /// [`Segment::handle_frame`]); its bytes replace those in `buffer`.
     pub fn poll_arrival(&mut self, buffer: &mut Vec<u8>) -> Option<Arrival> {
         loop {
-            let (at, path, frame) = self.arrivals.pop_until(self.now)?;
+            let (at, path, mut frame) = self.arrivals.pop_until(self.now)?;
             let intact = frame.damage.is_intact();
             let kept = self.receive(at, path, &frame);
             if kept {
-                buffer.clear();
-                buffer.extend_from_slice(&frame.bytes);
+                std::mem::swap(buffer, &mut frame.bytes);
             }
             self.recycle(frame.bytes);
             if kept {

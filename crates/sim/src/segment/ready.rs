@@ -7,7 +7,8 @@ use linesman_proto::time::Instant;
 use linesman_proto::topology::Tree;
 
 use super::arrivals::Arrivals;
-use super::{DeviceInfo, Segment};
+use super::late::Waiting;
+use super::{DeviceInfo, FrameTally, Segment};
 use crate::controller::Controller;
 use crate::device::Signals;
 use crate::seed::Seed;
@@ -28,30 +29,41 @@ impl Segment {
         let count = controllers.len();
         let names = (1..=count).map(|number| format!("device {number}")).collect();
         let world = World::new(&tree, controllers, cable_m, signals);
-        let nodes: BTreeMap<DeviceId, usize> =
-            (0..count).map(|node| (world.id(node), node)).collect();
-        let mut segment = Self {
+        let unwired = DeviceInfo { outputs: Vec::new(), inputs: Vec::new() };
+        let mut segment = Self::of_world(name, tree, world, vec![unwired; count], names);
+        segment.advance(Instant::ZERO);
+        segment
+    }
+
+    /// The segment around a world, with nothing planned beside it.
+    pub(super) fn of_world(
+        name: &str,
+        tree: Tree,
+        world: World,
+        devices: Vec<DeviceInfo>,
+        names: Vec<String>,
+    ) -> Self {
+        let count = devices.len();
+        Self {
             supplies: Vec::new(),
             ebus_ma: vec![0; count],
             fed_anew: vec![false; count],
             groups: BTreeMap::new(),
             name: name.to_owned(),
             tree,
-            world,
             seed: Seed(0),
-            devices: vec![DeviceInfo { outputs: Vec::new(), inputs: Vec::new() }; count],
-            nodes,
+            devices,
+            nodes: (0..count).map(|node| (world.id(node), node)).collect(),
             names,
+            world,
             now: Instant::ZERO,
             arrivals: Arrivals::default(),
             unplugged: BTreeMap::new(),
             strange: BTreeSet::new(),
             spare: Vec::new(),
-            waiting: super::late::Waiting::default(),
-            tally: super::FrameTally::default(),
-        };
-        segment.advance(Instant::ZERO);
-        segment
+            waiting: Waiting::default(),
+            tally: FrameTally::default(),
+        }
     }
 
     /// A controller, to give it a history; `None` for one that is not there.

@@ -12,9 +12,7 @@
 
 mod execute;
 
-use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
 
 use linesman_proto::address::Path;
 use linesman_proto::command::{Addressing, Command};
@@ -24,16 +22,11 @@ use linesman_proto::register as r;
 use linesman_proto::time::{Instant, Span};
 
 use super::change::Line;
+use super::kept::Kept;
 use super::route::Route;
 use super::walk::{Outcome, Traveller};
 use super::world::World;
 use crate::controller::Header;
-
-/// As many answers to "who maps these logical bytes" are kept.
-const KEPT_QUERIES: usize = 1_024;
-
-/// As many routes may wait to be noted.
-const MOST_UNNOTED: usize = 8;
 
 /// What is kept from frame to frame.
 #[derive(Default, Debug)]
@@ -42,57 +35,40 @@ pub(crate) struct Direct {
     pub(crate) forbidden: bool,
     /// Frames that needed no walk.
     pub(crate) frames: u64,
-    routes: [Known; 2],
-    /// [`Directory::ways`](super::directory::Directory::ways) when the routes were found.
+    /// The way from each card.
+    known: [Known; 2],
+    /// By card: the last frame that did not walk, if controllers do not know yet where it came in.
+    last: [Option<Passed>; 2],
+    /// Changes whenever ways are forgotten.
+    edition: u64,
+    /// [`Directory::ways`](super::directory::Directory::ways) when the ways were found.
     ways: u64,
-    /// Who maps these logical bytes: places on the route of a card, in order.
-    queries: BTreeMap<(usize, u32, u16), Arc<[u32]>>,
-    /// [`Directory::mappings`](super::directory::Directory::mappings) when they were asked.
-    mappings: u64,
-    /// Nodes at which something is due, nodes that were touched: kept for their memory.
+    /// Who answers to what, on which way.
+    kept: Kept,
+    /// Nodes at which something is due: kept for its memory, as are those below.
     due: Vec<u32>,
-    /// By card: until when no device samples anything new.
-    resting: [Resting; 2],
-    /// The last frame on each route since the last walk: where it came in is not noted yet.
-    unnoted: Vec<Passed>,
+    /// Places at which something is to be done before the datagrams, the last first.
+    turns: Vec<u32>,
+    /// Places that datagrams of this frame have touched.
     touched: Vec<u32>,
-    places: Vec<u32>,
-}
-
-/// No device on a route samples anything new before an instant, as long as all this stays as it is.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-struct Resting {
-    until: Instant,
-    ways: u64,
-    samplers_woken: u64,
-    signals: u64,
-}
-
-/// A frame that did not walk.
-#[derive(Debug)]
-struct Passed {
-    route: Arc<Route>,
-    at: Instant,
-    duration: Span,
-    number: u64,
 }
 
 /// What is known of the way from a card.
-#[derive(Clone, Default, Debug)]
+#[derive(Default, Debug)]
 enum Known {
     #[default]
     Nothing,
     /// There is none without a walk.
-    NoRoute,
-    Route(Arc<Route>),
+    NoWay,
+    Way(Box<Route>),
 }
 
-impl Direct {
-    /// Links or supplies have changed.
-    pub(super) fn forget_routes(&mut self) {
-        self.routes = [Known::Nothing, Known::Nothing];
-        self.queries.clear();
-    }
+/// A frame that did not walk.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(super) struct Passed {
+    pub(super) number: u64,
+    pub(super) at: Instant,
+    pub(super) duration: Span,
 }
 
 /// A frame on its way.
@@ -105,6 +81,7 @@ struct Journey<'a> {
 }
 
 impl Journey<'_> {
+    #[inline]
     fn at_place(&self, place: u32) -> (usize, Instant) {
         let visit = self.route.visits[place as usize];
         (visit.node as usize, self.at + visit.after)
@@ -130,56 +107,58 @@ impl World {
     /// Controllers learn when frames came in at their ports that did not walk: some of them latch
     /// the time of a frame other than the one that asks for it.
     pub(super) fn note_entries(&mut self) {
-        for Passed { route, at, duration, number } in self.direct.unnoted.drain(..) {
-            for (node, port, after) in &route.entries {
-                let controller = &mut self.nodes.quietly(*node as usize).controller;
-                controller.note_entry(*port, number, at + *after, duration);
+        for card in self.direct.by_age() {
+            if let Some(passed) = self.direct.last[card].take()
+                && let Known::Way(route) = &self.direct.known[card]
+            {
+                self.nodes.note_entries(route.entries(), passed);
             }
         }
     }
 
     /// Before ports of these nodes count anything: when the last frame came in there may tell what
-    /// they count.
-    fn note_entries_for(&mut self, due: &[u32]) {
-        let nodes = &self.nodes;
-        if !self.direct.unnoted.is_empty()
-            && due.iter().any(|node| nodes[*node as usize].controller.has_port_events())
-        {
-            self.note_entries();
+    /// they count. The way of a frame that is being sent is `leaving`.
+    fn note_entries_for(&mut self, due: &[u32], leaving: Option<&Journey<'_>>) {
+        for node in due.iter().copied() {
+            if !self.nodes[node as usize].controller.has_port_events() {
+                continue;
+            }
+            for card in self.direct.by_age() {
+                let leaving = leaving.filter(|journey| journey.card.index() == card);
+                let route = match (leaving, &self.direct.known[card]) {
+                    (Some(journey), _) => journey.route,
+                    (None, Known::Way(route)) => route,
+                    (None, Known::Nothing | Known::NoWay) => continue,
+                };
+                if let Some(passed) = self.direct.last[card] {
+                    self.nodes.note_entries(route.entries_of(node), passed);
+                }
+            }
         }
+    }
+
+    /// Links, loops or supplies have changed.
+    pub(super) fn forget_ways(&mut self) {
+        self.note_entries();
+        self.direct.known = [Known::Nothing, Known::Nothing];
+        self.direct.edition += 1;
+        self.nodes.forget_departures();
     }
 
     /// Brings every node to `now` at which something is due.
     #[inline]
     pub(super) fn touch_due(&mut self, now: Instant) {
         let mut due = std::mem::take(&mut self.direct.due);
-        due.clear();
         self.nodes.due_until(now, &mut due);
         if !due.is_empty() {
-            self.note_entries_for(&due);
+            self.note_entries_for(&due, None);
             // Devices meet in signals: the order is that of the nodes.
             due.sort_unstable();
-            for node in &due {
-                self.nodes[*node as usize].touch(now, &mut self.signals);
+            for node in due.drain(..) {
+                self.nodes[node as usize].touch(now, &mut self.signals);
             }
         }
         self.direct.due = due;
-    }
-
-    fn passed(&mut self, route: Arc<Route>, at: Instant, duration: Span, number: u64) {
-        if self.direct.unnoted.len() >= MOST_UNNOTED {
-            self.note_entries();
-        }
-        let known = &mut self.direct.unnoted;
-        match known.last_mut() {
-            Some(last) if Arc::ptr_eq(&last.route, &route) => {
-                (last.at, last.duration, last.number) = (at, duration, number);
-            }
-            _ => {
-                known.retain(|passed| !Arc::ptr_eq(&passed.route, &route));
-                known.push(Passed { route, at, duration, number });
-            }
-        }
     }
 
     fn go_directly(
@@ -192,46 +171,62 @@ impl World {
             return None;
         }
         let first = datagrams(&traveller.frame.bytes)?;
+        self.hear_signals(None);
         self.nodes.settle();
-        let route = self.route(card)?;
-        let duration = traveller.frame.duration();
-        if !self.is_calm(&route, at, duration) {
-            return None;
-        }
-        let number = traveller.frame.number;
+        let route = self.take_way(card)?;
+        let edition = self.direct.edition;
+        let (duration, number) = (traveller.frame.duration(), traveller.frame.number);
         let journey = Journey { route: &route, card, at, duration, number };
-        self.prepare(&journey);
-        let bytes = &mut traveller.frame.bytes;
-        if route.marks_source {
-            bytes[6] |= SOURCE_MARK;
+        let outcome = self.is_calm(&journey).then(|| {
+            self.prepare(&journey);
+            let bytes = &mut traveller.frame.bytes;
+            if route.marks_source {
+                bytes[6] |= SOURCE_MARK;
+            }
+            self.execute_all(&journey, &mut bytes[first..]);
+            self.end_all(&journey);
+            self.direct.last[card.index()] = Some(Passed { number, at, duration });
+            Outcome::Arrived(route.arrives_at, at + route.takes + duration)
+        });
+        self.direct.known[card.index()] = Known::Way(route);
+        if self.direct.edition != edition {
+            self.forget_ways();
         }
-        self.execute_all(&journey, &mut bytes[first..]);
-        self.end_all(&journey);
-        let outcome = Outcome::Arrived(route.arrives_at, at + route.takes + duration);
-        self.passed(route, at, duration, number);
-        Some(outcome)
+        outcome
     }
 
-    fn route(&mut self, card: Path) -> Option<Arc<Route>> {
+    /// The way from a card, to be put back.
+    #[inline]
+    fn take_way(&mut self, card: Path) -> Option<Box<Route>> {
         let ways = self.nodes.directory.ways();
         if self.direct.ways != ways {
+            self.forget_ways();
             self.direct.ways = ways;
-            self.direct.forget_routes();
         }
-        if let Known::Nothing = self.direct.routes[card.index()] {
-            let found = self.find_route(card);
-            self.direct.routes[card.index()] =
-                found.map_or(Known::NoRoute, |route| Known::Route(Arc::new(route)));
-        }
-        match &self.direct.routes[card.index()] {
-            Known::Route(route) => Some(Arc::clone(route)),
-            Known::Nothing | Known::NoRoute => None,
+        match std::mem::take(&mut self.direct.known[card.index()]) {
+            Known::Way(route) => Some(route),
+            Known::Nothing => self.find_way(card),
+            Known::NoWay => {
+                self.direct.known[card.index()] = Known::NoWay;
+                None
+            }
         }
     }
 
-    /// Whether nothing on the way happens to a frame. Notes the nodes at which something is due
-    /// that does not concern it.
-    fn is_calm(&mut self, route: &Route, at: Instant, duration: Span) -> bool {
+    fn find_way(&mut self, card: Path) -> Option<Box<Route>> {
+        let Some(route) = self.find_route(card) else {
+            self.direct.known[card.index()] = Known::NoWay;
+            return None;
+        };
+        let visits = route.visits.iter().map(|visit| (visit.node, visit.after));
+        self.nodes.plan_departures(card, visits);
+        Some(Box::new(route))
+    }
+
+    /// Whether nothing on the way happens to a frame.
+    #[inline]
+    fn is_calm(&mut self, journey: &Journey<'_>) -> bool {
+        let Journey { route, at, duration, .. } = *journey;
         for link in &self.noisy {
             for line in Line::both(*link) {
                 let noise = &self.links[*link].noise[usize::from(line.downstream)];
@@ -241,87 +236,78 @@ impl World {
                 }
             }
         }
-        let end = at + route.takes + duration;
-        self.direct.due.clear();
-        self.nodes.due_until(end, &mut self.direct.due);
-        let nodes = &self.nodes;
-        self.direct.due.iter().all(|node| nodes[*node as usize].next_way_event() > end)
+        !self.nodes.ways_change_until(at + route.takes + duration)
     }
 
     /// What is due on the way is done, and inputs are sampled, as the frame comes by.
+    #[inline]
     fn prepare(&mut self, journey: &Journey<'_>) {
-        let route = journey.route;
-        let due = std::mem::take(&mut self.direct.due);
-        self.note_entries_for(&due);
-        let mut places = std::mem::take(&mut self.direct.places);
-        places.clear();
-        places.extend(due.iter().filter_map(|node| route.place(*node)));
-        self.direct.due = due;
-        let rests = places.is_empty() && self.rests(journey);
-        if !places.is_empty() {
-            places.sort_unstable();
+        let mut due = std::mem::take(&mut self.direct.due);
+        self.nodes.met_by(journey.card, journey.at, &mut due);
+        if !due.is_empty() {
+            self.take_turns(journey, &due);
+            due.clear();
         }
-        let samplers = if rests { &[] } else { route.samplers.as_slice() };
-        let mut samplers = samplers.iter().copied().peekable();
-        let mut touches = places.iter().copied().peekable();
-        loop {
-            let place = match (touches.peek(), samplers.peek()) {
-                (None, None) => break,
-                (Some(place), None) | (None, Some(place)) => *place,
-                (Some(one), Some(other)) => *one.min(other),
-            };
+        self.direct.due = due;
+    }
+
+    fn take_turns(&mut self, journey: &Journey<'_>, met: &[u32]) {
+        self.note_entries_for(met, Some(journey));
+        self.direct.turns.clear();
+        let places = met.iter().filter_map(|node| journey.route.place(*node));
+        self.direct.turns.extend(places);
+        self.direct.turns.sort_unstable_by_key(|place| std::cmp::Reverse(*place));
+        while let Some(place) = self.direct.turns.pop() {
             let (node, at) = journey.at_place(place);
-            if touches.next_if_eq(&place).is_some() {
-                self.nodes[node].touch(at, &mut self.signals);
-                if self.nodes[node].controller.has_phy_acts() {
-                    self.take_phy_acts(node);
-                }
+            self.nodes[node].touch(at, &mut self.signals);
+            if self.nodes[node].controller.has_phy_acts() {
+                self.take_phy_acts(node);
             }
-            if samplers.next_if_eq(&place).is_some()
-                && self.nodes[node].controller.wants_sample(&self.signals) <= at
-            {
+            self.hear_signals(Some((journey.route, place)));
+            if self.nodes[node].next_sample() <= at {
                 let controller = &mut self.nodes[node].controller;
                 controller.sample(at, &mut self.signals);
                 controller.begin(at, journey.number);
                 let _ = controller.end(at + journey.duration);
+                self.hear_signals(Some((journey.route, place)));
             }
         }
-        self.direct.places = places;
         self.nodes.settle();
-        if !rests {
-            self.note_rest(journey);
+    }
+
+    /// Devices hear of the signals that have changed: those behind a place on the way of a frame
+    /// sample them as it comes by, all others with the next.
+    #[inline]
+    fn hear_signals(&mut self, behind: Option<(&Route, u32)>) {
+        while let Some(signal) = self.signals.take_fresh() {
+            for listener in self.nodes.listeners(signal) {
+                let node = self.nodes.listener(listener);
+                if !self.nodes[node as usize].controller.waits_for_signals() {
+                    continue;
+                }
+                self.nodes[node as usize].controller.hear();
+                let Some((route, here)) = behind else { continue };
+                if let Some(place) = route.place(node).filter(|place| *place > here) {
+                    let turns = &mut self.direct.turns;
+                    let at = turns.partition_point(|other| *other > place);
+                    if turns.get(at) != Some(&place) {
+                        turns.insert(at, place);
+                    }
+                }
+            }
         }
     }
+}
 
-    /// Whether no device on the way samples anything new.
-    fn rests(&self, journey: &Journey<'_>) -> bool {
-        let resting = &self.direct.resting[journey.card.index()];
-        let end = journey.at + journey.route.takes;
-        let same = Resting { until: resting.until, ..self.rest_now() };
-        same == *resting && end < resting.until
-    }
-
-    /// What must stay as it is for devices to rest.
-    fn rest_now(&self) -> Resting {
-        Resting {
-            until: Instant::ZERO,
-            ways: self.nodes.directory.ways(),
-            samplers_woken: self.nodes.samplers_woken(),
-            signals: self.signals.edition(),
-        }
-    }
-
-    fn note_rest(&mut self, journey: &Journey<'_>) {
-        let visits = &journey.route.visits;
-        let samplers = journey.route.samplers.iter();
-        let nodes = samplers.map(|place| &self.nodes[visits[*place as usize].node as usize]);
-        let wanted = nodes.map(|node| node.controller.wants_sample(&self.signals)).min();
-        let until = wanted.unwrap_or(Instant::MAX);
-        self.direct.resting[journey.card.index()] = Resting { until, ..self.rest_now() };
+impl Direct {
+    /// The cards, that whose last frame came earlier first.
+    fn by_age(&self) -> [usize; 2] {
+        if self.last[0] <= self.last[1] { [0, 1] } else { [1, 0] }
     }
 }
 
 /// Where the datagrams of a frame begin, if it is whole and they change nothing about its way.
+#[inline]
 fn datagrams(bytes: &[u8]) -> Option<usize> {
     let (wrapping, header_at) = ethernet::locate(bytes)?;
     if wrapping == Wrapping::Udp {
@@ -348,6 +334,7 @@ fn datagrams(bytes: &[u8]) -> Option<usize> {
 
 /// Whether a datagram writes what the rest of its frame's way depends on: resets, loops, PHYs, and
 /// receive times, which are taken on the way back, too.
+#[inline]
 fn leads_elsewhere(command: Command, header: &Header) -> bool {
     const SENSITIVE: [Range<usize>; 4] = [
         r::ESC_RESET_ECAT.address.0 as usize..r::ESC_RESET_ECAT.address.0 as usize + 2,
@@ -356,7 +343,7 @@ fn leads_elsewhere(command: Command, header: &Header) -> bool {
         r::RECEIVE_TIME.address.0 as usize..r::RECEIVE_TIME.address.0 as usize + 16,
     ];
     let effect = command.effect();
-    if !(effect.writes || effect.multiple_write) || command.addressing() == Addressing::Logical {
+    if !(effect.writes || effect.multiple_write) || effect.addressing == Addressing::Logical {
         return false;
     }
     // Where a read goes with a write, 0x0108 may move the write.

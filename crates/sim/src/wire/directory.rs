@@ -20,7 +20,7 @@ pub(super) struct Directory {
     /// Nodes that add to the event field of datagrams.
     interrupting: Vec<u32>,
     ways: u64,
-    mappings: u64,
+    names: u64,
 }
 
 impl Directory {
@@ -30,10 +30,10 @@ impl Directory {
         self.ways
     }
 
-    /// Changes with every FMMU.
+    /// Changes with every name: addresses, aliases, FMMUs.
     #[inline]
-    pub(super) fn mappings(&self) -> u64 {
-        self.mappings
+    pub(super) fn names(&self) -> u64 {
+        self.names
     }
 
     /// Nodes that add to the event field of datagrams.
@@ -64,12 +64,12 @@ impl Directory {
     pub(super) fn change(&mut self, index: usize, node: &mut Node, manner: Manner) {
         let before = std::mem::replace(&mut node.entry.manner, manner);
         let index = index as u32;
-        let way =
-            |manner: &Manner| (manner.open, manner.meddles, manner.marks_source, manner.samples);
+        let way = |manner: &Manner| (manner.open, manner.meddles, manner.marks_source);
         if way(&before) != way(&manner) {
             self.ways += 1;
         }
         if (before.station, before.alias) != (manner.station, manner.alias) {
+            self.names += 1;
             for address in [Some(before.station), before.alias].into_iter().flatten() {
                 self.stations.remove(&(address, index));
             }
@@ -77,7 +77,7 @@ impl Directory {
             self.stations.extend(new.map(|address| (address, index)));
         }
         // A node is entered here before it is ever asked for: station 0 is a name as any other.
-        self.stations.insert((manner.station, index));
+        self.names += u64::from(self.stations.insert((manner.station, index)));
         if before.interrupts != manner.interrupts {
             match self.interrupting.binary_search(&index) {
                 Ok(at) => {
@@ -87,7 +87,7 @@ impl Directory {
             }
         }
         if before.fmmus != manner.fmmus {
-            self.mappings += 1;
+            self.names += 1;
             for (start, behind) in node.entry.mapped.drain(..) {
                 self.mapped.remove(&(start, behind, index));
             }

@@ -42,6 +42,11 @@ impl Agenda {
         self.next += 1;
     }
 
+    #[inline]
+    pub(super) fn is_empty(&self) -> bool {
+        self.due.is_empty()
+    }
+
     pub(super) fn next_at(&self) -> Option<Instant> {
         self.due.first_key_value().map(|((at, _), _)| *at)
     }

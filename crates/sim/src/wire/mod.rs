@@ -10,11 +10,13 @@
 
 mod address;
 mod apply;
+mod calendar;
 pub mod change;
 mod direct;
 mod directory;
 mod due;
 pub mod history;
+mod kept;
 pub mod link;
 mod node;
 mod nodes;

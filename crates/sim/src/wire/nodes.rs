@@ -5,15 +5,18 @@
 //! asked, the entries of all that woke are made anew. So nobody who changes a controller needs to
 //! think of the book, and nothing is done for those that rest.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::ops::{Deref, Index, IndexMut};
 
-use linesman_proto::time::Instant;
+use linesman_proto::address::Path;
+use linesman_proto::port::Port;
+use linesman_proto::time::{Instant, Span};
 
+use super::calendar::Calendar;
+use super::direct::Passed;
 use super::directory::Directory;
 use super::node::Node;
 use crate::controller::{Controller, Manner};
+use crate::device::SignalId;
 
 /// All nodes of a segment, by their index in the tree.
 #[derive(Debug)]
@@ -21,44 +24,53 @@ pub(crate) struct Nodes {
     all: Vec<Node>,
     /// Nodes whose entries are to be made anew.
     woken: Vec<u32>,
-    /// When something is due at a node. A node may have several entries; that of its
-    /// [`Entry::scheduled`] counts, which is never later than the truth.
-    due: BinaryHeap<Reverse<(Instant, u32)>>,
+    /// When something is due at a node.
+    due: Calendar,
+    /// When something is due that can lead frames another way.
+    ways: Calendar,
+    /// By card: the frames that find something to do at a node.
+    departures: [Option<Departures>; 2],
     /// Who answers to what.
     pub(super) directory: Directory,
-    /// Counts how often nodes woke that sample inputs.
-    samplers_woken: u64,
+    /// Signals on which what a device samples depends, and its node; sorted.
+    listeners: Vec<(SignalId, u32)>,
+}
+
+/// For each node on the way of a frame: if it leaves its card at this instant or later, something is
+/// to be done at the node as it comes by. On a long line that is long after it has left.
+#[derive(Debug)]
+struct Departures {
+    calendar: Calendar,
+    /// From the card to the node, for those on the way.
+    after: Vec<Option<Span>>,
 }
 
 /// What the book says of a node.
-#[derive(Clone, Debug)]
+#[derive(Clone, Default, Debug)]
 pub(super) struct Entry {
     awake: bool,
-    scheduled: Instant,
     pub(super) manner: Manner,
     /// What the directory has of its FMMUs.
     pub(super) mapped: Vec<(u64, u64)>,
 }
 
-impl Default for Entry {
-    fn default() -> Self {
-        Self {
-            awake: false,
-            scheduled: Instant::MAX,
-            manner: Manner::default(),
-            mapped: Vec::new(),
-        }
-    }
-}
-
 impl Nodes {
     pub(super) fn new(controllers: Vec<Controller>) -> Self {
+        let count = controllers.len();
+        let mut listeners = Vec::new();
+        for (index, controller) in controllers.iter().enumerate() {
+            let heard = controller.firmware().listens_to();
+            listeners.extend(heard.into_iter().map(|signal| (signal, index as u32)));
+        }
+        listeners.sort_unstable();
         let mut nodes = Self {
             all: controllers.into_iter().map(Node::new).collect(),
             woken: Vec::new(),
-            due: BinaryHeap::new(),
+            due: Calendar::new(count),
+            ways: Calendar::new(count),
+            departures: [None, None],
             directory: Directory::default(),
-            samplers_woken: 0,
+            listeners,
         };
         nodes.wake_all();
         nodes
@@ -86,17 +98,10 @@ impl Nodes {
     #[inline]
     pub(super) fn wake(&mut self, node: usize) {
         let entry = &mut self.all[node].entry;
-        self.samplers_woken += u64::from(entry.manner.samples);
         if !entry.awake {
             entry.awake = true;
             self.woken.push(node as u32);
         }
-    }
-
-    /// A number that changes whenever something happens to a node that samples inputs.
-    #[inline]
-    pub(super) fn samplers_woken(&self) -> u64 {
-        self.samplers_woken
     }
 
     /// Makes the entries of all that woke anew.
@@ -110,56 +115,139 @@ impl Nodes {
     fn settle_woken(&mut self) {
         while let Some(index) = self.woken.pop() {
             let index = index as usize;
-            self.reschedule(index);
             let node = &mut self.all[index];
             node.entry.awake = false;
             let manner = node.manner();
             if manner != node.entry.manner {
                 self.directory.change(index, node, manner);
             }
+            self.reschedule(index);
         }
     }
 
-    /// What is due at a node may have come nearer.
+    /// What is due at a node may have come nearer. What was put off stays in the book as it is, and
+    /// is looked up again when its time comes.
     #[inline]
     pub(super) fn reschedule(&mut self, index: usize) {
-        let node = &mut self.all[index];
+        let node = &self.all[index];
         let next = node.next_event();
-        // What was put off stays in the book as it is, and is looked up again when its time comes.
-        if next < node.entry.scheduled {
-            node.entry.scheduled = next;
-            self.due.push(Reverse((next, index as u32)));
+        let turn = next.min(node.next_sample());
+        if next != Instant::MAX {
+            self.due.bring_forward(index as u32, next);
+            self.ways.bring_forward(index as u32, node.next_way_event());
+        }
+        for departures in self.departures.iter_mut().flatten() {
+            departures.bring_forward(index as u32, turn);
         }
     }
 
-    /// Takes the nodes out at which something is due up to `until`, in no order; they wake. The
-    /// book must be settled.
-    fn take_due(&mut self, until: Instant, taken: &mut Vec<u32>) {
-        while let Some(Reverse((at, index))) = self.due.peek().copied() {
-            if at > until {
-                return;
-            }
-            self.due.pop();
-            let node = &mut self.all[index as usize];
-            if node.entry.scheduled != at {
-                continue;
-            }
-            node.entry.scheduled = Instant::MAX;
-            if node.next_event() <= until {
+    /// Takes the nodes out at which something is due up to `until`, in no order; they wake.
+    #[inline]
+    pub(super) fn due_until(&mut self, until: Instant, taken: &mut Vec<u32>) {
+        self.settle();
+        while let Some(index) = self.due.first_until(until) {
+            let next = self.all[index as usize].next_event();
+            if next <= until {
+                self.due.put_off(index, Instant::MAX);
                 self.wake(index as usize);
                 taken.push(index);
             } else {
-                self.reschedule(index as usize);
+                self.due.put_off(index, next);
             }
         }
     }
 
-    /// The nodes at which something is due up to `until`, in no order: in `due`, which is empty.
+    /// Whether anything happens up to `until` that can lead frames another way.
     #[inline]
-    pub(super) fn due_until(&mut self, until: Instant, due: &mut Vec<u32>) {
-        self.settle();
-        if self.due.peek().is_some_and(|Reverse((at, _))| *at <= until) {
-            self.take_due(until, due);
+    pub(super) fn ways_change_until(&mut self, until: Instant) -> bool {
+        while let Some(index) = self.ways.first_until(until) {
+            let next = self.all[index as usize].next_way_event();
+            if next <= until {
+                return true;
+            }
+            self.ways.put_off(index, next);
+        }
+        false
+    }
+
+    // ---- what frames meet ----
+
+    /// A way was found for the frames of a card: it passes these nodes so long after leaving.
+    pub(super) fn plan_departures(&mut self, card: Path, way: impl Iterator<Item = (u32, Span)>) {
+        let mut after = vec![None; self.all.len()];
+        for (node, span) in way {
+            after[node as usize] = Some(span);
+        }
+        let mut departures = Departures { calendar: Calendar::new(self.all.len()), after };
+        for (index, node) in self.all.iter().enumerate() {
+            departures.bring_forward(index as u32, node.next_event().min(node.next_sample()));
+        }
+        self.departures[card.index()] = Some(departures);
+    }
+
+    /// No way is known any more.
+    pub(super) fn forget_departures(&mut self) {
+        self.departures = [None, None];
+    }
+
+    /// Takes the nodes out at which something is to be done when a frame comes by that leaves a card
+    /// at `at`, in no order. The book must be settled.
+    #[inline]
+    pub(super) fn met_by(&mut self, card: Path, at: Instant, taken: &mut Vec<u32>) {
+        let Some(departures) = &mut self.departures[card.index()] else { return };
+        while let Some(index) = departures.calendar.first_until(at) {
+            let node = &self.all[index as usize];
+            let turn = node.next_event().min(node.next_sample());
+            let leaves = departures.leaves(index, turn);
+            if leaves > at {
+                departures.calendar.put_off(index, leaves);
+                continue;
+            }
+            departures.calendar.put_off(index, Instant::MAX);
+            taken.push(index);
+        }
+    }
+
+    /// Controllers learn when a frame that did not walk came in at ports, so long after it left.
+    pub(super) fn note_entries(
+        &mut self,
+        entries: impl Iterator<Item = (u32, Port, Span)>,
+        frame: Passed,
+    ) {
+        for (node, port, after) in entries {
+            let controller = &mut self.all[node as usize].controller;
+            controller.note_entry(port, frame.number, frame.at + after, frame.duration);
+        }
+    }
+
+    /// Which of the listeners are those of devices that sample a signal.
+    pub(super) fn listeners(&self, signal: SignalId) -> std::ops::Range<usize> {
+        let first = self.listeners.partition_point(|(other, _)| *other < signal);
+        let len = self.listeners[first..].iter().take_while(|(other, _)| *other == signal).count();
+        first..first + len
+    }
+
+    /// The node of a listener.
+    pub(super) fn listener(&self, at: usize) -> u32 {
+        self.listeners[at].1
+    }
+}
+
+impl Departures {
+    /// The first departure whose frame is at a node at `turn` or later.
+    #[inline]
+    fn leaves(&self, index: u32, turn: Instant) -> Instant {
+        match self.after[index as usize] {
+            Some(after) if turn != Instant::MAX => turn.before(after),
+            Some(_) | None => Instant::MAX,
+        }
+    }
+
+    #[inline]
+    fn bring_forward(&mut self, index: u32, turn: Instant) {
+        let leaves = self.leaves(index, turn);
+        if leaves != Instant::MAX {
+            self.calendar.bring_forward(index, leaves);
         }
     }
 }
@@ -194,5 +282,11 @@ impl Node {
     fn manner(&self) -> Manner {
         let manner = self.controller.manner();
         Manner { meddles: manner.meddles || !self.glitches.is_empty(), ..manner }
+    }
+
+    /// From when on a frame that comes by samples something new.
+    #[inline]
+    pub(super) fn next_sample(&self) -> Instant {
+        if self.entry.manner.samples { self.controller.wants_sample() } else { Instant::MAX }
     }
 }

@@ -27,10 +27,8 @@ pub(super) struct Visit {
 pub(super) struct Route {
     /// Processing units, in the order of the way.
     pub(super) visits: Vec<Visit>,
-    /// Ports by which it comes in anywhere, in the order of the way.
-    pub(super) entries: Vec<(u32, Port, Span)>,
-    /// Places in `visits` at which a device samples inputs.
-    pub(super) samplers: Vec<u32>,
+    /// Ports by which it comes in anywhere, in the order of the nodes.
+    entries: Vec<(u32, Port, Span)>,
     /// The card at which it ends.
     pub(super) arrives_at: Path,
     /// From card to card.
@@ -50,6 +48,17 @@ impl Route {
         self.places.get(node as usize).copied().filter(|place| *place != NOWHERE)
     }
 
+    /// Ports by which it comes in anywhere, and when behind its leaving the card.
+    pub(super) fn entries(&self) -> impl Iterator<Item = (u32, Port, Span)> + '_ {
+        self.entries.iter().copied()
+    }
+
+    /// Those of one node.
+    pub(super) fn entries_of(&self, node: u32) -> impl Iterator<Item = (u32, Port, Span)> + '_ {
+        let first = self.entries.partition_point(|(other, ..)| *other < node);
+        self.entries[first..].iter().take_while(move |(other, ..)| *other == node).copied()
+    }
+
     /// When the first bit is at the receiver of a line, behind its leaving the card.
     pub(super) fn crossing(&self, line: Line) -> Option<Span> {
         let after = self.crossings[line.link][usize::from(line.downstream)];
@@ -66,7 +75,6 @@ impl World {
         let mut route = Route {
             visits: Vec::with_capacity(self.nodes.len()),
             entries: Vec::with_capacity(2 * self.nodes.len()),
-            samplers: Vec::new(),
             arrives_at: card,
             takes: Span::ZERO,
             marks_source: false,
@@ -88,6 +96,7 @@ impl World {
                 End::Controller(node, port) => (node, port),
                 End::MainDevice(path) => {
                     (route.arrives_at, route.takes) = (path, after);
+                    route.entries.sort_unstable();
                     return Some(route);
                 }
             };
@@ -123,9 +132,6 @@ impl World {
                 route.places[node] = place;
                 route.visits.push(Visit { node: node as u32, after });
                 route.marks_source |= manner.marks_source;
-                if manner.samples {
-                    route.samplers.push(place);
-                }
                 takes = timing.process;
             }
             stop = stop.next();

@@ -182,13 +182,23 @@ impl World {
         }
     }
 
+    /// Whether frames of strangers came to a card.
+    #[inline]
+    pub(crate) fn strangers_came_back(&self) -> bool {
+        !self.strangers.back.is_empty()
+    }
+
     /// Frames of strangers that came back to a card.
     pub(crate) fn take_strangers(&mut self) -> impl Iterator<Item = (Instant, Path, WireFrame)> {
         self.strangers.back.drain(..)
     }
 
     /// When a stranger sends next, as far as is known.
+    #[inline]
     pub(crate) fn next_stranger(&self) -> Option<Instant> {
+        if self.running.is_empty() && self.strangers.waiting.is_empty() {
+            return None;
+        }
         let running = self.running.iter().filter_map(crate::fault::Running::next_stranger);
         running.chain(self.strangers.next_at()).min()
     }

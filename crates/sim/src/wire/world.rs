@@ -181,6 +181,7 @@ impl World {
     // ---- time ----
 
     /// Makes all changes that a frame of `frame_time` which enters at `now` can meet.
+    #[inline]
     pub(crate) fn look_ahead(&mut self, now: Instant, frame_time: Span) {
         self.strangers_until(now);
         self.change_until(now + self.round + frame_time);
@@ -191,6 +192,7 @@ impl World {
 
     /// Strangers send what they send until `now`: each frame as if somebody looked at its time, so
     /// that it is all the same who looks and when.
+    #[inline]
     fn strangers_until(&mut self, now: Instant) {
         /// Longer than the frame of any stranger.
         const FRAME: Span = Span::us(20);
@@ -220,6 +222,7 @@ impl World {
     }
 
     /// Brings everything to `now`.
+    #[inline]
     pub(crate) fn advance(&mut self, now: Instant) {
         self.strangers_until(now);
         self.change_until(now);
@@ -227,11 +230,15 @@ impl World {
     }
 
     /// Makes all changes up to and at an instant.
+    #[inline]
     fn change_until(&mut self, until: Instant) {
-        if self.running.is_empty() && self.agenda.next_at().is_none() {
-            self.horizon = self.horizon.max(until);
-            return;
+        if !self.running.is_empty() || !self.agenda.is_empty() {
+            self.make_changes(until);
         }
+        self.horizon = self.horizon.max(until);
+    }
+
+    fn make_changes(&mut self, until: Instant) {
         loop {
             let due = self.agenda.next_at().filter(|at| *at <= until);
             let fault = self.next_fault().filter(|(at, _)| *at <= until);
@@ -246,7 +253,6 @@ impl World {
                 }
             }
         }
-        self.horizon = self.horizon.max(until);
     }
 
     /// Which running fault does something first, and when.
@@ -324,7 +330,7 @@ impl World {
     /// What lies on the way of frames changes at an instant that may be ahead.
     pub(super) fn way_changes(&mut self, at: Instant) {
         self.changed_at = self.changed_at.max(at);
-        self.direct.forget_routes();
+        self.forget_ways();
     }
 
     // ---- blame ----

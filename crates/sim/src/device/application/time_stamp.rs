@@ -19,6 +19,11 @@ impl TimeStamps {
         Self(LatchInput::ALL.into_iter().zip(signals.iter().copied()).collect())
     }
 
+    /// The signals.
+    pub(crate) fn signals(&self) -> impl Iterator<Item = SignalId> {
+        self.0.iter().map(|(_, signal)| *signal)
+    }
+
     /// Shows the unit what the signals have done by `now`.
     pub fn sample(&self, now: Instant, pdi: &mut Pdi<'_>) {
         for (input, signal) in &self.0 {

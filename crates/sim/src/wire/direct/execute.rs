@@ -1,19 +1,17 @@
 //! The datagrams of a frame that needs no walk, each at everybody it is for.
 
-use std::sync::Arc;
-
-use linesman_proto::address::LogicalAddress;
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, WKC_LEN};
 
-use super::{Journey, KEPT_QUERIES};
+use super::Journey;
 use crate::controller::{Answer, Header, PlainRead};
+use crate::wire::kept::{Asked, Question};
 use crate::wire::world::World;
 
 impl World {
     pub(super) fn execute_all(&mut self, journey: &Journey<'_>, bytes: &mut [u8]) {
-        let interrupting = self.nodes.directory.interrupting();
-        let irq = interrupting.iter().filter(|node| journey.route.place(**node).is_some());
+        let interrupting = self.nodes.directory.interrupting().iter();
+        let irq = interrupting.filter(|node| journey.route.place(**node).is_some());
         let irq = irq.fold(0, |irq, node| irq | self.nodes[*node as usize].controller.irq());
         let mut rest = bytes;
         while let Some((header, body)) = rest.split_first_chunk_mut::<DATAGRAM_HEADER_LEN>() {
@@ -82,36 +80,49 @@ impl World {
                 sum
             }
             Addressing::Station => {
-                let mut places = std::mem::take(&mut self.direct.places);
-                places.clear();
-                let nodes = self.nodes.directory.stations(header.adp);
-                places.extend(nodes.filter_map(|node| journey.route.place(node)));
-                if places.len() > 1 {
-                    places.sort_unstable();
-                }
-                let mut sum = 0_u16;
-                for place in &places {
-                    sum = sum.wrapping_add(self.one(
-                        journey,
-                        *place,
-                        plain.as_ref(),
-                        ors,
-                        header,
-                        data,
-                    ));
-                }
-                self.direct.places = places;
-                sum
+                let question = Question::station(journey.card, header.adp);
+                self.each(journey, question, |world, place| {
+                    world.one(journey, place, plain.as_ref(), ors, header, data)
+                })
             }
             Addressing::Logical => {
-                let places = self.mapped(journey, header.logical(), header.len);
-                let mut sum = 0_u16;
-                for place in places.iter() {
-                    sum = sum.wrapping_add(self.at(journey, *place, header, data));
-                }
-                sum
+                let question = Question::logical(journey.card, header.logical(), header.len);
+                self.each(journey, question, |world, place| world.at(journey, place, header, data))
             }
         }
+    }
+
+    /// Does something at each place on the way that answers a question, in order, and adds up.
+    #[inline]
+    fn each(
+        &mut self,
+        journey: &Journey<'_>,
+        question: Question,
+        mut one: impl FnMut(&mut Self, u32) -> u16,
+    ) -> u16 {
+        let edition = self.direct.edition + self.nodes.directory.names();
+        let places = match self.direct.kept.take(question, edition) {
+            Ok(places) => places,
+            Err(mut places) => {
+                let directory = &self.nodes.directory;
+                let mut answer = |node| places.extend(journey.route.place(node));
+                match question.asked() {
+                    Asked::Station(address) => directory.stations(address).for_each(&mut answer),
+                    Asked::Logical(start, len) => {
+                        directory.mapping(start, len).for_each(&mut answer);
+                    }
+                }
+                places.sort_unstable();
+                places.dedup();
+                places
+            }
+        };
+        let mut sum = 0_u16;
+        for place in &places {
+            sum = sum.wrapping_add(one(self, *place));
+        }
+        self.direct.kept.keep(question, edition, places);
+        sum
     }
 
     /// Reads registers of all controllers into one.
@@ -123,15 +134,24 @@ impl World {
         data: &mut [u8],
     ) -> u16 {
         let mut sum = 0_u16;
-        for place in 0..journey.route.visits.len() {
-            let node = journey.route.visits[place].node as usize;
-            match self.nodes[node].controller.read_plainly(read, data, true) {
+        let mut gathered = 0_u64;
+        for (place, visit) in (0_u32..).zip(&journey.route.visits) {
+            let controller = &self.nodes[visit.node as usize].controller;
+            let answer = if read.is_short() {
+                controller.peek(read, &mut gathered)
+            } else {
+                controller.read_plainly(read, data, true)
+            };
+            match answer {
                 Answer::Nothing => {}
                 Answer::Read => sum = sum.wrapping_add(1),
                 Answer::Effect => {
-                    sum = sum.wrapping_add(self.at(journey, place as u32, header, data));
+                    sum = sum.wrapping_add(self.at(journey, place, header, data));
                 }
             }
+        }
+        for (out, byte) in data.iter_mut().zip(gathered.to_le_bytes()) {
+            *out |= byte;
         }
         sum
     }
@@ -201,26 +221,5 @@ impl World {
             }
         }
         self.direct.touched = touched;
-    }
-
-    /// Places on the way with FMMUs that map any of these logical bytes, in order.
-    fn mapped(&mut self, journey: &Journey<'_>, start: LogicalAddress, len: usize) -> Arc<[u32]> {
-        let directory = &self.nodes.directory;
-        if self.direct.mappings != directory.mappings() || self.direct.queries.len() > KEPT_QUERIES
-        {
-            self.direct.mappings = directory.mappings();
-            self.direct.queries.clear();
-        }
-        let key = (journey.card.index(), start.0, len as u16);
-        if let Some(places) = self.direct.queries.get(&key) {
-            return Arc::clone(places);
-        }
-        let nodes = directory.mapping(start, len);
-        let mut places: Vec<u32> = nodes.filter_map(|node| journey.route.place(node)).collect();
-        places.sort_unstable();
-        places.dedup();
-        let places: Arc<[u32]> = places.into();
-        self.direct.queries.insert(key, Arc::clone(&places));
-        places
     }
 }

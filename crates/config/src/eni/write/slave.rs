@@ -1,0 +1,323 @@
+//! Elements `Slave`.
+
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::register::{
+    FMMU, FmmuConfig, SYNC_MANAGER, SmControl, SmDirection, SyncManagerConfig,
+};
+use linesman_proto::sii::{Direction, PortKind, Protocols};
+use linesman_proto::topology::End;
+
+use super::cyclic::Image;
+use super::transition::{Init, Target, command};
+use super::xml::{Xml, hex};
+use crate::eni::OWN;
+use crate::identity::RevisionRule;
+use crate::plan::{DevicePlan, Plan};
+use crate::profile::Mailbox;
+use crate::start_up::StartUpAction;
+
+/// Longest wait for a state, in ms.
+const PATIENCE_MS: u32 = 10_000;
+/// Longest wait for the SII, in ms.
+const SII_PATIENCE_MS: u32 = 100;
+
+pub(super) fn write(xml: &mut Xml, device: &DevicePlan, plan: &Plan, image: &Image) {
+    let position = 0_u16.wrapping_sub(device.id.index() as u16);
+    xml.element("Slave", &[], |xml| {
+        xml.element("Info", &[], |xml| {
+            xml.text("Name", &device.name);
+            xml.text("PhysAddr", device.station.0);
+            xml.text("AutoIncAddr", position);
+            if let Some(ports) = &device.ports {
+                let letter = |kind: &PortKind| match kind {
+                    PortKind::None => '-',
+                    PortKind::Mii | PortKind::Other(_) => 'Y',
+                    PortKind::EBus => 'K',
+                    PortKind::FastHotConnect => 'H',
+                };
+                xml.text("Physics", ports.0.iter().map(letter).collect::<String>());
+            }
+            xml.text("VendorId", device.identity.vendor_id);
+            xml.text("ProductCode", device.identity.product_code);
+            xml.text("RevisionNo", device.identity.revision);
+            xml.text("SerialNo", device.identity.serial_number);
+        });
+        process_data(xml, device, image);
+        if let Some(mailbox) = &device.mailbox {
+            write_mailbox(xml, device, mailbox);
+        }
+        xml.element("InitCmds", &[], |xml| init_commands(xml, device, position));
+        if let Some(End::Controller(node, port)) = plan.tree.upstream(device.id.index())
+            && let Some(before) = plan.devices.get(node)
+        {
+            xml.element("PreviousPort", &[("Selected", "1")], |xml| {
+                xml.text("Port", port.letter());
+                xml.text("PhysAddr", before.station.0);
+            });
+        }
+        if let Some(clock) = &device.settings.clock {
+            xml.element("DC", &[], |xml| {
+                xml.text("ReferenceClock", u8::from(clock.reference));
+                xml.text("CycleTime0", clock.sync0_cycle.as_nanos());
+                xml.text("CycleTime1", clock.sync1_cycle.as_nanos());
+                xml.text("ShiftTime", clock.sync0_shift_ns);
+            });
+        }
+        ours(xml, device, plan);
+    });
+}
+
+fn process_data(xml: &mut Xml, device: &DevicePlan, image: &Image) {
+    xml.element("ProcessData", &[], |xml| {
+        for (name, direction) in [("Send", Direction::Outputs), ("Recv", Direction::Inputs)] {
+            for run in image.runs(device, direction) {
+                xml.element(name, &[], |xml| {
+                    xml.text("BitStart", run.start);
+                    xml.text("BitLength", run.len());
+                });
+            }
+        }
+        for (index, manager) in &device.sync_managers {
+            let outputs = manager.control.direction() == SmDirection::MainDeviceWrites;
+            xml.element(&format!("Sm{index}"), &[], |xml| {
+                xml.text("Type", if outputs { "Outputs" } else { "Inputs" });
+                xml.text("DefaultSize", manager.length);
+                xml.text("StartAddress", manager.start.0);
+                xml.text("ControlByte", manager.control.0);
+                xml.text("Enable", manager.activate.0 & 1);
+            });
+        }
+    });
+}
+
+fn write_mailbox(xml: &mut Xml, device: &DevicePlan, mailbox: &Mailbox) {
+    xml.element("Mailbox", &[], |xml| {
+        for (name, area) in [("Send", mailbox.areas.receive), ("Recv", mailbox.areas.send)] {
+            xml.element(name, &[], |xml| {
+                xml.text("Start", area.offset.0);
+                xml.text("Length", area.size);
+                if name == "Recv" {
+                    match &device.mailbox_state {
+                        Some((_, fmmu)) => {
+                            let first = crate::plan::layout::MAILBOX_STATES.0;
+                            let byte = fmmu.logical_start.0.saturating_sub(first);
+                            let bit = byte * 8 + u32::from(fmmu.logical_start_bit);
+                            xml.text("StatusBitAddr", bit);
+                        }
+                        None => xml.text("PollTime", 10),
+                    }
+                }
+            });
+        }
+        if let Some(bootstrap) = &mailbox.bootstrap {
+            xml.element("BootStrap", &[], |xml| {
+                for (name, area) in [("Send", bootstrap.receive), ("Recv", bootstrap.send)] {
+                    xml.element(name, &[], |xml| {
+                        xml.text("Start", area.offset.0);
+                        xml.text("Length", area.size);
+                    });
+                }
+            });
+        }
+        for (bit, name) in [
+            (Protocols::AOE, "AoE"),
+            (Protocols::EOE, "EoE"),
+            (Protocols::COE, "CoE"),
+            (Protocols::FOE, "FoE"),
+            (Protocols::SOE, "SoE"),
+            (Protocols::VOE, "VoE"),
+        ] {
+            if mailbox.protocols.has(bit) {
+                xml.text("Protocol", name);
+            }
+        }
+        xml.element("CoE", &[], |xml| {
+            xml.element("InitCmds", &[], |xml| {
+                for start_up in &device.start_up {
+                    let StartUpAction::CoeDownload { object, complete_access, data } =
+                        &start_up.action
+                    else {
+                        continue;
+                    };
+                    let ObjectAddress { index, subindex } = *object;
+                    let whole = [("CompleteAccess", "1")];
+                    let attributes = if *complete_access { &whole[..] } else { &[] };
+                    xml.element("InitCmd", attributes, |xml| {
+                        xml.text("Transition", start_up.transition.letters());
+                        xml.text("Comment", &start_up.comment);
+                        xml.text("Timeout", 0);
+                        xml.text("Ccs", 1);
+                        xml.text("Index", index.0);
+                        xml.text("SubIndex", subindex);
+                        xml.text("Data", hex(data));
+                    });
+                }
+            });
+        });
+    });
+}
+
+fn init_commands(xml: &mut Xml, device: &DevicePlan, position: u16) {
+    let by_position = Target::Position(position);
+    let by_station = Target::Station(device.station.0);
+    // A device that only mirrors AL control must not see the acknowledge bit.
+    let acknowledge = if device.device_emulation { 0x00 } else { 0x10 };
+    let state = |xml: &mut Xml, name: &str, transitions: &[&str], target: Target, value: u8| {
+        let (write, read) = target.commands();
+        let ask = format!("set device state to {name}");
+        let ask = Init { counted: true, ..Init::new(&ask, transitions, target, 0x0120) };
+        let acknowledge = if value <= 2 { acknowledge } else { 0 };
+        command(xml, &ask, write, &[value | acknowledge, 0]);
+        let check = format!("check device state for {name}");
+        let check = Init {
+            validate: Some((vec![value, 0], vec![0x1F, 0], PATIENCE_MS)),
+            ..Init::new(&check, transitions, target, 0x0130)
+        };
+        command(xml, &check, read, &[0; 2]);
+    };
+    state(xml, "INIT", &["IP", "PI", "SI", "OI"], by_position, 1);
+    identity(xml, device, by_position);
+    let station = Init::new("set station address", &["IP"], by_position, 0x0010);
+    let (write_position, _) = by_position.commands();
+    command(xml, &station, write_position, &device.station.0.to_le_bytes());
+    let (write, _) = by_station.commands();
+    let mut set = |comment: &str, transition: &str, register: RegisterAddress, data: &[u8]| {
+        let transitions = [transition];
+        let init = Init::new(comment, &transitions, by_station, register.0);
+        command(xml, &Init { counted: true, ..init }, write, data);
+    };
+    let watchdog = device.settings.watchdog;
+    for (comment, register, value) in [
+        ("set watchdog divider", 0x0400, watchdog.divider),
+        ("set PDI watchdog", 0x0410, watchdog.pdi),
+        ("set process data watchdog", 0x0420, watchdog.process_data),
+    ] {
+        if let Some(value) = value {
+            set(comment, "IP", RegisterAddress(register), &value.to_le_bytes());
+        }
+    }
+    if let Some(mailbox) = &device.mailbox {
+        let areas = [mailbox.areas.receive, mailbox.areas.send];
+        let controls = [SmControl::MAILBOX_OUT, SmControl::MAILBOX_IN];
+        for ((area, control), index) in areas.into_iter().zip(controls).zip(0..) {
+            if let Some(at) = SYNC_MANAGER.at(index) {
+                let manager = SyncManagerConfig::enabled(area.offset, area.size, control);
+                set(&format!("set SM {index} (mailbox)"), "IP", at, &manager.to_bytes());
+            }
+        }
+    }
+    let mut fmmu = |index: u8, fmmu: &FmmuConfig, transition: &str| {
+        if let Some(at) = FMMU.at(u16::from(index)) {
+            set(&format!("set FMMU {index}"), transition, at, &fmmu.to_bytes());
+        }
+    };
+    if let Some((index, state)) = &device.mailbox_state {
+        fmmu(*index, state, "IP");
+    }
+    for (index, config) in &device.fmmus {
+        fmmu(*index, config, "PS");
+    }
+    for (index, manager) in &device.sync_managers {
+        if let Some(at) = SYNC_MANAGER.at(u16::from(*index)) {
+            set(&format!("set SM {index}"), "PS", at, &manager.to_bytes());
+        }
+    }
+    if let Some(clock) = &device.settings.clock {
+        let cycle = |span: linesman_proto::time::Span| {
+            u32::try_from(span.as_nanos()).unwrap_or(u32::MAX).to_le_bytes()
+        };
+        let cycles = [cycle(clock.sync0_cycle), cycle(clock.sync1_cycle)].concat();
+        set("set DC cycle time", "PS", RegisterAddress(0x09A0), &cycles);
+        let activation = clock.assign_activate.to_le_bytes();
+        set("set DC activation", "PS", RegisterAddress(0x0980), &activation);
+    }
+    for start_up in &device.start_up {
+        if let StartUpAction::RegisterWrite { address, data } = &start_up.action {
+            set(&start_up.comment, &start_up.transition.letters(), *address, data);
+        }
+    }
+    state(xml, "PREOP", &["IP", "SP", "OP"], by_station, 2);
+    state(xml, "SAFEOP", &["PS", "OS"], by_station, 4);
+    state(xml, "OP", &["SO"], by_station, 8);
+}
+
+/// Reads the identity from the SII and compares it.
+fn identity(xml: &mut Xml, device: &DevicePlan, target: Target) {
+    let (write, read) = target.commands();
+    command(xml, &Init::new("assign SII to the MainDevice", &["IP"], target, 0x0500), write, &[0]);
+    let identity = &device.identity;
+    let revision_mask = match device.revision_rule {
+        RevisionRule::Any => None,
+        RevisionRule::LowWordEqual | RevisionRule::LowWordEqualHighWordEqualOrGreater => {
+            Some(0x0000_FFFF_u32)
+        }
+        RevisionRule::HighWordEqual => Some(0xFFFF_0000),
+        // "Or greater" cannot be said by bytes that must be equal: this file's own element says it.
+        RevisionRule::EqualOrGreater | RevisionRule::HighWordEqualOrGreater => None,
+        RevisionRule::Equal => Some(u32::MAX),
+    };
+    let serial_mask = (identity.serial_number != 0).then_some(u32::MAX);
+    for (comment, word, value, mask) in [
+        ("check vendor id", 0x08_u32, identity.vendor_id, Some(u32::MAX)),
+        ("check product code", 0x0A, identity.product_code, Some(u32::MAX)),
+        ("check revision", 0x0C, identity.revision, revision_mask),
+        ("check serial number", 0x0E, identity.serial_number, serial_mask),
+    ] {
+        let Some(mask) = mask else { continue };
+        let ask = Init::new(comment, &["IP"], target, 0x0502);
+        let [a, b, c, d] = word.to_le_bytes();
+        command(xml, &ask, write, &[0x00, 0x01, a, b, c, d]);
+        let mask_bytes = if mask == u32::MAX { Vec::new() } else { mask.to_le_bytes().to_vec() };
+        let check = Init {
+            validate: Some(((value & mask).to_le_bytes().to_vec(), mask_bytes, SII_PATIENCE_MS)),
+            ..Init::new(comment, &["IP"], target, 0x0508)
+        };
+        command(xml, &check, read, &[0; 4]);
+    }
+    command(xml, &Init::new("assign SII to the SubDevice", &["IP"], target, 0x0500), write, &[1]);
+}
+
+/// What ENI has no word for.
+fn ours(xml: &mut Xml, device: &DevicePlan, plan: &Plan) {
+    let settings = &device.settings;
+    let mut attributes = vec![
+        ("type", device.type_name.clone()),
+        ("emulation", u8::from(device.device_emulation).to_string()),
+        ("target", device.target.to_string()),
+        ("frame-repeat", u8::from(settings.frame_repeat).to_string()),
+        ("revision-rule", Word(&device.revision_rule).to_string()),
+        ("access", Word(&settings.access).to_string()),
+        ("addressing", Word(&settings.addressing).to_string()),
+        ("on-wrong-counter", Word(&settings.on_wrong_counter).to_string()),
+        ("entry", plan.tree.entry(device.id.index()).to_string()),
+    ];
+    if let Some(mailbox) = &device.mailbox {
+        attributes.push(("complete-access", u8::from(mailbox.complete_access).to_string()));
+    }
+    if let Some(current) = device.ebus_current_ma {
+        attributes.push(("ebus-ma", current.to_string()));
+    }
+    if let Some(task) = &settings.task {
+        attributes.push(("task", task.clone()));
+    }
+    if let Some(unit) = &settings.sync_unit {
+        attributes.push(("sync-unit", unit.clone()));
+    }
+    let attributes: Vec<(&str, &str)> =
+        attributes.iter().map(|(key, value)| (*key, value.as_str())).collect();
+    xml.element(OWN, &attributes, |xml| {
+        for module in &settings.modules {
+            xml.text("Module", module);
+        }
+    });
+}
+
+/// The word that stands for a choice in files.
+struct Word<'a, T>(&'a T);
+
+impl<T: serde::Serialize> std::fmt::Display for Word<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.serialize(f)
+    }
+}
