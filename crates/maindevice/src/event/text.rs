@@ -44,9 +44,12 @@ impl Event {
                 name(*id)
             )],
             Self::AbnormalState { id, from, status, code } => {
+                let (name, to) = (name(*id), status.state());
                 let reason = reason(*status, *code);
-                let to = status.state();
-                vec![format!("{}: abnormal state change (from {from} to {to}){reason}", name(*id))]
+                let change = format!("{name}: abnormal state change (from {from} to {to}){reason}");
+                let action = code.explain().actions.first().filter(|_| status.error());
+                let action = action.map(|action| format!("{name}: {action}"));
+                std::iter::once(change).chain(action).collect()
             }
             Self::TargetReached { id, state } => vec![format!("{}: {state} reached", name(*id))],
             Self::DeviceLost { id } => vec![format!("{}: does not answer", name(*id))],
@@ -157,12 +160,12 @@ mod tests {
             status: AlStatus(0x0014),
             code: AlStatusCode(0x001B),
         };
+        let lines = lines(&event);
         assert_eq!(
-            lines(&event),
-            [
-                "SubDevice 1: abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog"
-            ]
+            lines[0],
+            "SubDevice 1: abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog"
         );
+        assert_eq!(lines.len(), 2, "and what to do: {lines:?}");
     }
 
     #[test]

@@ -25,8 +25,8 @@ const THROUGH_UNIT: Span = Span::ns(20);
 const SPEED_START: u16 = 0x1000;
 /// 0x092C without its sign.
 const MAGNITUDE: u32 = 0x7FFF_FFFF;
-/// Frames of a burst that are out at once.
-const BURST_AT_ONCE: u32 = 4;
+/// From one frame that compensates drift to the next, at least.
+const SPACING: Span = Span::us(50);
 
 /// Clocks that could not be set.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -155,30 +155,23 @@ pub(crate) async fn set(
     write_all(wire, Target::Station(station), writes).await
 }
 
-/// Sends the reference's time to all in `frames` frames of their own, as fast as they come back.
+/// Sends the reference's time to all in `frames` frames of their own, one after another. Closer
+/// together than [`SPACING`] clocks that count in steps of 10 ns learn nothing of their speed.
 pub(crate) async fn compensate(wire: &Wire, reference: StationAddress, frames: u32) {
-    let burst: Vec<_> = (0..BURST_AT_ONCE)
-        .map(|_| {
-            let wire = wire.clone();
-            let address = DatagramAddress::Physical(reference.0, register::SYSTEM_TIME.address);
-            wire.clone().spawn(async move {
-                for _ in 0..frames / BURST_AT_ONCE {
-                    let request = Request {
-                        command: Command::Frmw,
-                        address,
-                        data: vec![0; 8],
-                        card: None,
-                        repeats: 0,
-                        alone: true,
-                    };
-                    // A lost one is one less.
-                    let _ = wire.submit(request).await;
-                }
-            })
-        })
-        .collect();
-    for share in burst {
-        share.await;
+    let address = DatagramAddress::Physical(reference.0, register::SYSTEM_TIME.address);
+    for _ in 0..frames {
+        let next_at = wire.now() + SPACING;
+        let request = Request {
+            command: Command::Frmw,
+            address,
+            data: vec![0; 8],
+            card: None,
+            repeats: 0,
+            alone: true,
+        };
+        // A lost one is one less.
+        let _ = wire.submit(request).await;
+        wire.sleep_until(next_at).await;
     }
 }
 
