@@ -78,6 +78,11 @@ class Bench:
         process = self.start(namespace, *command)
         return self.finish(process, seconds)
 
+    def stop(self, process, seconds=20):
+        """Ends a command as Ctrl-C does: (exit status, stdout, stderr)."""
+        process.send_signal(2)
+        return self.finish(process, seconds)
+
     def finish(self, process, seconds=60):
         try:
             out, err = process.communicate(timeout=seconds)
@@ -207,10 +212,14 @@ class Telling:
 
 
 class Watch:
-    """Looks at the outputs of a segment again and again while others write them; use it in `with`."""
+    """Looks at the outputs of a segment again and again while others write them; use it in `with`.
 
-    def __init__(self, segment):
-        self.segment, self.seen, self.done = segment, [], False
+    With `then`, does that once, as soon as all the outputs in `wanted` have their values.
+    """
+
+    def __init__(self, segment, wanted=None, then=None):
+        self.segment, self.wanted, self.then = segment, wanted, then
+        self.seen, self.done = [], False
 
     def __enter__(self):
         self.thread = threading.Thread(target=self.look)
@@ -223,6 +232,9 @@ class Watch:
             values = {one["name"]: one["value"] for one in signals if one["direction"] == "output"}
             if not self.seen or self.seen[-1] != values:
                 self.seen.append(values)
+            if self.then and self.saw(self.wanted):
+                then, self.then = self.then, None
+                then()
             time.sleep(0.02)
 
     def saw(self, wanted):
@@ -245,7 +257,7 @@ class Capture:
         for interface in (NEAR, NEAR_B):
             file = self.bench.path(f"{interface}.pcap")
             process = self.bench.start(
-                self.bench.near, "tcpdump", "-i", interface, "-B", 16384, "-U", "--immediate-mode", "-Z", "root", "-w", file,
+                self.bench.near, "tcpdump", "-i", interface, "-B", 65536, "-U", "--immediate-mode", "-Z", "root", "-w", file,
                 "ether proto 0x88a4",
             )
             # It says so once it listens.

@@ -3,8 +3,8 @@
 import sys
 import time
 
-from bench import FAR, HERE, NEAR, Segment, parse
-from harness import CYCLE_US, CYCLES, LINE, LINESMAN, SOEM, check, names, ran
+from bench import FAR, HERE, NEAR, Segment, Watch, parse
+from harness import CYCLE_US, CYCLES, LINE, LINESMAN, SOEM, check, linesman, names, ran
 from plant import VENDOR
 
 # The source address SOEM sends from.
@@ -14,12 +14,20 @@ SOEM_ADDRESS = "01:01:01:01:01:01"
 # proves: FRM-19 partial: seen from beside, without the acyclic reading
 @check
 def a_listener_beside_soem_sees_the_line_cut(line):
-    with Segment(line, LINESMAN, HERE / "cut.toml"):
-        listener = line.start(line.near, LINESMAN, "diagnose", f"listen:{NEAR}", "--seconds", 12, "--json")
-        time.sleep(0.7)
-        result = SOEM.exchange(line, LINE, LINE.draw(1), cycles=4000)
+    with Segment(line, LINESMAN, LINE.file) as segment:
+        rounds = LINE.draw(1)
+
+        def cut_it():
+            # The listener knows what is whole by then.
+            time.sleep(1)
+            segment.ask(do="inject", fault={"kind": "link-open", "at": "O1.B-A1.A"})
+
+        listener = listening(line)
+        with Watch(segment, LINE.shown(rounds[0]), cut_it) as watch:
+            result = SOEM.exchange(line, LINE, rounds, cycles=2000)
+        assert watch.then is None, "the line was not cut"
         assert 0 < result["complete"] < result["cycles"], f"no cut: {result['complete']} complete"
-        status, out, err = line.finish(listener)
+        status, out, err = line.stop(listener)
         diagnosis = parse(out, err)
         assert status == 1 and diagnosis["verdict"] == "faulty", (status, diagnosis["verdict"])
         assert diagnosis["network"]["devices"] == len(LINE), diagnosis["network"]
@@ -31,7 +39,7 @@ def a_listener_beside_soem_sees_the_line_cut(line):
 @check
 def linesman_scans_the_same_line(line):
     with Segment(line, LINESMAN, LINE.file):
-        status, out, err = line.run(line.near, LINESMAN, "scan", NEAR, "--json")
+        status, out, err = linesman(line, "scan", NEAR, "--json")
         assert status == 0, f"status {status}: {err[-600:]}"
         scan = parse(out, err)
         assert scan["schema"] == "linesman.scan/1", scan["schema"]
@@ -48,7 +56,7 @@ def linesman_scans_the_same_line(line):
 @check
 def linesman_judges_the_idle_line_healthy(line):
     with Segment(line, LINESMAN, LINE.file):
-        status, out, err = line.run(line.near, LINESMAN, "diagnose", NEAR, "--seconds", 2, "--json")
+        status, out, err = linesman(line, "diagnose", NEAR, "--seconds", 2, "--json")
         diagnosis = parse(out, err)
         assert status == 0, f"status {status}, {diagnosis['verdict']}: {names(diagnosis)}"
         assert diagnosis["schema"] == "linesman.diagnosis/1"
@@ -66,10 +74,9 @@ def a_listener_beside_soem_sends_nothing(line):
         assert status in (2, 3), f"status {status}: {out[:300]} {err[-300:]}"
 
         watch = watcher(line)
-        listener = line.start(line.near, LINESMAN, "diagnose", f"listen:{NEAR}", "--seconds", 5, "--json")
-        time.sleep(0.7)
+        listener = listening(line)
         result = SOEM.exchange(line, LINE, LINE.draw(2))
-        status, out, err = line.finish(listener)
+        status, out, err = line.stop(listener)
         seen = watched(line, watch)
         assert set(seen) == {SOEM_ADDRESS}, f"others sent as well: {seen}"
         ran(result)
@@ -100,6 +107,13 @@ def linesman_leaves_a_driven_line_alone(line):
         ran(parse(out.strip().splitlines()[-1], err))
         seen = watched(line, watch)
         assert set(seen) == {SOEM_ADDRESS}, f"frames of others were on the line: {seen}"
+
+
+def listening(line):
+    """A listener that listens by now; Ctrl-C ends it with its diagnosis."""
+    process = line.start(line.near, LINESMAN, "diagnose", f"listen:{NEAR}", "--seconds", 120, "--json")
+    time.sleep(1)
+    return process
 
 
 def watcher(line):

@@ -14,7 +14,7 @@ ETHERCRAB = os.environ.get("ETHERCRAB_PEER", "")
 
 ONE, LINE, TREE = (Plant(HERE / name) for name in ("one.toml", "segment.toml", "tree.toml"))
 
-CYCLES, CYCLE_US, ROUNDS = 400, 2000, 4
+CYCLES, CYCLE_US, ROUNDS = 800, 2000, 4
 CHECKS = []
 
 
@@ -37,7 +37,7 @@ class Client:
         if self.name == "ethercrab":
             if not os.access(ETHERCRAB, os.X_OK):
                 raise Skip("ETHERCRAB_PEER is not built")
-            return [ETHERCRAB]
+            return ["env", "RUST_BACKTRACE=0", ETHERCRAB]
         module = {"soem": "pysoem", "kickcat": "kickcat"}[self.name]
         if importlib.util.find_spec(module) is None:
             raise Skip(f"{module} is not installed")
@@ -45,19 +45,28 @@ class Client:
 
     def run(self, line, *arguments, script=None, seconds=60):
         """Runs it on the near end; gives the object it prints."""
-        quiet = ("env", "RUST_BACKTRACE=0")
-        status, out, err = line.run(line.near, *quiet, *self.command(script), *arguments, seconds=seconds)
+        status, out, err = line.run(line.near, *self.command(script), *arguments, seconds=seconds)
         assert status == 0, f"status {status}: {err[-600:]}"
         # Some stacks print words of their own before.
         return parse(out.strip().splitlines()[-1] if out.strip() else out, err)
 
-    def exchange(self, line, plant, rounds, cycles=CYCLES, *options, on=NEAR, cycle_us=CYCLE_US, seconds=90):
+    def exchange(self, line, plant, rounds, cycles=CYCLES, *options, on=NEAR, cycle_us=CYCLE_US, seconds=240):
         """Takes a plant to OP and writes these rounds of values."""
         return self.run(line, on, cycles, cycle_us, rounds_file(line, plant, rounds), *options, seconds=seconds)
 
 
 SOEM, CRAB = Client("soem"), Client("ethercrab")
 CAT = Client("kickcat", tells_identity=False)
+
+
+def linesman(line, *arguments):
+    """Runs Linesman on the near end. It gives a line up that is silent for some 40 ms; on a busy host that may be the
+    host, so there are three attempts."""
+    for _ in range(3):
+        status, out, err = line.run(line.near, LINESMAN, *arguments)
+        if status != 2 or "does not answer" not in out + err:
+            break
+    return status, out, err
 
 
 def rounds_file(line, plant, rounds):

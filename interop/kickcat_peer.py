@@ -48,17 +48,19 @@ def main():
 def bring_up(interfaces):
     """All SubDevices in PREOP."""
     first, *second = interfaces
-    link = kickcat.create_link(first, second[0] if second else "")
-    # Without a second card it waits as long after each frame, and each frame that comes later ends everything: so it is
-    # short, and there is another attempt, as a busy host is late at times.
-    link.set_timeout(timedelta(milliseconds=30))
     for attempt in range(ATTEMPTS):
+        # A new one each time: what came too late for the last attempt must not be taken for an answer in this one.
+        link = kickcat.create_link(first, second[0] if second else "")
+        # Without a second card it waits as long after each frame, and each frame that comes later ends everything: so it
+        # is short, and there is another attempt, as a busy host is late at times.
+        link.set_timeout(timedelta(milliseconds=40))
         bus = kickcat.Bus(link)
         try:
             bus.init(timedelta(seconds=3))
             return bus
         except RuntimeError as error:
             print(f"attempt {attempt + 1}: {error}", file=sys.stderr)
+            time.sleep(0.5)
     peer.refuse(f"not in PREOP after {ATTEMPTS} attempts")
 
 

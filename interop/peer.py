@@ -1,7 +1,7 @@
 """What every foreign MainDevice written in Python does with its result.
 
-A peer is run as `PEER.py INTERFACE[+INTERFACE] CYCLES CYCLE_US ROUNDS.json [sync0=NS] [overlap]`. It takes the line to
-OP, exchanges process data for CYCLES cycles, an equal part of them for each round, and prints one JSON object:
+A peer is run as `PEER.py INTERFACE[+INTERFACE] CYCLES CYCLE_US ROUNDS.json [sync0=NS] [overlap] [axes]`. It takes the line
+to OP, exchanges process data for CYCLES cycles, an equal part of them for each round, and prints one JSON object:
 
     devices   what the scan found: [vendor, product, revision] or what this stack can tell
     state     the state reached by all
@@ -11,7 +11,8 @@ OP, exchanges process data for CYCLES cycles, an equal part of them for each rou
     clocks    with `sync0`, the period of that signal: how far the clocks were off, see soem_clocks.py
 
 ROUNDS.json is a list: for each round the output bytes by position, in hexadecimal. Outputs that are not named are 0.
-With `overlap`, outputs and inputs lie at the same logical addresses.
+With `overlap`, outputs and inputs lie at the same logical addresses. With `axes`, drives are told in PREOP how long it is
+from one target to the next (0x60C2), as CiA 402 has it.
 """
 
 import json
@@ -27,7 +28,7 @@ def arguments():
     return types.SimpleNamespace(
         interfaces=interfaces.split("+"), cycles=int(cycles), cycle_s=int(cycle_us) / 1e6,
         rounds=json.loads(pathlib.Path(rounds).read_text()),
-        sync0_ns=int(sync0[0]) if sync0 else 0, overlap="overlap" in options,
+        sync0_ns=int(sync0[0]) if sync0 else 0, overlap="overlap" in options, axes="axes" in options,
     )
 
 

@@ -29,6 +29,9 @@ class Kind:
         self.low, self.lost_bits, self.axis = low, lost_bits, axis
         self.wkc = 2 * bool(outputs or axis) + bool(inputs or axis) if wkc is None else wkc
 
+    def both_ways(self):
+        return self.axis or bool(self.outputs and self.inputs)
+
     def is_digital(self):
         return any(channels and channels[3] == 1 for channels in (self.outputs, self.inputs))
 
@@ -189,7 +192,9 @@ class Plant:
             status, mode, actual, _, error = struct.unpack("<Hbxii H".replace(" ", ""), bytes.fromhex(image[position]))
             _, target, state = DRIVE_ROUNDS[number]
             target *= position
-            told = f"round {number + 1}, drive at {position}: status 0x{status:04X}, mode {mode}, at {actual}, error 0x{error:04X}"
+            told = (
+                f"round {number + 1}, drive at {position}: status 0x{status:04X}, mode {mode}, at {actual}, error 0x{error:04X}"
+            )
             assert status & 0x6F == state, f"{told}; expected status 0x{state:02X} under 0x6F"
             assert abs(actual - target) <= 100, f"{told}; expected position {target}"
             assert state != 0x27 or mode == CSP, told

@@ -19,6 +19,9 @@ def main():
         devices = [[slave.man, slave.id, slave.rev] for slave in master.slaves]
         names = [slave.name for slave in master.slaves]
         clocks = soem_clocks.Clocks(master, asked.sync0_ns) if asked.sync0_ns else None
+        be_patient(master)
+        if asked.axes:
+            tell_axes(master, asked.cycle_s)
         mapped, send = configure(master, asked.overlap)
         if clocks:
             clocks.align(send)
@@ -26,13 +29,32 @@ def main():
         complete, wkc, inputs = exchange(master, send, asked)
         state = "OP" if master.state_check(pysoem.OP_STATE, 50_000) == pysoem.OP_STATE else states(master)
         clocks = clocks.told() if clocks else None
+        shared = shared_addresses(master) if asked.overlap else []
         stop(master)
         peer.report(
-            devices=devices, names=names, state=state, mapped=mapped,
+            devices=devices, names=names, state=state, mapped=mapped, shared=shared,
             wkc=wkc, cycles=asked.cycles, complete=complete, rounds=inputs, clocks=clocks,
         )
     finally:
         master.close()
+
+
+def be_patient(master):
+    """The watchdog of outputs waits three seconds: the host may be busy with other things."""
+    for slave in master.slaves:
+        slave._fpwr(0x0420, (30_000).to_bytes(2, "little"), 20_000)
+
+
+def tell_axes(master, cycle_s):
+    """0x60C2: value and power of ten of the time from one target to the next."""
+    for slave in master.slaves:
+        if not soem_clocks.has_mailbox(slave):
+            continue
+        try:
+            slave.sdo_write(0x60C2, 1, round(cycle_s * 1000).to_bytes(1, "little"))
+            slave.sdo_write(0x60C2, 2, (-3).to_bytes(1, "little", signed=True))
+        except (pysoem.SdoError, pysoem.MailboxError, pysoem.WkcError):
+            continue
 
 
 def configure(master, overlap=False):
@@ -79,6 +101,20 @@ def exchange(master, send, asked):
             time.sleep(max(0.0, due - time.monotonic()))
         inputs.append([slave.input.hex() for slave in master.slaves])
     return complete, expected, inputs
+
+
+def shared_addresses(master):
+    """Positions of SubDevices whose outputs and inputs begin at the same logical address."""
+    shared = []
+    for position, slave in enumerate(master.slaves):
+        starts = {}
+        for fmmu in range(2):
+            entry = slave._fprd(0x0600 + 16 * fmmu, 16, 20_000)
+            # The direction: 2 is for outputs, 1 for inputs.
+            starts[entry[11]] = entry[:4]
+        if starts.get(1) is not None and starts.get(1) == starts.get(2):
+            shared.append(position)
+    return shared
 
 
 def stop(master):

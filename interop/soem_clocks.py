@@ -29,6 +29,9 @@ class Clocks:
         self.exchange(send, 50)
         self.before = self.differences()
         self.exchange(send, ALIGNING)
+        # Before OP: there, whoever reads objects does not exchange, and drives complain of that.
+        slaves = [self.master.slaves[place] for place in self.in_step]
+        self.modes = [read_number(slave, 0x1C33, 1) for slave in slaves]
 
     def exchange(self, send, cycles):
         for _ in range(cycles):
@@ -44,16 +47,31 @@ class Clocks:
             "clocked": self.clocked, "in_step": self.in_step, "before": self.before, "after": self.differences(),
             "delays": [register(slaves[place], 0x0928, 4) for place in self.clocked],
             "speeds": [register(slaves[place], 0x0932, 2) for place in self.clocked],
-            "modes": [int.from_bytes(slaves[place].sdo_read(0x1C33, 1), "little") for place in self.in_step],
+            "modes": self.modes,
         }
 
 
 def knows_sync0(slave):
     """Whether its synchronisation object knows the mode."""
-    try:
-        return int.from_bytes(slave.sdo_read(0x1C33, 4), "little") & 0x04 != 0
-    except (pysoem.SdoError, pysoem.MailboxError, pysoem.PacketError, pysoem.WkcError):
-        return False
+    return has_mailbox(slave) and (read_number(slave, 0x1C33, 4) or 0) & 0x04 != 0
+
+
+def read_number(slave, index, subindex):
+    """A number, or nothing when there is no such object."""
+    for _ in range(5):
+        try:
+            return int.from_bytes(slave.sdo_read(index, subindex), "little")
+        except pysoem.SdoError:
+            return None
+        except (pysoem.MailboxError, pysoem.PacketError, pysoem.WkcError, pysoem.Emergency, AssertionError):
+            # On a busy host the answer may be late, which pysoem tells in many ways.
+            continue
+    return None
+
+
+def has_mailbox(slave):
+    """SyncManager 0 is in mailbox mode: there is somebody to be asked."""
+    return register(slave, 0x0804, 1) & 0x03 == 0x02
 
 
 def register(slave, address, length):

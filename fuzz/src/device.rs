@@ -5,7 +5,7 @@ use linesman_proto::command::Command;
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::frame::{FrameBuilder, FrameView};
-use linesman_proto::mailbox::{Message, coe, foe};
+use linesman_proto::mailbox::{Message, coe, eoe, foe};
 use linesman_proto::register::{SmControl, SyncManagerConfig};
 use linesman_proto::sii::{Image, MailboxPair};
 use linesman_proto::time::{Instant, Span};
@@ -115,6 +115,7 @@ impl Rig {
         match message.header.kind.code() {
             0 => assert!(message.data.len() == 4),
             3 => assert!(coe::Message::parse(message.data).is_ok(), "{:02X?}", message.data),
+            2 => assert!(eoe::Message::parse(message.data).is_ok(), "{:02X?}", message.data),
             4 => assert!(foe::Message::parse(message.data).is_ok(), "{:02X?}", message.data),
             other => panic!("a message of type {other}"),
         }

@@ -1,41 +1,29 @@
 //! Frames from anywhere into a virtual segment.
 
+use linesman_config::attachment::Attachment;
 use linesman_proto::address::Path;
 use linesman_proto::ethernet::MIN_LEN;
 use linesman_proto::frame::FrameView;
+use linesman_proto::port::Port;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::Segment;
-use linesman_sim::segment_file::SegmentFile;
+use linesman_sim::segment_file::{SegmentDevice, SegmentFile};
 
 use crate::series::series;
 
 /// One coupler, terminals, and a junction with something behind it.
-const LINE: &str = r#"
-name = "fuzz"
-seed = 1
-[[device]]
-name = "K1"
-type = "EK1100"
-on = "maindevice"
-[[device]]
-name = "I1"
-type = "EL1008"
-on = "K1.B"
-[[device]]
-name = "O1"
-type = "EL2008"
-on = "I1.B"
-[[device]]
-name = "K2"
-type = "EK1100"
-on = "K1.C"
-"#;
+fn line() -> SegmentFile {
+    let row = [("K1", "EK1100"), ("I1", "EL1008"), ("O1", "EL2008")];
+    let mut file = SegmentFile::in_a_row("fuzz", 1, &row);
+    let on = Attachment::Device { name: "K1".to_owned(), port: Port::C };
+    file.devices.push(SegmentDevice::new("K2", "EK1100", on));
+    file
+}
 
 /// Whatever a MainDevice sends, an undisturbed segment gives every frame back at most once, in full
 /// length and intact, and moves no counter without a cause.
 pub fn segment(data: &[u8]) {
-    let file = SegmentFile::parse(LINE).expect("the line is well described");
-    let mut segment = Segment::build(&file).expect("the line can be built");
+    let mut segment = Segment::build(&line()).expect("the line can be built");
     let mut now = Instant::ZERO + Span::ms(1);
     let mut buffer = Vec::new();
     let mut sent = Vec::new();

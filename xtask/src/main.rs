@@ -1,7 +1,8 @@
 //! Developer commands, run as `cargo xtask COMMAND`.
 //!
 //! `test` is everything that is checked, in one command; `tidy` holds the house rules; `features`
-//! writes `FEATURES.md` from the annotations on tests; `fuzz` and `interop` run those two alone.
+//! writes `FEATURES.md` from the annotations on tests; `fuzz` and `interop` run those two alone;
+//! `bench-peers` measures Linesman beside other MainDevices.
 
 mod annotation;
 mod features;
@@ -42,7 +43,12 @@ enum Command {
         seconds: u64,
     },
     /// Run the foreign MainDevices against the virtual segment (root, Linux)
-    Interop,
+    /// Measure Linesman beside other MainDevices: start to OP, CPU per cycle (root, Linux)
+    BenchPeers,
+    Interop {
+        /// Only the checks whose names contain one of these
+        names: Vec<String>,
+    },
 }
 
 fn main() -> ExitCode {
@@ -64,7 +70,8 @@ fn run(command: Command) -> Result<bool> {
         Command::Tidy => tidy::run(&root),
         Command::Features { check } => features::run(&root, check),
         Command::Fuzz { seconds } => test::run(&root, &test::Options::only("fuzz", Some(seconds))),
-        Command::Interop => test::run(&root, &test::Options::only("interop", None)),
+        Command::BenchPeers => test::run(&root, &test::Options::only("bench-peers", None)),
+        Command::Interop { names } => test::run(&root, &test::Options::interop(names)),
     }
 }
 

@@ -14,3 +14,4 @@ pub mod plan;
 pub mod profile;
 pub mod project;
 pub mod start_up;
+mod xml_writer;

@@ -6,8 +6,9 @@ use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::{SmControl, SmMode};
 use linesman_proto::sii::{
-    Direction, FmmuUsage, Image, MailboxPair, PortKind, Protocols, SyncManagerKind,
+    Direction, FmmuUsage, Image, MailboxPair, OpMode, PortKind, Protocols, SyncManagerKind,
 };
+use linesman_proto::time::Span;
 
 /// A SyncManager for process data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -73,8 +74,45 @@ pub struct DeviceProfile {
     pub ports: Option<PortMap<PortKind>>,
     /// PDOs that are assigned to SyncManagers, in the order of their data.
     pub pdos: Vec<MappedPdo>,
+    /// PDOs that are assigned to no SyncManager unless the user chooses them.
+    pub spare_pdos: Vec<MappedPdo>,
     /// What its FMMUs are meant for, in their order; empty when nothing is said.
     pub fmmus: Vec<FmmuUsage>,
+    /// Its operation modes with distributed clocks.
+    pub clock_modes: Vec<ClockMode>,
+}
+
+/// An operation mode with distributed clocks (SII category 60; ESI `Dc/OpMode`).
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct ClockMode {
+    /// Its name, such as `DcSync`.
+    pub name: String,
+    /// What is written to 0x0980.
+    pub assign_activate: u16,
+    /// Cycle of SYNC0 in ns; 0 is that of the task, times the factor.
+    pub sync0_cycle_ns: u32,
+    /// Positive: every n cycles; negative: n times within a cycle.
+    pub sync0_cycle_factor: i16,
+    /// Shift of SYNC0 in ns.
+    pub sync0_shift_ns: i32,
+    /// Cycle of SYNC1 in cycles of SYNC0.
+    pub sync1_cycle_factor: i16,
+    /// Shift of SYNC1 in ns.
+    pub sync1_shift_ns: i32,
+}
+
+impl ClockMode {
+    /// Cycle of SYNC0 with a task of this cycle.
+    #[must_use]
+    pub fn sync0_cycle(&self, cycle: Span) -> Span {
+        let of_task = cycle.as_nanos();
+        match (self.sync0_cycle_ns, self.sync0_cycle_factor) {
+            (0, 0) => cycle,
+            (0, factor @ 1..) => Span::ns(of_task * factor.unsigned_abs() as u64),
+            (0, factor) => Span::ns(of_task / u64::from(factor.unsigned_abs())),
+            (ns, _) => Span::ns(u64::from(ns)),
+        }
+    }
 }
 
 /// A PDO as it is assigned.
@@ -135,8 +173,26 @@ impl DeviceProfile {
             device_emulation: image.configuration.device_emulation(),
             ebus_current_ma: image.ebus_current_ma(),
             ports: general.map(|general| general.ports),
-            pdos: mapped_pdos(image),
+            pdos: pdos(image, true),
+            spare_pdos: pdos(image, false),
+            clock_modes: image.op_modes().map(|mode| clock_mode(image, mode)).collect(),
             fmmus: image.fmmu_usages().to_vec(),
+        }
+    }
+
+    /// Sets the lengths of the SyncManagers to those of their PDOs; where a direction has no PDOs at all,
+    /// they stay.
+    pub fn measure(&mut self) {
+        for manager in &mut self.process {
+            let same_way = |pdo: &&MappedPdo| pdo.direction == manager.direction;
+            if !self.pdos.iter().chain(&self.spare_pdos).any(|pdo| same_way(&pdo)) {
+                continue;
+            }
+            let mine = self.pdos.iter().filter(same_way);
+            let mine = mine.filter(|pdo| pdo.sync_manager == manager.index);
+            let bits: u32 = mine.map(MappedPdo::bits).sum();
+            manager.len = u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX);
+            manager.bits = u16::try_from(bits).unwrap_or(0);
         }
     }
 
@@ -178,12 +234,25 @@ fn process_sync_managers(image: &Image) -> Vec<ProcessSyncManager> {
         .collect()
 }
 
-/// PDOs that the image assigns to SyncManagers.
-fn mapped_pdos(image: &Image) -> Vec<MappedPdo> {
+fn clock_mode(image: &Image, mode: &OpMode) -> ClockMode {
+    ClockMode {
+        name: image.text(mode.name).unwrap_or_default().to_owned(),
+        assign_activate: mode.assign_activate,
+        sync0_cycle_ns: mode.sync0_cycle_ns,
+        sync0_cycle_factor: mode.sync0_cycle_factor,
+        sync0_shift_ns: mode.sync0_shift_ns,
+        sync1_cycle_factor: mode.sync1_cycle_factor,
+        sync1_shift_ns: mode.sync1_shift_ns,
+    }
+}
+
+/// PDOs that the image assigns to SyncManagers, or those that it does not.
+fn pdos(image: &Image, assigned: bool) -> Vec<MappedPdo> {
     let text = |at| image.text(at).unwrap_or_default().to_owned();
     let both = [Direction::Outputs, Direction::Inputs];
     let all = both.into_iter().flat_map(|direction| {
-        image.pdos(direction).filter_map(move |pdo| Some((direction, pdo.sync_manager?, pdo)))
+        let wanted = image.pdos(direction).filter(|pdo| pdo.sync_manager.is_some() == assigned);
+        wanted.map(move |pdo| (direction, pdo.sync_manager.unwrap_or(0), pdo))
     });
     all.map(|(direction, sync_manager, pdo)| MappedPdo {
         sync_manager,

@@ -55,8 +55,11 @@ fn recordings_of_real_lines_come_out_the_same() {
         let report = replay(path);
         println!("==== {}\n{report}", path.display());
         judged += report.compared;
-        // What is not compared are fields that tell a time or count, and bytes without any meaning.
-        if report.different > 0 {
+        // What earlier messages left in a mailbox is foretold; only the byte that closes it is not.
+        let foretold = report.equal_but.iter().all(|one| {
+            ["time", "counter", "closing byte of a mailbox"].contains(&one.reason.as_str())
+        });
+        if report.different > 0 || !foretold {
             wrong.push(format!("{}: {report}", path.display()));
         }
     }

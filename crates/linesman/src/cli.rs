@@ -3,7 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, demo, diagnose, explain, fault, interfaces, lab, scan, schema, sim,
+    completion, demo, diagnose, explain, fault, foe, history, interfaces, lab, plan, reg, run,
+    scan, schema, sdo, sii, sim, state,
 };
 use crate::version::VERSION;
 
@@ -50,10 +51,26 @@ pub(crate) enum Command {
     Scan(scan::Arguments),
     /// What is wrong with a line: where, why, and what to do
     Diagnose(diagnose::Arguments),
+    /// What follows from a project or ENI file: frames, load, E-bus budget, clocks, doubts
+    Plan(plan::Arguments),
     /// Network cards: link, driver, suitability, EtherCAT seen
     Interfaces(interfaces::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
     Explain(explain::Arguments),
+    /// States of SubDevices: look, ask for another, acknowledge an error
+    State(state::Arguments),
+    /// Objects of a SubDevice: read, write, list, explain
+    Sdo(sdo::Arguments),
+    /// What a SubDevice has noted of itself: its diagnosis history
+    History(history::Arguments),
+    /// Files of a SubDevice: fetch, bring, update firmware
+    Foe(foe::Arguments),
+    /// EEPROM of a SubDevice: read, write, compare, station alias
+    Sii(sii::Arguments),
+    /// Registers of a SubDevice's controller: read, write
+    Reg(reg::Arguments),
+    /// Drive a line: bring it up, exchange process data, watch it, stop it cleanly
+    Run(run::Arguments),
     /// Virtual segments on real interfaces, for any MainDevice
     Sim(sim::Arguments),
     /// Break, heal and watch a segment that runs on real interfaces
@@ -71,11 +88,19 @@ impl Command {
     pub(crate) fn wants_json(&self) -> bool {
         match self {
             Self::Scan(arguments) => arguments.json,
+            Self::Plan(arguments) => arguments.json,
+            Self::Run(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
             Self::Lab(arguments) => arguments.wants_json(),
             Self::Sim(arguments) => arguments.json,
+            Self::State(arguments) => arguments.json,
+            Self::Sdo(arguments) => arguments.json,
+            Self::History(arguments) => arguments.json,
+            Self::Foe(arguments) => arguments.json,
+            Self::Sii(arguments) => arguments.json,
+            Self::Reg(arguments) => arguments.json,
             Self::Demo(_) | Self::Explain(_) | Self::Schema(_) | Self::Completion(_) => false,
         }
     }

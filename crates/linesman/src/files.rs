@@ -1,7 +1,7 @@
 //! Files that users write: read as a whole, with messages that say which file and where.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use linesman_config::project::Project;
 use linesman_sim::segment::Segment;
@@ -62,19 +62,37 @@ impl Plant {
 /// A segment file.
 pub(crate) fn segment_file(path: &Path) -> Result<SegmentFile, Failure> {
     let text = text(path, "a segment file")?;
-    let files = Beside(path.parent().unwrap_or(Path::new("")));
-    SegmentFile::parse_with(&text, &files).map_err(|error| in_file(path, &error))
+    SegmentFile::parse_with(&text, &Beside::of(path)).map_err(|error| in_file(path, &error))
 }
 
-/// Files that a segment file names, relative to where that is.
-struct Beside<'a>(&'a Path);
+/// Files that a segment file or a story names, relative to where that is, or under the directory of
+/// device data: `$LINESMAN_DATA/esi/drive.xml`.
+pub(crate) struct Beside<'a>(&'a Path);
+
+impl<'a> Beside<'a> {
+    /// Those that the file at `path` names.
+    pub(crate) fn of(path: &'a Path) -> Self {
+        Self(path.parent().unwrap_or(Path::new("")))
+    }
+
+    fn path(&self, name: &str) -> Result<PathBuf, String> {
+        let Some(rest) = name.strip_prefix("$LINESMAN_DATA/") else {
+            return Ok(self.0.join(name));
+        };
+        let data = std::env::var_os("LINESMAN_DATA")
+            .ok_or_else(|| format!("{name}: set LINESMAN_DATA to the directory of device data"))?;
+        Ok(PathBuf::from(data).join(rest))
+    }
+}
 
 impl DescriptionFiles for Beside<'_> {
     fn read(&self, name: &str) -> Result<Vec<u8>, String> {
-        let path = self.0.join(name);
+        let path = self.path(name)?;
         let place = path.display();
         let refuse = |error: std::io::Error| {
-            format!("reading {place}: {error}; the path is relative to that of the segment file")
+            format!(
+                "reading {place}: {error}; the path is relative to that of the file that names it"
+            )
         };
         let about = fs::metadata(&path).map_err(refuse)?;
         if !about.is_file() {
@@ -121,10 +139,15 @@ pub(crate) fn refuse_to_overwrite(path: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes a file that is not there yet.
+/// Writes a text file that is not there yet.
 pub(crate) fn write_new(path: &Path, what: &str, text: &str) -> Result<(), Failure> {
+    write_new_bytes(path, what, text.as_bytes())
+}
+
+/// Writes a file that is not there yet.
+pub(crate) fn write_new_bytes(path: &Path, what: &str, bytes: &[u8]) -> Result<(), Failure> {
     refuse_to_overwrite(path)?;
-    fs::write(path, text).map_err(|error| {
+    fs::write(path, bytes).map_err(|error| {
         let reason = format!("{}: writing {what}: {error}", path.display());
         Failure::new(reason, "check the rights of the directory and its free space")
     })

@@ -80,3 +80,45 @@ fn an_interface_that_goes_is_told_with_what_was_served() {
     assert!(run.stdout.contains("live ran for"), "{}", run.all());
     assert!(run.stderr.contains("far0: the interface is gone"), "{}", run.all());
 }
+
+// proves: JCT-11 partial: the line as a MainDevice on a card sees it
+#[test]
+fn devices_and_groups_are_plugged_out_and_in_while_it_runs() {
+    let script = r#"
+        ask() { "$LINESMAN" fault "$DIRECTORY/control" "$@" 2>&1; }
+        devices() { "$LINESMAN" scan near0 --json | grep -c '"product_code"'; }
+        devices
+        ask unplug I1 | grep -c link-open; devices
+        ask unplug I1 | grep -o 'unplugged already'
+        ask plug I1 > /dev/null; sleep 0.2; devices
+        ask unplug outputs > /dev/null; devices
+        ask plug group:outputs --on K1.C | grep -o 'no cable fits both ports'
+        ask plug group:outputs --on here | grep -c 'here'
+        ask plug group:outputs --on I1.B > /dev/null; sleep 0.2; devices
+        ask plug outputs | grep -o 'is plugged in'
+        ask unplug nobody | grep -o 'no device or group is called `nobody`'
+        ask events | grep -c 'link-open: \(begins\|ends\)'
+        # What `heal` ends is plugged in, too.
+        ask unplug O1 > /dev/null; ask heal > /dev/null; sleep 0.2; devices
+        ask unplug O1 > /dev/null; devices
+    "#;
+    let Some(run) = beside_segment(script) else { return };
+    let lines: Vec<&str> = run.stdout.lines().map(str::trim).collect();
+    let expected = [
+        "3",
+        "1",
+        "1",
+        "unplugged already",
+        "3",
+        "2",
+        "no cable fits both ports",
+        "1",
+        "3",
+        "is plugged in",
+        "no device or group is called `nobody`",
+        "4",
+        "3",
+        "2",
+    ];
+    assert_eq!(lines, expected, "{}", run.all());
+}

@@ -5,25 +5,12 @@ mod support;
 use std::fs;
 
 use serde_json::Value;
+use support::bench::plant;
 use support::{Run, assert_valid, linesman};
 use tempfile::TempDir;
 
-/// A coupler, two terminals behind it, and a box on its second port.
-const PLANT: &str = r#"
-name = "branch"
-seed = 11
-[[device]]
-name = "K1"
-type = "EK1100"
-on = "maindevice"
-[[device]]
-name = "I1"
-type = "EL1008"
-on = "K1.B"
-[[device]]
-name = "O1"
-type = "EL2008"
-on = "I1.B"
+/// What hangs on the second port of the coupler.
+const BRANCH: &str = r#"
 [[device]]
 name = "K2"
 type = "EK1100"
@@ -35,10 +22,15 @@ type = "EL2008"
 on = "K2.B"
 "#;
 
+/// A coupler, two terminals behind it, and a box on its second port.
+fn branch() -> String {
+    format!("{}{BRANCH}", plant("branch", 11).to_toml())
+}
+
 fn with_segment(command: &str, faults: &str, more: &[&str]) -> Run {
     let directory = TempDir::new().expect("a temporary directory");
     let path = directory.path().join("plant.toml");
-    fs::write(&path, format!("{PLANT}{faults}")).expect("a file can be written");
+    fs::write(&path, format!("{}{faults}", branch())).expect("a file can be written");
     let place = format!("sim:{}", path.display());
     linesman([command, &place].into_iter().chain(more.iter().copied()))
 }

@@ -2,7 +2,7 @@
 //!
 //! Read first: [`capture`] for files, [`clock`] for time, [`interface`] for the cards there are,
 //! [`socket`] for frames on them, [`host`] for what the host itself does wrong, [`real_time`] for what
-//! a cycle asks of it.
+//! a cycle asks of it, [`shared_image`] for process data that other programs see.
 
 #![deny(unsafe_code)]
 
@@ -13,5 +13,6 @@ pub mod error;
 pub mod host;
 pub mod interface;
 pub mod real_time;
+pub mod shared_image;
 pub mod socket;
 pub mod unix_time;

@@ -15,6 +15,7 @@ use crate::exchange::{ExchangeError, Reply};
 use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
 use crate::procedure::{ClockError, Look, LookError, ScanError};
+use crate::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
 use crate::supervisor::StartUpError;
 
 mod text;
@@ -256,6 +257,15 @@ pub enum Event {
         object: ObjectAddress,
         /// Whether it was taken.
         result: Result<(), MailboxFailure>,
+    },
+    /// [`MainDevice::serve`](crate::MainDevice::serve) is done.
+    Served {
+        /// Which service.
+        ticket: ServiceTicket,
+        /// For whom.
+        id: DeviceId,
+        /// What it gives.
+        result: Box<Result<ServiceAnswer, ServiceFailure>>,
     },
     /// A probe is done.
     Probed {

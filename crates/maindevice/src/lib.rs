@@ -4,7 +4,8 @@
 //! with frames and time, asked for frames and the next deadline. Inside, [`exchange`] sends
 //! datagrams and matches what comes back; [`executor`] runs procedures ([`procedure`]) that await
 //! answers; `cyclic` exchanges process data; `supervisor` brings each SubDevice to its target and
-//! keeps it there; [`mailbox`] talks to the software of SubDevices.
+//! keeps it there; [`mailbox`] talks to the software of SubDevices; [`service`] does single things
+//! for tools.
 //!
 //! Read first: "Shapes" in `ARCHITECTURE.md`.
 
@@ -16,6 +17,7 @@ pub mod mailbox;
 pub mod main_device;
 pub mod options;
 pub mod procedure;
+pub mod service;
 pub mod statistics;
 mod supervisor;
 

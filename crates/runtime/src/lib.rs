@@ -4,19 +4,22 @@
 //! files, [`line`](mod@line) is where frames go, [`drive`] runs a MainDevice there, [`listen`] hears what is on a card, [`host_watch`]
 //! asks about a card, [`record`] writes what was seen to a file. [`serve`] puts a segment on real
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
-//! outside, [`journal`] writes down what really happened, [`names`] says where. [`stop`] is the wish
-//! to stop.
+//! outside, [`journal`] writes down what really happened, [`names`] says where. [`plan_file`] reads
+//! the file that a line is planned with. [`stop`] is the wish to stop.
 
 pub mod capture;
 pub mod control;
 mod desk;
 pub mod drive;
 pub mod host_watch;
+pub mod image;
 pub mod journal;
 pub mod line;
 pub mod listen;
 pub mod names;
+pub mod plan_file;
 pub mod record;
+pub mod run;
 pub mod selector;
 pub mod serve;
 pub mod stop;

@@ -9,13 +9,14 @@ use std::collections::BTreeMap;
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::register::{ErrorCounter, WatchdogTime};
+use linesman_proto::register::WatchdogTime;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
+use crate::controller::WatchdogKind;
 use crate::device::Trouble;
 
-pub use audit::Unexplained;
+pub use audit::{AuditedCounter, Unexplained};
 pub(crate) use audit::{Cause, Ledger};
 
 /// How many entries are kept; what comes later is counted in the [`FaultRecord`]s only, so that a
@@ -95,6 +96,13 @@ pub enum Effect {
     WatchdogSet {
         /// As in 0x0420; `None` for the former one.
         time: Option<WatchdogTime>,
+    },
+    /// A watchdog ran out and counted it. Entered when the log is audited.
+    WatchdogExpired {
+        /// Which.
+        kind: WatchdogKind,
+        /// How long what it waits for had not come.
+        silence: Span,
     },
     /// A device was made to send an emergency.
     EmergencySent {
@@ -253,6 +261,7 @@ impl FaultRecord {
             | Effect::EmergencySent { .. }
             | Effect::CardSilent
             | Effect::WatchdogSet { .. }
+            | Effect::WatchdogExpired { .. }
             | Effect::ClockDrifts { .. }
             | Effect::ClockStopped
             | Effect::ClockRestarted
@@ -282,7 +291,7 @@ pub struct TruthLog {
     left_out: u64,
     faults: Vec<FaultRecord>,
     /// What each counter may have counted, and for whom.
-    pub(crate) ledger: BTreeMap<(DeviceId, ErrorCounter), Ledger>,
+    pub(crate) ledger: BTreeMap<(DeviceId, AuditedCounter), Ledger>,
 }
 
 impl TruthLog {

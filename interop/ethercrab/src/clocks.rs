@@ -11,7 +11,7 @@ use crate::rounds::{self, Asked, Seen};
 use crate::{Group, failed};
 
 /// How often the reference's time is sent before SYNC0 is switched on.
-const ALIGNING: usize = 15_000;
+const ALIGNING: usize = 8_000;
 /// Registers: delay, difference, speed counter difference.
 const DELAY: u16 = 0x0928;
 const DIFFERENCE: u16 = 0x092C;
@@ -24,6 +24,7 @@ pub(crate) async fn run(interface: &str, asked: &Asked, sync0_period: Duration) 
     let maindevice = &crate::open(interface)?;
     let mut group = crate::scan(maindevice).await?;
     let found = rounds::found(&group, maindevice);
+    rounds::be_patient(&group, maindevice).await?;
     let mut in_step = Vec::new();
     for (position, mut subdevice) in group.iter_mut(maindevice).enumerate() {
         let modes = subdevice.sdo_read::<u16>(MODES.0, MODES.1).await.unwrap_or(0);
@@ -38,7 +39,8 @@ pub(crate) async fn run(interface: &str, asked: &Asked, sync0_period: Duration) 
     }
     // A quarter of a cycle ahead of SYNC0.
     let start_delay = Duration::from_millis(200);
-    let configuration = DcConfiguration { start_delay, sync0_period, sync0_shift: sync0_period / 4 };
+    let configuration =
+        DcConfiguration { start_delay, sync0_period, sync0_shift: sync0_period / 4 };
     let group = group
         .configure_dc_sync(maindevice, configuration)
         .await

@@ -5,6 +5,7 @@ mod loss;
 mod objects;
 mod rounds;
 mod services;
+mod speed;
 
 use std::time::Duration;
 
@@ -57,12 +58,13 @@ fn micros(text: &str) -> Result<Duration> {
 fn open(interface: &str) -> Result<MainDevice<'static>> {
     let (transmit, receive, pdus) =
         STORAGE.try_split().map_err(|()| anyhow!("the storage is split already"))?;
-    // The host is no real-time system, and may be busy: what is tried is the line, not the host.
+    // The host is no real-time system, and may be busy: what is tried is the line, not the host. Frames are never sent
+    // again: of two copies that come back the second one would end the task that receives.
     let timeouts = Timeouts {
-        pdu: Duration::from_millis(200),
-        eeprom: Duration::from_secs(1),
-        mailbox_echo: Duration::from_secs(1),
-        mailbox_response: Duration::from_secs(2),
+        pdu: Duration::from_secs(3),
+        eeprom: Duration::from_secs(8),
+        mailbox_echo: Duration::from_secs(8),
+        mailbox_response: Duration::from_secs(8),
         state_transition: Duration::from_secs(10),
         ..Timeouts::default()
     };

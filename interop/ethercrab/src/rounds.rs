@@ -26,6 +26,7 @@ pub(crate) async fn run(interface: &str, asked: &Asked) -> Result<()> {
     let maindevice = &crate::open(interface)?;
     let group = crate::scan(maindevice).await?;
     let found = found(&group, maindevice);
+    be_patient(&group, maindevice).await?;
     let group = group.into_safe_op(maindevice).await.map_err(failed("on the way to SAFEOP"))?;
     // SubDevices with outputs want process data before they go to OP, so it is not waited for here.
     let group = group.request_into_op(maindevice).await.map_err(failed("on the way to OP"))?;
@@ -36,6 +37,14 @@ pub(crate) async fn run(interface: &str, asked: &Asked) -> Result<()> {
 
     // Further down would need an acknowledgement where a watchdog was quicker; this stack has none.
     group.into_safe_op(maindevice).await.map_err(failed("back to SAFEOP"))?;
+    Ok(())
+}
+
+/// The watchdog of outputs waits three seconds: the host may be busy with other things.
+pub(crate) async fn be_patient(group: &Group, maindevice: &MainDevice<'_>) -> Result<()> {
+    for subdevice in group.iter(maindevice) {
+        subdevice.register_write(0x0420_u16, 30_000_u16).await.map_err(failed("watchdog"))?;
+    }
     Ok(())
 }
 

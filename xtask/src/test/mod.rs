@@ -5,6 +5,7 @@ mod count;
 mod exec;
 mod fuzz;
 mod interop;
+mod peers;
 mod product;
 mod tools;
 
@@ -38,12 +39,20 @@ pub(crate) struct Options {
     /// How many plants the demo draws
     #[arg(long, value_name = "N", default_value_t = 10)]
     demo_seeds: u64,
+    /// Only the interop checks whose names contain one of these
+    #[arg(long, value_name = "NAME")]
+    checks: Vec<String>,
 }
 
 impl Options {
     /// One step alone.
     pub(crate) fn only(step: &str, fuzz_seconds: Option<u64>) -> Self {
         Self { only: vec![step.to_owned()], fuzz_seconds, ..Self::default() }
+    }
+
+    /// The step with foreign MainDevices alone, and of it only the checks with these names.
+    pub(crate) fn interop(checks: Vec<String>) -> Self {
+        Self { checks, ..Self::only("interop", None) }
     }
 }
 
@@ -80,22 +89,25 @@ struct Step {
     name: &'static str,
     /// Part of `--quick`.
     quick: bool,
+    /// Only when it is asked for by name.
+    alone: bool,
     run: fn(&Context<'_>) -> Result<Outcome>,
 }
 
 const STEPS: &[Step] = &[
-    Step { name: "format", quick: true, run: cargo::format },
-    Step { name: "tidy", quick: true, run: cargo::tidy },
-    Step { name: "lints", quick: true, run: cargo::lints },
-    Step { name: "tests", quick: true, run: cargo::tests },
-    Step { name: "docs", quick: true, run: cargo::docs },
-    Step { name: "features", quick: true, run: cargo::features },
-    Step { name: "release", quick: false, run: product::release },
-    Step { name: "demo", quick: false, run: product::demo },
-    Step { name: "stories", quick: false, run: product::stories },
-    Step { name: "swarm", quick: false, run: product::swarm },
-    Step { name: "fuzz", quick: false, run: fuzz::run },
-    Step { name: "interop", quick: false, run: interop::run },
+    Step { name: "format", quick: true, alone: false, run: cargo::format },
+    Step { name: "tidy", quick: true, alone: false, run: cargo::tidy },
+    Step { name: "lints", quick: true, alone: false, run: cargo::lints },
+    Step { name: "tests", quick: true, alone: false, run: cargo::tests },
+    Step { name: "docs", quick: true, alone: false, run: cargo::docs },
+    Step { name: "features", quick: true, alone: false, run: cargo::features },
+    Step { name: "release", quick: false, alone: false, run: product::release },
+    Step { name: "demo", quick: false, alone: false, run: product::demo },
+    Step { name: "stories", quick: false, alone: false, run: product::stories },
+    Step { name: "swarm", quick: false, alone: false, run: product::swarm },
+    Step { name: "fuzz", quick: false, alone: false, run: fuzz::run },
+    Step { name: "interop", quick: false, alone: false, run: interop::run },
+    Step { name: "bench-peers", quick: false, alone: true, run: peers::run },
 ];
 
 /// Runs the chosen steps; `false` when one failed.
@@ -108,7 +120,7 @@ pub(crate) fn run(root: &Path, options: &Options) -> Result<bool> {
     }
     let chosen = |step: &&Step| {
         if options.only.is_empty() {
-            step.quick || !options.quick
+            !step.alone && (step.quick || !options.quick)
         } else {
             options.only.iter().any(|name| name == step.name)
         }
@@ -117,7 +129,10 @@ pub(crate) fn run(root: &Path, options: &Options) -> Result<bool> {
     let logs = target.join("xtask");
     std::fs::create_dir_all(&logs)?;
     let mut context = Context { root, options, target, logs, missing: BTreeMap::new() };
-    let wanted = STEPS.iter().filter(chosen).any(|step| matches!(step.name, "tests" | "interop"));
+    let wanted = STEPS
+        .iter()
+        .filter(chosen)
+        .any(|step| matches!(step.name, "tests" | "interop" | "bench-peers"));
     if wanted {
         context.missing = tools::prepare(&context);
     }

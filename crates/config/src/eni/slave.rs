@@ -162,15 +162,7 @@ fn mailbox(element: &Element, device: &mut DevicePlan) -> Result<Option<Mailbox>
     let bootstrap = element.child("BootStrap").map(self::areas).transpose()?;
     let mut protocols = 0;
     for protocol in element.children("Protocol") {
-        protocols |= match protocol.text() {
-            "AoE" => Protocols::AOE,
-            "EoE" => Protocols::EOE,
-            "CoE" => Protocols::COE,
-            "FoE" => Protocols::FOE,
-            "SoE" => Protocols::SOE,
-            "VoE" => Protocols::VOE,
-            _ => 0,
-        };
+        protocols |= Protocols::bit_of(protocol.text()).unwrap_or(0);
     }
     let mut complete_access = false;
     let commands = element.at("CoE/InitCmds");

@@ -22,6 +22,33 @@ pub struct EsiOpMode {
     pub sync1_cycle_factor: i16,
     /// Shift of SYNC1 in ns.
     pub sync1_shift_ns: i32,
+    /// What its SyncManagers carry in this mode; those that are not named carry what they do
+    /// otherwise.
+    pub sync_managers: Vec<EsiModeSyncManager>,
+}
+
+/// A SyncManager in an operation mode.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub struct EsiModeSyncManager {
+    /// Which one.
+    pub number: u8,
+    /// What is written to subindex 1 of 0x1C32 or 0x1C33, where that is said.
+    pub sync_type: Option<u16>,
+    /// What is written to subindex 2, in ns.
+    pub cycle_time_ns: Option<u32>,
+    /// What is written to subindex 3, in ns.
+    pub shift_time_ns: Option<i32>,
+    /// Its PDOs; none where those of the device stay.
+    pub pdos: Vec<EsiModePdo>,
+}
+
+/// A PDO in an operation mode.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct EsiModePdo {
+    /// Index of its mapping object.
+    pub index: u16,
+    /// How often it is there in each cycle: 1 without oversampling.
+    pub times: u16,
 }
 
 /// The modes of an element `Dc`.
@@ -44,5 +71,20 @@ fn op_mode(element: &Element) -> Result<EsiOpMode, EsiError> {
         sync0_shift_ns: element.child_number("ShiftTimeSync0")?.unwrap_or(0),
         sync1_cycle_factor: factor("CycleTimeSync1")?,
         sync1_shift_ns: element.child_number("ShiftTimeSync1")?.unwrap_or(0),
+        sync_managers: element.children("Sm").map(sync_manager).collect::<Result<_, _>>()?,
+    })
+}
+
+fn sync_manager(element: &Element) -> Result<EsiModeSyncManager, EsiError> {
+    let pdo = |pdo: &Element| {
+        let times = pdo.attribute_number("OSFac")?.unwrap_or(1);
+        Ok(EsiModePdo { index: pdo.number()?, times })
+    };
+    Ok(EsiModeSyncManager {
+        number: element.attribute_number("No")?.unwrap_or(0),
+        sync_type: element.child_number("SyncType")?,
+        cycle_time_ns: element.child_number("CycleTime")?,
+        shift_time_ns: element.child_number("ShiftTime")?,
+        pdos: element.children("Pdo").map(pdo).collect::<Result<_, _>>()?,
     })
 }

@@ -65,6 +65,8 @@ pub struct EsiDevice {
     pub profile: u16,
     /// Its dictionary, as far as it is described here.
     pub objects: Vec<EsiObject>,
+    /// Texts of its diagnosis messages (object 0x10F3) by their numbers, in English where they are.
+    pub diagnosis_texts: Vec<(u16, String)>,
     /// The file that holds its dictionary, if that is another.
     pub dictionary_file: Option<String>,
     /// Where modules can sit.
@@ -167,6 +169,7 @@ fn read(element: &Element, kind: &Element, type_name: &str) -> Result<EsiDevice,
         registers: Vec::new(),
         profile: 0,
         objects: Vec::new(),
+        diagnosis_texts: Vec::new(),
         dictionary_file: None,
         slots: element.child("Slots").map(slots).transpose()?,
         notes: Vec::new(),
@@ -196,6 +199,7 @@ fn read(element: &Element, kind: &Element, type_name: &str) -> Result<EsiDevice,
         if let Some(dictionary) = profile.child("Dictionary") {
             device.objects.extend(objects(dictionary, &mut notes));
         }
+        device.diagnosis_texts.extend(diagnosis_texts(profile, &mut notes));
         let file = profile.child_text("DictionaryFile");
         if !file.is_empty() {
             device.dictionary_file = Some(file.to_owned());
@@ -203,6 +207,23 @@ fn read(element: &Element, kind: &Element, type_name: &str) -> Result<EsiDevice,
     }
     device.notes = notes;
     Ok(device)
+}
+
+/// Texts of diagnosis messages: element `DiagMessages` (ETG.2000). One whose number cannot be read is
+/// left out, with the reason in `notes`.
+fn diagnosis_texts(profile: &Element, notes: &mut Vec<EsiError>) -> Vec<(u16, String)> {
+    let all = profile.children("DiagMessages").flat_map(|all| all.children("DiagMessage"));
+    let mut texts = Vec::new();
+    for message in all {
+        match message.child_number("TextId") {
+            Ok(Some(id)) => {
+                texts.push((id, message.in_language("MessageText", super::ENGLISH).to_owned()));
+            }
+            Ok(None) => {}
+            Err(error) => notes.push(error.within("DiagMessages")),
+        }
+    }
+    texts
 }
 
 fn names(element: &Element) -> Result<Vec<(u32, String)>, EsiError> {
@@ -255,6 +276,17 @@ pub(crate) fn physics(letters: &str) -> Result<PortMap<PortKind>, String> {
         *ports.0.get_mut(place).ok_or("more than four ports")? = kind;
     }
     Ok(ports)
+}
+
+/// The letters that stand for ports: `Y` for one of whatever kind with a cable, `-` for none.
+pub(crate) fn letters(ports: &PortMap<PortKind>) -> String {
+    let letter = |kind: &PortKind| match kind {
+        PortKind::None => '-',
+        PortKind::Mii | PortKind::Other(_) => 'Y',
+        PortKind::EBus => 'K',
+        PortKind::FastHotConnect => 'H',
+    };
+    ports.0.iter().map(letter).collect()
 }
 
 fn about(info: &Element, device: &mut EsiDevice) -> Result<(), EsiError> {

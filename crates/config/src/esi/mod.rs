@@ -4,23 +4,27 @@
 //! image that the maker programs into it. A file holds hundreds of devices, and one that cannot be
 //! understood is no cause to refuse the others: each is a result of its own.
 
+pub mod assignment;
 pub mod clock;
 pub mod device;
 pub mod dictionary;
 pub mod eeprom;
 pub mod error;
 pub mod find;
+pub mod header;
 pub mod image;
 pub mod mailbox;
 pub mod module;
 pub mod pdo;
 pub mod sync_manager;
+pub mod write;
 
 pub(crate) mod encoding;
 pub(crate) mod value;
 pub(crate) mod xml;
 
-pub use clock::EsiOpMode;
+pub use assignment::Assigned;
+pub use clock::{EsiModePdo, EsiModeSyncManager, EsiOpMode};
 pub use device::EsiDevice;
 pub use dictionary::{EsiObject, EsiObjectEntry};
 pub use eeprom::EsiEeprom;
@@ -28,7 +32,7 @@ pub use error::EsiError;
 pub use find::{FindError, Selection};
 pub use mailbox::EsiMailbox;
 pub use module::{EsiModule, EsiSlots};
-pub use pdo::{EsiEntry, EsiPdo};
+pub use pdo::{EsiEntry, EsiOversampling, EsiPdo};
 pub use sync_manager::{EsiFmmu, EsiSyncManager};
 
 use self::xml::Element;

@@ -53,6 +53,38 @@ pub struct EsiModule {
     pub notes: Vec<EsiError>,
 }
 
+impl EsiModule {
+    /// Its process data in a slot, counted from 0: indices are further by the increments of the device.
+    #[must_use]
+    pub fn pdos_in(&self, slots: &EsiSlots, place: u16) -> Vec<EsiPdo> {
+        let pdo_shift = slots.pdo_increment.wrapping_mul(place);
+        let index_shift = slots.index_increment.wrapping_mul(place);
+        let mut pdos = self.pdos.clone();
+        for pdo in &mut pdos {
+            if pdo.depends_on_slot {
+                pdo.index = pdo.index.wrapping_add(pdo_shift);
+                for excluded in &mut pdo.excludes {
+                    *excluded = excluded.wrapping_add(pdo_shift);
+                }
+            }
+            for entry in pdo.entries.iter_mut().filter(|entry| entry.depends_on_slot) {
+                entry.index = entry.index.wrapping_add(index_shift);
+            }
+        }
+        pdos
+    }
+
+    /// Whether a word of a user means it: its type, its name, or its ident in hexadecimal.
+    #[must_use]
+    pub fn is_called(&self, word: &str) -> bool {
+        let ident = word.strip_prefix("0x").and_then(|hex| u32::from_str_radix(hex, 16).ok());
+        match ident {
+            Some(ident) => self.ident == ident,
+            None => self.type_name.eq_ignore_ascii_case(word) || self.name == word,
+        }
+    }
+}
+
 /// Most slots of a device; object 0xF030 has as many entries.
 const MOST_SLOTS: usize = 255;
 

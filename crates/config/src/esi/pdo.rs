@@ -26,8 +26,23 @@ pub struct EsiPdo {
     pub is_virtual: bool,
     /// PDOs that cannot be assigned with it.
     pub excludes: Vec<u16>,
+    /// It can be there several times in each cycle, once for each sample.
+    pub oversampling: Option<EsiOversampling>,
     /// What it consists of. With oversampling, that of one sample.
     pub entries: Vec<EsiEntry>,
+}
+
+/// How often a PDO with oversampling can be there in each cycle.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct EsiOversampling {
+    /// How often unless an operation mode says otherwise (attribute `OSFac`).
+    pub factor: u16,
+    /// How often at least (`OSMin`).
+    pub least: u16,
+    /// How often at most (`OSMax`).
+    pub most: u16,
+    /// Added to indices from one sample to the next (`OSIndexInc`).
+    pub index_increment: u16,
 }
 
 /// A piece of a PDO.
@@ -76,10 +91,23 @@ pub(super) fn pdo(element: &Element, direction: Direction) -> Result<EsiPdo, Esi
         fixed: element.flag("Fixed")?,
         mandatory: element.flag("Mandatory")?,
         is_virtual: element.flag("Virtual")?,
+        oversampling: oversampling(element)?,
         excludes,
         entries,
         name,
     })
+}
+
+fn oversampling(element: &Element) -> Result<Option<EsiOversampling>, EsiError> {
+    let Some(factor) = element.attribute_number("OSFac")? else { return Ok(None) };
+    let least = element.attribute_number("OSMin")?.unwrap_or(1);
+    let most = element.attribute_number("OSMax")?.unwrap_or(factor);
+    if !(least..=most).contains(&factor) {
+        let reason = format!("OSFac is {factor}, expected OSMin to OSMax, {least} to {most}");
+        return Err(element.error(reason));
+    }
+    let index_increment = element.attribute_number("OSIndexInc")?.unwrap_or(0);
+    Ok(Some(EsiOversampling { factor, least, most, index_increment }))
 }
 
 fn entry(element: &Element) -> Result<EsiEntry, EsiError> {

@@ -265,18 +265,13 @@ impl ObservationFile {
     #[must_use]
     pub fn project(&self) -> Project {
         let devices = self.devices.iter().map(|device| ProjectDevice {
-            name: device.label(),
             type_name: device.type_name.clone(),
-            vendor_id: None,
-            product_code: None,
-            revision: None,
             revision_rule: RevisionRule::Any,
-            serial: None,
-            on: device.on.clone(),
             entry: device.entry.clone(),
             station: device.station,
+            ..ProjectDevice::at(&device.label(), device.on.clone())
         });
-        Project { name: self.name.clone(), devices: devices.collect(), ring: self.ring.clone() }
+        Project { ring: self.ring.clone(), ..Project::of(&self.name, devices.collect()) }
     }
 
     /// What is wrong with the line, as far as the values tell. A project in `setup` says what was

@@ -19,6 +19,7 @@ use std::collections::BTreeSet;
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::port::Port;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
@@ -111,19 +112,25 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
 }
 
-/// When the device was gone before it came back in INIT: as long as its neighbour had no link to it,
-/// or, where that is not known, as long as it did not answer.
+/// When the device was gone before it came back in INIT: as long as a neighbour had no link to it, the
+/// one before it first of all, or, where that is not known, as long as it did not answer. Neighbours
+/// behind it tell in a ring alone: elsewhere they are gone with it.
 fn outage(line: &Line, device: &Device, change: &AlChange) -> Option<(Instant, Instant)> {
     let is_recent =
         |since: Instant, until: Instant| since <= change.at && until + BEFORE >= change.at;
-    let entry = line.tree.as_ref().filter(|tree| device.id.index() < tree.len());
-    let upstream = entry.and_then(|tree| line.opposite(device.id, tree.entry(device.id.index())));
-    if let Some(End::Controller(parent, port)) = upstream
-        && let Some(parent) = line.device(parent)
-    {
+    let tree = line.tree.as_ref().filter(|tree| device.id.index() < tree.len());
+    let neighbours = tree.into_iter().flat_map(|tree| {
+        let node = device.id.index();
+        let children = tree.children(node).map(|(port, _)| port);
+        let ports: Vec<Port> = std::iter::once(tree.entry(node)).chain(children).collect();
+        ports.into_iter().filter_map(|port| line.opposite(device.id, port))
+    });
+    for end in neighbours {
+        let End::Controller(neighbour, port) = end else { continue };
+        let Some(neighbour) = line.device(neighbour) else { continue };
         let mut down = None;
         let mut latest = None;
-        for seen in &parent.dl.changes {
+        for seen in &neighbour.dl.changes {
             let is_active = seen.to.port_state(port).is_active();
             match (down, is_active) {
                 (None, false) if seen.from.port_state(port).is_active() => down = Some(seen.at),

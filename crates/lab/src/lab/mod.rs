@@ -7,6 +7,7 @@
 mod error;
 mod exchange;
 mod object;
+mod register;
 mod truth;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -64,6 +65,20 @@ pub struct Lab {
     transmit: Vec<u8>,
 }
 
+/// On a line of thousands a frame is longer on its way than is usually waited for, and more of them
+/// are out at once.
+fn by_length(segment: &Segment) -> Options {
+    const DEVICES_A_FRAME: usize = 1_000;
+    const MOST_FRAMES: usize = 64;
+    let usual = Options::default();
+    let frames = (segment.tree().len() / DEVICES_A_FRAME).min(MOST_FRAMES);
+    Options {
+        patience: usual.patience.max(segment.longest_way() * 2),
+        frames_at_once: usual.frames_at_once.max(frames),
+        ..usual
+    }
+}
+
 impl Lab {
     /// A lab for a segment file.
     ///
@@ -86,7 +101,7 @@ impl Lab {
             start: None,
             clock: "virtual".to_owned(),
         };
-        let main = MainDevice::new(network, Options { ring: paths == 2, ..Options::default() });
+        let main = MainDevice::new(network, Options { ring: paths == 2, ..by_length(&segment) });
         let mut lab = Self {
             now: Instant::ZERO,
             network,

@@ -4,7 +4,7 @@ use linesman_maindevice::Event;
 use linesman_maindevice::mailbox::MailboxFailure;
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 
 use super::{Lab, LabError};
 
@@ -12,7 +12,26 @@ use super::{Lab, LabError};
 const PATIENCE: Span = Span::s(10);
 const LOOK: Span = Span::us(100);
 
+/// A place among the events so far: the instant of the last, and how many are of that instant.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EventMark {
+    since: Option<Instant>,
+    before: usize,
+}
+
 impl Lab {
+    pub(super) fn event_mark(&self) -> EventMark {
+        let since = self.events.last().map(|(at, _)| *at);
+        let before = self.events.iter().filter(|(at, _)| Some(*at) == since).count();
+        EventMark { since, before }
+    }
+
+    /// Events behind a mark.
+    pub(super) fn events_since(&self, mark: EventMark) -> impl Iterator<Item = &Event> {
+        let new = self.events.iter().filter(move |(at, _)| Some(*at) >= mark.since);
+        new.skip(mark.before).map(|(_, event)| event)
+    }
+
     /// Reads an object of a SubDevice of the project through its mailbox. `None` when nothing came of
     /// it in any way.
     ///
@@ -24,13 +43,10 @@ impl Lab {
         object: ObjectAddress,
     ) -> Result<Option<Result<Vec<u8>, MailboxFailure>>, LabError> {
         let (of, now) = (self.in_plan(id), self.now);
-        let since = self.events.last().map(|(at, _)| *at);
-        let before = self.events.iter().filter(|(at, _)| Some(*at) == since).count();
+        let mark = self.event_mark();
         self.main.sdo_upload(now, of, object, false);
         let answer = |lab: &Self| {
-            // Those of the same instant that were there already do not count.
-            let new = lab.events.iter().filter(|(at, _)| Some(*at) >= since);
-            new.skip(before).find_map(|(_, event)| {
+            lab.events_since(mark).find_map(|event| {
                 let Event::SdoUploaded { id, object: about, result } = event else { return None };
                 ((*id, *about) == (of, object)).then(|| result.clone())
             })

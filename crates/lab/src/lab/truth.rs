@@ -55,15 +55,15 @@ impl Lab {
         blind
     }
 
-    /// Pulls the cable of a SubDevice.
+    /// Pulls the cable of a SubDevice, or those of a hot connect group.
     ///
     /// # Errors
-    /// The segment's, when there is no such SubDevice, or it is out already.
-    pub fn unplug(&mut self, name: &str) -> Result<FaultId, PlugError> {
-        let id = self.segment.unplug(self.now, name)?;
+    /// The segment's, when there is no such SubDevice or group, or it is out already.
+    pub fn unplug(&mut self, name: &str) -> Result<Vec<FaultId>, PlugError> {
+        let faults = self.segment.unplug(self.now, name)?;
         let blind = self.blind_ports();
-        self.blind.insert(id, blind);
-        Ok(id)
+        self.blind.extend(faults.iter().map(|fault| (*fault, blind.clone())));
+        Ok(faults)
     }
 
     /// Plugs a SubDevice in again, where it was or elsewhere.

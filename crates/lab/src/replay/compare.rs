@@ -1,8 +1,9 @@
 //! Two answers to the same datagram, field by field.
 //!
 //! Working counters must agree always, process data always. Data of registers must agree but for
-//! fields that tell a time or count something; behind the end of a mailbox message lies whatever was
-//! there before.
+//! fields that tell a time or count something. A mailbox is compared as far as its header says that it
+//! is message; behind it lies what earlier messages left, and in its last byte what the device wrote
+//! there to hand the mailbox over (ETG.1000.4, mailbox: full once its last byte was written).
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::command::{Addressing, Command};
@@ -20,6 +21,9 @@ pub enum Class {
     Counter,
     /// It lies behind the end of a mailbox message.
     BehindMessage,
+    /// It is the last byte of a mailbox whose message ends before: a device writes it, whatever is in
+    /// it, so that the controller takes the mailbox for full.
+    ClosingByte,
     /// It is a byte of an SDO response that carries nothing.
     Unused,
 }
@@ -32,6 +36,7 @@ impl Class {
             Self::Time => "time",
             Self::Counter => "counter",
             Self::BehindMessage => "behind the message",
+            Self::ClosingByte => "closing byte of a mailbox",
             Self::Unused => "unused byte of an SDO response",
         }
     }
@@ -101,9 +106,10 @@ pub enum What {
     Missing,
 }
 
-/// Compares the recorded datagram with ours. `is_mailbox` says that it fetches a mailbox.
+/// Compares the recorded datagram with ours. Where it fetches a mailbox, `mailbox` is the length of
+/// that, in bytes.
 #[must_use]
-pub fn compare(recorded: &Datagram<'_>, ours: &Datagram<'_>, is_mailbox: bool) -> Outcome {
+pub fn compare(recorded: &Datagram<'_>, ours: &Datagram<'_>, mailbox: Option<u16>) -> Outcome {
     let differs = |what, expected: String, received: String| {
         Outcome::Differs(Difference { what, expected, received })
     };
@@ -117,14 +123,16 @@ pub fn compare(recorded: &Datagram<'_>, ours: &Datagram<'_>, is_mailbox: bool) -
         return differs(What::Position, hex(recorded.adp), hex(ours.adp));
     }
     let is_logical = addressing == Some(Addressing::Logical);
-    let message_end = if is_mailbox { message_len(recorded.data) } else { usize::MAX };
-    let unused = if is_mailbox { unused(recorded.data) } else { 0..0 };
+    let message_end = mailbox.map_or(usize::MAX, |_| message_len(recorded.data));
+    let closing = mailbox.map(|len| usize::from(len.saturating_sub(1)));
+    let unused = mailbox.map_or(0..0, |_| unused(recorded.data));
     let mut but = None;
     let bytes = recorded.data.iter().zip(ours.data).enumerate();
     for (offset, _) in bytes.filter(|(_, (recorded, ours))| recorded != ours) {
         let address = recorded.ado.0.wrapping_add(offset as u16);
         let skipped = match is_logical {
             true => None,
+            false if offset >= message_end && closing == Some(offset) => Some(Class::ClosingByte),
             false if offset >= message_end => Some(Class::BehindMessage),
             false if unused.contains(&offset) => Some(Class::Unused),
             false => class(address),

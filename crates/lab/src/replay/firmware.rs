@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use linesman_proto::mailbox::Counter;
 use linesman_proto::register::{AlEvents, SmDirection, SmMode, SyncManagerConfig};
 use linesman_proto::sii::Protocols;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
@@ -40,6 +41,8 @@ pub(super) struct Learned {
     asked_at: Option<Instant>,
     looks_at: Option<Instant>,
     mailbox: Mailbox,
+    /// What the first answer counts, where the recording begins behind others.
+    first_answer: Option<Counter>,
     turns: VecDeque<MailboxTurn>,
     message: Option<Message>,
     /// When the device begins to write behind each fetch, and whether that shows.
@@ -72,6 +75,7 @@ impl Learned {
             asked_at: None,
             looks_at: None,
             mailbox: Mailbox::new(AT_ONCE, Protocols(Protocols::COE | Protocols::FOE)),
+            first_answer: seen.first_answer,
             turns: seen.mailbox.clone(),
             message: None,
             openings: seen.openings.clone(),
@@ -234,6 +238,9 @@ pub(super) fn input_areas(
 impl Firmware for Learned {
     fn start(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {
         self.mailbox.restart();
+        if let Some(counter) = self.first_answer {
+            self.mailbox.count_from(counter);
+        }
         self.step = None;
         self.message = None;
     }

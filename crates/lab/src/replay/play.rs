@@ -11,6 +11,7 @@ use linesman_sim::device::Signals;
 use linesman_sim::segment::Segment;
 
 use super::compare::{Difference, Outcome, What, compare};
+use super::exception::Reasons;
 use super::firmware::input_areas;
 use super::model::{Inputs, Model};
 use super::recording::{Datagram, Recording, Turn, datagrams};
@@ -25,14 +26,15 @@ const AFTER: Span = Span::ms(10);
 struct Outstanding {
     turn: usize,
     print: u64,
-    /// Datagrams of it that fetch a mailbox.
-    mailboxes: Vec<bool>,
+    /// For each datagram that fetches a mailbox, the length of that in bytes.
+    mailboxes: Vec<Option<u16>>,
 }
 
 /// Plays all requests at their times, and compares what comes back.
 #[must_use]
 pub fn play(recording: &Recording, model: &mut Model) -> Report {
     let mut report = Report::of(recording, model);
+    let reasons = Reasons::of(recording);
     let mut outstanding: Vec<Outstanding> = Vec::new();
     let start = recording.turns.first().map_or(Instant::ZERO, |turn| turn.request.at);
     let mut now = Instant::ZERO + BEFORE;
@@ -40,22 +42,22 @@ pub fn play(recording: &Recording, model: &mut Model) -> Report {
         // Time stamps of several cards may run backwards; the segment's time does not.
         now = now.max(Instant::ZERO + BEFORE + turn.request.at.since(start));
         model.segment.advance(now);
-        collect(recording, &mut model.segment, &mut outstanding, &mut report);
+        collect(recording, &reasons, &mut model.segment, &mut outstanding, &mut report);
         feed(turn, model);
         let mailboxes = turn
             .request
             .datagrams()
             .iter()
-            .map(|one| fetches_mailbox(one, &model.segment))
+            .map(|one| fetched_mailbox(one, &model.segment))
             .collect();
         let print = lasting(&turn.request.bytes);
         outstanding.push(Outstanding { turn: index, print, mailboxes });
         model.segment.handle_frame(now, Path::A, &turn.request.bytes);
     }
     model.segment.advance(now + AFTER);
-    collect(recording, &mut model.segment, &mut outstanding, &mut report);
+    collect(recording, &reasons, &mut model.segment, &mut outstanding, &mut report);
     for lost in outstanding {
-        missing(&recording.turns[lost.turn], &mut report);
+        missing(&recording.turns[lost.turn], &reasons, &mut report);
     }
     report
 }
@@ -67,6 +69,7 @@ fn lasting(frame: &[u8]) -> u64 {
 /// Takes what came back.
 fn collect(
     recording: &Recording,
+    reasons: &Reasons,
     segment: &mut Segment,
     outstanding: &mut Vec<Outstanding>,
     report: &mut Report,
@@ -78,33 +81,34 @@ fn collect(
         let one = outstanding.remove(at);
         let turn = &recording.turns[one.turn];
         if !arrival.intact {
-            missing(turn, report);
+            missing(turn, reasons, report);
             continue;
         }
         let Some(reply) = &turn.reply else {
             report.unanswered += 1;
             continue;
         };
+        if turn.is_rebuilt {
+            continue;
+        }
         let ours = datagrams(&buffer);
         for (number, recorded) in reply.datagrams().iter().enumerate() {
             let outcome = match ours.get(number) {
-                Some(ours) => {
-                    let is_mailbox = one.mailboxes.get(number).copied().unwrap_or(false);
-                    compare(recorded, ours, is_mailbox)
-                }
+                Some(ours) => compare(recorded, ours, one.mailboxes.get(number).copied().flatten()),
                 None => not_there(recorded),
             };
-            report.add(turn, number, recorded, outcome);
+            report.add(turn, number, recorded, outcome, reasons);
         }
     }
 }
 
-fn missing(turn: &Turn, report: &mut Report) {
+fn missing(turn: &Turn, reasons: &Reasons, report: &mut Report) {
     match &turn.reply {
+        Some(_) if turn.is_rebuilt => {}
         None => report.unanswered += 1,
         Some(reply) => {
             for (number, recorded) in reply.datagrams().iter().enumerate() {
-                report.add(turn, number, recorded, not_there(recorded));
+                report.add(turn, number, recorded, not_there(recorded), reasons);
             }
         }
     }
@@ -147,12 +151,12 @@ fn addressed(datagram: &Datagram<'_>, segment: &Segment) -> Option<DeviceId> {
     }
 }
 
-fn fetches_mailbox(datagram: &Datagram<'_>, segment: &Segment) -> bool {
+/// The length of the mailbox that a datagram fetches.
+fn fetched_mailbox(datagram: &Datagram<'_>, segment: &Segment) -> Option<u16> {
     let reads = datagram.command.is_some_and(|command| command.effect().reads);
-    let device = addressed(datagram, segment).filter(|_| reads);
-    let controller = device.and_then(|id| segment.controller(id));
-    let mailbox = controller.and_then(|controller| sync_manager(controller, 1));
-    mailbox.is_some_and(|manager| manager.is_active() && manager.start == datagram.ado)
+    let device = addressed(datagram, segment).filter(|_| reads)?;
+    let mailbox = sync_manager(segment.controller(device)?, 1)?;
+    (mailbox.is_active() && mailbox.start == datagram.ado).then_some(mailbox.length)
 }
 
 // ---- the world outside ----

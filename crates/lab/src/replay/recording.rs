@@ -1,10 +1,12 @@
 //! A recording as turns: a request and what came back for it.
 
+mod mend;
+
 use linesman_diagnosis::FrameSeen;
 use linesman_diagnosis::observe::{Exchange, Fingerprint, FrameCopy, Pairing};
 use linesman_proto::address::{LogicalAddress, RegisterAddress};
 use linesman_proto::command::Command;
-use linesman_proto::frame::FrameView;
+use linesman_proto::frame::{FrameError, FrameView};
 use linesman_proto::time::Instant;
 
 /// A frame of the recording.
@@ -74,6 +76,9 @@ pub struct Turn {
     pub request: Frame,
     /// What came back; `None` when nothing did.
     pub reply: Option<Frame>,
+    /// The request is not in the recording: it was made of what came back. What is learned of it
+    /// counts, and it is played, so that devices stay in step; it is not judged.
+    pub is_rebuilt: bool,
 }
 
 impl Turn {
@@ -90,10 +95,20 @@ impl Turn {
 pub struct Recording {
     /// By the time of their requests.
     pub turns: Vec<Turn>,
-    /// Frames that came back while their request was not recorded: they cannot be played.
+    /// Frames that came back while their request was not recorded.
     pub alone: u64,
-    /// Frames that cannot be used: damaged, cut off by the recorder, or no EtherCAT datagrams.
+    /// EtherCAT frames that cannot be used: damaged, cut off by the recorder, or without datagrams.
     pub unusable: u64,
+    /// Frames of other protocols.
+    pub other_traffic: u64,
+    /// Number of the first frame that lacks its request or its return, or cannot be used.
+    pub first_gap: Option<u64>,
+}
+
+impl Recording {
+    fn gap(&mut self, number: u64) {
+        self.first_gap = Some(self.first_gap.map_or(number, |first| first.min(number)));
+    }
 }
 
 /// Takes the frames of a capture, one after the other.
@@ -101,6 +116,8 @@ pub struct Recording {
 pub struct Recorder {
     pairing: Pairing,
     recording: Recording,
+    /// Returns whose request was not seen.
+    alone: Vec<Frame>,
 }
 
 impl Recorder {
@@ -108,28 +125,35 @@ impl Recorder {
     pub fn take(&mut self, frame: &FrameSeen<'_>) {
         let view = match FrameView::parse(frame.bytes) {
             Ok(view) if frame.fcs != Some(false) && !frame.truncated => view,
+            Err(FrameError::NotEtherCat { .. }) => {
+                self.recording.other_traffic += 1;
+                return;
+            }
             Ok(_) | Err(_) => {
                 self.recording.unusable += 1;
+                self.recording.gap(frame.number);
                 return;
             }
         };
         let print = Fingerprint::of(&view);
-        let recording = &mut self.recording;
-        self.pairing.take(frame, &view, print, &mut |exchange| note(recording, exchange));
+        let (recording, alone) = (&mut self.recording, &mut self.alone);
+        self.pairing.take(frame, &view, print, &mut |exchange| note(recording, alone, exchange));
     }
 
     /// There are no more frames.
     #[must_use]
     pub fn finish(mut self) -> Recording {
-        let recording = &mut self.recording;
-        self.pairing.finish(&mut |exchange| note(recording, exchange));
+        let (recording, alone) = (&mut self.recording, &mut self.alone);
+        self.pairing.finish(&mut |exchange| note(recording, alone, exchange));
         // By number: time stamps may run backwards.
+        recording.turns.sort_by_key(|turn| turn.request.number);
+        mend::mend(recording, std::mem::take(alone));
         self.recording.turns.sort_by_key(|turn| turn.request.number);
         self.recording
     }
 }
 
-fn note(recording: &mut Recording, exchange: &Exchange<'_>) {
+fn note(recording: &mut Recording, alone: &mut Vec<Frame>, exchange: &Exchange<'_>) {
     match (&exchange.request, &exchange.reply) {
         (Some(request), reply) => {
             // In a ring the second copy comes back for a request that is noted already.
@@ -142,10 +166,16 @@ fn note(recording: &mut Recording, exchange: &Exchange<'_>) {
                         turn.reply = reply;
                     }
                 }
-                None => recording.turns.push(Turn { request: Frame::of(request), reply }),
+                None => recording.turns.push(Turn {
+                    request: Frame::of(request),
+                    reply,
+                    is_rebuilt: false,
+                }),
             }
         }
-        (None, Some(_)) => recording.alone += 1,
+        (None, Some(reply)) => {
+            alone.push(Frame::of(reply));
+        }
         (None, None) => {}
     }
 }

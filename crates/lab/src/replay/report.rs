@@ -5,7 +5,10 @@ use std::fmt;
 
 use serde::Serialize;
 
+use linesman_proto::command::Addressing;
+
 use super::compare::{Outcome, What, register_name};
+use super::exception::{MOST_OF_A_HUNDRED, Reason, Reasons};
 use super::model::Model;
 use super::recording::{Datagram, Recording, Turn};
 
@@ -23,8 +26,10 @@ pub struct Report {
     pub unanswered: u64,
     /// Returns whose request was not recorded.
     pub returns_alone: u64,
-    /// Frames of the recording that could not be used.
+    /// EtherCAT frames of the recording that could not be used: damaged or cut off.
     pub unusable: u64,
+    /// Frames of other protocols, left out.
+    pub other_traffic: u64,
     /// What each device was taken for, nearest first.
     pub devices: Vec<String>,
     /// What had to be assumed.
@@ -37,6 +42,10 @@ pub struct Report {
     pub equal_but: Vec<Exempt>,
     /// Those that differ.
     pub different: u64,
+    /// Of those that differ, the ones for which the recording shows no reason.
+    pub unexplained: u64,
+    /// Of those that differ, the ones that carry process data.
+    pub process_data: u64,
     /// In what they differ, the most frequent first.
     pub differences: Vec<DifferenceKind>,
 }
@@ -57,6 +66,8 @@ pub struct Exempt {
 pub struct DifferenceKind {
     /// Of which datagrams, and in what.
     pub what: String,
+    /// Why, where the recording shows it.
+    pub reason: Option<String>,
     /// How many.
     pub datagrams: u64,
     /// The first of them.
@@ -83,7 +94,10 @@ pub struct Example {
 pub enum Verdict {
     /// All answers agree.
     Agrees,
-    /// Some do not.
+    /// All but few agree: at most one datagram in a hundred differs, none of process data, each for a
+    /// reason that the recording shows.
+    AgreesButForExceptions,
+    /// More differ.
     Differs,
     /// No answer could be compared.
     NothingJudged,
@@ -92,9 +106,10 @@ pub enum Verdict {
 impl Report {
     pub(super) fn of(recording: &Recording, model: &Model) -> Self {
         Self {
-            requests: recording.turns.len() as u64,
+            requests: recording.turns.iter().filter(|turn| !turn.is_rebuilt).count() as u64,
             returns_alone: recording.alone,
             unusable: recording.unusable,
+            other_traffic: recording.other_traffic,
             devices: model.devices.clone(),
             notes: model.notes.clone(),
             ..Self::default()
@@ -110,6 +125,7 @@ impl Report {
             unanswered,
             returns_alone: recording.alone,
             unusable: recording.unusable,
+            other_traffic: recording.other_traffic,
             ..Self::default()
         }
     }
@@ -120,6 +136,13 @@ impl Report {
         match (self.compared, self.different) {
             (0, _) => Verdict::NothingJudged,
             (_, 0) => Verdict::Agrees,
+            (compared, different)
+                if different * 100 <= compared * MOST_OF_A_HUNDRED
+                    && self.unexplained == 0
+                    && self.process_data == 0 =>
+            {
+                Verdict::AgreesButForExceptions
+            }
             (_, _) => Verdict::Differs,
         }
     }
@@ -130,6 +153,7 @@ impl Report {
         number: usize,
         recorded: &Datagram<'_>,
         outcome: Outcome,
+        reasons: &Reasons,
     ) {
         self.compared += 1;
         match outcome {
@@ -147,13 +171,19 @@ impl Report {
             }
             Outcome::Differs(difference) => {
                 self.different += 1;
+                let reason = reasons.of_difference(turn, recorded).map(Reason::name);
+                self.unexplained += u64::from(reason.is_none());
+                self.process_data += u64::from(is_logical(recorded));
                 let what = kind(recorded, difference.what);
-                let place = match self.differences.iter().position(|one| one.what == what) {
+                let same =
+                    |one: &DifferenceKind| one.what == what && one.reason.as_deref() == reason;
+                let place = match self.differences.iter().position(same) {
                     Some(place) => place,
                     None if self.differences.len() >= KINDS => return,
                     None => {
                         self.differences.push(DifferenceKind {
                             what,
+                            reason: reason.map(str::to_owned),
                             datagrams: 0,
                             examples: Vec::new(),
                         });
@@ -182,13 +212,14 @@ impl Report {
     }
 }
 
+fn is_logical(recorded: &Datagram<'_>) -> bool {
+    recorded.command.is_some_and(|one| one.addressing() == Addressing::Logical)
+}
+
 /// `FPRD 0x0130 AL status: data`.
 fn kind(recorded: &Datagram<'_>, what: What) -> String {
     let command = recorded.command.map_or("unknown command", |command| command.name());
-    let logical = recorded
-        .command
-        .is_some_and(|one| one.addressing() == linesman_proto::command::Addressing::Logical);
-    let place = if logical {
+    let place = if is_logical(recorded) {
         format!("{command} {}", recorded.logical)
     } else {
         format!("{command} {} {}", recorded.ado, register_name(recorded.ado))
@@ -226,6 +257,7 @@ impl fmt::Display for Report {
             ("  unanswered", self.unanswered),
             ("returns alone", self.returns_alone),
             ("unusable", self.unusable),
+            ("other traffic", self.other_traffic),
         ] {
             if count > 0 {
                 writeln!(f, "{name:<14} {count:>8}")?;
@@ -239,7 +271,8 @@ impl fmt::Display for Report {
         }
         writeln!(f, "  different    {:>8}", self.different)?;
         for one in sorted(&self.differences, |one| one.datagrams) {
-            writeln!(f, "               {:>8}  {}", one.datagrams, one.what)?;
+            let reason = one.reason.as_deref().unwrap_or("no reason known");
+            writeln!(f, "               {:>8}  {}; {reason}", one.datagrams, one.what)?;
             for example in &one.examples {
                 writeln!(
                     f,

@@ -12,6 +12,7 @@
 //! expect reached AMOUNT
 //! expect carrier | no carrier
 //! expect register NAME ADDRESS = VALUE
+//! expect clock NAME off AMOUNT
 //! ```
 //! `AMOUNT` is `= 3`, `>= 3`, `<= 3` or `3..5`. Counters and frames are counted since the last
 //! `inject` before the step, or since time 0.
@@ -130,6 +131,13 @@ pub enum Ground {
         /// Its bytes, lowest first.
         bytes: Vec<u8>,
     },
+    /// The last time that was written into a clock was so far from its own (0x092C without its sign).
+    Clock {
+        /// Whose.
+        device: String,
+        /// How far, in ns.
+        nanoseconds: Amount,
+    },
 }
 
 impl Ground {
@@ -157,6 +165,7 @@ impl Ground {
             "reached" => Self::Reached(amount(std::mem::take(&mut words.rest))?),
             "carrier" => Self::Carrier(true),
             "register" => register(words)?,
+            "clock" => clock(words)?,
             _ => return Ok(None),
         }))
     }
@@ -167,7 +176,7 @@ fn frames(fate: Fate, words: &mut Words<'_>) -> Result<Ground, String> {
     Ok(Ground::Frames { fate, amount: amount(std::mem::take(&mut words.rest))? })
 }
 
-fn amount(text: &str) -> Result<Amount, String> {
+pub(super) fn amount(text: &str) -> Result<Amount, String> {
     let text = text.trim();
     let wrong = || format!("`{text}` is no amount: write `= 3`, `>= 3`, `<= 3` or `3..5`");
     let number = |text: &str| text.trim().parse::<u64>().map_err(|_| wrong());
@@ -256,13 +265,27 @@ fn state(words: &mut Words<'_>) -> Result<Ground, String> {
 }
 
 fn register(words: &mut Words<'_>) -> Result<Ground, String> {
+    let (device, address) = place(words)?;
+    let text = words.next();
+    let bytes = value(text).ok_or_else(|| format!("`{text}` is no value, such as `0x5A37`"))?;
+    Ok(Ground::Register { device, address, bytes })
+}
+
+/// `T2 0x0110 =`: a register of a SubDevice.
+pub(super) fn place(words: &mut Words<'_>) -> Result<(String, RegisterAddress), String> {
     let (device, address) = (words.next().to_owned(), words.next());
     let hex = address.strip_prefix("0x").and_then(|hex| u16::from_str_radix(hex, 16).ok());
     let address = hex.ok_or_else(|| format!("`{address}` is no register, such as `0x0110`"))?;
     words.expect("=")?;
-    let text = words.next();
-    let bytes = value(text).ok_or_else(|| format!("`{text}` is no value, such as `0x5A37`"))?;
-    Ok(Ground::Register { device, address: RegisterAddress(address), bytes })
+    Ok((device, RegisterAddress(address)))
+}
+
+/// `T2 off <= 1000`.
+fn clock(words: &mut Words<'_>) -> Result<Ground, String> {
+    let device = words.next().to_owned();
+    words.expect("off")?;
+    let nanoseconds = amount(std::mem::take(&mut words.rest))?;
+    Ok(Ground::Clock { device, nanoseconds })
 }
 
 /// `0x1234`: as many bytes as pairs of digits, lowest first.

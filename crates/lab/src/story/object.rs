@@ -11,7 +11,7 @@ use linesman_maindevice::mailbox::Why;
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 
-use super::ground::value;
+use super::ground::{Amount, amount, value};
 use super::step::Words;
 use crate::lab::Lab;
 
@@ -33,6 +33,8 @@ pub enum Outcome {
     Read,
     /// This value, lowest byte first.
     Value(Vec<u8>),
+    /// A number, lowest byte first, that is one of these.
+    Number(Amount),
     /// The transfer is aborted with this code.
     Aborted(u32),
     /// The mailbox answers with an error of its own.
@@ -58,6 +60,10 @@ impl Reading {
                 let wrong = || format!("`{text}` is no value, such as `0x5A37`");
                 Outcome::Value(value(text).ok_or_else(wrong)?)
             }
+            word @ (">=" | "<=") => {
+                let rest = std::mem::take(&mut words.rest);
+                Outcome::Number(amount(&format!("{word} {rest}"))?)
+            }
             "aborted" => {
                 let text = words.next();
                 let code =
@@ -66,7 +72,7 @@ impl Reading {
             }
             other => {
                 return Err(format!(
-                    "`{other}`: expected `= 0x…`, `aborted 0x…`, `read`, `refused` or `unanswered`"
+                    "`{other}`: expected `= 0x…`, `>= 3`, `<= 3`, `aborted 0x…`, `read`, `refused` or `unanswered`"
                 ));
             }
         };
@@ -85,6 +91,7 @@ impl Reading {
                 Some(Err(Why::NoAnswer { .. } | Why::MailboxFull { .. })) | None,
             ) => true,
             (Outcome::Value(wanted), Some(Ok(found))) => wanted == found,
+            (Outcome::Number(wanted), Some(Ok(found))) => wanted.takes(number(found)),
             (Outcome::Aborted(wanted), Some(Err(Why::Aborted { code, .. }))) => {
                 code.value() == *wanted
             }
@@ -99,6 +106,11 @@ impl Reading {
             Some(Err(error)) => error.to_string(),
         })
     }
+}
+
+/// The number that up to eight bytes hold, lowest first.
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().take(8).fold(0, |number, byte| number << 8 | u64::from(*byte))
 }
 
 #[cfg(test)]
@@ -118,6 +130,7 @@ mod tests {
             ("T1 0x1018:1 aborted 0x06020000", Outcome::Aborted(0x0602_0000)),
             ("T1 0x1018:1 refused", Outcome::Refused),
             ("T1 0x1018:1 unanswered", Outcome::Unanswered),
+            ("T1 0x1018:1 >= 3", Outcome::Number(amount(">= 3").unwrap())),
         ] {
             let device = "T1".to_owned();
             assert_eq!(read(text), Ok(Reading { device, object, outcome }), "{text}");

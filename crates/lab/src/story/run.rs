@@ -5,14 +5,15 @@ use std::fmt;
 use linesman_config::attachment::Attachment;
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, Severity, Verdict};
-use linesman_proto::address::DeviceId;
+use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::register::SYSTEM_TIME;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
-use linesman_sim::segment_file::{FaultEntry, SegmentFile};
+use linesman_sim::segment_file::{DescriptionFiles, FaultEntry, SegmentFile};
 use linesman_sim::truth::{FaultId, FaultRecord};
 
 use super::parse::{SegmentText, Story};
-use super::step::{Expectation, Heal, Step, StepAt, What};
+use super::step::{Expectation, Heal, Step, StepAt, What, Written};
 use super::witness::Witness;
 use crate::lab::Lab;
 use crate::options::LabOptions;
@@ -85,8 +86,9 @@ impl fmt::Display for StoryReport {
     }
 }
 
-/// Plays a story; `load` reads the segment file that it names.
-pub fn play(story: &Story, load: impl FnOnce(&str) -> Result<String, String>) -> StoryReport {
+/// Plays a story; `files` reads the segment file that it names, and those that its segment names,
+/// relative to where the story is.
+pub fn play(story: &Story, files: &dyn DescriptionFiles) -> StoryReport {
     let mut report = StoryReport {
         title: story.front.title.clone(),
         steps: Vec::new(),
@@ -94,7 +96,7 @@ pub fn play(story: &Story, load: impl FnOnce(&str) -> Result<String, String>) ->
         up_in: Span::ZERO,
         diagnosis: None,
     };
-    if let Err(trouble) = try_play(story, load, &mut report) {
+    if let Err(trouble) = try_play(story, files, &mut report) {
         report.trouble = Some(trouble);
     }
     report
@@ -102,14 +104,18 @@ pub fn play(story: &Story, load: impl FnOnce(&str) -> Result<String, String>) ->
 
 fn try_play(
     story: &Story,
-    load: impl FnOnce(&str) -> Result<String, String>,
+    files: &dyn DescriptionFiles,
     report: &mut StoryReport,
 ) -> Result<(), String> {
     let text = match &story.segment {
         SegmentText::Inline(text) => text.clone(),
-        SegmentText::File(file) => load(file)?,
+        SegmentText::File(name) => {
+            let bytes = files.read(name).map_err(|error| format!("its segment: {error}"))?;
+            String::from_utf8(bytes).map_err(|error| format!("{name}: {error}"))?
+        }
     };
-    let mut file = SegmentFile::parse(&text).map_err(|error| format!("its segment: {error}"))?;
+    let mut file =
+        SegmentFile::parse_with(&text, files).map_err(|error| format!("its segment: {error}"))?;
     file.seed.get_or_insert(story.front.seed);
     let options = LabOptions {
         target: story.front.target,
@@ -189,15 +195,38 @@ impl Stage {
             Step::Heal(heal) => self.heal(*heal),
             Step::Unplug(device) => {
                 self.witness.mark(&self.lab);
-                let id = self.lab.unplug(device).map_err(|error| error.to_string())?;
-                self.faults.push(id);
+                let faults = self.lab.unplug(device).map_err(|error| error.to_string())?;
+                self.faults.extend(faults);
                 Ok(())
             }
             Step::Plug { device, on } => {
                 self.lab.plug(device, on.as_ref()).map_err(|error| error.to_string())
             }
+            Step::Write { device, address, value } => self.write(device, *address, value),
             Step::Expect { what, within } => self.expect(what, *within),
         }
+    }
+
+    fn write(
+        &mut self,
+        name: &str,
+        address: RegisterAddress,
+        value: &Written,
+    ) -> Result<(), String> {
+        let known = |stage: &Self, name: &str| {
+            let id = stage.device(name);
+            id.ok_or_else(|| format!("no SubDevice of this line is called `{name}`"))
+        };
+        let bytes = match value {
+            Written::Bytes(bytes) => bytes.clone(),
+            Written::Now => self.lab.now().as_nanos().to_le_bytes().to_vec(),
+            Written::ClockOf(other) => {
+                let id = known(self, other)?;
+                self.lab.read_register(id, SYSTEM_TIME.address, 8)?
+            }
+        };
+        let id = known(self, name)?;
+        self.lab.write_register(id, address, &bytes)
     }
 
     fn heal(&mut self, heal: Heal) -> Result<(), String> {

@@ -8,6 +8,7 @@
 //! [at TIME] heal [FAULT]
 //! [at TIME] unplug NAME
 //! [at TIME] plug NAME [on NAME.PORT]
+//! [at TIME] write NAME ADDRESS = VALUE | now | clock of NAME
 //! at TIME
 //! [at TIME] expect verdict [on FAULT] [within TIME]
 //! [at TIME] expect finding CODE|FAULT [at PLACE] [within TIME]
@@ -25,9 +26,10 @@
 
 use linesman_config::attachment::Attachment;
 use linesman_config::fault::FaultName;
+use linesman_proto::address::RegisterAddress;
 use linesman_proto::time::Span;
 
-use super::ground::Ground;
+use super::ground::{self, Ground};
 use super::object::Reading;
 
 /// A step and where it stands.
@@ -66,6 +68,15 @@ pub enum Step {
         /// Where; where it was unless said.
         on: Option<Attachment>,
     },
+    /// The MainDevice writes a register of a SubDevice, beside its cycle.
+    Write {
+        /// Whose.
+        device: String,
+        /// Which.
+        address: RegisterAddress,
+        /// What.
+        value: Written,
+    },
     /// Something must be so.
     Expect {
         /// What.
@@ -73,6 +84,18 @@ pub enum Step {
         /// How long it may take.
         within: Span,
     },
+}
+
+/// What is written into a register.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Written {
+    /// These bytes, lowest first.
+    Bytes(Vec<u8>),
+    /// The time of the run, in ns, as eight bytes.
+    Now,
+    /// The system time of another SubDevice, read right before: what a datagram that reads at one
+    /// and writes at the others does.
+    ClockOf(String),
 }
 
 /// Which faults end.
@@ -150,9 +173,10 @@ pub(crate) fn parse(text: &str) -> Result<(Option<Span>, Step), String> {
             Step::Plug { device, on }
         }
         "expect" => expect(&mut words)?,
+        "write" => write(&mut words)?,
         other => {
             return Err(format!(
-                "`{other}` is no step: expected `inject`, `heal`, `unplug`, `plug` or `expect`, with or without \
+                "`{other}` is no step: expected `inject`, `heal`, `unplug`, `plug`, `write` or `expect`, with or without \
                  `at TIME` before it"
             ));
         }
@@ -194,6 +218,21 @@ fn inject(words: &mut Words<'_>) -> Result<Step, String> {
     }
     words.rest = "";
     Ok(Step::Inject { entry, lasts })
+}
+
+fn write(words: &mut Words<'_>) -> Result<Step, String> {
+    let (device, address) = ground::place(words)?;
+    let value = match words.next() {
+        "now" => Written::Now,
+        "clock" => {
+            words.expect("of")?;
+            Written::ClockOf(words.next().to_owned())
+        }
+        text => Written::Bytes(ground::value(text).ok_or_else(|| {
+            format!("`{text}` is no value: write `0x5A37`, `now` or `clock of K1`")
+        })?),
+    };
+    Ok(Step::Write { device, address, value })
 }
 
 /// Splits `a = 1, b = ["x", "y"]` at the commas between parameters.
@@ -267,7 +306,7 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
                     "`{other}` cannot be expected: expected `verdict`, `finding`, `no finding`, `N findings`, \
                      `healthy`, `inconclusive`, `all closed`, `line up`, `exit N`, or something of the \
                      segment: `counter`, `no other counter`, `port`, `state`, `lost frames`, \
-                     `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`, `object`"
+                     `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`, `clock`, `object`"
                 )
             })?;
             if !words.take("findings") {
@@ -403,7 +442,7 @@ mod tests {
     #[test]
     fn what_is_no_step_says_what_was_expected() {
         for (text, expected) in [
-            ("wait a bit", "expected `inject`, `heal`, `unplug`, `plug` or `expect`"),
+            ("wait a bit", "expected `inject`, `heal`, `unplug`, `plug`, `write` or `expect`"),
             ("at 2 inject link-open at a.A-b.A", "write such as `20 ms`"),
             ("inject link-opened at K1.A-K2.A", "the names are: link-open"),
             ("inject link-open", "a fault needs a place"),

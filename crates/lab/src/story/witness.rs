@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_diagnosis::observe::{Direction, FrameSeen};
-use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::address::{DeviceId, Path, RegisterAddress};
 use linesman_proto::frame::FrameView;
 use linesman_proto::frame::builder::DatagramAddress;
-use linesman_proto::register::ErrorCounter;
+use linesman_proto::register::{ErrorCounter, SYSTEM_TIME_DIFFERENCE};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::FrameTally;
 
@@ -173,10 +173,20 @@ impl Witness {
             Ground::Register { device: name, address, bytes } => {
                 let controller = controller(lab, name)?;
                 let addresses = (address.0..).zip(bytes).map(|(at, _)| at);
-                let found: Vec<u8> = addresses
-                    .map(|at| controller.register(linesman_proto::address::RegisterAddress(at)))
-                    .collect();
+                let found: Vec<u8> =
+                    addresses.map(|at| controller.register(RegisterAddress(at))).collect();
                 check(found == *bytes, || format!("{bytes:02X?} in {name}, found {found:02X?}"))
+            }
+            Ground::Clock { device: name, nanoseconds } => {
+                /// The sign of a difference; the rest is its size.
+                const SIGN: u32 = 1 << 31;
+                let controller = controller(lab, name)?;
+                let start = SYSTEM_TIME_DIFFERENCE.address.0;
+                let bytes = std::array::from_fn(|at| {
+                    controller.register(RegisterAddress(start + at as u16))
+                });
+                let off = u64::from(u32::from_le_bytes(bytes) & !SIGN);
+                check(nanoseconds.takes(off), || format!("{nanoseconds} ns in {name}, found {off}"))
             }
         }
     }

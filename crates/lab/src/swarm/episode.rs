@@ -269,6 +269,7 @@ impl<'a> Episode<'a> {
                 | Effect::EmergencySent { .. }
                 | Effect::CardSilent
                 | Effect::WatchdogSet { .. }
+                | Effect::WatchdogExpired { .. }
                 | Effect::ClockDrifts { .. }
                 | Effect::ClockStopped
                 | Effect::ClockRestarted

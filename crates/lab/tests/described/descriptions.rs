@@ -4,9 +4,11 @@ use std::fmt::Write as _;
 
 use linesman_config::esi::EsiDevice;
 use linesman_config::esi::image::image;
+use linesman_lab::lab::Lab;
 use linesman_proto::sii::{Direction, Identity, Image};
 use linesman_sim::segment_file::DescriptionFiles;
 
+use crate::clock;
 use crate::data::{Collection, files, root};
 use crate::up::{segment, to_op};
 
@@ -14,12 +16,12 @@ use crate::up::{segment, to_op};
 #[derive(PartialEq, Eq, PartialOrd, Ord, Clone, Debug)]
 enum Outcome {
     InOp,
+    /// In OP with its clock only: it knows no other mode.
+    InOpWithClock,
     /// Refused: a thing without controller.
-    Passive,
+    Passive(String),
     /// Refused: the file lacks a part of it.
-    Incomplete,
-    /// It is there, but does not go to OP, for a reason that its description gives.
-    Unwilling,
+    Incomplete(String),
     Failed(String),
 }
 
@@ -27,46 +29,64 @@ fn type_name(file: &str, device: &EsiDevice) -> String {
     format!("esi:{file}#{}@0x{:08X}", device.type_name, device.revision)
 }
 
-fn bring_up(file: &str, device: &EsiDevice, collection: &Collection) -> Outcome {
-    let name = type_name(file, device);
-    match segment(&name, collection).and_then(|segment| to_op(&segment)) {
-        Ok(lab) => {
-            let found = lab.inventory().expect("scanned").devices.last().expect("a device").clone();
-            let identity = found.identity.expect("an identity");
-            let last = device.sub_devices.last().copied();
-            let expected = last.unwrap_or((device.product_code, device.revision));
-            if (identity.product_code, identity.revision) != expected {
-                return Outcome::Failed(format!("found {identity:?}"));
-            }
-            Outcome::InOp
-        }
-        Err(reason) if reason.contains("a passive part") => Outcome::Passive,
-        Err(reason) if reason.contains("which is not in the file") => Outcome::Incomplete,
-        Err(reason) if unwilling(device, &reason) => Outcome::Unwilling,
-        Err(reason) => Outcome::Failed(reason),
+fn is_the_described(lab: &Lab, device: &EsiDevice) -> Result<(), String> {
+    let found = lab.inventory().expect("scanned").devices.last().expect("a device").clone();
+    let identity = found.identity.expect("an identity");
+    let last = device.sub_devices.last().copied();
+    let expected = last.unwrap_or((device.product_code, device.revision));
+    if (identity.product_code, identity.revision) == expected {
+        Ok(())
+    } else {
+        Err(format!("found {identity:?}"))
     }
 }
 
-/// Devices that do not go to OP without more than process data.
-fn unwilling(device: &EsiDevice, reason: &str) -> bool {
-    match device.type_name.as_str() {
-        // Time stamps of many events: their object 0x1C32:04 knows no mode without SYNC0.
-        "EL1258" | "EL1259" => reason.contains("free run not supported"),
-        // Its SyncManager 3 begins at 0x23FF, its processor has a bus of 16 bits (SII byte 0: 0x08).
-        "CiA402 Motor Control Device" => reason.contains("invalid sync manager configuration"),
-        _ => false,
+fn bring_up(file: &str, device: &EsiDevice, collection: &Collection) -> Outcome {
+    let name = type_name(file, device);
+    let segment = match segment(&name, collection) {
+        Ok(segment) => segment,
+        // Whoever is refused learns of file, line and reason.
+        Err(reason) if !reason.contains(&format!("`{file}`, line {},", device.line)) => {
+            return Outcome::Failed(format!("neither file nor line: {reason}"));
+        }
+        Err(reason) if reason.contains("a passive part") => return Outcome::Passive(reason),
+        Err(reason) if reason.contains("which is not in the file") => {
+            return Outcome::Incomplete(reason);
+        }
+        Err(reason) => return Outcome::Failed(reason),
+    };
+    let reached = |lab: Result<Lab, String>| lab.and_then(|lab| is_the_described(&lab, device));
+    match (reached(to_op(&segment)), clock::modes(device).next()) {
+        (Ok(()), _) => Outcome::InOp,
+        // A description without a mode that leaves the clock alone: a MainDevice has no other choice.
+        (Err(reason), Some(mode)) if clock::modes(device).count() == device.op_modes.len() => {
+            match reached(clock::to_op(&segment, mode)) {
+                Ok(()) => Outcome::InOpWithClock,
+                Err(with_clock) => {
+                    Outcome::Failed(format!("{reason}; with its clock: {with_clock}"))
+                }
+            }
+        }
+        (Err(reason), _) => Outcome::Failed(reason),
     }
+}
+
+/// All files; those that the variable ESI names, if it is set.
+fn chosen() -> Option<Vec<String>> {
+    let mut names = files("esi", ".xml")?;
+    names.extend(files("esi/pairs", ".xml").unwrap_or_default());
+    let only = std::env::var("ESI").ok();
+    names.retain(|name| only.as_ref().is_none_or(|only| name.contains(only.as_str())));
+    Some(names)
 }
 
 #[test]
 fn every_device_of_every_description_goes_to_op_or_says_why_not() {
-    let (Some(root), Some(mut names)) = (root(), files("esi", ".xml")) else { return };
-    names.extend(files("esi/pairs", ".xml").unwrap_or_default());
-    let only = std::env::var("ESI").ok();
-    names.retain(|name| only.as_ref().is_none_or(|only| name.contains(only.as_str())));
-    let mut table = String::new();
+    let (Some(root), Some(names)) = (root(), chosen()) else { return };
+    let (mut table, mut refused) = (String::new(), String::new());
     let mut failed = Vec::new();
-    let mut total = ["in OP", "passive", "incomplete", "unwilling", "failed"].map(|what| (0, what));
+    let mut total = ["in OP", "in OP with their clock", "passive", "incomplete", "failed"]
+        .map(|what| (0, what));
     for name in &names {
         let collection = Collection::new(root.clone());
         let esi = collection.descriptions(name).unwrap();
@@ -76,11 +96,17 @@ fn every_device_of_every_description_goes_to_op_or_says_why_not() {
                 Ok(device) => bring_up(name, device, &collection),
                 Err(error) => Outcome::Failed(error.to_string()),
             };
-            match &outcome {
+            match outcome {
                 Outcome::InOp => counts[0] += 1,
-                Outcome::Passive => counts[1] += 1,
-                Outcome::Incomplete => counts[2] += 1,
-                Outcome::Unwilling => counts[3] += 1,
+                Outcome::InOpWithClock => counts[1] += 1,
+                Outcome::Passive(reason) => {
+                    counts[2] += 1;
+                    let _ = writeln!(refused, "{reason}");
+                }
+                Outcome::Incomplete(reason) => {
+                    counts[3] += 1;
+                    let _ = writeln!(refused, "{reason}");
+                }
                 Outcome::Failed(reason) => {
                     counts[4] += 1;
                     let which = device.as_ref().map_or(name.clone(), |one| type_name(name, one));
@@ -97,7 +123,30 @@ fn every_device_of_every_description_goes_to_op_or_says_why_not() {
     }
     let sums: Vec<String> =
         total.iter().map(|(count, what): &(usize, &str)| format!("{count} {what}")).collect();
-    println!("{table}{}", sums.join(", "));
+    println!("{table}{refused}{}", sums.join(", "));
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+#[test]
+fn every_device_follows_its_clock_in_each_of_its_modes() {
+    let (Some(root), Some(names)) = (root(), chosen()) else { return };
+    let (mut devices, mut tried, mut failed) = (0, 0, Vec::new());
+    for name in &names {
+        let collection = Collection::new(root.clone());
+        let esi = collection.descriptions(name).unwrap();
+        for device in esi.usable() {
+            let Ok(segment) = segment(&type_name(name, device), &collection) else { continue };
+            devices += usize::from(clock::modes(device).next().is_some());
+            for mode in clock::modes(device) {
+                tried += 1;
+                if let Err(reason) = clock::to_op(&segment, mode) {
+                    let (type_name, mode) = (type_name(name, device), &mode.name);
+                    failed.push(format!("{type_name} in {mode}: {reason}"));
+                }
+            }
+        }
+    }
+    println!("{tried} modes of {devices} devices, {} in OP", tried - failed.len());
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 

@@ -9,7 +9,9 @@
     reason = "tests of real files have to get at them, and must not be silent when they cannot"
 )]
 
+mod clock;
 mod data;
 mod descriptions;
+mod features;
 mod images;
 mod up;

@@ -24,7 +24,11 @@ pub(crate) fn segment(
 
 /// Brings a segment to OP by our own MainDevice, and keeps it there for a while.
 pub(crate) fn to_op(file: &SegmentFile) -> Result<Lab, String> {
-    let mut lab = Lab::new(file, LabOptions::default()).map_err(|error| error.to_string())?;
+    stay_up(Lab::new(file, LabOptions::default()).map_err(|error| error.to_string())?)
+}
+
+/// Waits until all is up, and sees that it stays so.
+pub(crate) fn stay_up(mut lab: Lab) -> Result<Lab, String> {
     lab.wait_up(Span::s(20)).map_err(|error| error.to_string())?;
     let until = lab.now() + Span::ms(300);
     lab.run_until(until).map_err(|error| error.to_string())?;

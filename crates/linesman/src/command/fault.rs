@@ -56,6 +56,21 @@ enum Action {
         /// Its number, as `list` tells; all unless said
         no: Option<u32>,
     },
+    /// Pull the cable of a device, or those of a hot connect group, with all that hangs behind
+    Unplug {
+        /// A device by name, or a group of the segment file
+        #[arg(value_name = "DEVICE|GROUP")]
+        name: String,
+    },
+    /// Plug it in again
+    Plug {
+        /// A device by name, or a group of the segment file
+        #[arg(value_name = "DEVICE|GROUP")]
+        name: String,
+        /// A free port, such as K1.C; where it was unless said
+        #[arg(long, value_name = "NAME.PORT")]
+        on: Option<String>,
+    },
     /// Tell which faults there are and were
     List,
     /// Tell what went over the interfaces, and whether this host kept up
@@ -117,6 +132,13 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             faults(arguments, &Request::Inject { fault, for_ms: *for_ms }, output)
         }
         Action::Heal { no } => faults(arguments, &Request::Heal { no: *no }, output),
+        Action::Unplug { name } => {
+            faults(arguments, &Request::Unplug { name: name.clone() }, output)
+        }
+        Action::Plug { name, on } => {
+            let request = Request::Plug { name: name.clone(), on: on.clone() };
+            faults(arguments, &request, output)
+        }
         Action::List => faults(arguments, &Request::List, output),
         Action::Status => {
             let status: SimStatus = asked(arguments, &Request::Status)?;

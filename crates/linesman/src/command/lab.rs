@@ -5,7 +5,7 @@ pub(crate) mod replay;
 use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc;
 use std::thread;
@@ -92,7 +92,7 @@ fn run_stories(stories: &[PathBuf], output: &mut Output) -> Result<Status, Failu
     for path in stories {
         let text = files::text(path, "a story")?;
         let story = Story::parse(&text).map_err(|error| files::in_file(path, &error))?;
-        let report = play(&story, |name| load(path, name));
+        let report = play(&story, &files::Beside::of(path));
         held += usize::from(report.held());
         output.text(&format!("{report}"));
     }
@@ -105,12 +105,6 @@ fn run_stories(stories: &[PathBuf], output: &mut Output) -> Result<Status, Failu
         }
     ));
     Ok(if held == stories.len() { Status::Good } else { Status::Findings })
-}
-
-/// A segment file that a story names, from the directory of the story.
-fn load(story: &Path, name: &str) -> Result<String, String> {
-    let path = story.parent().unwrap_or(Path::new("")).join(name);
-    files::text(&path, "a segment file").map_err(|failure| failure.reason)
 }
 
 fn run_swarm(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {

@@ -6,11 +6,20 @@ pub(crate) mod diagnose;
 pub(crate) mod driven;
 pub(crate) mod explain;
 pub(crate) mod fault;
+pub(crate) mod foe;
+pub(crate) mod history;
 pub(crate) mod interfaces;
 pub(crate) mod lab;
+pub(crate) mod plan;
+pub(crate) mod reg;
+pub(crate) mod run;
 pub(crate) mod scan;
 pub(crate) mod schema;
+pub(crate) mod sdo;
+pub(crate) mod service;
+pub(crate) mod sii;
 pub(crate) mod sim;
+pub(crate) mod state;
 
 use crate::cli::Command;
 use crate::exit::Status;
@@ -22,12 +31,20 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
     match command {
         Command::Demo(arguments) => demo::run(&arguments, output),
         Command::Lab(arguments) => lab::run(&arguments, output),
+        Command::Run(arguments) => run::run(&arguments, output),
+        Command::Plan(arguments) => plan::run(&arguments, output),
         Command::Scan(arguments) => scan::run(&arguments, output),
         Command::Diagnose(arguments) => diagnose::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
         Command::Explain(arguments) => explain::run(&arguments, output),
         Command::Sim(arguments) => sim::run(&arguments, output),
         Command::Fault(arguments) => fault::run(&arguments, output),
+        Command::State(arguments) => state::run(&arguments, output),
+        Command::Sdo(arguments) => sdo::run(&arguments, output),
+        Command::History(arguments) => history::run(&arguments, output),
+        Command::Foe(arguments) => foe::run(&arguments, output),
+        Command::Sii(arguments) => sii::run(&arguments, output),
+        Command::Reg(arguments) => reg::run(&arguments, output),
         Command::Schema(arguments) => schema::run(&arguments, output),
         Command::Completion(arguments) => completion::run(&arguments, output),
     }

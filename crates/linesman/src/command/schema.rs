@@ -5,6 +5,7 @@ use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
 use linesman_runtime::control::message::{Faults, Request, SignalTable};
 use linesman_runtime::journal::TruthEvent;
+use linesman_runtime::run::report::RunReport;
 use linesman_runtime::serve::report::Status as SimStatus;
 use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
@@ -12,7 +13,10 @@ use schemars::{Schema, schema_for};
 use super::diagnose::follow::EventReport;
 use super::interfaces;
 use super::lab::replay::ReplayReport;
+use super::plan::report::PlanReport;
 use super::scan::report::Scan;
+use super::sdo::report::{ListReport, ReadReport};
+use super::{foe, history, reg, service, sii, state};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::output::Output;
@@ -34,6 +38,8 @@ pub(crate) enum Name {
     Project,
     /// What was read with another tool (TOML), for `diagnose`
     Observations,
+    /// `plan --json`
+    Plan,
     /// `scan --json`
     Scan,
     /// `diagnose --json`
@@ -52,8 +58,26 @@ pub(crate) enum Name {
     Truth,
     /// A line that the control socket of `sim` takes
     Control,
+    /// `run --json`
+    Run,
     /// `interfaces --json`
     Interfaces,
+    /// `state --json`
+    States,
+    /// `sdo … read|write --json`
+    Sdo,
+    /// `sdo … list|info --json`
+    Objects,
+    /// `history --json`
+    History,
+    /// `foe --json`
+    File,
+    /// `sii --json`
+    Sii,
+    /// `reg --json`
+    Registers,
+    /// What services print with --json when the SubDevice refuses
+    Refusal,
     /// What every command with --json prints when nothing could be judged
     Error,
 }
@@ -69,6 +93,7 @@ fn schema(name: Name) -> Schema {
         Name::Segment => schema_for!(SegmentFile),
         Name::Project => schema_for!(Project),
         Name::Observations => schema_for!(ObservationFile),
+        Name::Plan => schema_for!(PlanReport),
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),
@@ -78,7 +103,16 @@ fn schema(name: Name) -> Schema {
         Name::Sim => schema_for!(SimStatus),
         Name::Truth => schema_for!(TruthEvent),
         Name::Control => schema_for!(Request),
+        Name::Run => schema_for!(RunReport),
         Name::Interfaces => schema_for!(interfaces::Report),
+        Name::States => schema_for!(state::Report),
+        Name::Sdo => schema_for!(ReadReport),
+        Name::Objects => schema_for!(ListReport),
+        Name::History => schema_for!(history::Report),
+        Name::File => schema_for!(foe::Report),
+        Name::Sii => schema_for!(sii::Report),
+        Name::Registers => schema_for!(reg::Report),
+        Name::Refusal => schema_for!(service::RefusalReport),
         Name::Error => schema_for!(ErrorReport),
     }
 }

@@ -3,26 +3,16 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
+use linesman_sim::segment_file::SegmentFile;
 use tempfile::TempDir;
 
 use super::{PROGRAM, Run, run};
 
-const PLANT: &str = r#"
-name = "live"
-seed = 3
-[[device]]
-name = "K1"
-type = "EK1100"
-on = "maindevice"
-[[device]]
-name = "I1"
-type = "EL1008"
-on = "K1.B"
-[[device]]
-name = "O1"
-type = "EL2008"
-on = "I1.B"
-"#;
+/// A coupler and two terminals behind it.
+pub(crate) fn plant(name: &str, seed: u64) -> SegmentFile {
+    let row = [("K1", "EK1100"), ("I1", "EL1008"), ("O1", "EL2008")];
+    SegmentFile::in_a_row(name, seed, &row)
+}
 
 /// A virtual cable from `near0` to `far0`, with a segment on the far end while the script runs.
 const BENCH: &str = r#"
@@ -55,9 +45,11 @@ pub(crate) fn beside_segment(script: &str) -> Option<Run> {
         return None;
     }
     let directory = TempDir::new().expect("a temporary directory");
-    let plant: PathBuf = directory.path().join("plant.toml");
-    std::fs::write(&plant, PLANT).expect("a file can be written");
+    let path: PathBuf = directory.path().join("plant.toml");
+    let mut file = plant("live", 3);
+    file.devices[2].group = Some("outputs".to_owned());
+    std::fs::write(&path, file.to_toml()).expect("a file can be written");
     let mut command = in_namespace(&format!("{BENCH}{script}"));
-    command.env("LINESMAN", PROGRAM).env("PLANT", &plant).env("DIRECTORY", directory.path());
+    command.env("LINESMAN", PROGRAM).env("PLANT", &path).env("DIRECTORY", directory.path());
     Some(run(&mut command))
 }

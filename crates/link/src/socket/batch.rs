@@ -31,6 +31,8 @@ pub struct Batch {
     vectors: Box<[libc::iovec]>,
     headers: Box<[libc::mmsghdr]>,
     frames: Vec<Placed>,
+    /// So many headers, from the first on, are to be laid out anew: the kernel has filled them in.
+    used: usize,
 }
 
 /// A received frame, borrowed from its batch.
@@ -84,8 +86,8 @@ pub(super) enum Wanted {
     BothWays,
 }
 
-// SAFETY: the pointers in `vectors` and `headers` are set anew for each call of recvmmsg, lead to
-// memory that the batch owns, and are never followed after the call.
+// SAFETY: the pointers in `vectors` and `headers` lead to memory that the batch owns, which stays where
+// it is when the batch moves, and are followed by recvmmsg only.
 #[allow(unsafe_code)]
 unsafe impl Send for Batch {}
 
@@ -104,6 +106,7 @@ impl Batch {
             vectors: vec![vector; frames].into_boxed_slice(),
             headers: vec![header; frames].into_boxed_slice(),
             frames: Vec::with_capacity(frames),
+            used: frames,
         }
     }
 
@@ -168,10 +171,12 @@ impl Batch {
         let result = unsafe {
             libc::recvmmsg(socket, self.headers.as_mut_ptr(), count, flags as _, ptr::null_mut())
         };
-        usize::try_from(result).map_err(|_| io::Error::last_os_error())
+        let count = usize::try_from(result).map_err(|_| io::Error::last_os_error())?;
+        self.used = count;
+        Ok(count)
     }
 
-    /// Sets the pointers of all headers. Each array is borrowed once, so that all its pointers stay
+    /// Sets the pointers and lengths of the headers that were used since they were set last. Each array is borrowed once, so that all its pointers stay
     /// valid together.
     #[allow(unsafe_code)]
     fn point(&mut self) {
@@ -179,7 +184,8 @@ impl Batch {
         let controls = self.controls.as_mut_ptr();
         let senders = self.senders.as_mut_ptr();
         let vectors = self.vectors.as_mut_ptr();
-        for (slot, message) in self.headers.iter_mut().enumerate() {
+        let used = std::mem::take(&mut self.used);
+        for (slot, message) in self.headers.iter_mut().take(used).enumerate() {
             let header = &mut message.msg_hdr;
             // SAFETY: every array has one element for each header, and `bytes` SLOT_LEN bytes, so
             // that all offsets stay inside their arrays.

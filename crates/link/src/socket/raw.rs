@@ -8,6 +8,8 @@ use std::os::fd::AsRawFd as _;
 
 use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, HEADER_LEN, MacAddress};
 use linesman_proto::time::{Instant, Span};
+use rustix::io::Errno;
+use rustix::net::{SendFlags, send};
 
 use super::batch::{Batch, Wanted};
 use super::packet;
@@ -152,6 +154,38 @@ impl RawSocket {
                 return Ok(total);
             }
         }
+    }
+
+    /// Sends one frame, without waiting: as [`send_batch`](Self::send_batch), with less work.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn send_one(&mut self, frame: &[u8]) -> Result<Sent, LinkError> {
+        self.receiver.check_presence()?;
+        for _ in 0..RETRIES {
+            match send(self.receiver.socket(), frame, SendFlags::DONTWAIT) {
+                Ok(_) => {
+                    self.receiver.counters.sent += 1;
+                    return Ok(Sent { frames: 1, full: false });
+                }
+                Err(Errno::INTR) => {}
+                Err(Errno::AGAIN | Errno::NOBUFS) => break,
+                // The whole story is told there.
+                Err(_) => return self.send_batch([frame]),
+            }
+        }
+        self.receiver.counters.send_failures += 1;
+        Ok(Sent { frames: 0, full: true })
+    }
+
+    /// Fetches one frame that has come back, without waiting, and without the time that the kernel
+    /// put on it; a VLAN tag is left out. Gives its length, which is more than `buffer` has when it
+    /// did not fit.
+    ///
+    /// # Errors
+    /// As [`recv_batch`](Self::recv_batch).
+    pub fn recv_one(&mut self, buffer: &mut [u8]) -> Result<Option<usize>, LinkError> {
+        self.receiver.receive_one(buffer)
     }
 
     /// Fetches what has come back, as much as `batch` has room for, without waiting; gives how

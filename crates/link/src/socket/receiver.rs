@@ -4,7 +4,7 @@ use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 
 use rustix::io::Errno;
-use rustix::net::sockopt;
+use rustix::net::{RecvFlags, recv, sockopt};
 
 use super::batch::{Batch, Wanted};
 use super::packet;
@@ -137,6 +137,23 @@ impl Receiver {
             }
         }
         Ok(0)
+    }
+
+    pub(super) fn receive_one(&mut self, buffer: &mut [u8]) -> Result<Option<usize>, LinkError> {
+        self.check_presence()?;
+        let flags = RecvFlags::DONTWAIT | RecvFlags::TRUNC;
+        for _ in 0..RETRIES {
+            match recv(&self.socket, &mut *buffer, flags) {
+                Ok((_, len)) => {
+                    self.counters.received += 1;
+                    return Ok(Some(len));
+                }
+                Err(Errno::INTR) => {}
+                Err(Errno::AGAIN) => return Ok(None),
+                Err(error) => return Err(self.explain("receiving frames", error.into())),
+            }
+        }
+        Ok(None)
     }
 
     /// The counters, with the drops that the kernel has counted up to now.

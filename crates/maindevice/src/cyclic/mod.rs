@@ -53,7 +53,7 @@ struct Frame {
     /// Bits of the datagrams that carry outputs.
     carries: u16,
     /// Which version of the line's state its expectations are made of.
-    version: Option<u64>,
+    version: u64,
     /// It is on its way.
     out: bool,
     status: FrameStatus,
@@ -160,13 +160,10 @@ impl Cyclic {
             line,
             live,
         };
-        cyclic.next_at = cyclic.earliest();
+        cyclic.next_at =
+            cyclic.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
         cyclic.refresh();
         cyclic
-    }
-
-    fn earliest(&self) -> Instant {
-        self.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX)
     }
 
     /// Takes over who is present, if that has changed.
@@ -180,10 +177,10 @@ impl Cyclic {
         }
     }
 
-    /// When the next frames are due.
+    /// When the next frames are due; [`Instant::MAX`]: never.
     #[inline]
-    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
-        (self.next_at != Instant::MAX).then_some(self.next_at)
+    pub(crate) fn next_at(&self) -> Instant {
+        self.next_at
     }
 
     /// The application gives its outputs: all of them, or those of one task.
@@ -218,9 +215,11 @@ impl Cyclic {
         if now < self.next_at {
             return false;
         }
-        let Self { departures, tasks, frames, outputs, .. } = self;
+        let Self { departures, tasks, frames, outputs, next_at, .. } = self;
+        let mut earliest = Instant::MAX;
         for departure in departures {
             if departure.next_at > now {
+                earliest = earliest.min(departure.next_at);
                 continue;
             }
             departure.next_at += departure.cycle;
@@ -230,6 +229,7 @@ impl Cyclic {
                 behind = now.since(departure.next_at).as_nanos() / departure.cycle.as_nanos() + 1;
                 departure.next_at += departure.cycle * behind;
             }
+            earliest = earliest.min(departure.next_at);
             let Some(task) = tasks.get_mut(departure.task) else { continue };
             if departure.begins {
                 statistics.cycles += 1;
@@ -266,7 +266,7 @@ impl Cyclic {
                 task.out += u32::from(sent && !std::mem::replace(&mut frame.out, sent));
             }
         }
-        self.next_at = self.earliest();
+        *next_at = earliest;
         true
     }
 
@@ -293,8 +293,8 @@ impl Cyclic {
                 lock(line).alert();
             }
         }
-        if frame.version != Some(self.version) {
-            frame.version = Some(self.version);
+        if frame.version != self.version {
+            frame.version = self.version;
             frame.take_over(plan, index, least, most, shares, inputs);
         }
         frame.status.wrong_counter = 0;
@@ -352,7 +352,8 @@ impl Cyclic {
             departure.next_at =
                 if by < 0 { departure.next_at.before(span) } else { departure.next_at + span };
         }
-        self.next_at = self.earliest();
+        self.next_at =
+            self.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
     }
 
     /// A frame did not come back.
@@ -428,7 +429,7 @@ impl Frame {
             outputs,
             datagrams,
             carries,
-            version: None,
+            version: u64::MAX,
             out: false,
             status: FrameStatus::default(),
         }

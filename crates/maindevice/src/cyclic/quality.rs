@@ -104,6 +104,10 @@ impl Share {
         id: DeviceId,
         of: impl Fn(usize, usize) -> (bool, Option<Instant>, u64),
     ) -> Quality {
+        // Who has no process data has none that could be wrong.
+        if self.datagrams.is_empty() {
+            return Quality { valid: true, updated_at: None };
+        }
         let mut valid = self.serving && present.of(id).reached_by.is_some();
         let mut updated_at = None;
         for (frame, at, inputs) in &self.datagrams {

@@ -91,7 +91,9 @@ impl Fixture {
         // Two outputs from byte 26 on, two inputs behind them, then the counter.
         back[28..30].copy_from_slice(&inputs);
         back[30] = wkc;
-        let Received::Complete(slot) = self.exchange.receive(Path::A, &back) else { panic!() };
+        let Received::Complete(slot) = self.exchange.receive(self.now, Path::A, &back) else {
+            panic!()
+        };
         let (withheld, events) = (self.exchange.slot(slot).withheld, &mut self.events);
         let emit = &mut |event| events.push(event);
         let statistics = &mut self.statistics;
@@ -181,11 +183,11 @@ fn inputs_of_one_flow_while_the_other_is_on_its_way() {
 fn cycles_slept_through_are_left_out_on_the_grid() {
     let mut fixture = Fixture::new();
     fixture.cycle([0, 0], 0);
-    assert_eq!(fixture.cyclic.poll_timeout(), Some(Instant::ZERO + Span::ms(1)));
+    assert_eq!(fixture.cyclic.next_at(), Instant::ZERO + Span::ms(1));
     fixture.now = Instant::ZERO + Span::us(4_300);
     fixture.cycle([0, 0], 0);
     assert_eq!(fixture.statistics.cycles_missed, 3);
-    assert_eq!(fixture.cyclic.poll_timeout(), Some(Instant::ZERO + Span::ms(5)));
+    assert_eq!(fixture.cyclic.next_at(), Instant::ZERO + Span::ms(5));
 }
 
 // proves: FRM-18 partial: per SubDevice

@@ -87,6 +87,7 @@ impl Event {
             | Self::Mailbox { .. }
             | Self::SdoUploaded { .. }
             | Self::SdoDownloaded { .. }
+            | Self::Served { .. }
             | Self::Probed { .. }
             | Self::OutputsWithheld { .. }
             | Self::OutputsResumed { .. }

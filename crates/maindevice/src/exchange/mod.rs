@@ -33,6 +33,8 @@ pub const MAX_ACYCLIC_DATAGRAMS: usize = 15;
 /// As many frames as the low byte of a frame's number can tell apart.
 const SLOTS: usize = 256;
 
+/// An answer that comes once more so long after its deadline is none: its index was made up.
+const OLD: Span = Span::ms(50);
 /// Offset of the source address in a frame.
 const SOURCE_AT: usize = 6;
 /// Offset of the byte whose upper half is the type in the EtherCAT header.
@@ -91,11 +93,14 @@ pub(crate) struct Exchange {
     sources: [MacAddress; 2],
     origins: [Origin; 2],
     paths: [bool; 2],
-    slots: Vec<Slot>,
+    /// As many as an index byte can name.
+    slots: Box<[Slot; SLOTS]>,
     /// The frames of the running plan.
     cyclic: Vec<Prebuilt>,
     /// Slots that are waiting, oldest first.
     waiting: Vec<usize>,
+    /// When the first of them is given up.
+    earliest: Instant,
     outgoing: VecDeque<(usize, Path)>,
     queue: VecDeque<Queued>,
     acyclic_out: usize,
@@ -112,7 +117,8 @@ impl Exchange {
             origins: sources.map(origin),
             cyclic: Vec::new(),
             paths: [true, ring],
-            slots: (0..SLOTS).map(|_| Slot::new()).collect(),
+            slots: Box::new(std::array::from_fn(|_| Slot::new())),
+            earliest: Instant::MAX,
             waiting: Vec::with_capacity(SLOTS),
             outgoing: VecDeque::with_capacity(2 * SLOTS),
             queue: VecDeque::new(),
@@ -219,6 +225,7 @@ impl Exchange {
         slot.spares = [times - 1; 2];
         slot.reply.clear();
         self.waiting.push(at);
+        self.earliest = self.earliest.min(deadline);
         for _ in 0..times {
             self.outgoing.push_back((at, Path::A));
             if self.paths[Path::B.index()] {
@@ -277,7 +284,7 @@ impl Exchange {
 
     /// Takes a frame that arrived at card `path`.
     #[inline]
-    pub(crate) fn receive(&mut self, path: Path, frame: &[u8]) -> Received {
+    pub(crate) fn receive(&mut self, now: Instant, path: Path, frame: &[u8]) -> Received {
         let Some(sender) = self.sender(frame) else { return Received::Foreign };
         let Some(first) = frame.get(FIRST_INDEX) else { return Received::Truncated };
         let at = usize::from(*first);
@@ -313,6 +320,8 @@ impl Exchange {
             }
             SlotState::Free => return Received::Stray,
             SlotState::GivenUp => return Received::Late,
+            // Numbers come again. No line doubles what was answered so long ago.
+            SlotState::Answered if now > slot.deadline + OLD => return Received::Stray,
             SlotState::Answered => return Received::Duplicate,
         }
         if slot.arrived[copy] || !slot.outstanding[copy] {
@@ -374,20 +383,37 @@ impl Exchange {
         if reply.is_empty() { last } else { reply }
     }
 
+    #[inline]
     fn retire(&mut self, at: usize, state: SlotState) {
         self.slots[at].state = state;
-        // Oldest first, and answers come in order: it is nearly always the first.
-        if let Some(place) = self.waiting.iter().position(|waiting| *waiting == at) {
-            self.waiting.remove(place);
+        if self.waiting.as_slice() == [at] {
+            self.waiting.clear();
+            self.earliest = Instant::MAX;
+        } else {
+            self.retire_of_many(at);
         }
         if self.slots[at].purpose == Purpose::Acyclic {
             self.acyclic_out = self.acyclic_out.saturating_sub(1);
         }
     }
 
+    fn retire_of_many(&mut self, at: usize) {
+        // Oldest first, and answers come in order: it is nearly always the first.
+        if let Some(place) = self.waiting.iter().position(|waiting| *waiting == at) {
+            self.waiting.remove(place);
+        }
+        let deadlines = self.waiting.iter().map(|at| self.slots[*at].deadline);
+        self.earliest = deadlines.min().unwrap_or(Instant::MAX);
+    }
+
     /// The next slot whose time is up at `now`. With one copy back it is answered by that, else it
     /// is given up; the slot's state tells which.
+    #[inline]
     pub(crate) fn expire(&mut self, now: Instant) -> Option<usize> {
+        if now < self.earliest { None } else { self.expire_one(now) }
+    }
+
+    fn expire_one(&mut self, now: Instant) -> Option<usize> {
         let due = |at: &&usize| self.slots[**at].deadline <= now;
         let at = *self.waiting.iter().find(due)?;
         let answered = self.slots[at].arrived.contains(&true);
@@ -438,9 +464,10 @@ impl Exchange {
         self.patience
     }
 
-    /// When the first slot's time is up.
-    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
-        self.waiting.iter().map(|at| self.slots[*at].deadline).min()
+    /// When the first slot's time is up; [`Instant::MAX`] when nothing is out.
+    #[inline]
+    pub(crate) fn earliest(&self) -> Instant {
+        self.earliest
     }
 }
 

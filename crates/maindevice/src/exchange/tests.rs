@@ -58,7 +58,8 @@ fn datagrams_of_many_share_a_frame() {
     // 14 + 2 + 15 x (10 + 2 + 2) bytes.
     assert_eq!(frames[0].1.len(), 16 + 15 * 14);
     assert!(exchange.has_queued());
-    let Received::Complete(slot) = exchange.receive(Path::A, &answered(&frames[0].1, [8, 0], 1))
+    let Received::Complete(slot) =
+        exchange.receive(NOW, Path::A, &answered(&frames[0].1, [8, 0], 1))
     else {
         panic!()
     };
@@ -79,25 +80,25 @@ fn lost_late_duplicate_foreign_and_echo() {
     let mut exchange = exchange(false);
     exchange.submit(queued(1, read(0x1001, 0))).unwrap();
     let (_, frame) = transmit(&mut exchange).remove(0);
-    assert_eq!(exchange.receive(Path::A, &frame), Received::Echo);
+    assert_eq!(exchange.receive(NOW, Path::A, &frame), Received::Echo);
     let good = answered(&frame, [8, 0], 1);
     let mut other_source = good.clone();
     other_source[11] = 0x77;
-    assert_eq!(exchange.receive(Path::A, &other_source), Received::Foreign);
+    assert_eq!(exchange.receive(NOW, Path::A, &other_source), Received::Foreign);
     let mut other_register = good.clone();
     other_register[20] = 0x34;
-    assert_eq!(exchange.receive(Path::A, &other_register), Received::Stray);
-    assert_eq!(exchange.receive(Path::A, &good[..27]), Received::Truncated);
-    assert_eq!(exchange.receive(Path::A, &good), Received::Complete(0));
-    assert_eq!(exchange.receive(Path::A, &good), Received::Duplicate);
+    assert_eq!(exchange.receive(NOW, Path::A, &other_register), Received::Stray);
+    assert_eq!(exchange.receive(NOW, Path::A, &good[..27]), Received::Truncated);
+    assert_eq!(exchange.receive(NOW, Path::A, &good), Received::Complete(0));
+    assert_eq!(exchange.receive(NOW, Path::A, &good), Received::Duplicate);
 
     exchange.submit(queued(2, read(0x1001, 0))).unwrap();
     let (_, frame) = transmit(&mut exchange).remove(0);
-    assert_eq!(exchange.poll_timeout(), Some(NOW + Span::ms(10)));
+    assert_eq!(exchange.earliest(), NOW + Span::ms(10));
     assert_eq!(exchange.expire(NOW + Span::ms(9)), None);
     assert_eq!(exchange.expire(NOW + Span::ms(10)), Some(1));
     assert_eq!(exchange.slot(1).state, SlotState::GivenUp);
-    assert_eq!(exchange.receive(Path::A, &answered(&frame, [8, 0], 1)), Received::Late);
+    assert_eq!(exchange.receive(NOW, Path::A, &answered(&frame, [8, 0], 1)), Received::Late);
 }
 
 #[test]
@@ -122,7 +123,7 @@ fn a_slot_that_waits_is_passed_over() {
         exchange.submit(queued(ticket, read(0x1001, 0))).unwrap();
         let (_, frame) = transmit(&mut exchange).remove(0);
         let back = answered(&frame, [8, 0], 1);
-        let Received::Complete(slot) = exchange.receive(Path::A, &back) else { panic!() };
+        let Received::Complete(slot) = exchange.receive(NOW, Path::A, &back) else { panic!() };
         assert_ne!(slot, 0);
     }
     assert_eq!(exchange.slot(0).state, SlotState::Waiting);
@@ -137,8 +138,8 @@ fn two_copies_of_an_intact_ring() {
     assert_eq!(frames[1].1[6..12], SOURCES[1].0);
     // The copy of card A went through all and comes in at card B; the other one went by.
     let first = answered(&frames[0].1, [8, 0], 1);
-    assert_eq!(exchange.receive(Path::B, &first), Received::FirstCopy);
-    assert_eq!(exchange.receive(Path::A, &frames[1].1), Received::Complete(0));
+    assert_eq!(exchange.receive(NOW, Path::B, &first), Received::FirstCopy);
+    assert_eq!(exchange.receive(NOW, Path::A, &frames[1].1), Received::Complete(0));
     assert_eq!(reply_of(&exchange, 0), ([8, 0], 1));
 }
 
@@ -149,9 +150,9 @@ fn two_copies_of_a_broken_ring() {
     exchange.submit(queued(1, all)).unwrap();
     let frames = transmit(&mut exchange);
     // Three on the side of card A are in OP, two on the other one in SAFEOP.
-    exchange.receive(Path::A, &answered(&frames[0].1, [8, 0], 3));
+    exchange.receive(NOW, Path::A, &answered(&frames[0].1, [8, 0], 3));
     assert_eq!(
-        exchange.receive(Path::B, &answered(&frames[1].1, [4, 0], 2)),
+        exchange.receive(NOW, Path::B, &answered(&frames[1].1, [4, 0], 2)),
         Received::Complete(0)
     );
     assert_eq!(reply_of(&exchange, 0), ([0x0C, 0], 5));
@@ -162,7 +163,7 @@ fn one_copy_is_enough_when_the_other_does_not_come() {
     let mut exchange = exchange(true);
     exchange.submit(queued(1, read(0x1001, 0))).unwrap();
     let frames = transmit(&mut exchange);
-    exchange.receive(Path::A, &answered(&frames[0].1, [4, 0], 1));
+    exchange.receive(NOW, Path::A, &answered(&frames[0].1, [4, 0], 1));
     assert_eq!(exchange.expire(NOW + Span::ms(10)), Some(0));
     assert_eq!(exchange.slot(0).state, SlotState::Answered);
     assert_eq!(reply_of(&exchange, 0), ([4, 0], 1));
@@ -175,9 +176,9 @@ fn card_b_asks_nobody_by_position() {
     exchange.submit(queued(1, Request::read(target, RegisterAddress(0x0130), 2))).unwrap();
     let frames = transmit(&mut exchange);
     assert_eq!((frames[0].1[16], frames[1].1[16]), (1, 0), "APRD and NOP");
-    exchange.receive(Path::B, &frames[1].1);
+    exchange.receive(NOW, Path::B, &frames[1].1);
     let back = answered(&frames[0].1, [2, 0], 1);
-    assert_eq!(exchange.receive(Path::A, &back), Received::Complete(0));
+    assert_eq!(exchange.receive(NOW, Path::A, &back), Received::Complete(0));
     assert_eq!(reply_of(&exchange, 0), ([2, 0], 1));
 }
 
@@ -192,11 +193,11 @@ fn in_a_broken_ring_each_card_has_positions_of_its_own() {
     let frames = transmit(&mut exchange);
     assert_eq!((frames[0].1[16], frames[0].1[30]), (1, 0));
     assert_eq!((frames[1].1[16], frames[1].1[30]), (0, 1));
-    exchange.receive(Path::A, &answered(&frames[0].1, [2, 0], 1));
+    exchange.receive(NOW, Path::A, &answered(&frames[0].1, [2, 0], 1));
     let mut back = frames[1].1.clone();
     back[6] |= SOURCE_MARK;
     back[40..43].copy_from_slice(&[4, 0, 1]);
-    assert_eq!(exchange.receive(Path::B, &back), Received::Complete(0));
+    assert_eq!(exchange.receive(NOW, Path::B, &back), Received::Complete(0));
     let reply = &exchange.slot(0).reply;
     assert_eq!((reply[26], reply[28], reply[40], reply[42]), (2, 1, 4, 1));
     assert_eq!(exchange.ring_intact(), Some(false));

@@ -295,11 +295,10 @@ impl Executor {
         }
     }
 
-    /// When the first sleeper wants to be woken.
+    /// When the first sleeper wants to be woken; [`Instant::MAX`] when nobody sleeps.
     #[inline]
-    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
-        let first = self.board.first_timer.load(Ordering::Relaxed);
-        (first != u64::MAX).then(|| Instant::from_nanos(first))
+    pub(crate) fn first_timer(&self) -> Instant {
+        Instant::from_nanos(self.board.first_timer.load(Ordering::Relaxed))
     }
 }
 

@@ -225,9 +225,11 @@ impl fmt::Display for MailboxFailure {
             write!(f, ", {step}")?;
         }
         write!(f, ": {why}")?;
-        match why.advice().trim_end_matches('.') {
-            "" => Ok(()),
-            advice => write!(f, ". Do: {advice}"),
+        let advice = why.advice().trim_end_matches('.');
+        let mut letters = advice.chars();
+        match letters.next() {
+            None => Ok(()),
+            Some(first) => write!(f, ". Do: {}{}", first.to_ascii_lowercase(), letters.as_str()),
         }
     }
 }

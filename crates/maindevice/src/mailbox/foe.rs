@@ -136,7 +136,11 @@ async fn unexpected(
     found: Result<Message<'_>, linesman_proto::mailbox::foe::FoeError>,
 ) -> Why {
     let found = match found {
-        Ok(Message::Error { code, text }) => return Why::File { code, text: words(text) },
+        Ok(Message::Error { code, text }) => {
+            // Some only repeat what the code says.
+            let text = Some(words(text)).filter(|text| text != code.text());
+            return Why::File { code, text: text.unwrap_or_default() };
+        }
         Ok(Message::Read { .. }) => "a request to read".to_owned(),
         Ok(Message::Write { .. }) => "a request to write".to_owned(),
         Ok(Message::Data { packet, .. }) => format!("packet {packet}"),

@@ -37,15 +37,16 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
     let mut openings = 0;
     loop {
         let job = context.mailboxes.next(id, context.wire.sleep(interval)).await;
-        let (open, now) = {
+        let (open, boots, now) = {
             let line = lock(&context.line);
-            (line.has_mailbox(id), line.mailbox_openings(id))
+            (line.has_mailbox(id), line.boots(id), line.mailbox_openings(id))
         };
         // It may have been closed and opened again between two looks.
         if !open || openings != now {
             multiplexer.reset();
             openings = now;
         }
+        let open = open && multiplexer.set_boots(boots);
         match job {
             Some(job) => work(&context, &mut multiplexer, job, open).await,
             None if open => multiplexer.drain().await,

@@ -36,6 +36,8 @@ pub(crate) struct Multiplexer {
     id: DeviceId,
     target: Target,
     areas: MailboxPair,
+    standard: MailboxPair,
+    bootstrap: Option<MailboxPair>,
     protocols: Protocols,
     /// Counter of the last message that was sent; `None` before the first.
     sent: Option<Counter>,
@@ -57,6 +59,8 @@ impl Multiplexer {
             id: device.id,
             target: Target::Station(device.station),
             areas: mailbox.areas,
+            standard: mailbox.areas,
+            bootstrap: mailbox.bootstrap,
             protocols: mailbox.protocols,
             sent: None,
             received: Counter::NONE,
@@ -70,6 +74,14 @@ impl Multiplexer {
     pub(crate) fn reset(&mut self) {
         (self.sent, self.received) = (None, Counter::NONE);
         (self.fetched_again, self.late) = (false, false);
+    }
+
+    /// It is the mailbox of BOOT from now on, or that of all other states. False when it has none
+    /// for BOOT.
+    pub(crate) fn set_boots(&mut self, boots: bool) -> bool {
+        let areas = if boots { self.bootstrap } else { Some(self.standard) };
+        self.areas = areas.unwrap_or(self.standard);
+        areas.is_some()
     }
 
     pub(crate) fn now(&self) -> Instant {

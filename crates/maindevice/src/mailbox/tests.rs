@@ -1,6 +1,7 @@
 //! SDO transfers against a SubDevice of a few lines: its mailbox is a buffer, its answers are bytes
 //! written down by hand.
 
+use std::collections::VecDeque;
 use std::pin::pin;
 use std::sync::{Arc, Mutex};
 use std::task::{Poll, Waker};
@@ -11,10 +12,14 @@ use linesman_config::profile::Mailbox;
 use linesman_proto::address::{Network, RegisterAddress, StationAddress, WorkingCounter};
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
-use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::mailbox::coe::information::ListKind;
+use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::foe::FoeErrorCode;
 use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
+use proptest::collection::vec;
+use proptest::prelude::*;
 
 use super::*;
 use crate::event::Event;
@@ -30,10 +35,24 @@ const OUT_STATUS: u16 = 0x0805;
 const IN_STATUS: u16 = 0x080D;
 const FULL: u8 = 0x08;
 
+const COE: u8 = 3;
+const FOE: u8 = 4;
+
+/// A message of the SubDevice.
+#[derive(Clone, Debug)]
+enum Said {
+    /// What is behind the mailbox header.
+    Body(Vec<u8>),
+    /// The whole mailbox.
+    Raw(Vec<u8>),
+    /// More than one message: the others follow when the first was fetched.
+    Several(Vec<(u8, Vec<u8>)>),
+}
+
 /// A mailbox of 32 bytes each way: 16 bytes of SDO data in a first message, 23 in a segment.
 fn device() -> DevicePlan {
     let areas = MailboxPair::from_words([OUT, 32, IN, 32]);
-    let protocols = Protocols(Protocols::COE);
+    let protocols = Protocols(Protocols::COE | Protocols::FOE);
     DevicePlan {
         name: "5".to_owned(),
         station: StationAddress(0x1005),
@@ -46,18 +65,42 @@ fn device() -> DevicePlan {
 
 /// A SubDevice that answers each message with the next of its messages.
 struct Scripted {
-    /// What it says, in order; each begins behind the mailbox header.
-    says: Vec<Vec<u8>>,
+    /// What it says, in order, with the code of the protocol.
+    says: Vec<(u8, Said)>,
+    /// It does not fetch what is written to it.
+    deaf: bool,
+    /// Its counter stays at 1.
+    stuck_counter: bool,
     /// What it was told, without mailbox headers.
     heard: Vec<Vec<u8>>,
     waiting: Option<Vec<u8>>,
+    /// What follows it.
+    behind: VecDeque<(u8, Vec<u8>)>,
     counter: u8,
 }
 
 impl Scripted {
+    /// One that speaks CoE.
     fn new(says: &[&[u8]]) -> Self {
-        let says = says.iter().map(|message| message.to_vec()).collect();
-        Self { says, heard: Vec::new(), waiting: None, counter: 0 }
+        Self::with(says.iter().map(|message| (COE, Said::Body(message.to_vec()))).collect())
+    }
+
+    /// One that speaks FoE.
+    fn of_files(says: &[&[u8]]) -> Self {
+        Self::with(says.iter().map(|message| (FOE, Said::Body(message.to_vec()))).collect())
+    }
+
+    fn with(says: Vec<(u8, Said)>) -> Self {
+        let (deaf, stuck_counter) = (false, false);
+        Self {
+            says,
+            deaf,
+            stuck_counter,
+            heard: Vec::new(),
+            waiting: None,
+            behind: VecDeque::new(),
+            counter: 0,
+        }
     }
 
     fn answer(&mut self, request: &Request) -> Reply {
@@ -66,7 +109,8 @@ impl Scripted {
         };
         assert_eq!(station, 0x1005);
         let (wkc, data) = match (request.command, at) {
-            (Command::Fprd, OUT_STATUS) => (1, vec![0]),
+            (Command::Fprd, OUT_STATUS) => (1, vec![if self.deaf { FULL } else { 0 }]),
+            (Command::Fpwr, OUT) if self.deaf => (0, request.data.clone()),
             (Command::Fprd, IN_STATUS) => (1, vec![if self.waiting.is_some() { FULL } else { 0 }]),
             (Command::Fpwr, OUT) => {
                 assert_eq!(request.data.len(), 32, "the whole mailbox is written");
@@ -78,7 +122,12 @@ impl Scripted {
                 (1, request.data.clone())
             }
             (Command::Fprd, IN) => match self.waiting.take() {
-                Some(message) => (1, message),
+                Some(message) => {
+                    if let Some((kind, body)) = self.behind.pop_front() {
+                        self.put(kind, &body);
+                    }
+                    (1, message)
+                }
                 None => (0, vec![0; 32]),
             },
             other => panic!("{other:?}"),
@@ -87,9 +136,23 @@ impl Scripted {
     }
 
     fn speak(&mut self) {
-        let body = self.says.remove(0);
-        self.counter = self.counter % 7 + 1;
-        let mut message = vec![body.len() as u8, 0, 0, 0, 0, 0x03 | self.counter << 4];
+        match self.says.remove(0) {
+            (kind, Said::Body(body)) => self.put(kind, &body),
+            (_, Said::Raw(message)) => self.waiting = Some(message),
+            (_, Said::Several(messages)) => {
+                self.behind.extend(messages);
+                if let Some((kind, body)) = self.behind.pop_front() {
+                    self.put(kind, &body);
+                }
+            }
+        }
+    }
+
+    fn put(&mut self, kind: u8, body: &[u8]) {
+        if !self.stuck_counter || self.counter == 0 {
+            self.counter = self.counter % 7 + 1;
+        }
+        let mut message = vec![body.len() as u8, 0, 0, 0, 0, kind | self.counter << 4];
         message.extend(body);
         message.resize(32, 0);
         self.waiting = Some(message);
@@ -133,7 +196,7 @@ fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>
             return (outcome, events);
         }
         if executor.shared().submitted.is_empty() {
-            now = executor.poll_timeout().expect("somebody waits").max(now);
+            now = executor.first_timer().max(now);
             executor.advance(now);
         }
     }
@@ -217,4 +280,221 @@ fn an_abort_carries_its_code() {
     let error = upload(&mut Scripted::new(&[&abort]), 0x2000).unwrap_err();
     let Why::Aborted { code } = error.why else { panic!("{error}") };
     assert_eq!(code.value(), 0x0602_0000);
+}
+
+/// The first message of an upload of 50 bytes, with 16 of them.
+fn first_of_50() -> Vec<u8> {
+    [&[0x00, 0x30, 0x41, 0x00, 0x20, 1, 50, 0, 0, 0][..], &[7; 16]].concat()
+}
+
+#[test]
+fn a_transfer_that_is_cut_off_or_too_long_is_refused_and_ended() {
+    // The last segment comes too early; one more than was announced.
+    let early = [&[0x00, 0x30, 0x01][..], &[7; 11]].concat();
+    let full = [&[0x00, 0x30, 0x00][..], &[7; 23]].concat();
+    let more = [&[0x00, 0x30, 0x11][..], &[7; 23]].concat();
+    for (rest, words) in [
+        (vec![&early[..]], "the end after 27 of 50 bytes"),
+        (vec![&full[..], &more], "62 bytes, although 50 were announced"),
+    ] {
+        let mut scripted = Scripted::new(&[&[&first_of_50()[..]], &rest[..]].concat());
+        let text = upload(&mut scripted, 0x2000).unwrap_err().to_string();
+        assert!(text.contains(words) && text.contains("segment"), "{text}");
+        // It is told so: abort, general error.
+        let abort = [0x00, 0x20, 0x80, 0x00, 0x20, 1, 0, 0, 0, 8];
+        assert_eq!(scripted.heard.last().unwrap()[..], abort, "{words}");
+    }
+}
+
+#[test]
+fn rubbish_is_told_when_no_answer_comes() {
+    let mut raw = vec![0xFF; 32];
+    raw[5] = 0x13;
+    let mut scripted = Scripted::with(vec![(COE, Said::Raw(raw))]);
+    let failure = upload(&mut scripted, 0x2000).unwrap_err();
+    let text = failure.to_string();
+    assert!(matches!(failure.why, Why::NoAnswer { .. }), "{text}");
+    assert!(text.contains("announces 65535 bytes") && text.contains("0x2000:01"), "{text}");
+}
+
+#[test]
+fn messages_of_other_protocols_are_handed_on_and_the_answer_is_found() {
+    let answer = vec![0x00, 0x30, 0x4B, 0x00, 0x20, 1, 0x2A, 0, 0, 0];
+    let several = Said::Several(vec![
+        (2, vec![1, 2, 3, 4]),
+        (FOE, vec![4, 0, 0, 0, 0, 0]),
+        (COE, vec![0x00, 0x10, 0x10, 0x43, 0x08, 1, 2, 3, 4, 5]),
+        (COE, answer),
+    ]);
+    let mut scripted = Scripted::with(vec![(COE, several)]);
+    let object = ObjectAddress::new(0x2000, 1);
+    let (outcome, events) = run(&mut scripted, MailboxRequest::Upload { object, complete: false });
+    assert_eq!(outcome.unwrap(), [0x2A, 0], "two of the four bytes count");
+    let kinds: Vec<&str> = (events.iter())
+        .map(|event| if matches!(event, Event::Emergency { .. }) { "emergency" } else { "other" })
+        .collect();
+    assert_eq!(kinds, ["other", "other", "emergency"]);
+}
+
+#[test]
+fn a_counter_that_stays_is_understood_as_nothing_was_asked_for_again() {
+    let second = [&[0x00, 0x30, 0x00][..], &[7; 23]].concat();
+    let last = [&[0x00, 0x30, 0x11][..], &[7; 11]].concat();
+    let mut scripted = Scripted::new(&[&first_of_50(), &second, &last]);
+    scripted.stuck_counter = true;
+    assert_eq!(upload(&mut scripted, 0x2000).unwrap(), [7; 50]);
+}
+
+#[test]
+fn a_mailbox_that_nobody_reads_is_told_so() {
+    let mut scripted = Scripted::new(&[]);
+    scripted.deaf = true;
+    let failure = upload(&mut scripted, 0x2000).unwrap_err();
+    assert!(matches!(failure.why, Why::MailboxFull { .. }), "{failure}");
+}
+
+#[test]
+fn a_list_comes_in_fragments() {
+    let head = |left: u8| [0x00, 0x80, 2 | if left > 0 { 0x80 } else { 0 }, 0, left, 0];
+    let first = [&head(1)[..], &[1, 0, 0x00, 0x10, 0x18, 0x10]].concat();
+    let second = [&head(0)[..], &[0x08, 0x10]].concat();
+    let several = Said::Several(vec![(COE, first.clone()), (COE, second)]);
+    let mut scripted = Scripted::with(vec![(COE, several)]);
+    let list = ListKind::All;
+    let (outcome, _) = run(&mut scripted, MailboxRequest::ObjectList { list });
+    assert_eq!(outcome.unwrap(), [1, 0, 0x00, 0x10, 0x18, 0x10, 0x08, 0x10]);
+    assert_eq!(scripted.heard[0], [0x00, 0x80, 1, 0, 0, 0, 1, 0]);
+    // The second fragment does not come.
+    let (outcome, _) = run(&mut Scripted::new(&[&first]), MailboxRequest::ObjectList { list });
+    let text = outcome.unwrap_err().to_string();
+    assert!(text.contains("object list 1") && text.contains("fragment 1"), "{text}");
+}
+
+#[test]
+fn a_description_of_something_else_or_none_is_told() {
+    let index = ObjectIndex(0x2000);
+    let ask = |says: &[u8]| {
+        run(&mut Scripted::new(&[says]), MailboxRequest::DescribeObject { index }).0.unwrap_err()
+    };
+    let other = [0x00, 0x80, 4, 0, 0, 0, 0x18, 0x10, 7, 0, 4, 9, b'I'];
+    assert!(matches!(ask(&other).why, Why::Protocol { .. }));
+    let short = [0x00, 0x80, 4, 0, 0, 0, 0x00];
+    assert!(matches!(ask(&short).why, Why::Protocol { .. }));
+    let refused = ask(&[0x00, 0x80, 7, 0, 0, 0, 0, 0, 2, 6]);
+    assert!(refused.to_string().contains("0x06020000"), "{refused}");
+}
+
+/// A packet of a file: 20 bytes fill the mailbox of 32.
+fn packet(number: u8, data: &[u8]) -> Vec<u8> {
+    [&[3, 0, number, 0, 0, 0][..], data].concat()
+}
+
+fn ack(number: u8) -> Vec<u8> {
+    vec![4, 0, number, 0, 0, 0]
+}
+
+fn read_file(scripted: &mut Scripted) -> Outcome {
+    run(scripted, MailboxRequest::ReadFile { name: "log".to_owned(), password: 0x1234 }).0
+}
+
+fn write_file(scripted: &mut Scripted, data: &[u8]) -> Outcome {
+    let request =
+        MailboxRequest::WriteFile { name: "a".to_owned(), password: 0, data: data.to_vec() };
+    run(scripted, request).0
+}
+
+#[test]
+fn a_file_is_read_packet_by_packet() {
+    let whole: Vec<u8> = (0..40).collect();
+    let mut scripted = Scripted::of_files(&[
+        // Not yet: the request is sent again.
+        &[6, 0, 1, 0, 2, 0],
+        &packet(1, &whole[..20]),
+        &packet(2, &whole[20..]),
+        &packet(3, &[]),
+    ]);
+    assert_eq!(read_file(&mut scripted).unwrap(), whole);
+    let request = [&[1, 0, 0x34, 0x12, 0, 0][..], b"log"].concat();
+    assert_eq!(scripted.heard[..2], [request.clone(), request]);
+    assert_eq!(scripted.heard[2..], [ack(1), ack(2), ack(3)]);
+}
+
+#[test]
+fn a_file_is_written_and_an_empty_packet_ends_it() {
+    let whole: Vec<u8> = (0..40).collect();
+    let mut scripted =
+        Scripted::of_files(&[&ack(0), &[6, 0, 0, 0, 0, 0], &ack(1), &ack(2), &ack(3)]);
+    write_file(&mut scripted, &whole).unwrap();
+    assert_eq!(scripted.heard[0], [2, 0, 0, 0, 0, 0, b'a']);
+    let sent = [packet(1, &whole[..20]), packet(1, &whole[..20]), packet(2, &whole[20..])];
+    assert_eq!(scripted.heard[1..4], sent, "the busy one is sent again");
+    assert_eq!(scripted.heard[4], packet(3, &[]), "the others filled the mailbox");
+}
+
+// proves: SW-11 partial: texts and codes; the segment has them on a public surface
+#[test]
+fn files_that_are_refused_say_why() {
+    for (code, words) in [
+        (FoeErrorCode::NOT_FOUND, "no file of this name"),
+        (FoeErrorCode::DISK_FULL, "no room left"),
+        (FoeErrorCode::NOT_IN_BOOTSTRAP, "BOOT"),
+        (FoeErrorCode::NO_RIGHTS, "password"),
+    ] {
+        let number = code.0.to_le_bytes();
+        let error = [&[5, 0][..], &number, b"no\0"].concat();
+        let failure = write_file(&mut Scripted::of_files(&[&error]), &[1]).unwrap_err();
+        assert_eq!(failure.why, Why::File { code, text: "no".to_owned() });
+        let text = failure.to_string();
+        assert!(text.contains(words) && text.contains("writing file `a`"), "{text}");
+    }
+    let failure = read_file(&mut Scripted::of_files(&[&packet(2, &[1])])).unwrap_err();
+    assert!(failure.to_string().contains("packet 2 instead of 1"), "{failure}");
+    let mut silent = Scripted::of_files(&[&ack(0)]);
+    let failure = write_file(&mut silent, &[1; 30]).unwrap_err();
+    assert!(failure.to_string().contains("packet 1: no answer within 10 s"), "{failure}");
+    let name = "a name that does not fit into a mailbox".to_owned();
+    let request = MailboxRequest::ReadFile { name, password: 0 };
+    let failure = run(&mut Scripted::of_files(&[]), request).0.unwrap_err();
+    assert!(matches!(failure.why, Why::TooSmall(_)), "{failure}");
+}
+
+/// Something that may come: mostly with a header that can be read.
+fn anything() -> impl Strategy<Value = (u8, Said)> {
+    let raw = vec(any::<u8>(), 32).prop_map(|bytes| (COE, Said::Raw(bytes)));
+    let coe = (vec(prop::sample::select(vec![0x10, 0x20, 0x30, 0x80]), 1), vec(any::<u8>(), 0..25))
+        .prop_map(|(service, rest)| (COE, Said::Body([&[0], &service[..], &rest].concat())));
+    // A response about the object that is asked for.
+    let about = (prop::sample::select(vec![0x41, 0x43, 0x4F, 0x60, 0x00, 0x01, 0x11, 0x20, 0x80]))
+        .prop_flat_map(|command| {
+            vec(any::<u8>(), 0..20).prop_map(move |rest| {
+                let head = [0x00, 0x30, command, 0x00, 0x20, 1];
+                (COE, Said::Body([&head[..], &rest].concat()))
+            })
+        });
+    let foe = (1_u8..8, 0_u8..4, vec(any::<u8>(), 0..20)).prop_map(|(opcode, number, rest)| {
+        (FOE, Said::Body([&[opcode, 0, number, 0, 0, 0][..], &rest].concat()))
+    });
+    let error = vec(any::<u8>(), 0..6).prop_map(|body| (0, Said::Body(body)));
+    prop_oneof![raw, coe, about, foe, error]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+    #[test]
+    fn whatever_comes_an_errand_ends(said in vec(anything(), 0..10), which in 0..6_usize) {
+        let object = ObjectAddress::new(0x2000, 1);
+        let name = "file".to_owned();
+        let request = match which {
+            0 => MailboxRequest::Upload { object, complete: false },
+            1 => MailboxRequest::Download { object, complete: true, data: vec![7; 60] },
+            2 => MailboxRequest::ObjectList { list: ListKind::All },
+            3 => MailboxRequest::DescribeEntry { object, values: Default::default() },
+            4 => MailboxRequest::ReadFile { name, password: 0 },
+            _ => MailboxRequest::WriteFile { name, password: 0, data: vec![7; 60] },
+        };
+        let (outcome, _) = run(&mut Scripted::with(said), request);
+        if let Err(failure) = outcome {
+            prop_assert!(failure.to_string().starts_with("SubDevice 5, "));
+        }
+    }
 }

@@ -16,6 +16,7 @@ use crate::executor::{Handle, Wire, lock};
 use crate::mailbox::queue::Pending;
 use crate::mailbox::{MailboxRequest, ProtocolErrors, Queues};
 use crate::procedure::{look, scan, state};
+use crate::service::{self, Attended, Servant, Service, ServiceFailure, ServiceTicket};
 use crate::supervisor::{self, Context, Line};
 
 /// One register access beside the cycle, for those who want to know more.
@@ -147,6 +148,7 @@ impl MainDevice {
             self.executor.cancel(control.group());
         }
         self.running = None;
+        self.attended = None;
         self.exchange.abandon_cyclic();
         let wire = self.executor.group(self.options.repeats);
         self.control = Some(wire.clone());
@@ -214,6 +216,41 @@ impl MainDevice {
             wire.emit(Event::SdoDownloaded { id, object, result });
         });
         self.handle_timeout(now);
+    }
+
+    /// Serves the SubDevices of a plan without driving them: each stays in its state until a
+    /// [`Service`] takes it elsewhere. Another command that is going on is ended.
+    pub fn attend(&mut self, now: Instant, plan: Plan) {
+        let wire = self.command();
+        self.attended = Some(Attended::new(&wire, self.network, plan, &self.options));
+        self.handle_timeout(now);
+    }
+
+    /// Does one service for a SubDevice, beside all else. Ends in [`Event::Served`].
+    pub fn serve(&mut self, now: Instant, id: DeviceId, service: Service) -> ServiceTicket {
+        let ticket = ServiceTicket(self.next_service);
+        self.next_service += 1;
+        let wire = self.aside.clone();
+        let servant = self.servant();
+        self.aside.spawn(async move {
+            let result = match servant {
+                Some(servant) => service::perform(&servant, id, service).await,
+                None => Err(ServiceFailure::Unknown { id }),
+            };
+            wire.emit(Event::Served { ticket, id, result: Box::new(result) });
+        });
+        self.handle_timeout(now);
+        ticket
+    }
+
+    fn servant(&self) -> Option<Servant> {
+        let (wire, options) = (self.aside.clone(), Arc::clone(&self.options));
+        if let Some(Running { plan, line, mailboxes, .. }) = &self.running {
+            let (plan, line, mailboxes) = (Arc::clone(plan), Arc::clone(line), mailboxes.clone());
+            return Some(Servant { wire, plan, line, mailboxes, driven: true, options });
+        }
+        let Attended { plan, line, mailboxes } = self.attended.clone()?;
+        Some(Servant { wire, plan, line, mailboxes, driven: false, options })
     }
 
     /// Asks a running SubDevice through its mailbox. Without a plan that runs nobody has one.

@@ -18,6 +18,7 @@ use crate::exchange::{
 use crate::executor::{Executor, Wire, lock};
 use crate::mailbox::Queues;
 use crate::options::Options;
+use crate::service::Attended;
 use crate::statistics::Statistics;
 use crate::supervisor::{BringUpTimes, Line};
 
@@ -40,6 +41,9 @@ pub struct MainDevice {
     /// Probes, which outlive commands.
     aside: Wire,
     running: Option<Running>,
+    /// SubDevices that are served without being driven.
+    attended: Option<Attended>,
+    next_service: u64,
     /// How many frames of procedures may still go out in this cycle.
     acyclic_left: usize,
 }
@@ -67,6 +71,8 @@ impl MainDevice {
             control: None,
             aside,
             running: None,
+            attended: None,
+            next_service: 0,
             acyclic_left: 0,
         }
     }
@@ -80,9 +86,12 @@ impl MainDevice {
     // ---- frames and time ----
 
     /// The next frame to be sent, written into `buffer`, which must hold 1514 bytes.
+    #[inline]
     pub fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
         self.executor.advance(now);
-        if let Some(running) = &mut self.running {
+        if let Some(running) = &mut self.running
+            && running.cyclic.next_at() <= now
+        {
             let (exchange, statistics) = (&mut self.exchange, &mut self.statistics);
             let shared = &self.executor;
             let emit = &mut |event| shared.emit(event);
@@ -113,13 +122,12 @@ impl MainDevice {
         let settled = |running: &&Running| lock(&running.line).all_have_been_reached();
         if let Some(running) = self.running.as_ref().filter(settled) {
             let Some(left) = self.acyclic_left.checked_sub(1) else { return };
-            if let Some(next_at) = running.cyclic.poll_timeout() {
-                let until = next_at.since(now).as_nanos() / BYTE_NS;
-                room = (until as usize).saturating_sub(WIRE_OVERHEAD).min(MAX_LEN);
-                // Too late in this cycle, unless the cycle is too short for any frame at all.
-                if room < MIN_LEN && self.acyclic_left < self.options.frames_at_once {
-                    return;
-                }
+            let until = running.cyclic.next_at().since(now).as_nanos() / BYTE_NS;
+            room = usize::try_from(until).unwrap_or(MAX_LEN);
+            room = room.saturating_sub(WIRE_OVERHEAD).min(MAX_LEN);
+            // Too late in this cycle, unless the cycle is too short for any frame at all.
+            if room < MIN_LEN && self.acyclic_left < self.options.frames_at_once {
+                return;
             }
             self.acyclic_left = left;
         }
@@ -150,9 +158,10 @@ impl MainDevice {
 
     /// A frame has arrived at a card, with a good check sequence. Nothing is given up here, so that a
     /// frame which was fetched together with this one, late, still counts.
+    #[inline]
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.executor.advance(now);
-        match self.exchange.receive(path, frame) {
+        match self.exchange.receive(now, path, frame) {
             Received::Complete(slot) => {
                 self.statistics.frames_received += 1;
                 self.complete(now, slot, frame);
@@ -190,6 +199,7 @@ impl MainDevice {
 
     /// Time has come to `now`. Hand over frames that have arrived first: whatever is overdue then is
     /// given up.
+    #[inline]
     pub fn handle_timeout(&mut self, now: Instant) {
         self.executor.advance(now);
         while let Some(slot) = self.exchange.expire(now) {
@@ -203,6 +213,7 @@ impl MainDevice {
     }
 
     /// Runs whoever is ready.
+    #[inline]
     fn work(&mut self) {
         self.executor.run();
         self.submit();
@@ -212,6 +223,7 @@ impl MainDevice {
     }
 
     /// All that comes back of a frame is back; `last` is what came back last.
+    #[inline]
     fn complete(&mut self, now: Instant, slot: usize, last: &[u8]) {
         match self.exchange.slot(slot).purpose {
             Purpose::Cyclic { frame } => {
@@ -222,13 +234,16 @@ impl MainDevice {
                 let emit = &mut |event| shared.emit(event);
                 running.cyclic.received(now, frame, withheld, reply, statistics, emit);
             }
-            Purpose::Acyclic => {
-                let requests = self.exchange.take_requests(slot);
-                let replies = replies(self.exchange.answer(slot, last));
-                for (queued, reply) in requests.into_iter().zip(replies) {
-                    self.executor.answer(queued.ticket, Ok(reply));
-                }
-            }
+            Purpose::Acyclic => self.complete_acyclic(slot, last),
+        }
+    }
+
+    #[inline(never)]
+    fn complete_acyclic(&mut self, slot: usize, last: &[u8]) {
+        let requests = self.exchange.take_requests(slot);
+        let replies = replies(self.exchange.answer(slot, last));
+        for (queued, reply) in requests.into_iter().zip(replies) {
+            self.executor.answer(queued.ticket, Ok(reply));
         }
     }
 
@@ -270,23 +285,24 @@ impl MainDevice {
     }
 
     /// When [`MainDevice::handle_timeout`] is to be called, if nothing comes before.
+    #[inline]
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let cycle = self.running.as_ref().and_then(|running| running.cyclic.poll_timeout());
-        [cycle, self.exchange.poll_timeout(), self.executor.poll_timeout()]
-            .into_iter()
-            .flatten()
-            .min()
+        let cycle = self.running.as_ref().map_or(Instant::MAX, |running| running.cyclic.next_at());
+        let first = cycle.min(self.exchange.earliest()).min(self.executor.first_timer());
+        (first != Instant::MAX).then_some(first)
     }
 
     /// When the next cyclic frames are due.
     #[inline]
     #[must_use]
     pub fn poll_cycle_timeout(&self) -> Option<Instant> {
-        self.running.as_ref().and_then(|running| running.cyclic.poll_timeout())
+        let next = self.running.as_ref()?.cyclic.next_at();
+        (next != Instant::MAX).then_some(next)
     }
 
     /// What has happened, oldest first.
+    #[inline]
     pub fn poll_event(&mut self) -> Option<Event> {
         self.executor.poll_event()
     }
@@ -322,6 +338,12 @@ impl MainDevice {
             running.cyclic.give_outputs(None);
             &mut running.cyclic.outputs
         })
+    }
+
+    /// The same, without giving them anew: for a look, or for changes that are given later.
+    #[inline]
+    pub fn image_mut(&mut self) -> &mut [u8] {
+        self.running.as_mut().map_or(&mut [], |running| &mut running.cyclic.outputs)
     }
 
     /// The same, but only those of one task count as given anew.

@@ -6,6 +6,7 @@ pub mod look;
 pub mod scan;
 pub mod set_up;
 pub mod sii;
+pub mod sii_write;
 pub mod state;
 pub(crate) mod sync_signal;
 

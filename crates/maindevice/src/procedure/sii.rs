@@ -9,7 +9,7 @@ use linesman_proto::register::{
     SII_ACCESS_ECAT, SII_ADDRESS, SII_CONTROL_STATUS, SII_DATA, SiiCommand, SiiControl,
 };
 use linesman_proto::sii::word::{CHECKSUM, SERIAL_NUMBER, SIZE, STATION_ALIAS, VENDOR_ID};
-use linesman_proto::sii::{Identity, Image, Reader, SiiError, WordAddress};
+use linesman_proto::sii::{Identity, Image, Reader, SiiError, Size, WordAddress};
 use linesman_proto::time::Span;
 
 use crate::exchange::{ExchangeError, Reply, Target};
@@ -20,6 +20,9 @@ const ALL_LEN: u16 = SII_DATA.end().0 - SII_CONTROL_STATUS.address.0;
 const ADDRESS_AT: usize = (SII_ADDRESS.address.0 - SII_CONTROL_STATUS.address.0) as usize;
 const DATA_AT: usize = (SII_DATA.address.0 - SII_CONTROL_STATUS.address.0) as usize;
 
+/// The largest EEPROM that controllers address with two bytes holds 512 KiB.
+const LARGEST: usize = 512 << 10;
+
 /// How long a controller may be busy: it may be loading the first words after power-on.
 const BUSY_LIMIT: Span = Span::ms(500);
 /// Between two looks whether a command is done, at first.
@@ -28,9 +31,9 @@ const POLL_AFTER: Span = Span::us(20);
 const SLOWEST_POLL: Span = Span::ms(1);
 /// How long the SubDevice's processor may keep the EEPROM once it was asked for.
 const RELEASE_LIMIT: Span = Span::ms(20);
-const ATTEMPTS: u32 = 5;
+pub(super) const ATTEMPTS: u32 = 5;
 /// An EEPROM that writes does not answer for some milliseconds.
-const RETRY_AFTER: Span = Span::ms(5);
+pub(super) const RETRY_AFTER: Span = Span::ms(5);
 
 /// An EEPROM could not be read.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -65,6 +68,19 @@ pub enum SiiAccessError {
         /// Whose.
         target: Target,
         /// Which word was asked for.
+        word: WordAddress,
+        /// What 0x0502 says.
+        status: u16,
+    },
+    /// A word does not stay as it was written.
+    #[error(
+        "EEPROM of {target}: word {word} was written {ATTEMPTS} times and is not as it should be \
+         (0x0502 = 0x{status:04X}); the EEPROM is protected or damaged"
+    )]
+    NotWritten {
+        /// Whose.
+        target: Target,
+        /// Which word.
         word: WordAddress,
         /// What 0x0502 says.
         status: u16,
@@ -160,6 +176,35 @@ pub async fn read_rest(
     Ok(reader.bytes().to_vec())
 }
 
+/// Reads an EEPROM as it is: its used part, or as much as its size word says there is.
+///
+/// # Errors
+/// [`SiiAccessError`].
+pub async fn read_bytes(
+    wire: &Wire,
+    target: Target,
+    whole: bool,
+) -> Result<Vec<u8>, SiiAccessError> {
+    let mut session = Session::open(wire, target).await?;
+    let mut reader = Reader::new();
+    let read = async {
+        while let Some(words) = reader.needs() {
+            let chunk = session.read(words.start).await?;
+            reader.supply(&chunk);
+        }
+        let mut bytes = reader.bytes().to_vec();
+        let size = bytes.get(SIZE.byte()..SIZE.byte() + 2).and_then(|word| word.first_chunk());
+        let all = size.map_or(0, |size| Size(u16::from_le_bytes(*size)).bytes());
+        while whole && bytes.len() < all.min(LARGEST) {
+            bytes.extend(session.read(WordAddress(bytes.len() as u32 / 2)).await?);
+        }
+        Ok(bytes)
+    };
+    let outcome = read.await;
+    session.close().await;
+    outcome
+}
+
 /// Reads who a SubDevice is: words 8 to 15.
 ///
 /// # Errors
@@ -171,19 +216,22 @@ pub async fn read_identity(wire: &Wire, target: Target) -> Result<Identity, SiiA
     outcome
 }
 
-struct Session<'a> {
-    wire: &'a Wire,
-    target: Target,
+pub(super) struct Session<'a> {
+    pub(super) wire: &'a Wire,
+    pub(super) target: Target,
     /// It was the SubDevice's before and is to be given back.
     give_back: bool,
     /// How long the last command took: the next one is not asked for before.
     took: Span,
     /// The last command is known to be done, without error.
-    idle: bool,
+    pub(super) idle: bool,
 }
 
 impl<'a> Session<'a> {
-    async fn open(wire: &'a Wire, target: Target) -> Result<Session<'a>, SiiAccessError> {
+    pub(super) async fn open(
+        wire: &'a Wire,
+        target: Target,
+    ) -> Result<Session<'a>, SiiAccessError> {
         let access = SII_ACCESS_ECAT.address;
         let failed = |error| SiiAccessError::Exchange { target, error };
         let owner = wire.read_one(target, access, 2).await.map_err(failed)?;
@@ -207,7 +255,7 @@ impl<'a> Session<'a> {
         Ok(session)
     }
 
-    async fn close(self) {
+    pub(super) async fn close(self) {
         if self.give_back {
             // Whoever does not answer now has nothing to be given.
             let _ = self.wire.write_one(self.target, SII_ACCESS_ECAT.address, &[1]).await;
@@ -242,7 +290,7 @@ impl<'a> Session<'a> {
     }
 
     /// Four or eight bytes from `word` on.
-    async fn read(&mut self, word: WordAddress) -> Result<Vec<u8>, SiiAccessError> {
+    pub(super) async fn read(&mut self, word: WordAddress) -> Result<Vec<u8>, SiiAccessError> {
         let mut status = SiiControl::default();
         for attempt in 0..ATTEMPTS {
             if attempt > 0 {
@@ -277,7 +325,11 @@ impl<'a> Session<'a> {
 
     /// Command and address in one datagram. The working counter is not looked at: when the frame
     /// before was lost on its way back, the controller is busy with the command already.
-    async fn command(&self, command: SiiCommand, word: WordAddress) -> Result<(), SiiAccessError> {
+    pub(super) async fn command(
+        &self,
+        command: SiiCommand,
+        word: WordAddress,
+    ) -> Result<(), SiiAccessError> {
         let [low, high] = SiiControl::start(command).to_bytes();
         let [a, b, c, d] = word.value().to_le_bytes();
         let bytes = [low, high, a, b, c, d];
@@ -289,7 +341,7 @@ impl<'a> Session<'a> {
     }
 
     /// Control, address and data once the controller is no longer busy.
-    async fn idle(&self, word: WordAddress) -> Result<Reply, SiiAccessError> {
+    pub(super) async fn idle(&self, word: WordAddress) -> Result<Reply, SiiAccessError> {
         let target = self.target;
         let limit = self.wire.now() + BUSY_LIMIT;
         let mut pause = POLL_AFTER;

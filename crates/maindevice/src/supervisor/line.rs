@@ -48,6 +48,8 @@ struct Live {
     mailbox: bool,
     /// Its clock was set since it was last without power.
     clock_set: bool,
+    /// That is the one of BOOT, for files only.
+    boots: bool,
     /// How far it is to be driven; what the plan says unless asked for otherwise.
     target: Option<AlState>,
     /// How often a state was asked for.
@@ -181,10 +183,10 @@ impl Line {
     fn set(&mut self, id: DeviceId, state: Option<AlState>, settled: bool, reached: bool) {
         let Some(live) = self.live(id) else { return };
         live.served = state.is_some_and(AlState::has_inputs);
-        // In BOOT there is another mailbox, for files only.
-        let mailbox = state.is_some_and(|state| state.has_mailbox() && state != AlState::Boot);
-        live.openings += u32::from(mailbox && !live.mailbox);
-        live.mailbox = mailbox;
+        let (mailbox, boots) =
+            (state.is_some_and(AlState::has_mailbox), state == Some(AlState::Boot));
+        live.openings += u32::from(mailbox && (!live.mailbox || boots != live.boots));
+        (live.mailbox, live.boots) = (mailbox, boots);
         live.settled = settled;
         self.set_at_target(id, reached);
         self.changes(id);
@@ -209,6 +211,11 @@ impl Line {
     /// Whether the mailbox of a SubDevice can be used.
     pub(crate) fn has_mailbox(&self, id: DeviceId) -> bool {
         self.devices.get(id.index()).is_some_and(|live| live.mailbox)
+    }
+
+    /// Whether it is the mailbox of BOOT.
+    pub(crate) fn boots(&self, id: DeviceId) -> bool {
+        self.devices.get(id.index()).is_some_and(|live| live.boots)
     }
 
     /// How often the mailbox of a SubDevice was opened so far.

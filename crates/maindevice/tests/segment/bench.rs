@@ -19,6 +19,10 @@ pub(crate) enum Fate {
     Lost,
     Doubled,
     Late(Span),
+    /// Another one comes with it, whose index nobody has given.
+    Accompanied,
+    /// All behind so many bytes is missing.
+    Truncated(usize),
     /// A byte of it is replaced: an answer that lies.
     Garbled {
         at: usize,
@@ -32,6 +36,11 @@ pub(crate) struct Bench {
     pub(crate) segment: Segment,
     pub(crate) events: Vec<(Instant, Event)>,
     pub(crate) tamper: Option<Tamper>,
+    /// Whose process data are judged in each cycle, when its frames are back or given up.
+    pub(crate) judged: Option<DeviceId>,
+    /// How many cycles were judged, and in how many the data were not valid.
+    pub(crate) cycles: u64,
+    pub(crate) bad_cycles: u64,
     arrivals: u64,
     delayed: Vec<(Instant, Path, Vec<u8>)>,
 }
@@ -53,6 +62,9 @@ impl Bench {
             segment: Segment::build(file).expect("segment"),
             events: Vec::new(),
             tamper: None,
+            judged: None,
+            cycles: 0,
+            bad_cycles: 0,
             arrivals: 0,
             delayed: Vec::new(),
         }
@@ -95,9 +107,21 @@ impl Bench {
                 let (_, path, frame) = self.delayed.remove(due);
                 self.device.handle_frame(self.now, path, &frame);
             }
+            self.judge();
             if self.device.poll_timeout().is_some_and(|at| at <= self.now) {
                 self.device.handle_timeout(self.now);
+                self.judge();
             }
+        }
+    }
+
+    /// Looks at the process data as an application would, once a cycle.
+    fn judge(&mut self) {
+        if let Some(id) = self.judged
+            && self.device.take_exchanged(0)
+        {
+            self.cycles += 1;
+            self.bad_cycles += u64::from(!self.device.quality(id).valid);
         }
     }
 
@@ -116,6 +140,16 @@ impl Bench {
                 let at = at % frame.len();
                 frame[at] = byte;
                 self.device.handle_frame(self.now, path, &frame);
+            }
+            Fate::Accompanied => {
+                let mut stray = frame.to_vec();
+                // The index byte of the first datagram; half of all numbers are not in use.
+                stray[17] = stray[17].wrapping_add(128);
+                self.device.handle_frame(self.now, path, &stray);
+                self.device.handle_frame(self.now, path, frame);
+            }
+            Fate::Truncated(len) => {
+                self.device.handle_frame(self.now, path, &frame[..len.min(frame.len())]);
             }
             Fate::Late(span) => self.delayed.push((self.now + span, path, frame.to_vec())),
         }

@@ -1,10 +1,11 @@
-//! Mailbox messages: the header all protocols share, error replies, CoE, FoE, abort codes.
+//! Mailbox messages: the header all protocols share, error replies, CoE, EoE, FoE, abort codes.
 //!
 //! Messages are views on borrowed bytes: `parse` looks into a buffer, `write` fills one, neither
 //! allocates. Read first: ETG.1000.4 for the header, ETG.1000.6 for CoE and FoE.
 
 pub mod abort_code;
 pub mod coe;
+pub mod eoe;
 pub mod error_reply;
 pub mod foe;
 pub mod header;

@@ -81,6 +81,13 @@ impl Protocols {
         self.0 & bits == bits
     }
 
+    /// The bit of a protocol by its name, in small or capital letters.
+    #[must_use]
+    pub fn bit_of(name: &str) -> Option<u16> {
+        let mut known = Self::NAMES.into_iter();
+        known.find(|(_, known)| known.eq_ignore_ascii_case(name)).map(|(bit, _)| bit)
+    }
+
     /// Names of the protocols that are spoken, in the order of their bits.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES.into_iter().filter(move |(bit, _)| self.has(*bit)).map(|(_, name)| name)

@@ -27,6 +27,19 @@ pub enum Request {
         /// Its number; all unless said.
         no: Option<u32>,
     },
+    /// Pull the cable of a device, or those of a hot connect group, with all that hangs behind. The
+    /// answer is about faults: each cable is a `link-open` until it is plugged in again.
+    Unplug {
+        /// A device, or a group of the segment file: `K1`, `group:robot`.
+        name: String,
+    },
+    /// Plug it in again. The answer is about faults.
+    Plug {
+        /// A device, or a group of the segment file.
+        name: String,
+        /// A free port, such as `K1.C`; where it was unless said.
+        on: Option<String>,
+    },
     /// Tell which faults there are and were.
     List,
     /// Tell what went over the interfaces, and whether the host kept up.

@@ -1,5 +1,6 @@
 //! Doing what was asked of a segment.
 
+use linesman_config::attachment::Attachment;
 use linesman_proto::time::Instant;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::FaultEntry;
@@ -20,6 +21,14 @@ pub(crate) fn obey(now: Instant, request: &Request, server: &mut Server) -> Answ
         }
         Request::Heal { no } => {
             let error = heal(now, *no, segment).err();
+            faults(error, segment)
+        }
+        Request::Unplug { name } => {
+            let error = segment.unplug(now, name).err();
+            faults(error.map(|error| error.to_string()), segment)
+        }
+        Request::Plug { name, on } => {
+            let error = plug(now, name, on.as_deref(), segment).err();
             faults(error, segment)
         }
         Request::List => faults(None, segment),
@@ -52,6 +61,14 @@ fn inject(
     fault.to_ms = for_ms.map(|ms| now_ms + ms);
     // Its schedule counts from its begin, which is now.
     segment.inject(now, &fault).map(drop).map_err(|error| error.to_string())
+}
+
+fn plug(now: Instant, name: &str, on: Option<&str>, segment: &mut Segment) -> Result<(), String> {
+    let on = match on {
+        Some(text) => Some(text.parse::<Attachment>().map_err(|error| error.to_string())?),
+        None => None,
+    };
+    segment.plug(now, name, on.as_ref()).map_err(|error| error.to_string())
 }
 
 fn heal(now: Instant, no: Option<u32>, segment: &mut Segment) -> Result<(), String> {

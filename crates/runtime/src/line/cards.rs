@@ -3,21 +3,27 @@
 use linesman_diagnosis::HostObservation;
 use linesman_link::clock::{HostClock, tighten_timers};
 use linesman_link::error::LinkError;
-use linesman_link::socket::{Batch, Bell, RawSocket, SocketOptions, Waitable, Waker, wait_any};
+use linesman_link::socket::{Bell, RawSocket, Ready, SocketOptions, Waitable, Waker, wait_any};
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
 use super::{Arrived, Line};
 use crate::host_watch::HostWatch;
 
-/// Frames fetched in one call.
-const BATCH: usize = 64;
+/// Room for a frame, in bytes: the longest has 1,514.
+const ROOM: usize = 1_536;
+/// Most frames fetched in one go, so that a flood does not keep the cycle from its work.
+const MOST: usize = 64;
 
 /// The cards of a MainDevice.
 pub struct Cards {
     clock: HostClock,
     cards: Vec<Card>,
-    batch: Batch,
+    buffer: Vec<u8>,
+    /// Frames that were sent and have not come back: so many are fetched without asking further.
+    expected: usize,
+    /// There may be something to fetch.
+    ready: bool,
     waker: Waker,
     /// So long before a deadline it no longer sleeps but looks again and again.
     spin: Span,
@@ -50,7 +56,15 @@ impl Cards {
             doing: "making a way to be woken",
             source,
         })?;
-        Ok(Self { clock, cards: cards?, batch: Batch::new(BATCH), waker, spin: Span::ZERO })
+        Ok(Self {
+            clock,
+            cards: cards?,
+            buffer: vec![0; ROOM],
+            expected: 0,
+            ready: true,
+            waker,
+            spin: Span::ZERO,
+        })
     }
 
     /// Looks again and again for so long before each deadline, instead of sleeping up to it: the
@@ -85,14 +99,30 @@ impl Line for Cards {
     }
 
     fn receive(&mut self, taken: &mut dyn FnMut(Arrived<'_>)) -> Result<usize, LinkError> {
-        let Self { clock, cards, batch, .. } = self;
+        if !std::mem::replace(&mut self.ready, false) {
+            return Ok(0);
+        }
+        let Self { clock, cards, buffer, expected, .. } = self;
         let mut count = 0;
         for card in cards {
-            count += card.socket.recv_batch(batch, clock)?;
-            for frame in batch.iter() {
-                let (at, path) = (frame.at, card.path);
-                taken(Arrived { at, path, bytes: frame.bytes, truncated: frame.truncated });
+            for _ in 0..MOST {
+                let Some(len) = card.socket.recv_one(buffer)? else {
+                    *expected = 0;
+                    break;
+                };
+                count += 1;
+                let (at, path) = (clock.now(), card.path);
+                let bytes = &buffer[..len.min(ROOM)];
+                taken(Arrived { at, path, bytes, truncated: len > ROOM });
+                *expected = expected.saturating_sub(1);
+                // All are back. Should there be more, the next wait tells at once.
+                if *expected == 0 {
+                    break;
+                }
             }
+        }
+        if count == 0 {
+            self.waker.take();
         }
         Ok(count)
     }
@@ -100,7 +130,7 @@ impl Line for Cards {
     fn send(&mut self, path: Path, frame: &[u8]) -> Result<(), LinkError> {
         let Some(card) = self.cards.get_mut(path.index()) else { return Ok(()) };
         // The host watch tells of what was refused; the MainDevice sends it again.
-        let _sent = card.socket.send_batch([frame])?;
+        self.expected += card.socket.send_one(frame)?.frames;
         Ok(())
     }
 
@@ -119,17 +149,19 @@ impl Line for Cards {
     fn wait(&mut self, deadline: Instant) -> Result<(), LinkError> {
         let sleep_until = deadline.before(self.spin);
         if sleep_until <= self.clock.now() {
+            // No time to sleep, but to look.
+            self.ready = true;
             return Ok(());
         }
         let waker: &dyn Waitable = &self.waker;
-        match self.cards.as_slice() {
+        let ready = match self.cards.as_slice() {
             [a, b, ..] => {
                 wait_any([&a.socket as &dyn Waitable, &b.socket, waker], &self.clock, sleep_until)
             }
             [a] => wait_any([&a.socket as &dyn Waitable, waker], &self.clock, sleep_until),
             [] => wait_any([waker], &self.clock, sleep_until),
         }?;
-        self.waker.take();
+        self.ready = ready != Ready::Deadline;
         Ok(())
     }
 

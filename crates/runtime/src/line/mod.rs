@@ -56,3 +56,29 @@ pub trait Line {
     /// A deadline of the MainDevice was met so late.
     fn note_late(&mut self, late: Span);
 }
+
+impl<L: Line + ?Sized> Line for &mut L {
+    fn now(&self) -> Instant {
+        (**self).now()
+    }
+
+    fn receive(&mut self, taken: &mut dyn FnMut(Arrived<'_>)) -> Result<usize, LinkError> {
+        (**self).receive(taken)
+    }
+
+    fn send(&mut self, path: Path, frame: &[u8]) -> Result<(), LinkError> {
+        (**self).send(path, frame)
+    }
+
+    fn look_at_host(&mut self, tell: &mut dyn FnMut(&HostObservation)) -> Result<(), LinkError> {
+        (**self).look_at_host(tell)
+    }
+
+    fn wait(&mut self, deadline: Instant) -> Result<(), LinkError> {
+        (**self).wait(deadline)
+    }
+
+    fn note_late(&mut self, late: Span) {
+        (**self).note_late(late);
+    }
+}

@@ -23,7 +23,7 @@ use super::posted::Queue;
 use super::shadow::Shadow;
 use super::sii::Sii;
 use super::sync_manager::{self, SyncManagers};
-use super::watchdog::Watchdog;
+use super::watchdog::{Watchdog, WatchdogExpiry};
 use crate::hardware::PortKind;
 
 /// All that a MainDevice sees.
@@ -62,6 +62,8 @@ pub(super) struct Core {
     pub(super) process_data_watchdog: Watchdog,
     pub(super) pdi_watchdog: Watchdog,
     pub(super) pdi_watchdog_ok: bool,
+    /// Watchdogs that ran out, until somebody asks.
+    pub(super) expiries: Vec<WatchdogExpiry>,
     /// The processor behind the controller has stopped serving it.
     pub(super) processor_stuck: bool,
     /// Where a coding switch is read, and what it says.
@@ -139,6 +141,7 @@ impl Core {
             process_data_watchdog: Watchdog::default(),
             pdi_watchdog: Watchdog::default(),
             pdi_watchdog_ok: true,
+            expiries: Vec::new(),
             processor_stuck: false,
             coding_switch: None,
             emulation_suspended: false,
@@ -246,7 +249,7 @@ impl Core {
         if let Some((at, value)) = self.coding_switch
             && usize::from(at.0) + 2 <= self.memory.len()
         {
-            self.memory.put(usize::from(at.0), &value.to_le_bytes());
+            self.memory.copy_in(usize::from(at.0), &value.to_le_bytes());
         }
     }
 

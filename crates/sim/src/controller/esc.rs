@@ -216,7 +216,7 @@ impl Controller {
             Due::Sii => self.finish_sii(at, signals),
             Due::Phy => core.finish_phy(),
             Due::ProcessDataWatchdog => core.expire_process_data_watchdog(at),
-            Due::PdiWatchdog => core.expire_pdi_watchdog(),
+            Due::PdiWatchdog => core.expire_pdi_watchdog(at),
             Due::Reset => {
                 self.samples = false;
                 self.firmware.stop(signals);

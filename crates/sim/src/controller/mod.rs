@@ -48,6 +48,7 @@ pub use posted::{CountKind, PortEvent};
 pub(crate) use processing_unit::Header;
 pub use sii::{LOAD_TIME, PROGRAMMING_TIME, READ_TIME, STARTUP_DELAY, WRITE_TIME};
 pub use sii_emulation::SiiRequest;
+pub use watchdog::{WatchdogExpiry, WatchdogKind};
 
 #[cfg(test)]
 pub(crate) mod tests;

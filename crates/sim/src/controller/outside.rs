@@ -10,6 +10,7 @@ use super::clock::SyncSignal;
 use super::esc::Controller;
 use super::memory::at;
 use super::pdi::Pdi;
+use super::watchdog::WatchdogExpiry;
 use crate::device::{Firmware, Refusal, Signals, Trouble};
 use crate::hardware::Hardware;
 
@@ -64,6 +65,17 @@ impl Controller {
         self.firmware.report(emergency);
         self.core.call_firmware(at);
         self.reschedule();
+    }
+
+    /// Whether a watchdog ran out since they were taken last.
+    #[must_use]
+    pub fn has_watchdog_expiries(&self) -> bool {
+        !self.core.expiries.is_empty()
+    }
+
+    /// Watchdogs that ran out since the last call, the first ones of many.
+    pub fn take_watchdog_expiries(&mut self) -> Vec<WatchdogExpiry> {
+        std::mem::take(&mut self.core.expiries)
     }
 
     /// A coding switch is wired to the controller: its value stands at `address` from every start on.

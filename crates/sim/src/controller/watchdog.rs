@@ -9,16 +9,46 @@ use linesman_proto::time::{Instant, Span};
 
 use super::core::Core;
 
+/// One of the two watchdogs of a controller.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub enum WatchdogKind {
+    /// That of the process data, counted at 0x0442.
+    ProcessData,
+    /// That of the processor, counted at 0x0443.
+    Pdi,
+}
+
+/// A watchdog that ran out.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct WatchdogExpiry {
+    /// Which.
+    pub kind: WatchdogKind,
+    /// When.
+    pub at: Instant,
+    /// How long what it waits for had not come.
+    pub silence: Span,
+}
+
+/// Expiries that are kept until somebody asks for them: no counter counts further.
+const KEPT: usize = 256;
+
 /// One watchdog.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct Watchdog {
     expires: Option<Instant>,
+    /// When it was triggered last.
+    triggered: Instant,
 }
 
 impl Watchdog {
     /// When it will expire, if it runs.
     pub(super) fn expires(&self) -> Option<Instant> {
         self.expires
+    }
+
+    /// How long it has not been triggered at an instant.
+    fn silence(&self, at: Instant) -> Span {
+        at.since(self.triggered)
     }
 
     pub(super) fn is_running(&self) -> bool {
@@ -37,6 +67,7 @@ impl Watchdog {
         divider: WatchdogDivider,
         time: WatchdogTime,
     ) {
+        self.triggered = at;
         self.expires = time.span(divider).map(|span| {
             let tick = divider.tick().as_nanos();
             let earliest = (at + span).since(ticks_since).as_nanos();
@@ -59,6 +90,8 @@ impl Core {
     }
 
     pub(super) fn expire_process_data_watchdog(&mut self, when: Instant) {
+        let silence = self.process_data_watchdog.silence(when);
+        self.note_expiry(WatchdogKind::ProcessData, when, silence);
         self.process_data_watchdog.stop();
         self.memory.set_u16(&r::WATCHDOG_STATUS_PROCESS_DATA, 0);
         self.increment(r::WATCHDOG_COUNTER_PROCESS_DATA.address);
@@ -100,7 +133,15 @@ impl Core {
         }
     }
 
-    pub(super) fn expire_pdi_watchdog(&mut self) {
+    fn note_expiry(&mut self, kind: WatchdogKind, at: Instant, silence: Span) {
+        if self.expiries.len() < KEPT {
+            self.expiries.push(WatchdogExpiry { kind, at, silence });
+        }
+    }
+
+    pub(super) fn expire_pdi_watchdog(&mut self, when: Instant) {
+        let silence = self.pdi_watchdog.silence(when);
+        self.note_expiry(WatchdogKind::Pdi, when, silence);
         self.pdi_watchdog.stop();
         self.pdi_watchdog_ok = false;
         self.increment(r::WATCHDOG_COUNTER_PDI.address);

@@ -107,6 +107,14 @@ impl Firmware for EmulatedSii {
         self.inner.listens_to()
     }
 
+    fn slow_down(&mut self, takes: Option<Span>) {
+        self.inner.slow_down(takes);
+    }
+
+    fn read_sii(&mut self) {
+        self.inner.read_sii();
+    }
+
     fn synchronises(&self) -> bool {
         self.inner.synchronises()
     }

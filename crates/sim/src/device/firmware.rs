@@ -114,6 +114,10 @@ pub trait Firmware: Debug + Send {
     /// software knew is forgotten.
     fn reboot(&mut self, _now: Instant, _pdi: &mut Pdi<'_>) {}
 
+    /// Its software reads the SII itself on the way to PREOP: it needs the MainDevice to leave the
+    /// EEPROM to it (0x0500, bit 0), and refuses with 0x0050 otherwise.
+    fn read_sii(&mut self) {}
+
     /// The value of its identification, as somebody sets it at its switches. False when it has no
     /// way of its own to tell it; then it goes into the station alias.
     fn identify(&mut self, _id: u16, _signals: &mut Signals) -> bool {

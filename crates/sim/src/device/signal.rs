@@ -1,5 +1,7 @@
 //! Electrical signals between devices: outputs of one terminal wired to inputs of another.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use linesman_proto::time::Instant;
 
 /// A signal: a wire between terminals, by its number in [`Signals`].
@@ -18,6 +20,10 @@ impl SignalId {
 #[derive(Clone, Default, Debug)]
 pub struct Signals {
     values: Vec<Option<i32>>,
+    /// Inputs that hang on an output: source and sink, in the order of sources.
+    wires: BTreeMap<SignalId, Vec<SignalId>>,
+    /// Inputs that hang on an output.
+    wired: BTreeSet<SignalId>,
     /// When each changed last.
     changed: Vec<Instant>,
     /// When what happens now happens.
@@ -43,6 +49,8 @@ impl Signals {
     pub fn new(count: usize) -> Self {
         Self {
             values: vec![None; count],
+            wires: BTreeMap::new(),
+            wired: BTreeSet::new(),
             changed: vec![Instant::ZERO; count],
             now: Instant::ZERO,
             fresh: Vec::new(),
@@ -76,23 +84,49 @@ impl Signals {
         self.driven(signal).unwrap_or(0)
     }
 
-    /// Drives it. A signal that does not exist goes nowhere.
-    pub fn set(&mut self, signal: SignalId, value: i32) {
-        if let Some(slot) = self.values.get_mut(signal.0 as usize)
-            && *slot != Some(value)
-        {
-            *slot = Some(value);
-            self.note_change(signal);
+    /// Lays a wire: from now on `input` carries what drives `output`. False when it has one already.
+    pub fn wire(&mut self, output: SignalId, input: SignalId) -> bool {
+        if output == input || !self.wired.insert(input) {
+            return false;
         }
+        self.wires.entry(output).or_default().push(input);
+        if let Some(value) = self.driven(output) {
+            self.put(input, Some(value));
+        }
+        true
+    }
+
+    /// Drives it, and what is wired to it. A signal that does not exist goes nowhere.
+    pub fn set(&mut self, signal: SignalId, value: i32) {
+        self.drive(signal, Some(value));
     }
 
     /// Lets go of it: nothing drives it any more.
     pub fn release(&mut self, signal: SignalId) {
-        if let Some(slot) = self.values.get_mut(signal.0 as usize)
-            && slot.take().is_some()
-        {
-            self.note_change(signal);
+        self.drive(signal, None);
+    }
+
+    fn drive(&mut self, signal: SignalId, value: Option<i32>) {
+        if !self.put(signal, value) {
+            return;
         }
+        // An input drives nothing: one step is enough.
+        let mut at = 0;
+        while let Some(input) = self.wires.get(&signal).and_then(|inputs| inputs.get(at)).copied() {
+            self.put(input, value);
+            at += 1;
+        }
+    }
+
+    /// Whether that changed it.
+    fn put(&mut self, signal: SignalId, value: Option<i32>) -> bool {
+        let Some(slot) = self.values.get_mut(signal.0 as usize).filter(|slot| **slot != value)
+        else {
+            return false;
+        };
+        *slot = value;
+        self.note_change(signal);
+        true
     }
 
     /// What is driven from here on is driven at this instant.
@@ -116,6 +150,12 @@ impl Signals {
         {
             self.fresh.push(signal);
         }
+    }
+
+    /// Whether a signal has changed that was not told of.
+    #[inline]
+    pub(crate) fn has_fresh(&self) -> bool {
+        !self.fresh.is_empty()
     }
 
     /// A signal that has changed since it was last told of; each is told once.
@@ -164,5 +204,20 @@ mod tests {
         signals.release(SignalId(9));
         assert_eq!(signals.take_fresh(), None);
         assert_eq!(signals.value(SignalId(9)), 0, "a signal that leads nowhere reads low");
+    }
+
+    #[test]
+    fn an_input_carries_what_its_output_drives() {
+        let mut signals = Signals::new(4);
+        let [output, one, two, other] = [0, 1, 2, 3].map(SignalId);
+        signals.set(output, 5);
+        assert!(signals.wire(output, one) && signals.wire(output, two));
+        assert!(!signals.wire(other, one), "it has a wire");
+        assert!(!signals.wire(other, other));
+        assert_eq!((signals.value(one), signals.value(two)), (5, 5));
+        signals.set(output, -1);
+        assert_eq!((signals.value(one), signals.value(two)), (-1, -1));
+        signals.release(output);
+        assert_eq!((signals.driven(one), signals.driven(two)), (None, None));
     }
 }

@@ -21,7 +21,8 @@ pub(super) const KIND: Kind = Kind {
             key: "how",
             meaning: "`hangs`: its processor stops. `restarts`: it crashes and starts anew by itself, \
                       in INIT with code 0x0060. `inputs-frozen`: its application stops, the rest \
-                      works. `state-machine-dead`: requests for a state stay unanswered, the rest \
+                      works; a device that starts like that has no values to exchange and does not \
+                      get to OP (0x0018, 0x0019 or 0x002B). `state-machine-dead`: requests for a state stay unanswered, the rest \
                       works.",
             shape: Shape::Word {
                 words: &["hangs", "restarts", "inputs-frozen", "state-machine-dead"],

@@ -12,7 +12,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
 use super::turn::turn;
-use super::{DeviceInfo, Segment, exchange, identification};
+use super::{DeviceInfo, Segment, exchange, identification, signal_wires};
 use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
@@ -36,6 +36,31 @@ pub enum BuildError {
     /// With the devices that are wrong or missing the wiring does not fit together.
     #[error("with its faults the wiring does not fit together: {0}")]
     Wiring(ProjectError),
+    /// A wire leads nowhere.
+    #[error("wire {number}, from `{from}` to `{to}`: {why}")]
+    Wire {
+        /// Which `[[wire]]`, from 1.
+        number: usize,
+        /// Whose output.
+        from: String,
+        /// Whose input.
+        to: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// A device has no processor that could do what the file says.
+    #[error(
+        "device `{device}`: `sii = \"{place}\"` needs a processor, and a {type_name} has none; \
+         leave it out"
+    )]
+    NoProcessor {
+        /// Which device.
+        device: String,
+        /// What the file says.
+        place: &'static str,
+        /// Its type.
+        type_name: String,
+    },
     /// The type that is to sit in another's place is not known.
     #[error("{entry}: {source}")]
     Replacement {
@@ -132,7 +157,15 @@ fn assemble(
             identification::set_alias(&mut built.sii, alias);
         }
         let clock = clock(file, &one.planned, seed);
-        let Built { mut hardware, sii, firmware, outputs, inputs } = built;
+        let place = file.devices[one.planned.device].sii.unwrap_or_default();
+        if place.needs_processor() && !built.firmware.has_processor() {
+            return Err(BuildError::NoProcessor {
+                device: one.planned.name.clone(),
+                place: place.name(),
+                type_name: one.planned.kind.name().to_owned(),
+            });
+        }
+        let Built { mut hardware, sii, firmware, outputs, inputs } = place.apply(built);
         let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
         hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
         let remakes = file.devices[one.planned.device].remakes_symbol_errors;
@@ -144,6 +177,7 @@ fn assemble(
         devices.push(DeviceInfo { outputs, inputs });
     }
     exchange::move_wiring(&placed, &mut devices);
+    signal_wires::lay(file, &names, &placed, &devices, &mut signals)?;
     let cable_m: Vec<f64> = tree
         .links()
         .iter()

@@ -12,13 +12,14 @@ mod identification;
 mod late;
 pub mod plug;
 mod ready;
+mod signal_wires;
 mod turn;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
-use linesman_proto::register::ErrorCounter;
+use linesman_proto::register::{ErrorCounter, WATCHDOG_COUNTER_PDI, WATCHDOG_COUNTER_PROCESS_DATA};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 
@@ -27,13 +28,13 @@ pub use card::{FrameTally, HostPort};
 pub use plug::PlugError;
 
 use self::arrivals::Arrivals;
-use crate::controller::Controller;
+use crate::controller::{Controller, WatchdogKind};
 use crate::device::{SignalId, Signals};
 use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
 use crate::segment_file::{FaultEntry, SegmentFile, Supply};
-use crate::truth::{self, Effect, FaultId, Place, TruthLog, Unexplained};
+use crate::truth::{self, AuditedCounter, Effect, FaultId, Place, TruthLog, Unexplained};
 use crate::wire::walk::{Outcome, Traveller};
 use crate::wire::world::World;
 
@@ -161,9 +162,12 @@ impl Segment {
     /// Frames of strangers arrive as all others do.
     #[inline]
     fn fetch_strangers(&mut self) {
-        if !self.world.strangers_came_back() {
-            return;
+        if self.world.strangers_came_back() {
+            self.take_strangers();
         }
+    }
+
+    fn take_strangers(&mut self) {
         for (at, path, frame) in self.world.take_strangers() {
             self.strange.insert(frame.number);
             self.arrivals.push(at, path, frame);
@@ -306,6 +310,13 @@ impl Segment {
 
     // ---- what there is ----
 
+    /// Longer than a frame is on its way through all of it and back, whatever way it takes, without
+    /// its own duration.
+    #[must_use]
+    pub fn longest_way(&self) -> Span {
+        self.world.round()
+    }
+
     /// What the segment is called.
     #[must_use]
     pub fn title(&self) -> &str {
@@ -390,8 +401,10 @@ impl Segment {
         self.world.truth.take_entries()
     }
 
-    /// Error counters that moved, since the audit before, without a cause in the log.
+    /// Counters that moved, since the audit before, without a cause in the log: of errors, and of
+    /// watchdogs. Those that ran out are entered now.
     pub fn audit(&mut self) -> Vec<Unexplained> {
+        self.world.enter_expiries();
         let nodes = self.world.nodes.iter();
         let shown = nodes.flat_map(|node| {
             let id = node.controller.id();
@@ -399,7 +412,15 @@ impl Segment {
             let counters: Vec<_> = counters.iter().collect();
             // What a processor does to its controller is no business of the wires.
             let counters = counters.into_iter().filter(|(which, _)| *which != ErrorCounter::Pdi);
-            counters.map(move |(counter, value)| (id, counter, value))
+            let errors = counters.map(|(counter, value)| (AuditedCounter::Error(counter), value));
+            let watchdogs = [
+                (WatchdogKind::ProcessData, WATCHDOG_COUNTER_PROCESS_DATA),
+                (WatchdogKind::Pdi, WATCHDOG_COUNTER_PDI),
+            ];
+            let watchdogs = watchdogs.map(|(kind, register)| {
+                (AuditedCounter::Watchdog(kind), node.controller.register(register.address))
+            });
+            errors.chain(watchdogs).map(move |(counter, value)| (id, counter, value))
         });
         self.world.truth.audit(shown)
     }

@@ -2,7 +2,8 @@
 //!
 //! Pulling the cable of a device cuts it off with all that hangs behind it; to the ports it is an open
 //! link (`link-open` in the truth log, until it is plugged in again). It may be plugged in at another
-//! free port: the wiring is another one from then on, and the link is negotiated anew.
+//! free port: the wiring is another one from then on, and the link is negotiated anew. A hot connect
+//! group of the segment file comes off by every cable that leads into it.
 
 use linesman_config::attachment::Attachment;
 use linesman_config::fault::FaultName;
@@ -20,7 +21,7 @@ use crate::truth::FaultId;
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum PlugError {
     /// Nobody is called so.
-    #[error("no device is called `{name}`, or it is not there")]
+    #[error("no device or group is called `{name}`, or it is not there")]
     Unknown {
         /// What was given.
         name: String,
@@ -53,26 +54,33 @@ pub enum PlugError {
 }
 
 impl Segment {
-    /// Pulls the cable by which a device hangs on the line.
+    /// Pulls the cable by which a device hangs on the line, or those of a group. `name` is a device,
+    /// or a group as the segment file names it, with or without `group:` before it.
     ///
     /// # Errors
-    /// [`PlugError`] when there is no such device, or it is out already.
-    pub fn unplug(&mut self, now: Instant, name: &str) -> Result<FaultId, PlugError> {
-        let node = self.named(name)?;
-        if self.unplugged.contains_key(&node) {
-            return Err(PlugError::IsOut { name: name.to_owned() });
+    /// [`PlugError`] when there is no such device or group, or it is out already.
+    pub fn unplug(&mut self, now: Instant, name: &str) -> Result<Vec<FaultId>, PlugError> {
+        let heads = self.heads(name)?;
+        if let Some(out) = heads.iter().find(|head| self.is_out(**head)) {
+            return Err(PlugError::IsOut { name: self.name(self.world.id(*out)).to_owned() });
         }
-        let Some(link) = self.tree.link_above(node) else {
-            return Err(PlugError::Unknown { name: name.to_owned() });
-        };
-        let ends = self.tree.links()[link];
-        let place = format!("{}-{}", self.written(ends.upstream), self.written(ends.downstream));
-        let fault = self.inject(now, &FaultEntry::new(FaultName::LinkOpen).at(place))?;
-        self.unplugged.insert(node, fault);
-        Ok(fault)
+        let mut faults = Vec::new();
+        for node in heads {
+            let Some(link) = self.tree.link_above(node) else {
+                return Err(PlugError::Unknown { name: name.to_owned() });
+            };
+            let ends = self.tree.links()[link];
+            let place =
+                format!("{}-{}", self.written(ends.upstream), self.written(ends.downstream));
+            let fault = self.inject(now, &FaultEntry::new(FaultName::LinkOpen).at(place))?;
+            self.unplugged.insert(node, fault);
+            faults.push(fault);
+        }
+        Ok(faults)
     }
 
-    /// Plugs a device in again: where it was, or at another free port.
+    /// Plugs a device in again: where it was, or at another free port. A group comes in where it was,
+    /// or at another port when one cable leads into it.
     ///
     /// # Errors
     /// [`PlugError`] when it is in, or the port is not there, taken, or of another kind.
@@ -82,16 +90,50 @@ impl Segment {
         name: &str,
         on: Option<&Attachment>,
     ) -> Result<(), PlugError> {
-        let node = self.named(name)?;
-        let Some(fault) = self.unplugged.get(&node).copied() else {
-            return Err(PlugError::IsIn { name: name.to_owned() });
-        };
-        if let Some(on) = on {
-            self.rewire(node, name, on)?;
+        let heads = self.heads(name)?;
+        let out: Vec<usize> = heads.into_iter().filter(|head| self.is_out(*head)).collect();
+        match (out.as_slice(), on) {
+            ([], _) => return Err(PlugError::IsIn { name: name.to_owned() }),
+            ([node], Some(on)) => self.rewire(*node, name, on)?,
+            (_, Some(on)) => {
+                let why =
+                    format!("{} cables lead into it: plug in its devices one by one", out.len());
+                return Err(PlugError::Place { name: name.to_owned(), on: on.to_string(), why });
+            }
+            (_, None) => {}
         }
-        self.unplugged.remove(&node);
-        self.heal(now, fault);
+        for node in out {
+            if let Some(fault) = self.unplugged.remove(&node) {
+                self.heal(now, fault);
+            }
+        }
         Ok(())
+    }
+
+    /// Whether a cable is out: one whose fault was healed is in again.
+    fn is_out(&self, node: usize) -> bool {
+        let fault = self.unplugged.get(&node).and_then(|fault| self.truth().fault(*fault));
+        fault.is_some_and(|fault| fault.ended.is_none())
+    }
+
+    /// Devices by whose cables something hangs on the line: the device itself, or those of a group
+    /// that hang on none of the group.
+    fn heads(&self, name: &str) -> Result<Vec<usize>, PlugError> {
+        let unknown = || PlugError::Unknown { name: name.to_owned() };
+        let of_group = if self.names.iter().any(|known| known == name) {
+            None
+        } else if name.starts_with("group:") {
+            Some(self.groups.get(name).ok_or_else(unknown)?)
+        } else {
+            self.groups.get(&format!("group:{name}"))
+        };
+        let Some(members) = of_group else { return Ok(vec![self.named(name)?]) };
+        let nodes: Vec<usize> = members.iter().filter_map(|id| self.node(*id)).collect();
+        let is_inside = |node: usize| {
+            self.tree.upstream(node).and_then(End::node).is_some_and(|on| nodes.contains(&on))
+        };
+        let heads: Vec<usize> = nodes.iter().copied().filter(|node| !is_inside(*node)).collect();
+        if heads.is_empty() { Err(unknown()) } else { Ok(heads) }
     }
 
     fn rewire(&mut self, node: usize, name: &str, on: &Attachment) -> Result<(), PlugError> {

@@ -4,7 +4,6 @@
 use std::collections::BTreeMap;
 
 use linesman_config::attachment::Attachment;
-use linesman_config::identity::RevisionRule;
 use linesman_config::project::{Project, ProjectDevice, ProjectError, Ring};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::sii::Image;
@@ -418,19 +417,12 @@ const fn kind_name(kind: PortKind) -> &'static str {
 /// A project that says how things are wired, and nothing of what they are.
 pub(crate) fn wiring(file: &SegmentFile, planned: &[Planned]) -> Project {
     let devices = planned.iter().map(|controller| ProjectDevice {
-        name: controller.name.clone(),
         type_name: controller.kind.name().to_owned(),
-        vendor_id: None,
-        product_code: None,
-        revision: None,
-        revision_rule: RevisionRule::Equal,
-        serial: None,
-        on: controller.on.clone(),
         entry: controller.entry.to_string(),
-        station: None,
+        ..ProjectDevice::at(&controller.name, controller.on.clone())
     });
     let ring = file.ring.as_ref().map(|ring| Ring { closes_at: ring.closes_at.clone() });
-    Project { name: file.name.clone(), devices: devices.collect(), ring }
+    Project { ring, ..Project::of(&file.name, devices.collect()) }
 }
 
 /// The whole project.

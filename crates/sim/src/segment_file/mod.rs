@@ -23,7 +23,10 @@ mod clock;
 mod expand;
 mod passive;
 mod plant;
+mod row;
 mod schedule;
+mod signal_wire;
+mod sii;
 mod types;
 mod value;
 mod write;
@@ -39,6 +42,8 @@ pub use expand::parse_counter;
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
 pub use schedule::{BurstTimes, RandomTimes, Schedule, Times};
+pub use signal_wire::SignalWire;
+pub use sii::SiiPlace;
 pub use types::{DescribedTypes, DescriptionFiles, NoFiles, TypeError};
 pub use value::{OneOrMany, Value};
 
@@ -72,6 +77,10 @@ pub struct SegmentFile {
     /// Its devices, in the order of their numbers.
     #[serde(default, rename = "device")]
     pub devices: Vec<SegmentDevice>,
+    /// Electrical wires from outputs to inputs, such as from an EL2008 to an EL1008, or between the
+    /// two sides of a bridge.
+    #[serde(default, rename = "wire")]
+    pub wires: Vec<SignalWire>,
     /// Where a second card closes a ring, if it does.
     #[serde(default)]
     pub ring: Option<SegmentRing>,
@@ -146,6 +155,11 @@ pub struct SegmentDevice {
     /// Those of its description unless said.
     #[serde(default)]
     pub slots: Option<Vec<String>>,
+    /// Where its SII lies: `eeprom`; `shared`, in an EEPROM that its software reads, too, and that the
+    /// MainDevice has to leave to it on the way to PREOP; `emulated`, in the memory of its processor.
+    /// `eeprom` unless said; the others need a processor.
+    #[serde(default)]
+    pub sii: Option<SiiPlace>,
     /// Error counters that are not 0 at the start: `A.frame`, `A.physical`, `A.forwarded`,
     /// `A.lost_link` (and B, C, D), `processing_unit`, `pdi`.
     #[serde(default)]
@@ -368,6 +382,7 @@ impl SegmentDevice {
             clock: None,
             counts_forwarded: None,
             slots: None,
+            sii: None,
             counters: BTreeMap::new(),
         }
     }

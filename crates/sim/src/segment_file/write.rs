@@ -27,6 +27,16 @@ pub(super) fn to_toml(file: &SegmentFile) -> String {
     for device in &file.devices {
         write_device(device, &mut text);
     }
+    for wire in &file.wires {
+        let _ = writeln!(text, "\n[[wire]]\nfrom = {}", quoted(&wire.from));
+        if let Some(output) = wire.output {
+            let _ = writeln!(text, "output = {output}");
+        }
+        let _ = writeln!(text, "to = {}", quoted(&wire.to));
+        if let Some(input) = wire.input {
+            let _ = writeln!(text, "input = {input}");
+        }
+    }
     if let Some(ring) = &file.ring {
         let _ = writeln!(text, "\n[ring]\ncloses_at = {}", quoted(&ring.closes_at.to_string()));
         if let Some(cable_m) = ring.cable_m {
@@ -88,6 +98,9 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
         ];
         let said = keys.into_iter().filter_map(|(key, value)| Some(format!("{key} = {}", value?)));
         line("clock", format!("{{ {} }}", said.collect::<Vec<_>>().join(", ")));
+    }
+    if let Some(place) = device.sii {
+        line("sii", quoted(place.name()));
     }
     if let Some(counts) = device.counts_forwarded {
         line("counts_forwarded", counts.to_string());

@@ -8,6 +8,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::register::ErrorCounter;
 
 use super::{FaultId, TruthLog};
+use crate::controller::WatchdogKind;
 
 /// Why a controller sees an error.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -35,6 +36,21 @@ impl Cause {
     }
 }
 
+/// A counter that is audited.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub enum AuditedCounter {
+    /// Of errors on the wires.
+    Error(ErrorCounter),
+    /// Of a watchdog that ran out.
+    Watchdog(WatchdogKind),
+}
+
+impl From<ErrorCounter> for AuditedCounter {
+    fn from(counter: ErrorCounter) -> Self {
+        Self::Error(counter)
+    }
+}
+
 /// What one counter may have counted.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub(crate) struct Ledger {
@@ -56,7 +72,7 @@ pub struct Unexplained {
     /// Whose.
     pub device: DeviceId,
     /// Which.
-    pub counter: ErrorCounter,
+    pub counter: AuditedCounter,
     /// How far it moved since the audit before.
     pub moved: u64,
     /// How many causes the log holds for that time.
@@ -65,8 +81,13 @@ pub struct Unexplained {
 
 impl TruthLog {
     /// A controller is made to see an error.
-    pub(crate) fn may_move(&mut self, device: DeviceId, counter: ErrorCounter, cause: Cause) {
-        let ledger = self.ledger.entry((device, counter)).or_default();
+    pub(crate) fn may_move(
+        &mut self,
+        device: DeviceId,
+        counter: impl Into<AuditedCounter>,
+        cause: Cause,
+    ) {
+        let ledger = self.ledger.entry((device, counter.into())).or_default();
         ledger.seen += 1;
         match cause {
             Cause::Fault(fault) => ledger.last = Some(fault),
@@ -77,19 +98,19 @@ impl TruthLog {
 
     /// A counter is given a value.
     pub(crate) fn set(&mut self, device: DeviceId, counter: ErrorCounter, value: u8) {
-        self.ledger.entry((device, counter)).or_default().shown = value;
+        self.ledger.entry((device, counter.into())).or_default().shown = value;
     }
 
     /// The fault behind the last error that a counter was made to see.
     #[must_use]
     pub fn last_cause(&self, device: DeviceId, counter: ErrorCounter) -> Option<FaultId> {
-        self.ledger.get(&(device, counter)).and_then(|ledger| ledger.last)
+        self.ledger.get(&(device, counter.into())).and_then(|ledger| ledger.last)
     }
 
     /// Compares what counters show with what was entered since the audit before.
     pub(crate) fn audit(
         &mut self,
-        shown: impl Iterator<Item = (DeviceId, ErrorCounter, u8)>,
+        shown: impl Iterator<Item = (DeviceId, AuditedCounter, u8)>,
     ) -> Vec<Unexplained> {
         let mut holes = Vec::new();
         for (device, counter, value) in shown {
@@ -121,7 +142,7 @@ mod tests {
     const COUNTER: ErrorCounter = ErrorCounter::InvalidFrame(Port::B);
 
     fn audit(log: &mut TruthLog, shown: u8) -> Vec<(u64, u64)> {
-        let holes = log.audit([(DEVICE, COUNTER, shown)].into_iter());
+        let holes = log.audit([(DEVICE, COUNTER.into(), shown)].into_iter());
         holes.iter().map(|hole| (hole.moved, hole.causes)).collect()
     }
 

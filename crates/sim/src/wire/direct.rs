@@ -148,6 +148,12 @@ impl World {
     /// Brings every node to `now` at which something is due.
     #[inline]
     pub(super) fn touch_due(&mut self, now: Instant) {
+        if self.nodes.may_be_due(now) {
+            self.touch_all_due(now);
+        }
+    }
+
+    fn touch_all_due(&mut self, now: Instant) {
         let mut due = std::mem::take(&mut self.direct.due);
         self.nodes.due_until(now, &mut due);
         if !due.is_empty() {
@@ -171,7 +177,9 @@ impl World {
             return None;
         }
         let first = datagrams(&traveller.frame.bytes)?;
-        self.hear_signals(None);
+        if self.signals.has_fresh() {
+            self.hear_signals(None);
+        }
         self.nodes.settle();
         let route = self.take_way(card)?;
         let edition = self.direct.edition;
@@ -184,7 +192,9 @@ impl World {
                 bytes[6] |= SOURCE_MARK;
             }
             self.execute_all(&journey, &mut bytes[first..]);
-            self.end_all(&journey);
+            if !self.direct.touched.is_empty() {
+                self.end_all(&journey);
+            }
             self.direct.last[card.index()] = Some(Passed { number, at, duration });
             Outcome::Arrived(route.arrives_at, at + route.takes + duration)
         });
@@ -242,6 +252,12 @@ impl World {
     /// What is due on the way is done, and inputs are sampled, as the frame comes by.
     #[inline]
     fn prepare(&mut self, journey: &Journey<'_>) {
+        if self.nodes.may_meet(journey.card, journey.at) {
+            self.meet(journey);
+        }
+    }
+
+    fn meet(&mut self, journey: &Journey<'_>) {
         let mut due = std::mem::take(&mut self.direct.due);
         self.nodes.met_by(journey.card, journey.at, &mut due);
         if !due.is_empty() {
@@ -277,7 +293,6 @@ impl World {
 
     /// Devices hear of the signals that have changed: those behind a place on the way of a frame
     /// sample them as it comes by, all others with the next.
-    #[inline]
     fn hear_signals(&mut self, behind: Option<(&Route, u32)>) {
         while let Some(signal) = self.signals.take_fresh() {
             for listener in self.nodes.listeners(signal) {

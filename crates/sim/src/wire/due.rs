@@ -117,7 +117,9 @@ impl World {
             return;
         }
         for end in 0..2 {
-            if receives[end] && !before[end] {
+            // An end that kept its signal may have waited for the other: now it goes on alone.
+            let waits = self.links[index].ends[end] == EndState::Down;
+            if receives[end] && (!before[end] || waits) {
                 self.receives_again(index, end, at);
             }
         }
@@ -181,7 +183,8 @@ impl World {
                 }
             }
             Due::EndUp { link, end, epoch } => {
-                if self.links[link].epochs[end] == epoch {
+                let waits = self.links[link].ends[end] == EndState::Down;
+                if waits && self.links[link].epochs[end] == epoch {
                     self.end_up(link, end, at);
                     self.comes_up(link, at);
                 }

@@ -141,6 +141,12 @@ impl Nodes {
         }
     }
 
+    /// Whether anything may be due up to `until`.
+    #[inline]
+    pub(super) fn may_be_due(&self, until: Instant) -> bool {
+        !self.woken.is_empty() || self.due.first_until(until).is_some()
+    }
+
     /// Takes the nodes out at which something is due up to `until`, in no order; they wake.
     #[inline]
     pub(super) fn due_until(&mut self, until: Instant, taken: &mut Vec<u32>) {
@@ -190,9 +196,15 @@ impl Nodes {
         self.departures = [None, None];
     }
 
+    /// Whether a frame that leaves a card at `at` may find something to do on its way.
+    #[inline]
+    pub(super) fn may_meet(&self, card: Path, at: Instant) -> bool {
+        let departures = self.departures[card.index()].as_ref();
+        departures.is_some_and(|known| known.calendar.first_until(at).is_some())
+    }
+
     /// Takes the nodes out at which something is to be done when a frame comes by that leaves a card
     /// at `at`, in no order. The book must be settled.
-    #[inline]
     pub(super) fn met_by(&mut self, card: Path, at: Instant, taken: &mut Vec<u32>) {
         let Some(departures) = &mut self.departures[card.index()] else { return };
         while let Some(index) = departures.calendar.first_until(at) {

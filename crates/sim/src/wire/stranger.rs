@@ -134,6 +134,7 @@ impl Strangers {
         self.waiting.insert((at, self.count), (fault, line, what));
     }
 
+    #[inline]
     pub(super) fn next_at(&self) -> Option<Instant> {
         self.waiting.first_key_value().map(|((at, _), _)| *at)
     }

@@ -162,6 +162,11 @@ impl World {
         (links + nodes) * 2
     }
 
+    /// An upper bound of the time that a frame of no length takes through all of it, twice.
+    pub(crate) fn round(&self) -> Span {
+        self.round
+    }
+
     // ---- names ----
 
     pub(crate) fn id(&self, node: usize) -> DeviceId {
@@ -183,11 +188,25 @@ impl World {
     /// Makes all changes that a frame of `frame_time` which enters at `now` can meet.
     #[inline]
     pub(crate) fn look_ahead(&mut self, now: Instant, frame_time: Span) {
+        let until = now + self.round + frame_time;
+        if self.is_uneventful() {
+            self.horizon = self.horizon.max(until);
+            return;
+        }
         self.strangers_until(now);
-        self.change_until(now + self.round + frame_time);
+        self.change_until(until);
         if !self.noisy.is_empty() {
             self.forget_noise(now - MEMORY);
         }
+    }
+
+    /// Whether nothing is going to change, no stranger sends and no noise lies in wait.
+    #[inline]
+    fn is_uneventful(&self) -> bool {
+        self.running.is_empty()
+            && self.agenda.is_empty()
+            && self.noisy.is_empty()
+            && self.strangers.next_at().is_none()
     }
 
     /// Strangers send what they send until `now`: each frame as if somebody looked at its time, so
@@ -224,8 +243,12 @@ impl World {
     /// Brings everything to `now`.
     #[inline]
     pub(crate) fn advance(&mut self, now: Instant) {
-        self.strangers_until(now);
-        self.change_until(now);
+        if self.is_uneventful() {
+            self.horizon = self.horizon.max(now);
+        } else {
+            self.strangers_until(now);
+            self.change_until(now);
+        }
         self.touch_due(now);
     }
 

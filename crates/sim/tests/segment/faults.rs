@@ -1,13 +1,15 @@
 //! What each fault does to frames and counters.
 
 use linesman_config::fault::FaultName;
-use linesman_proto::address::Path;
+use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::command::Command;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Span;
+use linesman_sim::controller::WatchdogKind;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{FaultEntry, OneOrMany, SegmentFile};
+use linesman_sim::truth::{Effect, Entry};
 
 use super::rig::{Bench, PLANT, at, frame};
 
@@ -545,4 +547,59 @@ fn old_counters_are_no_fault() {
     let text = PLANT.replace("cable_m = 10.0", "counters = { \"A.physical\" = 3, pdi = 1 }");
     let bench = Bench::new(&text);
     assert_eq!(bench.counters(), ["K1.A physical 3", "K1 pdi 1"]);
+}
+
+#[test]
+fn a_link_that_negotiates_while_one_pair_breaks_comes_up_again() {
+    // The negotiation of both ends is cut short by one end that loses its signal; the other goes on
+    // alone, whoever is healed first.
+    for place in ["maindevice-K1.A", "maindevice>K1.A", "K1.A>maindevice", "K1.C-K6.A", "K6.A>K1.C"]
+    {
+        let link = if place.contains("K6") { "K1.C-K6.A" } else { "maindevice-K1.A" };
+        for (pause, far) in [(100, "without-link"), (100, "with-link"), (5_000, "without-link")] {
+            let mut bench = Bench::plant();
+            let open = bench.inject(&FaultEntry::new(FaultName::LinkOpen).at(link));
+            bench.wait(Span::ms(500));
+            bench.heal(open);
+            bench.wait(Span::ms(100));
+            let entry = FaultEntry::new(FaultName::FalseLink).at(place).with("far", far);
+            let hole = bench.inject(&entry);
+            bench.wait(Span::ms(pause));
+            bench.heal(hole);
+            bench.wait(Span::s(15));
+            assert_eq!(bench.count(), Some(8), "{place}, {pause} ms, {far}");
+            bench.assert_audit();
+        }
+    }
+}
+
+/// Outputs that stop coming let a watchdog run out: its counter moves with an entry of the log.
+#[test]
+fn a_watchdog_that_runs_out_is_in_the_log() {
+    let mut bench = Bench::plant();
+    let output = at(0u16.wrapping_sub(2), 0x0F00);
+    // SyncManager 0 of T3: one byte of outputs, watched.
+    let guard = [0x00, 0x0F, 1, 0, 0x44, 0, 1, 0];
+    bench.send(Command::Apwr, at(0u16.wrapping_sub(2), 0x0800), &guard).unwrap();
+    bench.send(Command::Apwr, output, &[1]).unwrap();
+    bench.wait(Span::ms(300));
+    let count = |bench: &Bench| {
+        let controller = bench.segment.controller(bench.id("T3")).unwrap();
+        controller.register(RegisterAddress(0x0442))
+    };
+    assert_eq!(count(&bench), 1);
+    bench.assert_audit();
+    let expired = bench.segment.truth().entries().iter().find_map(|entry| match entry {
+        Entry::Effect {
+            fault: None, effect: Effect::WatchdogExpired { kind, silence }, ..
+        } => Some((*kind, *silence)),
+        Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
+    });
+    let (kind, silence) = expired.expect("an entry");
+    assert_eq!(kind, WatchdogKind::ProcessData);
+    assert!((Span::ms(100)..Span::ms(101)).contains(&silence), "{silence}");
+    bench.send(Command::Apwr, output, &[1]).unwrap();
+    bench.wait(Span::ms(300));
+    assert_eq!(count(&bench), 2);
+    bench.assert_audit();
 }

@@ -6,6 +6,7 @@ mod clocks;
 mod exchange;
 mod faults;
 mod identification;
+mod junctions;
 mod long_line;
 mod oracle;
 mod plug;

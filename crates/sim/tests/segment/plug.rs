@@ -22,7 +22,7 @@ fn a_group_comes_off_and_on_again_and_fits_nowhere_else_here() {
         ("K8", "K1.C", "something is plugged in there"),
         ("K8", "K8.C", "it would hang on itself"),
         ("K8", "T5.B", "no cable fits both ports"),
-        ("K8", "K9.C", "no device is called `K9`"),
+        ("K8", "K9.C", "no device or group is called `K9`"),
         ("K6", "K6.C", "unplug it first"),
     ] {
         let error = plug(&mut bench, device, on).unwrap_err();

@@ -7,10 +7,10 @@ use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::register::FmmuConfig;
 use linesman_proto::sii::Direction;
 
-use super::xml::Xml;
 use crate::eni::OWN;
 use crate::eni::slave::fmmus_of;
 use crate::plan::{DatagramPlan, DevicePlan, IoAt, PathView, Plan, Presence, Role, expect};
+use crate::xml_writer::Xml;
 
 /// Where the data of each datagram lie in the file's process image: one behind the other.
 pub(super) struct Image {

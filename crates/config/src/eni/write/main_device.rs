@@ -3,9 +3,9 @@
 use linesman_proto::command::Command;
 
 use super::transition::{Init, Target, command};
-use super::xml::Xml;
 use crate::plan::Plan;
 use crate::plan::layout::MAILBOX_STATES;
+use crate::xml_writer::Xml;
 
 pub(super) fn write(xml: &mut Xml, name: &str, plan: &Plan) {
     xml.element("Master", &[], |xml| {

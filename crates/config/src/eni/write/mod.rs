@@ -8,11 +8,10 @@ mod cyclic;
 mod main_device;
 mod slave;
 mod transition;
-mod xml;
 
 use self::cyclic::Image;
-use self::xml::Xml;
 use crate::plan::Plan;
+use crate::xml_writer::Xml;
 
 /// The file of a plan.
 #[must_use]

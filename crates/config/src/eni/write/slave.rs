@@ -5,17 +5,18 @@ use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::register::{
     FMMU, FmmuConfig, SYNC_MANAGER, SmControl, SmDirection, SyncManagerConfig,
 };
-use linesman_proto::sii::{Direction, PortKind, Protocols};
+use linesman_proto::sii::Direction;
 use linesman_proto::topology::End;
 
 use super::cyclic::Image;
 use super::transition::{Init, Target, command};
-use super::xml::{Xml, hex};
 use crate::eni::OWN;
+use crate::esi::device::letters;
 use crate::identity::RevisionRule;
 use crate::plan::{DevicePlan, Plan};
 use crate::profile::Mailbox;
 use crate::start_up::StartUpAction;
+use crate::xml_writer::{Xml, hex};
 
 /// Longest wait for a state, in ms.
 const PATIENCE_MS: u32 = 10_000;
@@ -30,13 +31,7 @@ pub(super) fn write(xml: &mut Xml, device: &DevicePlan, plan: &Plan, image: &Ima
             xml.text("PhysAddr", device.station.0);
             xml.text("AutoIncAddr", position);
             if let Some(ports) = &device.ports {
-                let letter = |kind: &PortKind| match kind {
-                    PortKind::None => '-',
-                    PortKind::Mii | PortKind::Other(_) => 'Y',
-                    PortKind::EBus => 'K',
-                    PortKind::FastHotConnect => 'H',
-                };
-                xml.text("Physics", ports.0.iter().map(letter).collect::<String>());
+                xml.text("Physics", letters(ports));
             }
             xml.text("VendorId", device.identity.vendor_id);
             xml.text("ProductCode", device.identity.product_code);
@@ -120,17 +115,8 @@ fn write_mailbox(xml: &mut Xml, device: &DevicePlan, mailbox: &Mailbox) {
                 }
             });
         }
-        for (bit, name) in [
-            (Protocols::AOE, "AoE"),
-            (Protocols::EOE, "EoE"),
-            (Protocols::COE, "CoE"),
-            (Protocols::FOE, "FoE"),
-            (Protocols::SOE, "SoE"),
-            (Protocols::VOE, "VoE"),
-        ] {
-            if mailbox.protocols.has(bit) {
-                xml.text("Protocol", name);
-            }
+        for name in mailbox.protocols.names() {
+            xml.text("Protocol", name);
         }
         xml.element("CoE", &[], |xml| {
             xml.element("InitCmds", &[], |xml| {

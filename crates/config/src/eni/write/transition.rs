@@ -2,7 +2,7 @@
 
 use linesman_proto::command::Command;
 
-use super::xml::{Xml, hex};
+use crate::xml_writer::{Xml, hex};
 
 /// Whom a command is for.
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use linesman_proto::address::RegisterAddress;
-use linesman_proto::mailbox::Message;
+use linesman_proto::mailbox::{Counter, Message};
 use linesman_proto::register::{
     self as r, AlStatus, FmmuConfig, SiiCommand, SiiControl, SyncManagerConfig,
 };
@@ -21,6 +21,8 @@ const FULL: u8 = 1 << 3;
 const SM0: u16 = r::SYNC_MANAGER.address.0;
 const SM_STATUS: u16 = 5;
 const ERROR: u16 = 1 << 4;
+/// What was not done when the recording ended is not done while it is played.
+const UNSEEN: Span = Span::s(86_400);
 
 /// A step of the application layer as it was seen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,6 +57,8 @@ pub struct DeviceSeen {
     pub memory: BTreeMap<u16, u8>,
     /// Words of its SII as they were before anything wrote them.
     pub sii: BTreeMap<u32, u16>,
+    /// It took an acknowledgement for what it is: a controller without a processor gives the bit back.
+    pub acknowledges: bool,
     /// How long its SII took for each command.
     pub sii_times: Vec<Span>,
     /// How long its EEPROM acknowledges nothing behind a write, if that showed.
@@ -66,6 +70,8 @@ pub struct DeviceSeen {
     pub openings: VecDeque<Option<(Span, bool)>>,
     /// Mailbox requests.
     pub mailbox: VecDeque<MailboxTurn>,
+    /// The counter of the first answer that was fetched: what the device had counted to before.
+    pub first_answer: Option<Counter>,
     /// Its dictionary.
     pub objects: ObjectsSeen,
     written: BTreeSet<u16>,
@@ -82,6 +88,8 @@ pub struct DeviceSeen {
     /// What 0x0508 holds: from which word on, and how many bytes of it.
     last_word: Option<(u32, usize)>,
     al_waiting: Option<(Waiting, u8)>,
+    /// The last request for a state acknowledged an error.
+    al_acknowledged: bool,
     /// Mailbox bytes of which the first content was seen.
     memory_seen: BTreeSet<u16>,
     fetched: Option<Waiting>,
@@ -264,11 +272,20 @@ impl DeviceSeen {
         if let Some(control) = view(r::AL_CONTROL.address.0) {
             self.al_overtaken(at);
             self.al_waiting = Some((Waiting::since(at), control & 0x0F));
+            self.al_acknowledged = u16::from(control) & ERROR != 0;
         }
     }
 
-    /// The recording has ended.
+    /// The recording has ended: what was still under way took longer than that.
     pub(super) fn finish(&mut self) {
+        if let Some((waiting, requested)) = self.al_waiting.take() {
+            let taken = self.al_taken(&waiting, waiting.last_seen());
+            let status = u16::from(requested);
+            self.steps.push_back(AlStep { requested, taken, took: UNSEEN, status, code: 0 });
+        }
+        if self.sii_waiting.take().is_some() {
+            self.sii_times.push(UNSEEN);
+        }
         if let Some((_, taken, _)) = self.mailbox_waiting.take() {
             self.mailbox
                 .push_back(MailboxTurn { taken: taken.unwrap_or_default(), answered: None });
@@ -372,6 +389,7 @@ impl DeviceSeen {
             waiting.still(at);
             return;
         }
+        self.acknowledges |= self.al_acknowledged && status & ERROR == 0;
         let (waiting, requested) = (*waiting, *requested);
         self.al_waiting = None;
         let taken = self.al_taken(&waiting, at);
@@ -394,6 +412,9 @@ impl DeviceSeen {
         self.answer_polled(answered, at);
         if answered {
             self.leftover(self.sync_manager(1).start, data);
+            if let (None, Ok(message)) = (self.first_answer, Message::parse(data)) {
+                self.first_answer = Some(message.header.counter);
+            }
             self.objects.answered(data);
             if self.fetched.replace(Waiting::since(at)).is_some() {
                 self.openings.push_back(None);

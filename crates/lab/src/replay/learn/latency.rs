@@ -21,6 +21,11 @@ impl Waiting {
         self.last = self.last.max(at);
     }
 
+    /// When it was last seen not to be done.
+    pub(super) fn last_seen(&self) -> Instant {
+        self.last
+    }
+
     /// A poll saw the new: how long it took, half way between the two polls.
     pub(super) fn done(&self, at: Instant) -> Span {
         let before = self.last.since(self.since).as_nanos();

@@ -21,7 +21,7 @@ pub use device::{AlStep, DeviceSeen, MailboxTurn};
 use stations::Stations;
 pub use target::Target;
 
-use super::recording::{Datagram, Recording};
+use super::recording::{Datagram, Recording, Turn};
 use linesman_proto::time::Instant;
 
 /// Registers that say what a controller is end here.
@@ -124,6 +124,9 @@ pub fn learn(recording: &Recording) -> Learned {
         learned.devices[position].preset_station(station);
     }
     for turn in &recording.turns {
+        if turn.reply.is_none() {
+            learned.take_lost(turn, &mut stations);
+        }
         for (request, reply) in turn.pairs() {
             let count = learned.devices.len();
             let target = request
@@ -151,6 +154,18 @@ pub fn learn(recording: &Recording) -> Learned {
 }
 
 impl Learned {
+    /// What came back was not recorded. A write to a device that answers otherwise was done.
+    fn take_lost(&mut self, turn: &Turn, stations: &mut Stations) {
+        for request in turn.request.datagrams() {
+            let Some(command) = request.command else { continue };
+            let target = stations.target(command, &request, self.devices.len());
+            let only_writes = command.effect().writes && !command.effect().reads;
+            if let (Target::One(device), true) = (target, only_writes) {
+                self.devices[device].write(request.ado, request.data, true, turn.request.at);
+            }
+        }
+    }
+
     fn take(
         &mut self,
         request: &Datagram<'_>,
@@ -209,6 +224,17 @@ impl Learned {
         let is_identity = usize::from(request.ado.0) + request.data.len() <= IDENTITY;
         if target == Target::All && effect.reads && !effect.writes && is_identity {
             self.identities.push((request.ado, reply.data.to_vec(), reply.wkc));
+        }
+        if effect.multiple_write && target != Target::Nobody {
+            // One reads, the others write: all that have the register add one.
+            self.presence.push(Presence {
+                device: None,
+                address: request.ado,
+                len: request.data.len(),
+                writes: true,
+                answered: reply.wkc,
+            });
+            return;
         }
         if effect.reads == effect.writes || usize::from(request.ado.0) + request.data.len() > 0x0F00
         {

@@ -101,6 +101,7 @@ fn candidates(seen: &DeviceSeen, images: &[Vec<u8>], tree: &Tree, node: usize) -
     let given = images.iter().map(Vec::as_slice).find(|image| image::is_of(image, identity));
     let same = given.or(built_in.as_deref());
     let has_processor = seen.objects.speaks
+        || seen.acknowledges
         || seen
             .sii
             .get(&word::MAILBOX_PROTOCOLS.value())

@@ -50,7 +50,7 @@ pub(crate) struct ReplayReport {
     tool: String,
     /// The recording.
     capture: String,
-    /// `agrees`, `differs` or `nothing judged`.
+    /// `agrees`, `agrees but for exceptions`, `differs` or `nothing judged`.
     verdict: String,
     /// What it showed.
     #[serde(flatten)]
@@ -84,6 +84,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     };
     let (verdict, status) = match report.verdict() {
         Verdict::Agrees => ("agrees", Status::Good),
+        Verdict::AgreesButForExceptions => ("agrees but for exceptions", Status::Good),
         Verdict::Differs => ("differs", Status::Findings),
         Verdict::NothingJudged => ("nothing judged", Status::NotJudged),
     };
@@ -103,16 +104,32 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 }
 
 fn conclusion(report: &Report) -> String {
+    let share = || format!("{} of {} differ", count(report.different, "datagram"), report.compared);
     match report.verdict() {
         Verdict::Agrees => {
             format!("All answers agree: {}.", count(report.compared, "datagram"))
         }
-        Verdict::Differs => {
-            format!("{} of {} differ.", count(report.different, "datagram"), report.compared)
+        Verdict::AgreesButForExceptions => {
+            format!("The answers agree but for exceptions: {}, each for a reason.", share())
         }
-        Verdict::NothingJudged => {
-            "Nothing could be judged: no request of the recording was answered.".to_owned()
+        Verdict::Differs if report.process_data > 0 => {
+            format!("{}, {} of them in process data.", share(), report.process_data)
         }
+        Verdict::Differs if report.unexplained > 0 => {
+            format!("{}, {} of them for no reason that the recording shows.", share(), report.unexplained)
+        }
+        Verdict::Differs => format!("{}: more than one in a hundred.", share()),
+        Verdict::NothingJudged => match (report.requests, report.returns_alone) {
+            (0, _) => "Nothing could be judged: the recording shows only frames that came back, and \
+                       without their requests nothing can be played. Record both directions on the \
+                       card of the MainDevice."
+                .to_owned(),
+            (_, 0) => "Nothing could be judged: no request of the recording was answered. Either no \
+                       device was there, or only one direction was recorded: then record on the card \
+                       of the MainDevice."
+                .to_owned(),
+            (_, _) => "Nothing could be judged: no request of the recording was answered.".to_owned(),
+        },
     }
 }
 

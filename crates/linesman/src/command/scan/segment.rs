@@ -12,9 +12,9 @@ use crate::command::driven;
 use crate::failure::Failure;
 use crate::files;
 
-/// Virtual seconds cost little.
-const PATIENCE: Span = Span::s(60);
-/// Between two looks whether it is done.
+/// Virtual seconds cost little: so many in any case, and one more for each SubDevice.
+const PATIENCE_S: u64 = 60;
+/// Between two looks whether it is done, on a line of usual length.
 const STEP: Span = Span::ms(1);
 
 /// Scans the segment of a file.
@@ -23,10 +23,13 @@ pub(super) fn scan(path: &Path) -> Result<Scan, Failure> {
     let options = LabOptions { begin: Begin::Scan, ..LabOptions::default() };
     let mut lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
     let ended = |lab: &Lab| lab.events().iter().any(|(_, event)| outcome(event).is_some());
-    lab.run_while(PATIENCE, STEP, ended).map_err(|error| files::in_file(path, &error))?;
+    let patience = Span::s(PATIENCE_S + lab.segment().tree().len() as u64);
+    let step = STEP.max(lab.segment().longest_way());
+    lab.run_while(patience, step, ended).map_err(|error| files::in_file(path, &error))?;
     let result = lab.events().iter().find_map(|(_, event)| outcome(event));
     let inventory = result.unwrap_or_else(|| {
-        let reason = format!("{}: the scan was not done after 60 virtual seconds", path.display());
+        let reason =
+            format!("{}: the scan was not done after {patience} in virtual time", path.display());
         Err(Failure::new(reason, "this is a fault of the program, please report it with the file"))
     })?;
     Ok(Scan { inventory, start: None })

@@ -3,6 +3,8 @@
 //! Reference: ETG.1000.6, Emergency; the classes of codes are those of CiA 301. Code (u16), error
 //! register (u8), five bytes of the vendor.
 
+use std::fmt;
+
 use super::message::CoeError;
 use crate::mailbox::header::BufferTooSmall;
 
@@ -40,6 +42,19 @@ impl Emergency {
         body[2] = self.register.0;
         body[3..].copy_from_slice(&self.data);
         Ok(Self::LEN)
+    }
+}
+
+impl fmt::Display for Emergency {
+    /// `0x4310 temperature, errors: temperature; data 01 02 03 04 05`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "0x{:04X} {}", self.code, self.class().text())?;
+        let sorts: Vec<&str> = self.register.names().collect();
+        if !sorts.is_empty() {
+            write!(f, ", errors: {}", sorts.join(", "))?;
+        }
+        f.write_str("; data")?;
+        self.data.iter().try_for_each(|byte| write!(f, " {byte:02X}"))
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a device does with its process data: channels between objects and electrical signals.
 
 pub mod analog;
+pub mod bridge;
 pub mod digital;
 pub mod drive;
 pub(crate) mod motion;

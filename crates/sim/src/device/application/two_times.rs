@@ -19,6 +19,8 @@ const PRIMARY_LEADS: u64 = 2;
 #[derive(Clone, Debug)]
 pub struct TwoTimes {
     ahead: SignalId,
+    /// The other side is there, whatever its time is.
+    connected: bool,
     system_time: u64,
     secondary_leads: Value,
     mode: Value,
@@ -39,6 +41,7 @@ impl TwoTimes {
         let value = |subindex| Value::of(dictionary, 0x10F4, subindex);
         Self {
             ahead,
+            connected: false,
             system_time: 0,
             secondary_leads: Value::of(dictionary, 0x10F5, 0x01),
             mode: value(0x01),
@@ -51,6 +54,12 @@ impl TwoTimes {
             toggles: [0x1800, 0x1801, 0x1802, 0x1803]
                 .map(|parameter| Value::of(dictionary, parameter, 0x09)),
         }
+    }
+
+    /// The other side is there, or not. While nobody says how far its time is ahead, both are in one
+    /// network and have one time.
+    pub fn set_connected(&mut self, connected: bool) {
+        self.connected = connected;
     }
 
     fn toggle(value: Value, dictionary: &mut Dictionary) {
@@ -72,7 +81,7 @@ impl Channel for TwoTimes {
         for toggle in self.toggles {
             Self::toggle(toggle, dictionary);
         }
-        let ahead = signals.driven(self.ahead);
+        let ahead = signals.driven(self.ahead).or(self.connected.then_some(0));
         self.alone.set_bit(dictionary, ahead.is_none());
         let Some(ahead) = ahead else {
             self.mode.set(dictionary, 0);

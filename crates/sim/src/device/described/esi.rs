@@ -47,7 +47,8 @@ fn one(
         return Err(DescribedError::DictionaryFile(file.clone()));
     }
     let fitted = modules::fit(esi, device, slots)?;
-    let pdos: Vec<EsiPdo> = device.pdos.iter().chain(&fitted.pdos).cloned().collect();
+    let mut pdos = assigned(device);
+    pdos.extend(fitted.pdos.iter().cloned());
     let whole = device.eeprom.as_ref().and_then(|eeprom| eeprom.image.as_ref());
     if let Some(bytes) = whole {
         return DescribedType::from_sii(bytes).map(|made| with_objects(made, device, &fitted));
@@ -66,6 +67,36 @@ fn one(
         image,
     };
     Ok(with_objects(made, device, &fitted))
+}
+
+/// The PDOs of a device, assigned as after power-on: as its default mapping and its first operation
+/// mode say, where they say something, else as each PDO says of itself. What is assigned by a list
+/// stands in the order of the list, before what is not.
+fn assigned(device: &EsiDevice) -> Vec<EsiPdo> {
+    let mapping = device.alternatives.iter().find(|mapping| mapping.is_default);
+    let mode = device.op_mode(None);
+    let lists = |number: u8| {
+        mapping.is_some_and(|mapping| mapping.assignments.iter().any(|one| one.0 == number))
+            || mode.is_some_and(|mode| {
+                mode.sync_managers.iter().any(|one| one.number == number && !one.pdos.is_empty())
+            })
+    };
+    let mut pdos = Vec::with_capacity(device.pdos.len());
+    for assigned in device.assigned(mapping, mode).iter().filter(|one| lists(one.sync_manager)) {
+        let mine = assigned.pdos.iter();
+        let mine = mine.map(|(pdo, _)| EsiPdo {
+            sync_manager: Some(assigned.sync_manager),
+            ..EsiPdo::clone(pdo)
+        });
+        pdos.extend(mine);
+    }
+    for pdo in &device.pdos {
+        if !pdos.iter().any(|known| known.index == pdo.index) {
+            let sync_manager = pdo.sync_manager.filter(|number| !lists(*number));
+            pdos.push(EsiPdo { sync_manager, ..pdo.clone() });
+        }
+    }
+    pdos
 }
 
 fn with_objects(mut made: DescribedType, device: &EsiDevice, fitted: &Fitted) -> DescribedType {
@@ -89,6 +120,7 @@ fn pdo(pdo: &EsiPdo) -> DescribedPdo {
         name: pdo.name.clone(),
         fixed: pdo.fixed,
         excludes: pdo.excludes.clone(),
+        oversampled: pdo.oversampling.is_some(),
         entries: entries.collect(),
     }
 }

@@ -1,7 +1,9 @@
 //! What is behind the controller of a described device.
 
 use linesman_proto::address::RegisterAddress;
-use linesman_proto::sii::{Direction, Identity, Protocols, SyncManagerKind};
+use linesman_proto::sii::{
+    Direction, General, Identification, Identity, Protocols, SyncManagerKind,
+};
 
 use super::DescribedType;
 use super::channel::{Driven, Taken};
@@ -9,10 +11,11 @@ use super::objects;
 use super::signals::{Layout, Point};
 use crate::device::application::Channel;
 use crate::device::application::drive::Cia402;
+use crate::device::application::oversampling::{Oversampling, SampleBuffer, Sampled};
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
 use crate::device::files::{Files, FirmwareSlot};
 use crate::device::firmware::{Firmware, NoFirmware};
-use crate::device::processor::{Description, ProcessBuffer, Processor, ResponseTimes};
+use crate::device::processor::{BusAccess, Description, ProcessBuffer, Processor, ResponseTimes};
 use crate::device::signal::SignalId;
 
 /// SII byte 0: nothing is connected to the controller.
@@ -54,6 +57,9 @@ pub(super) fn build(
 ) -> Box<dyn Firmware> {
     match kind(described) {
         Kind::Nothing => Box::new(NoFirmware),
+        Kind::Emulated if layout.points.iter().any(|point| point.stride.is_some()) => {
+            Box::new(sampling(described, layout, outputs, inputs))
+        }
         Kind::Emulated => Box::new(emulated(described, layout, outputs, inputs)),
         Kind::Processor => Box::new(processor(described, identity, layout, outputs, inputs)),
     }
@@ -124,6 +130,8 @@ fn processor(
         protocols: described.image.protocols,
         bootstrap: bootstrap.is_present().then_some(bootstrap),
         times: if layout.axis.is_some() { ResponseTimes::DRIVE } else { ResponseTimes::TERMINAL },
+        bus: BusAccess::of(described.image.sync_managers().iter().map(|one| one.start)),
+        unit_alone: described.image.op_modes().any(|mode| mode.assign_activate & 0x0700 == 0x0100),
     });
     processor.with_files(files)
 }
@@ -139,6 +147,45 @@ fn excludes(described: &DescribedType) -> Vec<(u16, u16)> {
         .iter()
         .flat_map(|pdo| pdo.excludes.iter().map(move |other| (pdo.index, *other)));
     pairs.filter(|(one, other)| !(assigned(*one) && assigned(*other))).collect()
+}
+
+/// Outputs and inputs with several samples in each cycle. The samples begin where the description
+/// has the first; how many there are the length of the SyncManager says.
+fn sampling(
+    described: &DescribedType,
+    layout: &Layout,
+    outputs: &[SignalId],
+    inputs: &[SignalId],
+) -> Oversampling {
+    let mut sampled = [Vec::new(), Vec::new()];
+    for buffer in buffers(described) {
+        let (signals, into) = match buffer.direction {
+            Direction::Outputs => (outputs, 0),
+            Direction::Inputs => (inputs, 1),
+        };
+        let mine = layout.points.iter().filter(|point| {
+            point.sync_manager == Some(buffer.sync_manager) && point.direction == buffer.direction
+        });
+        let mut made: Option<SampleBuffer> = None;
+        for point in mine {
+            let (Some(stride), Some(signal)) = (point.stride, signals.get(point.first)) else {
+                continue;
+            };
+            let made = made.get_or_insert_with(|| SampleBuffer {
+                sync_manager: buffer.sync_manager,
+                stride,
+                first: point.at,
+                values: Vec::new(),
+            });
+            // Samples of a second kind have their place where the length of the first is known only.
+            if point.at < made.first + made.stride {
+                made.values.push(Sampled { signal: *signal, at: point.at, bits: point.bits });
+            }
+        }
+        sampled[into].extend(made);
+    }
+    let [outputs, inputs] = sampled;
+    Oversampling::new(outputs, inputs)
 }
 
 /// Pins that the controller drives and takes itself.
@@ -189,5 +236,16 @@ fn emulated(
         }
     }
     let [outputs, inputs] = areas;
-    Emulated::new(outputs, inputs).with_words(words)
+    // One of the words may be the switch that tells which of several alike it is.
+    let way = described.image.general().map(General::identification);
+    let switch = match way {
+        Some(Identification::Memory(at)) => words.iter().find(|word| word.at == at),
+        Some(Identification::AlStatus | Identification::None) | None => None,
+    };
+    let switch = switch.map(|word| word.signal);
+    let device = Emulated::new(outputs, inputs).with_words(words);
+    match switch {
+        Some(switch) => device.with_coding_switch(switch),
+        None => device,
+    }
 }

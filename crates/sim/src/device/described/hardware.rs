@@ -2,7 +2,9 @@
 //!
 //! No data name it; they say what it has to have: ports, FMMUs, SyncManagers, memory. It is the
 //! smallest that has all that: an ET1200 for simple E-bus devices, an ET1100, else an IP core, whose
-//! memory is as large as it has to be. A processor interface within a chip (SII byte 0: 0x80) is
+//! memory is as large as it has to be. One that has operation modes with distributed clocks although
+//! its SII switches no clock unit on (byte 1, bits 2 and 3) has a controller of the first generation,
+//! whose units are always on. A processor interface within a chip (SII byte 0: 0x80) is
 //! an IP core in any case.
 
 use linesman_config::esi::device::EsiController;
@@ -11,11 +13,13 @@ use linesman_proto::register::{SmControl, SmMode};
 use linesman_proto::sii::{Image, PortKind as SiiPort};
 
 use super::DescribedError;
-use crate::device::library::chip::{ET1100, ET1200, IP_CORE};
+use crate::device::library::chip::{ESC20_64, ET1100, ET1200, IP_CORE};
 use crate::hardware::{Hardware, PortKind};
 
 /// SII byte 0: a bus within the chip.
 const ON_CHIP: u8 = 0x80;
+/// SII byte 1: SYNC and latch unit.
+const CLOCK_UNITS: u8 = 0x0C;
 /// Where process-data RAM begins.
 const RAM: u32 = 0x1000;
 /// The largest RAM, in KiB.
@@ -39,7 +43,17 @@ pub(super) fn with(image: &Image, said: &EsiController) -> Result<Hardware, Desc
     };
     let chips = [&ET1200, &ET1100, &IP_CORE].map(|chip| chip.with_ports(ports));
     let ebus = ports.iter().any(|(_, kind)| *kind == PortKind::Ebus);
-    let [small, large, mut logic] = chips;
+    let [small, large, logic] = chips;
+    let enlarged = |chip: Hardware| Hardware {
+        ram_kib: chip.ram_kib.max(needs.ram_kib),
+        fmmus: chip.fmmus.max(needs.fmmus),
+        sync_managers: chip.sync_managers.max(needs.sync_managers),
+        ..chip
+    };
+    let clocked = image.op_modes().any(|mode| mode.assign_activate != 0);
+    if clocked && image.configuration.esc_configuration & CLOCK_UNITS == 0 {
+        return Ok(enlarged(ESC20_64.with_ports(ports)));
+    }
     let on_chip = image.configuration.pdi_control == ON_CHIP && !ebus;
     let fits_small = ebus && image.mailbox().is_none() && ports.0[3] == PortKind::Absent;
     if !on_chip && fits_small && needs.fit(&small) {
@@ -48,10 +62,7 @@ pub(super) fn with(image: &Image, said: &EsiController) -> Result<Hardware, Desc
     if !on_chip && needs.fit(&large) {
         return Ok(large);
     }
-    logic.ram_kib = logic.ram_kib.max(needs.ram_kib);
-    logic.fmmus = logic.fmmus.max(needs.fmmus);
-    logic.sync_managers = logic.sync_managers.max(needs.sync_managers);
-    Ok(logic)
+    Ok(enlarged(logic))
 }
 
 /// What a controller has to have.

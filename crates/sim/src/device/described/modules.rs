@@ -75,13 +75,8 @@ fn named<'a>(
     place: usize,
     name: &str,
 ) -> Result<&'a EsiModule, DescribedError> {
-    let number = name.strip_prefix("0x").and_then(|hex| u32::from_str_radix(hex, 16).ok());
     let fits = |module: &&EsiModule| slots.slots[place].idents.contains(&module.ident);
-    let is_it = |module: &&EsiModule| match number {
-        Some(ident) => module.ident == ident,
-        None => module.type_name.eq_ignore_ascii_case(name) || module.name == name,
-    };
-    let found = esi.modules.iter().flatten().filter(fits).find(is_it);
+    let found = esi.modules.iter().flatten().filter(fits).find(|module| module.is_called(name));
     found.ok_or_else(|| DescribedError::Slot {
         slot: place + 1,
         reason: format!("no module \"{name}\" fits there; {}", fitting(esi, slots, place)),
@@ -98,21 +93,8 @@ fn fitting(esi: &Esi, slots: &EsiSlots, place: usize) -> String {
 }
 
 fn add(module: &EsiModule, slots: &EsiSlots, place: u16, fitted: &mut Fitted) {
-    let pdo_shift = slots.pdo_increment.wrapping_mul(place);
     let index_shift = slots.index_increment.wrapping_mul(place);
-    for pdo in &module.pdos {
-        let mut pdo = pdo.clone();
-        if pdo.depends_on_slot {
-            pdo.index = pdo.index.wrapping_add(pdo_shift);
-            for excluded in &mut pdo.excludes {
-                *excluded = excluded.wrapping_add(pdo_shift);
-            }
-        }
-        for entry in pdo.entries.iter_mut().filter(|entry| entry.depends_on_slot) {
-            entry.index = entry.index.wrapping_add(index_shift);
-        }
-        fitted.pdos.push(pdo);
-    }
+    fitted.pdos.extend(module.pdos_in(slots, place));
     for object in &module.objects {
         let mut object = object.clone();
         if object.depends_on_slot {

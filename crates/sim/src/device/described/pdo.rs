@@ -21,6 +21,8 @@ pub struct DescribedPdo {
     pub fixed: bool,
     /// PDOs that cannot be assigned together with it.
     pub excludes: Vec<u16>,
+    /// It is there several times in each cycle, once for each sample.
+    pub oversampled: bool,
     /// What it consists of.
     pub entries: Vec<DescribedEntry>,
 }
@@ -91,6 +93,7 @@ fn of_pdo(image: &Image, pdo: &Pdo, direction: Direction) -> DescribedPdo {
         name: text(pdo.name),
         fixed: pdo.flags.fixed(),
         excludes: Vec::new(),
+        oversampled: false,
         entries: entries.collect(),
     }
 }
@@ -119,6 +122,7 @@ fn bytes(direction: Direction, sync_manager: u8, length: u16, pdos: &mut Vec<Des
             name: "Bytes".to_owned(),
             fixed: true,
             excludes: Vec::new(),
+            oversampled: false,
             entries: entries.collect(),
         });
     }

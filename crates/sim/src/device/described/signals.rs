@@ -3,7 +3,8 @@
 //! A device with a processor has one signal for each object that a PDO maps, in the order of the
 //! PDOs; a value of more than 32 bits has one for each 32 bits, lowest first. A controller that
 //! works without a processor has one for each bit, and one for each word that fills a SyncManager by
-//! itself, such as a coding switch. A drive of CiA 402 has five more, behind all others: it drives
+//! itself, such as a coding switch; where such a controller takes or plays several samples in each
+//! cycle, one for each value of a sample. A drive of CiA 402 has five more, behind all others: it drives
 //! the position of its axis, and takes home switch, negative and positive limit switch, and whether
 //! something holds the axis.
 
@@ -28,6 +29,8 @@ pub(super) struct Point {
     pub(super) first: usize,
     /// How many signals it has.
     pub(super) count: usize,
+    /// From one sample to the next in bits, for a value of which there are several in each cycle.
+    pub(super) stride: Option<usize>,
 }
 
 /// All values and signals.
@@ -59,7 +62,13 @@ impl Layout {
                     lengths[manager] += bits;
                 }
                 let address = ObjectAddress::new(entry.index, entry.subindex);
-                if !entry.is_padding() && bits > 0 {
+                if entry.is_padding() || bits == 0 {
+                    continue;
+                }
+                let here = pdos.iter().filter(|other| other.sync_manager == pdo.sync_manager);
+                if kind == Kind::Emulated && here.clone().any(|other| other.oversampled) {
+                    layout.add_sampled(pdo, address, at, bits);
+                } else {
                     layout.add(pdo, address, at, bits, kind);
                 }
             }
@@ -96,13 +105,50 @@ impl Layout {
                 bits.div_ceil(32)
             }
         };
+        let first = self.signals(direction, count);
+        let stride = None;
+        self.points.push(Point {
+            direction,
+            sync_manager,
+            at,
+            bits,
+            address,
+            first,
+            count,
+            stride,
+        });
+    }
+
+    /// A value in a buffer of samples. What is not sampled there, the count of cycles and what fills
+    /// up, is no signal; nor is what is not assigned.
+    fn add_sampled(&mut self, pdo: &DescribedPdo, address: ObjectAddress, at: usize, bits: usize) {
+        if !pdo.oversampled || pdo.sync_manager.is_none() {
+            return;
+        }
+        let (direction, sync_manager, count) = (pdo.direction, pdo.sync_manager, 1);
+        let stride = Some(pdo.entries.iter().map(|entry| usize::from(entry.bits)).sum());
+        let first = self.signals(direction, count);
+        self.points.push(Point {
+            direction,
+            sync_manager,
+            at,
+            bits,
+            address,
+            first,
+            count,
+            stride,
+        });
+    }
+
+    /// So many more signals: the first of them.
+    fn signals(&mut self, direction: Direction, count: usize) -> usize {
         let signals = match direction {
             Direction::Outputs => &mut self.outputs,
             Direction::Inputs => &mut self.inputs,
         };
         let first = *signals;
         *signals += count;
-        self.points.push(Point { direction, sync_manager, at, bits, address, first, count });
+        first
     }
 }
 

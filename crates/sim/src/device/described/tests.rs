@@ -90,6 +90,32 @@ fn an_image_without_pdos_has_as_many_bytes_as_its_sync_managers() {
     assert_eq!(described.channels(), (3, 10));
 }
 
+/// A bus of 16 bits has a line for single bytes: the software of a maker that begins a SyncManager at
+/// an odd address uses it, any other refuses such an address.
+#[test]
+fn a_device_reaches_the_odd_addresses_that_its_own_data_have() {
+    let up_to_safeop = |own: u16, used: u16| {
+        let mut image = with_mailbox();
+        image.configuration.pdi_control = 0x08;
+        if let Category::SyncManagers(records) = &mut image.categories[2] {
+            records[3].start = RegisterAddress(own);
+        }
+        let described = DescribedType::from_sii(&image.build().unwrap()).unwrap();
+        let mut signals = Signals::default();
+        let built = described.build(None, 1, &mut signals);
+        let mut device = crate::device::tests::Device::new(built, signals);
+        device.enter_preop();
+        device.profile.process.iter_mut().filter(|one| one.start.0 == own).for_each(|one| {
+            one.start = RegisterAddress(used);
+        });
+        device.set_up_process_data();
+        device.request(4)
+    };
+    assert_eq!(up_to_safeop(0x1181, 0x1181), (4, 0));
+    assert_eq!(up_to_safeop(0x1180, 0x1180), (4, 0));
+    assert_eq!(up_to_safeop(0x1180, 0x1181), (0x12, 0x0017));
+}
+
 #[test]
 fn the_smallest_controller_that_has_it_all_is_taken() {
     let hardware = |change: fn(&mut Image)| {

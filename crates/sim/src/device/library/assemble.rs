@@ -9,9 +9,10 @@ use super::spec::{Behind, Function, ProcessorSpec, Spec, Use};
 use super::{Built, file, image};
 use crate::device::application::Channel;
 use crate::device::application::analog::{AnalogInput, AnalogOutput, Range};
+use crate::device::application::bridge::Bridge;
 use crate::device::application::digital::DigitalOutput;
 use crate::device::application::drive::Cia402;
-use crate::device::application::oversampling::{Oversampling, SampledOutput};
+use crate::device::application::oversampling::{Oversampling, SampleBuffer};
 use crate::device::application::sercos::Sercos;
 use crate::device::application::stepper::Stepper;
 use crate::device::application::time_stamp::TimeStamps;
@@ -19,7 +20,7 @@ use crate::device::application::two_times::TwoTimes;
 use crate::device::dictionary::Dictionary;
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
 use crate::device::firmware::Firmware;
-use crate::device::processor::{Description, ProcessBuffer, Processor};
+use crate::device::processor::{BusAccess, Description, ProcessBuffer, Processor};
 use crate::device::signal::{SignalId, Signals};
 
 /// Makes one controller with what is behind it.
@@ -49,10 +50,10 @@ pub(super) fn build_one(spec: &Spec, individual: Individual, signals: &mut Signa
             }
         }
         Behind::Oversampling { .. } => {
-            let channels = (0..).zip(outputs.iter());
-            let channels = channels
-                .map(|(sync_manager, signal)| SampledOutput { sync_manager, signal: *signal });
-            Box::new(Oversampling::new(channels.collect()))
+            let buffers = (0..).zip(&outputs);
+            let buffers =
+                buffers.map(|(sync_manager, signal)| SampleBuffer::of_words(sync_manager, *signal));
+            Box::new(Oversampling::new(buffers.collect(), Vec::new()))
         }
         Behind::Processor(processor) => {
             with_processor(spec, processor, individual, &outputs, &inputs)
@@ -103,6 +104,8 @@ fn with_processor(
         protocols: Protocols(spec.protocols),
         bootstrap: Some(image::bootstrap(spec)),
         times: processor.times,
+        bus: BusAccess::Words,
+        unit_alone: false,
     };
     Box::new(Processor::new(description).with_files(file::files(spec)))
 }
@@ -151,6 +154,12 @@ fn channels(
                 vec![Box::new(Sercos::new(dictionary, *position, *blocked))]
             }
             _ => Vec::new(),
+        },
+        Function::Bridge { .. } => match inputs.split_last() {
+            Some((ahead, inputs)) => {
+                vec![Box::new(Bridge::new(dictionary, outputs, inputs, *ahead))]
+            }
+            None => Vec::new(),
         },
         Function::TwoTimes => inputs
             .iter()

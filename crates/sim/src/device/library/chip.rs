@@ -109,7 +109,7 @@ pub(in crate::device) const ESC20: Chip = Chip {
 
 /// The same with clocks of 64 bits. Terminals whose SII switches no clock unit on, and that use them
 /// all the same, must have one like it: its units are always on.
-pub(super) const ESC20_64: Chip = Chip { features: 0x000C, ..ESC20 };
+pub(in crate::device) const ESC20_64: Chip = Chip { features: 0x000C, ..ESC20 };
 /// A controller with two ports and a processor interface, from another maker: three FMMUs, four
 /// SyncManagers, distributed clocks of 64 bits.
 const LAN9252: Chip = Chip {

@@ -1,7 +1,8 @@
 //! Terminals between networks: Ethernet ports, other clocks, other EtherCAT segments.
 //!
 //! An EL6692 and an EL6695 have two sides, each a device in a network of its own: the primary one is a
-//! terminal, the secondary one has sockets. Both tell the times of their networks to each other.
+//! terminal, the secondary one has sockets. Both tell the times of their networks to each other, and
+//! values that one side puts out come in at the other, once their signals are wired.
 
 use linesman_proto::mailbox::coe::DataType;
 use linesman_proto::sii::Protocols;
@@ -9,8 +10,8 @@ use linesman_proto::sii::Protocols;
 use super::LibraryType;
 use super::smart::{NO_INPUTS, NO_OUTPUTS, TERMINAL, inputs, mailbox_in, mailbox_out};
 use super::spec::{
-    Behind, EntrySpec, Function, OpModeSpec, PdoSpec, ProcessorSpec, SettingSpec, SettingsSpec,
-    Spec, SyncManagerSpec,
+    Behind, COE_WITH_PDO_CONFIGURATION, EntrySpec, Function, OpModeSpec, PdoSpec, ProcessorSpec,
+    SettingSpec, SettingsSpec, Spec, SyncManagerSpec,
 };
 use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Mii};
@@ -83,7 +84,9 @@ const CLOCK_PDOS: &[PdoSpec] = &[
 ];
 
 const BRIDGE_PDOS: &[PdoSpec] = &[
+    PdoSpec::single(0x1600, "IO Outputs", Some(2), &[]),
     PdoSpec::single(0x1A01, "External Sync Compact", Some(3), times!(0x1801)),
+    PdoSpec::single(0x1A00, "IO Inputs", Some(3), &[]),
     PdoSpec::single(
         0x1A02,
         "External Sync (64 Bit)",
@@ -99,7 +102,9 @@ const BRIDGE_PDOS: &[PdoSpec] = &[
 ];
 
 const FAST_BRIDGE_PDOS: &[PdoSpec] = &[
+    PdoSpec::single(0x1608, "IO Outputs", Some(2), &[]),
     PdoSpec::single(0x1A01, "External Sync Compact", Some(3), times!(0x1801)),
+    PdoSpec::single(0x1A08, "IO Inputs", Some(3), &[]),
     PdoSpec::single(
         0x1A02,
         "External Sync (64 Bit)",
@@ -129,9 +134,9 @@ const SYNC_SETTINGS: &[SettingsSpec] = &[SettingsSpec {
     }],
 }];
 
-const fn two_times(version: &'static str) -> ProcessorSpec {
+const fn two_times(version: &'static str, function: Function) -> ProcessorSpec {
     ProcessorSpec {
-        function: Function::TwoTimes,
+        function,
         hardware_version: version,
         software_version: version,
         settings: SYNC_SETTINGS,
@@ -140,8 +145,11 @@ const fn two_times(version: &'static str) -> ProcessorSpec {
     }
 }
 
-const CLOCK_PROCESSOR: ProcessorSpec = two_times("16");
-const BRIDGE_PROCESSOR: ProcessorSpec = two_times("12");
+const CLOCK_PROCESSOR: ProcessorSpec = two_times("16", Function::TwoTimes);
+/// 480 bytes each way.
+const BRIDGE_PROCESSOR: ProcessorSpec = two_times("12", Function::Bridge { values: 120 });
+/// As much as one object and one PDO hold: 1,000 bytes each way.
+const FAST_BRIDGE_PROCESSOR: ProcessorSpec = two_times("12", Function::Bridge { values: 250 });
 
 const BRIDGE: Spec = Spec {
     group: "Communication",
@@ -153,6 +161,7 @@ const BRIDGE: Spec = Spec {
         SyncManagerSpec { start: 0x1C00, ..inputs(2) },
     ],
     pdos: BRIDGE_PDOS,
+    coe: COE_WITH_PDO_CONFIGURATION,
     protocols: Protocols::AOE | Protocols::EOE | Protocols::COE | Protocols::FOE | Protocols::VOE,
     behind: Behind::Processor(&BRIDGE_PROCESSOR),
     op_modes: &[OpModeSpec::free("FreeRun"), OpModeSpec::with_clock("DcSync", 0x0320)],
@@ -168,6 +177,7 @@ const FAST_BRIDGE: Spec = Spec {
         SyncManagerSpec { start: 0x2400, ..inputs(2) },
     ],
     pdos: FAST_BRIDGE_PDOS,
+    behind: Behind::Processor(&FAST_BRIDGE_PROCESSOR),
     ..BRIDGE
 };
 

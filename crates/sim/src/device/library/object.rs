@@ -9,10 +9,11 @@ use linesman_proto::sii::SyncManagerKind;
 
 use super::image::sync_manager_kind;
 use super::spec::{
-    COE_WITH_PDO_CONFIGURATION, EntrySpec, PdoSpec, ProcessorSpec, Rights, SettingsSpec, Spec,
-    VariableSpec,
+    COE_WITH_PDO_CONFIGURATION, EntrySpec, Function, PdoSpec, ProcessorSpec, Rights, SettingsSpec,
+    Spec, VariableSpec,
 };
 use super::synchronisation::{Clocked, synchronisation};
+use crate::device::application::bridge;
 use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE, special};
 use crate::device::history;
 
@@ -48,6 +49,10 @@ pub(super) fn dictionary(
 ) -> Dictionary {
     let mut objects = about(spec, processor, individual);
     objects.extend(processor.variables.iter().map(variable));
+    if let Function::Bridge { values } = processor.function {
+        objects.push(crossing(bridge::OUTPUTS, "IO Outputs", Access::RX_PDO, values));
+        objects.push(crossing(bridge::INPUTS, "IO Inputs", Access::TX_PDO, values));
+    }
     for pdo in spec.pdos {
         for channel in 0..pdo.channels {
             objects.push(mapping(spec, pdo, channel));
@@ -75,6 +80,16 @@ pub(super) fn dictionary(
     let code_word = Entry::number(0, "Code word", DataType::UDINT, 32, READ_WRITE, 0);
     objects.push(Object::variable(ObjectIndex(0xF008), code_word));
     Dictionary::new(objects, spec.coe.complete_access())
+}
+
+/// Values that cross a bridge.
+fn crossing(index: u16, name: &str, direction: u16, values: u8) -> Object {
+    let access = Access(READ_ONLY.0 | direction);
+    let entry = |subindex| {
+        Entry::number(subindex, &subindex_name(subindex), DataType::UDINT, 32, access, 0)
+    };
+    let entries = (1..=values).map(entry).collect();
+    Object::list(ObjectIndex(index), name, ObjectCode::Array, DataType::UDINT, entries)
 }
 
 /// How devices react to errors. Subindex 1 is kept and has no function; 2 is how many missed events
@@ -159,11 +174,18 @@ pub(in crate::device) fn subindex_name(subindex: u8) -> String {
 
 /// Entries that a PDO has room for where its mapping can be changed.
 const MAPPING_ROOM: usize = 8;
+/// The same of a PDO that is empty after power-on: all that it maps the MainDevice has to say.
+const EMPTY_MAPPING_ROOM: usize = 250;
 
 fn mapping(spec: &Spec, pdo: &PdoSpec, channel: u8) -> Object {
     let changeable = spec.coe == COE_WITH_PDO_CONFIGURATION;
     let access = if changeable { SET_UP } else { READ_ONLY };
-    let room = if changeable { MAPPING_ROOM } else { 0 }.max(pdo.entries.len());
+    let free = match (changeable, pdo.entries.is_empty()) {
+        (true, true) => EMPTY_MAPPING_ROOM,
+        (true, false) => MAPPING_ROOM,
+        (false, _) => 0,
+    };
+    let room = free.max(pdo.entries.len());
     let entries = (1..=u8::MAX).take(room).map(|subindex| {
         let value = pdo.entries.get(usize::from(subindex) - 1).map_or(0, |entry| {
             let index = u64::from(entry.index_of(channel));

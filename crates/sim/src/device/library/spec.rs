@@ -144,6 +144,11 @@ pub(super) enum Function {
     Sercos,
     /// Time of this network and of another one.
     TwoTimes,
+    /// One side of a bridge between two networks: their times, and values that cross over.
+    Bridge {
+        /// How many of 32 bits each way.
+        values: u8,
+    },
 }
 
 impl Function {
@@ -167,6 +172,7 @@ impl Function {
             Self::Cia402 => (1, 4),
             Self::Sercos => (1, 1),
             Self::TwoTimes => (0, 1),
+            Self::Bridge { values } => (values as usize, values as usize + 1),
         }
     }
 }

@@ -1,10 +1,11 @@
 //! The mailbox of a SubDevice: takes messages, answers them, repeats what was lost.
 //!
-//! Read first: ETG.1000.4 (mailbox), ETG.1000.6 (CoE, FoE). SyncManager 0 brings requests,
+//! Read first: ETG.1000.4 (mailbox), ETG.1000.6 (CoE, EoE, FoE). SyncManager 0 brings requests,
 //! SyncManager 1 takes answers. One request is worked on at a time; the next stays in its
 //! SyncManager, which tells the MainDevice to wait.
 
 mod coe;
+mod eoe;
 mod foe;
 mod information;
 mod outbox;
@@ -21,6 +22,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
 use self::coe::CoeServer;
+use self::eoe::EoePort;
 use self::foe::FoeServer;
 use self::outbox::{Envelope, Outbox};
 use super::dictionary::Dictionary;
@@ -57,6 +59,7 @@ pub struct Served<'a> {
 pub struct Mailbox {
     protocols: Protocols,
     coe: CoeServer,
+    eoe: EoePort,
     foe: FoeServer,
     response_time: Span,
     /// The request that is worked on, and when that ends.
@@ -74,6 +77,7 @@ impl Mailbox {
         Self {
             protocols,
             coe: CoeServer::default(),
+            eoe: EoePort::default(),
             foe: FoeServer::default(),
             response_time,
             request: None,
@@ -87,6 +91,11 @@ impl Mailbox {
     /// INIT is left, or entered: whatever was under way is forgotten.
     pub fn restart(&mut self) {
         *self = Self::new(self.response_time, self.protocols);
+    }
+
+    /// The next message has this counter: the device sent others before.
+    pub fn count_from(&mut self, next: Counter) {
+        self.outbox.count_from(next);
     }
 
     /// Tells the MainDevice of an error on the device's own account, as soon as there is room.
@@ -180,6 +189,9 @@ impl Mailbox {
             MailboxType::Foe if !served.files.is_empty() => {
                 let rooms = foe::Rooms { requests: request_room(pdi), answers: answer_room(pdi) };
                 self.foe.answer(message.data, served.files, served.state, now, rooms)
+            }
+            MailboxType::Eoe if !boots && self.protocols.has(Protocols::EOE) => {
+                self.eoe.answer(message.data, now)
             }
             MailboxType::Soe if !boots && self.protocols.has(Protocols::SOE) => {
                 Ok(soe::answer(message.data).into_iter().collect())

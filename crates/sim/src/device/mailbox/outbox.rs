@@ -51,6 +51,12 @@ impl Outbox {
         self.waiting.len()
     }
 
+    /// The next message has this counter, 1 to 7.
+    pub(super) fn count_from(&mut self, next: Counter) {
+        let before = (0..=7).filter_map(Counter::new).find(|counter| counter.next() == next);
+        self.sent = before.unwrap_or(Counter::NONE);
+    }
+
     /// Queues a message behind all of its own and of higher priority.
     pub(super) fn push(&mut self, kind: MailboxType, envelope: Envelope, body: Vec<u8>) {
         let before = |waiting: &Waiting| waiting.envelope.priority >= envelope.priority;

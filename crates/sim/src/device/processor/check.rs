@@ -3,6 +3,7 @@
 //! Read first: ETG.1000.6, state transitions; the codes are those that the public SubDevice stack
 //! code gives.
 
+use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::coe::ObjectIndex;
 use linesman_proto::register::{self as r, SmDirection, SmMode, SyncManagerConfig};
 use linesman_proto::sii::Direction;
@@ -43,14 +44,31 @@ pub(super) fn modules(dictionary: &Dictionary) -> Result<(), AlStatusCode> {
     }
 }
 
-/// Whether the device reaches its controller in words of 16 bits: PDI 0x08 and 0x0A (S2 2.6).
-fn reads_words(pdi: &Pdi<'_>) -> bool {
-    matches!(pdi.register(r::PDI_CONTROL.address), 0x08 | 0x0A)
+/// How the software of a device reaches memory over a bus of 16 bits, PDI 0x08 and 0x0A (S2 2.6).
+/// The bus itself has a line for single bytes (BHE), so it is the software that cannot begin at an
+/// odd address; one whose maker lets a SyncManager begin there evidently can.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub enum BusAccess {
+    /// In whole words: what begins at an odd address is refused (AL status code 0x0017).
+    #[default]
+    Words,
+    /// In bytes where it has to.
+    Bytes,
 }
 
-/// Whether a SyncManager begins where the device can reach it.
-fn is_reachable(manager: &SyncManagerConfig, pdi: &Pdi<'_>) -> bool {
-    manager.start.0.is_multiple_of(2) || !reads_words(pdi)
+impl BusAccess {
+    /// That of a device with these SyncManagers after power-on.
+    #[must_use]
+    pub fn of(starts: impl IntoIterator<Item = RegisterAddress>) -> Self {
+        let odd = starts.into_iter().any(|start| !start.0.is_multiple_of(2));
+        if odd { Self::Bytes } else { Self::Words }
+    }
+
+    /// Whether a SyncManager begins where the device can reach it.
+    fn reaches(self, manager: &SyncManagerConfig, pdi: &Pdi<'_>) -> bool {
+        let bus_of_words = matches!(pdi.register(r::PDI_CONTROL.address), 0x08 | 0x0A);
+        self == Self::Bytes || !bus_of_words || manager.start.0.is_multiple_of(2)
+    }
 }
 
 /// Whether both SyncManagers of the mailbox are set up. `longest` is the longest one that the device
@@ -58,6 +76,7 @@ fn is_reachable(manager: &SyncManagerConfig, pdi: &Pdi<'_>) -> bool {
 pub(super) fn mailbox(
     pdi: &Pdi<'_>,
     longest: u16,
+    bus: BusAccess,
     wrong: AlStatusCode,
 ) -> Result<(), AlStatusCode> {
     let (Some(requests), Some(answers)) = (pdi.sync_manager(REQUESTS), pdi.sync_manager(ANSWERS))
@@ -76,7 +95,7 @@ pub(super) fn mailbox(
         && !overlap(&requests, &answers);
     if !both {
         Err(wrong)
-    } else if [requests, answers].iter().all(|manager| is_reachable(manager, pdi)) {
+    } else if [requests, answers].iter().all(|manager| bus.reaches(manager, pdi)) {
         Ok(())
     } else {
         Err(AlStatusCode::INVALID_SYNC_MANAGER)
@@ -89,6 +108,7 @@ pub(super) fn process_data(
     pdi: &Pdi<'_>,
     areas: &Areas,
     mailbox: bool,
+    bus: BusAccess,
 ) -> Result<(), AlStatusCode> {
     let mut others = if mailbox { vec![REQUESTS, ANSWERS] } else { Vec::new() };
     for direction in [Direction::Inputs, Direction::Outputs] {
@@ -110,7 +130,7 @@ pub(super) fn process_data(
     let mut used = areas.lengths(Direction::Inputs).chain(areas.lengths(Direction::Outputs));
     let unreachable = |(index, _)| {
         let manager: Option<SyncManagerConfig> = pdi.sync_manager(index);
-        manager.is_some_and(|used| used.activate.enable() && !is_reachable(&used, pdi))
+        manager.is_some_and(|used| used.activate.enable() && !bus.reaches(&used, pdi))
     };
     if used.any(unreachable) {
         return Err(AlStatusCode::INVALID_SYNC_MANAGER);

@@ -26,6 +26,7 @@ impl Firmware for Processor {
         self.synchronisation.start(&self.description.dictionary, &mut self.dictionary);
         self.step = None;
         self.emergencies.clear();
+        self.has_values = false;
         self.next_sample = now;
         self.make_safe(pdi);
     }
@@ -98,6 +99,10 @@ impl Firmware for Processor {
     fn identify(&mut self, id: u16, _signals: &mut Signals) -> bool {
         self.application_layer.identify(id);
         true
+    }
+
+    fn read_sii(&mut self) {
+        self.reads_sii = true;
     }
 
     fn samples(&self) -> bool {

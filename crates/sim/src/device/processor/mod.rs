@@ -21,6 +21,7 @@ use linesman_proto::time::{Instant, Span};
 
 use self::areas::Areas;
 pub use self::areas::ProcessBuffer;
+pub use self::check::BusAccess;
 use self::synchronisation::Synchronisation;
 use super::application::Channel;
 use super::application_layer::ApplicationLayer;
@@ -97,6 +98,11 @@ pub struct Description {
     pub bootstrap: Option<MailboxPair>,
     /// How quick it is.
     pub times: ResponseTimes,
+    /// How its software reaches memory, where its bus has 16 bits.
+    pub bus: BusAccess,
+    /// It takes a clock unit that is on and makes neither SYNC0 nor SYNC1 (0x0981 is 0x01) as no
+    /// synchronisation at all. Others refuse that.
+    pub unit_alone: bool,
 }
 
 /// A device with a processor.
@@ -114,6 +120,10 @@ pub struct Processor {
     files: Files,
     history: History,
     troubles: Troubles,
+    /// Its application has run since it started: there are values.
+    has_values: bool,
+    /// It reads its SII itself on the way to PREOP.
+    reads_sii: bool,
     /// Settings before they were made not to fit.
     former: Vec<mismatch::Former>,
     /// Errors to tell of.
@@ -153,6 +163,8 @@ impl Processor {
             files: Files::default(),
             history: History::default(),
             troubles: Troubles::default(),
+            has_values: false,
+            reads_sii: false,
             former: Vec::new(),
             emergencies: Vec::new(),
             buffer: Vec::new(),
@@ -250,6 +262,10 @@ impl Processor {
         if !pdi.sii_load_ok() {
             return Outcome::Failed(AlState::Init, AlStatusCode::EEPROM_ERROR);
         }
+        // The MainDevice has to leave the EEPROM to it: bit 0 of 0x0500.
+        if self.reads_sii && pdi.register(r::SII_ACCESS_ECAT.address) & 1 == 0 {
+            return Outcome::Failed(AlState::Init, AlStatusCode::EEPROM_NO_ACCESS);
+        }
         if let Err(code) = self.check_mailbox(pdi, code) {
             return Outcome::Failed(AlState::Init, code);
         }
@@ -270,22 +286,29 @@ impl Processor {
         }
         let boot = wrong == AlStatusCode::INVALID_MAILBOX_BOOT;
         let areas = self.description.bootstrap.filter(|_| boot).unwrap_or(self.description.mailbox);
-        check::mailbox(pdi, areas.receive.size.max(areas.send.size), wrong)
+        let longest = areas.receive.size.max(areas.send.size);
+        check::mailbox(pdi, longest, self.description.bus, wrong)
     }
 
     fn set_up_process_data(&mut self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
         let areas =
             Areas::of(&self.dictionary, &self.description.buffers, &self.description.excludes)?;
         check::modules(&self.dictionary)?;
-        check::process_data(pdi, &areas, self.description.mailbox.is_present())?;
+        self.check_areas(pdi, &areas)?;
         let outputs = areas.len(Direction::Outputs) > 0;
-        self.synchronisation.set_up(&mut self.dictionary, outputs, pdi)?;
+        let alone = self.description.unit_alone;
+        self.synchronisation.set_up(&mut self.dictionary, outputs, alone, pdi)?;
         self.process_data = areas;
         Ok(())
     }
 
     fn check_process_data(&self, pdi: &Pdi<'_>) -> Result<(), AlStatusCode> {
-        check::process_data(pdi, &self.process_data, self.description.mailbox.is_present())
+        self.check_areas(pdi, &self.process_data)
+    }
+
+    fn check_areas(&self, pdi: &Pdi<'_>, areas: &Areas) -> Result<(), AlStatusCode> {
+        let mailbox = self.description.mailbox.is_present();
+        check::process_data(pdi, areas, mailbox, self.description.bus)
     }
 
     fn has_outputs(&self) -> bool {
@@ -305,6 +328,13 @@ impl Processor {
         if let Err(code) = self.check_process_data(pdi) {
             return Outcome::Failed(AlState::PreOp, code);
         }
+        // What stood still when it entered SAFEOP may run by now.
+        if !self.has_values {
+            self.sample_inputs(now, pdi);
+        }
+        if let Some(code) = self.values_missing() {
+            return Outcome::Failed(AlState::SafeOp, code);
+        }
         if let Some(outcome) = self.wait_for_clock(step, now) {
             return outcome;
         }
@@ -319,6 +349,21 @@ impl Processor {
             return Outcome::Waits;
         }
         Outcome::Failed(AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG)
+    }
+
+    /// The code to show when an application that has not run since the start gives no values to
+    /// exchange.
+    fn values_missing(&self) -> Option<AlStatusCode> {
+        if self.has_values {
+            return None;
+        }
+        let has = |direction| self.process_data.len(direction) > 0;
+        match (has(Direction::Inputs), has(Direction::Outputs)) {
+            (true, true) => Some(AlStatusCode::NO_VALID_INPUTS_AND_OUTPUTS),
+            (true, false) => Some(AlStatusCode::NO_VALID_INPUTS),
+            (false, true) => Some(AlStatusCode::NO_VALID_OUTPUTS),
+            (false, false) => None,
+        }
     }
 
     /// It leaves its state, or does not get further, because of an error. On the way out of OP it
@@ -389,6 +434,7 @@ impl Processor {
         self.next_sample = now + self.description.times.sample;
         let time = pdi.system_time();
         if !self.troubles.has(Trouble::FrozenApplication) {
+            self.has_values = true;
             for channel in &mut self.description.channels {
                 channel.tell_time(time);
                 channel.sample(now, &mut self.dictionary, pdi.signals());

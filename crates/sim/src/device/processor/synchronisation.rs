@@ -97,6 +97,8 @@ pub(super) struct Synchronisation {
     cycle: Span,
     /// What it wrote into the cycle time itself.
     shown_cycle: u64,
+    /// What stands there after power-on, for outputs and inputs: nobody has asked for that.
+    default_cycles: [u64; 2],
     last_pulse: Option<Instant>,
     /// Pulses in their time, in a row.
     in_time: u32,
@@ -155,6 +157,7 @@ impl Synchronisation {
             mode: Mode::Frames,
             cycle: Span::ZERO,
             shown_cycle: 0,
+            default_cycles: [OUTPUTS, INPUTS].map(|index| get(fresh, index, sub::CYCLE)),
             last_pulse: None,
             in_time: 0,
             steady: 0,
@@ -192,18 +195,23 @@ impl Synchronisation {
     // ---- set-up ----
 
     /// Finds out what to keep step with, from the objects and from what the MainDevice has switched
-    /// on in the SYNC unit; the code to show when that cannot be.
+    /// on in the SYNC unit; the code to show when that cannot be. `unit_alone`: a unit without signals
+    /// counts as off.
     pub(super) fn set_up(
         &mut self,
         dictionary: &mut Dictionary,
         outputs: bool,
+        unit_alone: bool,
         pdi: &Pdi<'_>,
     ) -> Result<(), AlStatusCode> {
+        const SIGNALS: u8 = 0b110;
+        let activation = pdi.sync_activation();
+        let activation = if unit_alone && activation & SIGNALS == 0 { 0 } else { activation };
         let leads = leading(outputs);
         let wanted = get(dictionary, leads, sub::MODE);
         let supported =
             if has(dictionary, leads) { get(dictionary, leads, sub::SUPPORTED) } else { u64::MAX };
-        let mode = mode(wanted, supported, pdi.sync_activation())?;
+        let mode = mode(wanted, supported, activation)?;
         let cycle = match mode {
             Mode::FreeRun | Mode::Frames => 0,
             Mode::Clock(signal) => self.check_cycle(dictionary, leads, signal, pdi)?,
@@ -211,6 +219,7 @@ impl Synchronisation {
         *self = Self {
             needs: self.needs,
             takes: self.takes,
+            default_cycles: self.default_cycles,
             mode,
             cycle: Span::ns(cycle),
             ..Self::new(dictionary)
@@ -256,7 +265,8 @@ impl Synchronisation {
             return Err(too_short);
         }
         let written = get(dictionary, leads, sub::CYCLE);
-        if written != 0 && written != self.shown_cycle && written != cycle {
+        let own = [0, self.shown_cycle, self.default_cycles[usize::from(leads == INPUTS)]];
+        if written != cycle && !own.contains(&written) {
             return Err(AlStatusCode::DC_INVALID_SYNC_CYCLE_TIME);
         }
         Ok(cycle)

@@ -6,7 +6,7 @@ use linesman_proto::time::Span;
 
 use super::Device;
 use crate::device::library::build;
-use crate::device::{Refusal, Signals};
+use crate::device::{Refusal, Signals, Trouble};
 
 #[test]
 fn it_takes_its_time() {
@@ -181,6 +181,45 @@ fn it_goes_down_step_by_step_or_at_once() {
     device.exchange(&[]);
     assert_eq!(device.request(8), (8, 0));
     assert_eq!(device.request(1), (1, 0));
+}
+
+/// An application that has not run since the start gives no values: AL status codes 0x0018, 0x0019
+/// and 0x002B, by what there is to exchange.
+#[test]
+fn without_an_application_there_are_no_valid_values() {
+    for (name, code) in [("EL3104", 0x0018), ("EL4102", 0x0019), ("EL7041", 0x002B)] {
+        let mut device = Device::of(name);
+        let stands = Trouble::FrozenApplication;
+        let now = device.bench.now;
+        device.bench.controller.trouble(now, stands, true);
+        device.enter_preop();
+        device.enter_safeop();
+        device.exchange(&[]);
+        assert_eq!(device.request(8), (0x14, code), "{name}");
+        assert_eq!(device.request(0x14), (4, 0), "{name}");
+        let now = device.bench.now;
+        device.bench.controller.trouble(now, stands, false);
+        device.exchange(&[]);
+        assert_eq!(device.request(8), (8, 0), "{name}: it runs");
+        // One that stops later has values: they stay as they are.
+        let now = device.bench.now;
+        device.bench.controller.trouble(now, stands, true);
+        device.exchange(&[]);
+        assert_eq!(device.status(), (8, 0), "{name}");
+    }
+}
+
+/// A device that reads its EEPROM itself needs it: AL status code 0x0050.
+#[test]
+fn software_that_reads_the_eeprom_wants_it_left_to_it() {
+    let mut device = Device::of("EL3104");
+    device.bench.controller.firmware_mut().read_sii();
+    device.bench.write(0x0500, &[0]);
+    device.set_up_mailbox();
+    assert_eq!(device.request(2), (0x11, 0x0050));
+    assert_eq!(device.request(0x11), (1, 0));
+    device.bench.write(0x0500, &[1]);
+    assert_eq!(device.request(2), (2, 0));
 }
 
 #[test]

@@ -9,10 +9,10 @@ use crate::wire::kept::{Asked, Question};
 use crate::wire::world::World;
 
 impl World {
+    #[inline]
     pub(super) fn execute_all(&mut self, journey: &Journey<'_>, bytes: &mut [u8]) {
-        let interrupting = self.nodes.directory.interrupting().iter();
-        let irq = interrupting.filter(|node| journey.route.place(**node).is_some());
-        let irq = irq.fold(0, |irq, node| irq | self.nodes[*node as usize].controller.irq());
+        let interrupting = self.nodes.directory.interrupting();
+        let irq = if interrupting.is_empty() { 0 } else { self.irq(journey, interrupting) };
         let mut rest = bytes;
         while let Some((header, body)) = rest.split_first_chunk_mut::<DATAGRAM_HEADER_LEN>() {
             let read = Header::read(header);
@@ -35,6 +35,12 @@ impl World {
             }
             rest = next;
         }
+    }
+
+    /// What controllers on the way add to the event field.
+    fn irq(&self, journey: &Journey<'_>, interrupting: &[u32]) -> u16 {
+        let here = interrupting.iter().filter(|node| journey.route.place(**node).is_some());
+        here.fold(0, |irq, node| irq | self.nodes[*node as usize].controller.irq())
     }
 
     /// Executes a datagram at everybody it is for, and says what to add to its working counter.

@@ -1,4 +1,4 @@
-//! Writing elements, indented.
+//! Writing XML: elements, indented.
 
 use std::fmt::Display;
 
@@ -6,18 +6,18 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 
 /// A file that is being written, into memory: nothing can fail.
-pub(super) struct Xml {
+pub(crate) struct Xml {
     writer: Writer<Vec<u8>>,
 }
 
 impl Xml {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let mut xml = Self { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
         xml.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
         xml
     }
 
-    pub(super) fn finish(self) -> String {
+    pub(crate) fn finish(self) -> String {
         let mut text = String::from_utf8_lossy(&self.writer.into_inner()).into_owned();
         text.push('\n');
         text
@@ -29,7 +29,7 @@ impl Xml {
     }
 
     /// An element with what `content` writes in it.
-    pub(super) fn element(
+    pub(crate) fn element(
         &mut self,
         name: &str,
         attributes: &[(&str, &str)],
@@ -44,8 +44,13 @@ impl Xml {
         self.event(Event::End(BytesEnd::new(name)));
     }
 
+    /// Text within an element.
+    pub(crate) fn raw(&mut self, text: &str) {
+        self.event(Event::Text(BytesText::new(text)));
+    }
+
     /// An element without content.
-    pub(super) fn empty(&mut self, name: &str, attributes: &[(&str, String)]) {
+    pub(crate) fn empty(&mut self, name: &str, attributes: &[(&str, String)]) {
         let mut start = BytesStart::new(name);
         for (key, value) in attributes {
             start.push_attribute((*key, value.as_str()));
@@ -54,7 +59,7 @@ impl Xml {
     }
 
     /// An element with a text.
-    pub(super) fn text(&mut self, name: &str, text: impl Display) {
+    pub(crate) fn text(&mut self, name: &str, text: impl Display) {
         self.event(Event::Start(BytesStart::new(name)));
         self.event(Event::Text(BytesText::new(&text.to_string())));
         self.event(Event::End(BytesEnd::new(name)));
@@ -62,6 +67,6 @@ impl Xml {
 }
 
 /// Bytes as ENI writes them: two digits each, in the order on the wire.
-pub(super) fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -14,18 +14,29 @@
 //!
 //! Unknown keys are errors. The order of devices is the order of their numbers.
 
+mod choice;
+mod description;
+mod device;
+mod from_esi;
+mod resolve;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use linesman_proto::address::{DeviceId, Path, StationAddress};
-use linesman_proto::port::Port;
-use linesman_proto::sii::Identity;
+use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::topology::{End, Tree, Wired, WiringError};
 use serde::{Deserialize, Serialize};
 
 use crate::attachment::Attachment;
-use crate::identity::RevisionRule;
 use crate::inventory::Inventory;
+
+pub use choice::{ClockChoice, Mapping, Network, ProjectTask, StartUpEntry, WatchdogChoice};
+pub use description::{
+    DescribedEntry, DescribedMailbox, DescribedPdo, DescribedSyncManager, Description, FmmuWord,
+    Way,
+};
+pub use device::ProjectDevice;
+pub use resolve::{Described, Lookup, ResolveError, Resolved};
 
 /// A project.
 #[derive(Clone, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
@@ -34,6 +45,15 @@ pub struct Project {
     /// What the machine is called.
     #[serde(default)]
     pub name: String,
+    /// Folders and files with device descriptions of makers (ESI), relative to the project.
+    #[serde(default)]
+    pub esi: Vec<String>,
+    /// The network as a whole.
+    #[serde(default)]
+    pub network: Network,
+    /// Tasks, the first of which has all devices that do not say otherwise; one of 1 ms unless said.
+    #[serde(default, rename = "task")]
+    pub tasks: Vec<ProjectTask>,
     /// Its SubDevices, in the order of their numbers.
     #[serde(default, rename = "device")]
     pub devices: Vec<ProjectDevice>,
@@ -48,45 +68,6 @@ pub struct Project {
 pub struct Ring {
     /// The port that is wired to the second card, such as `B9.B`.
     pub closes_at: Attachment,
-}
-
-/// A SubDevice of a project.
-#[derive(Clone, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ProjectDevice {
-    /// Unique name.
-    pub name: String,
-    /// Order designation, such as `EL2004`; for people.
-    #[serde(default, rename = "type")]
-    pub type_name: String,
-    /// Vendor; with `product_code`, what is compared.
-    #[serde(default)]
-    pub vendor_id: Option<u32>,
-    /// Product code.
-    #[serde(default)]
-    pub product_code: Option<u32>,
-    /// Revision number.
-    #[serde(default)]
-    pub revision: Option<u32>,
-    /// How the revision is compared.
-    #[serde(default)]
-    pub revision_rule: RevisionRule,
-    /// Serial number; not compared when absent.
-    #[serde(default)]
-    pub serial: Option<u32>,
-    /// Whose port it hangs on: `maindevice` or a device's name and port.
-    pub on: Attachment,
-    /// The port by which it is entered, `A` unless said.
-    #[serde(default = "port_a")]
-    #[schemars(regex(pattern = "^[A-D]$"))]
-    pub entry: String,
-    /// Station address; 0x1001 and up in order unless said.
-    #[serde(default)]
-    pub station: Option<u16>,
-}
-
-fn port_a() -> String {
-    "A".to_owned()
 }
 
 /// A project that cannot be used.
@@ -117,6 +98,28 @@ pub enum ProjectError {
         /// What was written.
         entry: String,
     },
+    /// Two tasks bear the same name.
+    #[error("two tasks are called `{name}`: give each a name of its own")]
+    TaskTwice {
+        /// The name.
+        name: String,
+    },
+    /// A device is in a task that is not there.
+    #[error("device `{device}` is in the task `{task}`, but there is no [[task]] of that name")]
+    UnknownTask {
+        /// Whose.
+        device: String,
+        /// The unknown name.
+        task: String,
+    },
+    /// A value that makes no sense.
+    #[error("{whose}: {reason}")]
+    Value {
+        /// Of which task or device.
+        whose: String,
+        /// What was expected.
+        reason: String,
+    },
     /// The places contradict each other.
     #[error("the wiring does not fit together: {0}")]
     Wiring(WiringError),
@@ -131,6 +134,7 @@ impl Project {
         let project: Self =
             toml::from_str(text).map_err(|error| ProjectError::Form(error.to_string()))?;
         project.tree()?;
+        project.check()?;
         Ok(project)
     }
 
@@ -145,23 +149,84 @@ impl Project {
         };
         let devices = inventory.devices.iter().enumerate().map(|(node, found)| {
             let identity = found.identity;
+            let described = Description::of(&found.profile);
             ProjectDevice {
                 name: found.label(),
                 type_name: found.profile.type_name.clone(),
                 vendor_id: identity.map(|identity| identity.vendor_id),
                 product_code: identity.map(|identity| identity.product_code),
                 revision: identity.map(|identity| identity.revision),
-                revision_rule: RevisionRule::Equal,
-                serial: None,
-                on: attachment(tree.upstream(node).unwrap_or(End::MainDevice(Path::A))),
                 entry: tree.entry(node).to_string(),
                 station: (found.station.0 != 0).then_some(found.station.0),
+                description: (described != Description::default()).then_some(described),
+                ..ProjectDevice::at(
+                    "",
+                    attachment(tree.upstream(node).unwrap_or(End::MainDevice(Path::A))),
+                )
             }
         });
         let ring = tree
             .closes_at()
             .map(|(node, port)| Ring { closes_at: Attachment::Device { name: label(node), port } });
-        Self { name: name.to_owned(), devices: devices.collect(), ring }
+        let devices = devices.collect();
+        Self { ring, ..Self::of(name, devices) }
+    }
+
+    /// A project of these devices with nothing special.
+    #[must_use]
+    pub fn of(name: &str, devices: Vec<ProjectDevice>) -> Self {
+        let (esi, network, tasks, ring) = (Vec::new(), Network::default(), Vec::new(), None);
+        Self { name: name.to_owned(), esi, network, tasks, devices, ring }
+    }
+
+    /// Whether what refers to something refers to something that is there, and numbers make sense.
+    fn check(&self) -> Result<(), ProjectError> {
+        let value = |whose: String, reason: &str| {
+            Err(ProjectError::Value { whose, reason: reason.to_owned() })
+        };
+        for (at, task) in self.tasks.iter().enumerate() {
+            if self.tasks[..at].iter().any(|other| other.name == task.name) {
+                return Err(ProjectError::TaskTwice { name: task.name.clone() });
+            }
+            let whose = format!("task `{}`", task.name);
+            if task.cycle_us == 0 {
+                return value(whose, "cycle_us is 0, expected a cycle time in µs");
+            }
+            if task.pre_ticks > 0 && !task.separate_inputs {
+                return value(whose, "pre_ticks needs separate_inputs = true");
+            }
+            let ahead = u64::from(task.pre_ticks) * u64::from(self.network.base_time_us);
+            if ahead >= u64::from(task.cycle_us) {
+                let reason = "pre_ticks times base_time_us is a whole cycle or more";
+                if task.pre_ticks > 0 {
+                    return value(whose, reason);
+                }
+            }
+            if task.repeats > MOST_REPEATS {
+                return value(whose, "repeats is above 3");
+            }
+        }
+        if self.network.base_time_us == 0 {
+            return value("network".to_owned(), "base_time_us is 0, expected a time in µs");
+        }
+        let mut stations = BTreeMap::new();
+        for (device, id) in self.devices.iter().zip(0..) {
+            if let Some(task) = &device.task
+                && !self.tasks.iter().any(|known| known.name == *task)
+            {
+                let (device, task) = (device.name.clone(), task.clone());
+                return Err(ProjectError::UnknownTask { device, task });
+            }
+            let station = device.station(DeviceId(id)).0;
+            if let Some(other) = stations.insert(station, &device.name) {
+                let whose = format!("device `{}`", device.name);
+                let reason =
+                    format!("station address 0x{station:04X} is that of `{other}` already");
+                return Err(ProjectError::Value { whose, reason });
+            }
+            device.check()?;
+        }
+        Ok(())
     }
 
     /// How the devices are wired; node *n* is device *n*.
@@ -203,6 +268,15 @@ impl Project {
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut text = format!("name = {}\n", quoted(&self.name));
+        if !self.esi.is_empty() {
+            let _ = writeln!(text, "esi = {}", inline(&self.esi));
+        }
+        if self.network != Network::default() {
+            let _ = writeln!(text, "\n[network]\n{}", lines(&self.network));
+        }
+        for task in &self.tasks {
+            let _ = writeln!(text, "\n[[task]]\n{}", lines(task));
+        }
         if let Some(ring) = &self.ring {
             let _ = write!(text, "\n[ring]\ncloses_at = {}\n", quoted(&ring.closes_at.to_string()));
         }
@@ -213,77 +287,17 @@ impl Project {
     }
 }
 
-impl ProjectDevice {
-    /// Who it must be; `None` when the project does not say.
-    #[must_use]
-    pub fn identity(&self) -> Option<Identity> {
-        Some(Identity {
-            vendor_id: self.vendor_id?,
-            product_code: self.product_code?,
-            revision: self.revision.unwrap_or(0),
-            serial_number: self.serial.unwrap_or(0),
-        })
-    }
+/// Most copies of a frame beside the first.
+const MOST_REPEATS: u8 = 3;
 
-    /// How its revision is compared: not at all when none was given.
-    #[must_use]
-    pub const fn rule(&self) -> RevisionRule {
-        match self.revision {
-            Some(_) => self.revision_rule,
-            None => RevisionRule::Any,
-        }
-    }
+/// A value on one line.
+fn inline<T: Serialize>(value: &T) -> String {
+    toml::Value::try_from(value).map_or_else(|_| String::new(), |value| value.to_string())
+}
 
-    /// The station address it is to have.
-    #[must_use]
-    pub fn station(&self, id: DeviceId) -> StationAddress {
-        StationAddress(self.station.unwrap_or(0x1000_u16.wrapping_add(id.no() as u16)))
-    }
-
-    fn entry_port(&self) -> Result<Port, ProjectError> {
-        let mut letters = self.entry.chars();
-        match (letters.next().and_then(Port::from_letter), letters.next()) {
-            (Some(port), None) => Ok(port),
-            (Some(_) | None, _) => {
-                Err(ProjectError::NoPort { device: self.name.clone(), entry: self.entry.clone() })
-            }
-        }
-    }
-
-    fn write(&self, text: &mut String) {
-        let mut line = |key: &str, value: String| {
-            let _ = writeln!(text, "{key} = {value}");
-        };
-        line("\n[[device]]\nname", quoted(&self.name));
-        line("type", quoted(&self.type_name));
-        let hex = |value: u32| format!("0x{value:08X}");
-        if let Some(vendor_id) = self.vendor_id {
-            line("vendor_id", hex(vendor_id));
-        }
-        if let Some(product_code) = self.product_code {
-            line("product_code", hex(product_code));
-        }
-        if let Some(revision) = self.revision {
-            line("revision", hex(revision));
-        }
-        if self.revision_rule != RevisionRule::Equal {
-            line(
-                "revision_rule",
-                toml::Value::try_from(self.revision_rule)
-                    .map_or_else(|_| quoted("equal"), |rule| rule.to_string()),
-            );
-        }
-        if let Some(serial) = self.serial {
-            line("serial", serial.to_string());
-        }
-        line("on", quoted(&self.on.to_string()));
-        if self.entry != "A" {
-            line("entry", quoted(&self.entry));
-        }
-        if let Some(station) = self.station {
-            line("station", format!("0x{station:04X}"));
-        }
-    }
+/// The keys of a table, one a line.
+fn lines<T: Serialize>(value: &T) -> String {
+    toml::to_string(value).unwrap_or_default().trim_end().to_owned()
 }
 
 /// A TOML string.
@@ -294,6 +308,9 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identity::RevisionRule;
+    use linesman_proto::address::StationAddress;
+    use linesman_proto::port::Port;
 
     const PLANT: &str = r#"
 name = "plant \"7\""

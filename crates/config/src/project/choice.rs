@@ -1,0 +1,224 @@
+//! What a user chooses in a project: tasks, the network as a whole, clocks, watchdogs, PDOs, start-up
+//! commands.
+
+use linesman_proto::time::Span;
+use serde::{Deserialize, Serialize};
+
+use crate::plan::layout::{Grouping, PlanOptions, TaskOptions};
+use crate::plan::{ClockSettings, IoAt, OnWrongCounter, ProcessAccess, WatchdogSettings};
+use crate::profile::ClockMode;
+
+/// The network as a whole: table `[network]`.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Network {
+    /// Which SubDevices share datagrams.
+    pub layout: Grouping,
+    /// SubDevices with a few bits each share bytes.
+    pub pack_bits: bool,
+    /// Commands for process data of all SubDevices that do not say otherwise.
+    pub access: ProcessAccess,
+    /// What becomes of inputs when a working counter is wrong, for all SubDevices that do not say
+    /// otherwise.
+    pub on_wrong_counter: OnWrongCounter,
+    /// Read in every cycle which mailboxes hold something, instead of asking each now and then.
+    pub mailbox_states: bool,
+    /// The unit of `pre_ticks`, in µs.
+    #[schemars(range(min = 1))]
+    pub base_time_us: u32,
+}
+
+impl Default for Network {
+    fn default() -> Self {
+        Self {
+            layout: Grouping::ByKind,
+            pack_bits: true,
+            access: ProcessAccess::Auto,
+            on_wrong_counter: OnWrongCounter::Keep,
+            mailbox_states: true,
+            base_time_us: 1_000,
+        }
+    }
+}
+
+/// A task: `[[task]]`.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProjectTask {
+    /// Unique name.
+    pub name: String,
+    /// Cycle time in µs.
+    #[schemars(range(min = 1))]
+    pub cycle_us: u32,
+    /// When its frames leave: when its cycle begins, or when the application has finished.
+    #[serde(default)]
+    pub io_at: IoAt,
+    /// Inputs are fetched in frames of their own, earlier than the others.
+    #[serde(default)]
+    pub separate_inputs: bool,
+    /// How much earlier, in units of the base time.
+    #[serde(default)]
+    pub pre_ticks: u32,
+    /// How often a frame is sent again at once, if all SubDevices in it allow that (`frame_repeat`).
+    #[serde(default)]
+    #[schemars(range(max = 3))]
+    pub repeats: u8,
+}
+
+impl ProjectTask {
+    /// The same for the planner.
+    #[must_use]
+    pub fn options(&self, network: &Network) -> TaskOptions {
+        let ahead = u64::from(self.pre_ticks) * u64::from(network.base_time_us);
+        TaskOptions {
+            name: self.name.clone(),
+            cycle: Span::us(u64::from(self.cycle_us)),
+            io_at: self.io_at,
+            separate_inputs: self.separate_inputs.then(|| Span::us(ahead)),
+            repeats: self.repeats,
+        }
+    }
+}
+
+impl Network {
+    /// What the planner is told; without tasks there is one of 1 ms.
+    #[must_use]
+    pub fn options(&self, tasks: &[ProjectTask]) -> PlanOptions {
+        PlanOptions {
+            separate_directions: false,
+            tasks: tasks.iter().map(|task| task.options(self)).collect(),
+            grouping: self.layout,
+            pack_bits: self.pack_bits,
+            clock_datagrams: true,
+            mailbox_states: self.mailbox_states,
+            ..PlanOptions::default()
+        }
+    }
+}
+
+/// The distributed clock of a device: `clock = { … }`. What is not said is that of the mode.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ClockChoice {
+    /// An operation mode of its description, by name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mode: Option<String>,
+    /// What is written to 0x0980: 0x0300 is SYNC0, 0x0700 SYNC0 and SYNC1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assign_activate: Option<u16>,
+    /// Cycle of SYNC0 in µs; that of its task unless said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sync0_cycle_us: Option<u32>,
+    /// Shift of SYNC0 in ns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sync0_shift_ns: Option<i64>,
+    /// Cycle of SYNC1 in µs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sync1_cycle_us: Option<u32>,
+    /// It is the reference clock.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reference: bool,
+}
+
+impl ClockChoice {
+    /// The settings, with what the modes of its description say and the cycle of its task.
+    ///
+    /// # Errors
+    /// A mode that its description does not have.
+    pub(super) fn settings(
+        &self,
+        modes: &[ClockMode],
+        cycle: Span,
+    ) -> Result<ClockSettings, String> {
+        let mode = match &self.mode {
+            None => ClockMode::default(),
+            Some(name) => {
+                modes.iter().find(|mode| mode.name == *name).cloned().ok_or_else(|| {
+                    let names: Vec<_> =
+                        modes.iter().map(|mode| format!("`{}`", mode.name)).collect();
+                    let has = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                    format!("clock: its description has no mode `{name}`; it has {has}")
+                })?
+            }
+        };
+        let us = |us: u32| Span::us(u64::from(us));
+        let sync0_cycle = self.sync0_cycle_us.map_or_else(|| mode.sync0_cycle(cycle), us);
+        let sync1_cycle = Span::ns(
+            sync0_cycle.as_nanos() * u64::try_from(mode.sync1_cycle_factor).unwrap_or(0)
+                + u64::try_from(mode.sync1_shift_ns).unwrap_or(0),
+        );
+        let assign_activate = match (self.assign_activate, &self.mode) {
+            (Some(activate), _) => activate,
+            (None, Some(_)) => mode.assign_activate,
+            // A clock that is asked for without further words gives SYNC0.
+            (None, None) => 0x0300,
+        };
+        Ok(ClockSettings {
+            assign_activate,
+            sync0_cycle,
+            sync0_shift_ns: self.sync0_shift_ns.unwrap_or(i64::from(mode.sync0_shift_ns)),
+            sync1_cycle: self.sync1_cycle_us.map_or(sync1_cycle, us),
+            reference: self.reference,
+        })
+    }
+}
+
+/// Watchdogs of a device: `watchdog = { … }`; what is not said stays as the device has it.
+#[derive(
+    Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(deny_unknown_fields)]
+pub struct WatchdogChoice {
+    /// Divider (0x0400) in units of 40 ns, less 2; 2498 makes steps of 100 µs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub divider: Option<u16>,
+    /// PDI watchdog (0x0410) in steps of the divider; 0 is off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pdi: Option<u16>,
+    /// Process data watchdog (0x0420) in steps of the divider; 0 is off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub process_data: Option<u16>,
+}
+
+impl WatchdogChoice {
+    pub(super) fn settings(self) -> WatchdogSettings {
+        let Self { divider, pdi, process_data } = self;
+        WatchdogSettings { divider, pdi, process_data }
+    }
+}
+
+/// Other entries for a PDO: `[[device.mapping]]`.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Mapping {
+    /// Index of the PDO.
+    pub pdo: u16,
+    /// What it consists of from now on, in order.
+    pub entries: Vec<super::DescribedEntry>,
+}
+
+/// A command at start-up: `[[device.start_up]]`, either for an object or for registers.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StartUpEntry {
+    /// When: `IP`, `PS`, `SO` and so on.
+    #[schemars(regex(pattern = "^[IPSOB]{2}$"))]
+    pub transition: String,
+    /// Index of the object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub index: Option<u16>,
+    /// Its subindex.
+    #[serde(default)]
+    pub subindex: u8,
+    /// The whole object in one transfer.
+    #[serde(default)]
+    pub complete_access: bool,
+    /// The first register, instead of an object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub register: Option<u16>,
+    /// What is written: bytes in the order on the wire, as hexadecimal digits, such as `"08 00"`.
+    pub data: String,
+    /// What it is for.
+    #[serde(default)]
+    pub comment: String,
+}

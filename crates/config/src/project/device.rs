@@ -1,0 +1,280 @@
+//! A SubDevice of a project: `[[device]]`.
+
+use std::fmt::Write as _;
+
+use linesman_proto::address::{DeviceId, StationAddress};
+use linesman_proto::port::Port;
+use linesman_proto::sii::Identity;
+use linesman_proto::state::AlState;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    ClockChoice, Description, Mapping, ProjectError, StartUpEntry, WatchdogChoice, inline, quoted,
+};
+use crate::attachment::Attachment;
+use crate::esi::value;
+use crate::identity::RevisionRule;
+use crate::plan::{AddressingChoice, OnWrongCounter, ProcessAccess};
+use crate::start_up::Transition;
+
+/// A SubDevice of a project.
+#[derive(Clone, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProjectDevice {
+    /// Unique name.
+    pub name: String,
+    /// Order designation, such as `EL2004`; for people.
+    #[serde(default, rename = "type")]
+    pub type_name: String,
+    /// Vendor; with `product_code`, what is compared.
+    #[serde(default)]
+    pub vendor_id: Option<u32>,
+    /// Product code.
+    #[serde(default)]
+    pub product_code: Option<u32>,
+    /// Revision number.
+    #[serde(default)]
+    pub revision: Option<u32>,
+    /// How the revision is compared.
+    #[serde(default)]
+    pub revision_rule: RevisionRule,
+    /// Serial number; not compared when absent.
+    #[serde(default)]
+    pub serial: Option<u32>,
+    /// Whose port it hangs on: `maindevice` or a device's name and port.
+    pub on: Attachment,
+    /// The port by which it is entered, `A` unless said.
+    #[serde(default = "port_a")]
+    #[schemars(regex(pattern = "^[A-D]$"))]
+    pub entry: String,
+    /// Station address; 0x1001 and up in order unless said.
+    #[serde(default)]
+    pub station: Option<u16>,
+    /// How far it is driven: `OP` unless said, `SAFEOP`, `PREOP`, `INIT` or `BOOT`.
+    #[serde(default)]
+    #[schemars(regex(pattern = "^(INIT|PREOP|SAFEOP|OP|BOOT)$"))]
+    pub state: Option<String>,
+    /// The task that exchanges its process data; the first unless said.
+    #[serde(default)]
+    pub task: Option<String>,
+    /// The sync unit within that task.
+    #[serde(default)]
+    pub sync_unit: Option<String>,
+    /// Commands for its process data; those of the network unless said.
+    #[serde(default)]
+    pub access: Option<ProcessAccess>,
+    /// Its frame may be sent twice in a cycle.
+    #[serde(default)]
+    pub frame_repeat: bool,
+    /// How it may be addressed.
+    #[serde(default)]
+    pub addressing: AddressingChoice,
+    /// What becomes of its inputs when a working counter is wrong; as in the network unless said.
+    #[serde(default)]
+    pub on_wrong_counter: Option<OnWrongCounter>,
+    /// Its watchdogs.
+    #[serde(default)]
+    pub watchdog: WatchdogChoice,
+    /// Its distributed clock; it runs free unless said.
+    #[serde(default)]
+    pub clock: Option<ClockChoice>,
+    /// PDOs to be assigned, by index, instead of those of its description.
+    #[serde(default)]
+    pub pdos: Option<Vec<u16>>,
+    /// Other entries for PDOs.
+    #[serde(default, rename = "mapping")]
+    pub mappings: Vec<Mapping>,
+    /// Commands at start-up, behind those of its description.
+    #[serde(default)]
+    pub start_up: Vec<StartUpEntry>,
+    /// Modules in its slots, from the first on: type, name or ident; empty for an empty slot.
+    #[serde(default)]
+    pub modules: Vec<String>,
+    /// What it is, where no description of its maker is at hand.
+    #[serde(default)]
+    pub description: Option<Description>,
+}
+
+fn port_a() -> String {
+    "A".to_owned()
+}
+
+impl ProjectDevice {
+    /// A device with this name at this place and nothing special.
+    #[must_use]
+    pub fn at(name: &str, on: Attachment) -> Self {
+        Self {
+            name: name.to_owned(),
+            type_name: String::new(),
+            vendor_id: None,
+            product_code: None,
+            revision: None,
+            revision_rule: RevisionRule::Equal,
+            serial: None,
+            on,
+            entry: port_a(),
+            station: None,
+            state: None,
+            task: None,
+            sync_unit: None,
+            access: None,
+            frame_repeat: false,
+            addressing: AddressingChoice::Auto,
+            on_wrong_counter: None,
+            watchdog: WatchdogChoice::default(),
+            clock: None,
+            pdos: None,
+            mappings: Vec::new(),
+            start_up: Vec::new(),
+            modules: Vec::new(),
+            description: None,
+        }
+    }
+
+    /// Who it must be; `None` when the project does not say.
+    #[must_use]
+    pub fn identity(&self) -> Option<Identity> {
+        Some(Identity {
+            vendor_id: self.vendor_id?,
+            product_code: self.product_code?,
+            revision: self.revision.unwrap_or(0),
+            serial_number: self.serial.unwrap_or(0),
+        })
+    }
+
+    /// How its revision is compared: not at all when none was given.
+    #[must_use]
+    pub const fn rule(&self) -> RevisionRule {
+        match self.revision {
+            Some(_) => self.revision_rule,
+            None => RevisionRule::Any,
+        }
+    }
+
+    /// The station address it is to have.
+    #[must_use]
+    pub fn station(&self, id: DeviceId) -> StationAddress {
+        StationAddress(self.station.unwrap_or(0x1000_u16.wrapping_add(id.no() as u16)))
+    }
+
+    pub(super) fn entry_port(&self) -> Result<Port, ProjectError> {
+        let mut letters = self.entry.chars();
+        match (letters.next().and_then(Port::from_letter), letters.next()) {
+            (Some(port), None) => Ok(port),
+            (Some(_) | None, _) => {
+                Err(ProjectError::NoPort { device: self.name.clone(), entry: self.entry.clone() })
+            }
+        }
+    }
+
+    pub(super) fn write(&self, text: &mut String) {
+        let mut line = |key: &str, value: String| {
+            let _ = writeln!(text, "{key} = {value}");
+        };
+        line("\n[[device]]\nname", quoted(&self.name));
+        line("type", quoted(&self.type_name));
+        let hex = |value: u32| format!("0x{value:08X}");
+        if let Some(vendor_id) = self.vendor_id {
+            line("vendor_id", hex(vendor_id));
+        }
+        if let Some(product_code) = self.product_code {
+            line("product_code", hex(product_code));
+        }
+        if let Some(revision) = self.revision {
+            line("revision", hex(revision));
+        }
+        if self.revision_rule != RevisionRule::Equal {
+            line(
+                "revision_rule",
+                toml::Value::try_from(self.revision_rule)
+                    .map_or_else(|_| quoted("equal"), |rule| rule.to_string()),
+            );
+        }
+        if let Some(serial) = self.serial {
+            line("serial", serial.to_string());
+        }
+        line("on", quoted(&self.on.to_string()));
+        if self.entry != "A" {
+            line("entry", quoted(&self.entry));
+        }
+        if let Some(station) = self.station {
+            line("station", format!("0x{station:04X}"));
+        }
+        let mut choice = |key: &str, value: Option<String>| {
+            if let Some(value) = value {
+                let _ = writeln!(text, "{key} = {value}");
+            }
+        };
+        choice("state", self.state.as_ref().map(inline));
+        choice("task", self.task.as_ref().map(inline));
+        choice("sync_unit", self.sync_unit.as_ref().map(inline));
+        choice("access", self.access.as_ref().map(inline));
+        choice("frame_repeat", self.frame_repeat.then(|| "true".to_owned()));
+        let addressing = &self.addressing;
+        choice("addressing", (*addressing != AddressingChoice::Auto).then(|| inline(addressing)));
+        choice("on_wrong_counter", self.on_wrong_counter.as_ref().map(inline));
+        let watchdog = &self.watchdog;
+        choice("watchdog", (*watchdog != WatchdogChoice::default()).then(|| inline(watchdog)));
+        choice("clock", self.clock.as_ref().map(inline));
+        choice("pdos", self.pdos.as_ref().map(inline));
+        choice("modules", (!self.modules.is_empty()).then(|| inline(&self.modules)));
+        for mapping in &self.mappings {
+            let _ = writeln!(text, "[[device.mapping]]\n{}", inline_lines(mapping));
+        }
+        for command in &self.start_up {
+            let _ = writeln!(text, "[[device.start_up]]\n{}", inline_lines(command));
+        }
+        if let Some(description) = &self.description {
+            let _ = writeln!(text, "[device.description]\n{}", inline_lines(description));
+        }
+    }
+}
+
+/// The keys of a table, each on one line with all that is in it.
+fn inline_lines<T: Serialize>(value: &T) -> String {
+    let Ok(toml::Value::Table(table)) = toml::Value::try_from(value) else { return String::new() };
+    let lines: Vec<String> = table.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+    lines.join("\n")
+}
+
+impl ProjectDevice {
+    /// Whether its values make sense by themselves.
+    pub(super) fn check(&self) -> Result<(), ProjectError> {
+        let wrong = |reason: String| {
+            Err(ProjectError::Value { whose: format!("device `{}`", self.name), reason })
+        };
+        if let Some(state) = &self.state
+            && self.target().is_none()
+        {
+            return wrong(format!("state `{state}`, expected INIT, PREOP, SAFEOP, OP or BOOT"));
+        }
+        for command in &self.start_up {
+            if Transition::from_letters(&command.transition).is_none() {
+                let given = &command.transition;
+                return wrong(format!(
+                    "start_up: transition `{given}`, expected two of the letters I, P, S, O, B"
+                ));
+            }
+            if command.index.is_some() == command.register.is_some() {
+                return wrong("start_up: expected either `index` or `register`".to_owned());
+            }
+            if let Err(reason) = value::bytes(&command.data) {
+                return wrong(format!("start_up: data: {reason}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// How far it is driven; `None` for a state that does not exist.
+    #[must_use]
+    pub fn target(&self) -> Option<AlState> {
+        match self.state.as_deref() {
+            None | Some("OP") => Some(AlState::Op),
+            Some("SAFEOP") => Some(AlState::SafeOp),
+            Some("PREOP") => Some(AlState::PreOp),
+            Some("INIT") => Some(AlState::Init),
+            Some("BOOT") => Some(AlState::Boot),
+            Some(_) => None,
+        }
+    }
+}

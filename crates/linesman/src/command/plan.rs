@@ -1,0 +1,79 @@
+//! `linesman plan`: what follows from a project or network configuration, before anything is switched
+//! on: frame table, load, E-bus budget, clock shifts, doubts.
+
+pub(crate) mod report;
+mod segment;
+mod table;
+
+use std::path::PathBuf;
+
+use linesman_config::eni;
+use linesman_config::plan::Severity;
+use linesman_runtime::plan_file::{PlanFile, PlanFileError};
+
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::files;
+use crate::output::Output;
+
+/// What can be asked.
+#[derive(clap::Args, Debug)]
+#[command(
+    after_help = "Exit status: 0 nothing is doubtful, 1 there is a warning or an error, 2 no plan can be \
+                  made of the file."
+)]
+pub(crate) struct Arguments {
+    /// A project (TOML) or a network configuration of another tool (ENI, XML)
+    #[arg(value_name = "PROJECT.toml|ENI.xml")]
+    file: PathBuf,
+    /// Every SubDevice too: addresses, process data, what it adds to working counters
+    #[arg(long, short)]
+    verbose: bool,
+    /// Write the plan as a network configuration (ENI) for the MainDevices of others
+    #[arg(long, value_name = "F.xml")]
+    export: Option<PathBuf>,
+    /// Write a virtual segment made of the plan, to run on it; its descriptions go beside it
+    #[arg(long, value_name = "SEGMENT.toml")]
+    segment: Option<PathBuf>,
+    /// JSON, schema linesman.plan/1
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Makes the plan and shows it.
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    for path in [&arguments.export, &arguments.segment].into_iter().flatten() {
+        files::refuse_to_overwrite(path)?;
+    }
+    let file = PlanFile::open(&arguments.file)?;
+    let doubts = file.plan.doubts();
+    if arguments.json {
+        output.json(&report::report(&file, &doubts));
+    } else {
+        output.text(&table::text(&file, &doubts, arguments.verbose, output));
+    }
+    if let Some(path) = &arguments.export {
+        let text = eni::write(&file.name, &file.plan);
+        files::write_new(path, "the network configuration", &text)?;
+        say(&format!("\nExported to {}.", path.display()), arguments.json, output);
+    }
+    if let Some(path) = &arguments.segment {
+        segment::write(path, &file)?;
+        let advice = format!("\nSegment in {}: try `linesman scan sim:{0}`.", path.display());
+        say(&advice, arguments.json, output);
+    }
+    let bad = doubts.iter().any(|doubt| doubt.severity >= Severity::Warning);
+    Ok(if bad { Status::Findings } else { Status::Good })
+}
+
+fn say(text: &str, json: bool, output: &mut Output) {
+    if !json {
+        output.line(text);
+    }
+}
+
+impl From<PlanFileError> for Failure {
+    fn from(error: PlanFileError) -> Self {
+        Self::from_error(&error)
+    }
+}

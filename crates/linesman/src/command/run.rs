@@ -1,0 +1,273 @@
+//! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
+
+mod told;
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+
+use linesman_config::eni::Eni;
+use linesman_config::plan::Plan;
+use linesman_config::project::Project;
+use linesman_diagnosis::Setup;
+use linesman_diagnosis::report::Verdict;
+use linesman_link::clock::HostClock;
+use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
+use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
+use linesman_runtime::run::{
+    self as running, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
+};
+use linesman_runtime::selector::Selector;
+use linesman_runtime::stop::Stop;
+use linesman_runtime::wiring::Wiring;
+
+use self::told::Teller;
+use super::driven;
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::files;
+use crate::output::Output;
+
+/// Longest ENI file that is read, in bytes.
+const MOST: u64 = 256 * 1024 * 1024;
+
+/// What can be asked.
+#[derive(clap::Args, Debug)]
+#[command(
+    after_help = "It drives every SubDevice to the target state, and at the end sets outputs to zero \
+                  and takes every SubDevice to the state of --leave. Ctrl-C ends it; a second one \
+                  ends it at once.\n\nWithout the rights for real time it runs all the same, as \
+                  steadily as this host lets it, and says so."
+)]
+pub(crate) struct Arguments {
+    /// The project (TOML), or a configuration of another tool (ENI); without one, what is there is run
+    /// as it is
+    #[arg(value_name = "PROJECT.toml|ENI.xml")]
+    file: Option<PathBuf>,
+    /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
+    #[arg(long, value_name = "WHERE")]
+    on: String,
+    /// End after so many seconds; else Ctrl-C ends it
+    #[arg(long, value_name = "N")]
+    seconds: Option<f64>,
+    /// The state that SubDevices are driven to: PREOP, SAFEOP or OP
+    #[arg(long, value_name = "STATE", default_value = "OP", value_parser = state)]
+    to: AlState,
+    /// The state in which they are left at the end
+    #[arg(long, value_name = "STATE", default_value = "INIT", value_parser = state)]
+    leave: AlState,
+    /// Cycle time in microseconds, instead of that of the project
+    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    cycle_us: Option<u64>,
+    /// Keep the cycle on this CPU
+    #[arg(long, value_name = "N")]
+    cpu: Option<usize>,
+    /// Real-time priority, 1 to 99; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
+    priority: u8,
+    /// Look again and again for so many microseconds before each cycle, instead of sleeping up to it
+    #[arg(long, value_name = "US", default_value_t = 0)]
+    spin_us: u64,
+    /// Another program is the application: it sees the process image in this file, such as
+    /// /dev/shm/machine
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
+    /// How many cycles in a row that program may give no outputs before they are withheld
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "image")]
+    misses: u32,
+    /// Do not judge the line meanwhile
+    #[arg(long)]
+    no_diagnosis: bool,
+    /// At the end one JSON object, schema linesman.run/1, and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn state(word: &str) -> Result<AlState, String> {
+    let known = [AlState::Init, AlState::PreOp, AlState::SafeOp, AlState::Op];
+    let same = |state: &&AlState| state.to_string().eq_ignore_ascii_case(word);
+    let found = known.iter().find(same).copied();
+    found.ok_or_else(|| "expected INIT, PREOP, SAFEOP or OP".to_owned())
+}
+
+/// Drives the line.
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    let selector: Selector = arguments.on.parse()?;
+    let lasts = lasts(arguments.seconds)?;
+    let source = match &arguments.file {
+        Some(path) => Source::read(path)?,
+        None => Source::AsFound,
+    };
+    let choices = Choices { target: arguments.to, cycle: arguments.cycle_us.map(Span::us) };
+    let title = match (&source, &arguments.file) {
+        (Source::Project(project), Some(path)) => {
+            format!("{} SubDevices of {}", project.devices.len(), path.display())
+        }
+        (Source::Eni(plan), Some(path)) => {
+            format!("{} SubDevices of {}", plan.devices.len(), path.display())
+        }
+        _ => "what is there".to_owned(),
+    };
+    let setup = (!arguments.no_diagnosis).then(|| Setup {
+        project: match &source {
+            Source::Project(project) => Some((**project).clone()),
+            Source::AsFound | Source::Eni(_) => None,
+        },
+        source: arguments.on.clone(),
+        ..Setup::default()
+    });
+    let options = RunOptions {
+        on: arguments.on.clone(),
+        leave: arguments.leave,
+        lasts,
+        real_time: None,
+        allowed_misses: arguments.image.is_some().then_some(arguments.misses),
+        diagnose: setup,
+    };
+    let wanted = match source {
+        Source::Project(project) => choices.project(*project),
+        Source::Eni(plan) => Wanted::Plan(plan),
+        Source::AsFound => choices.as_found(),
+    };
+    let application = arguments.image.clone();
+    let stop = driven::stop()?;
+    let said = format!(
+        "Drives {title} on {} to {}; Ctrl-C stops it: outputs to zero, all back to {}.",
+        arguments.on, arguments.to, arguments.leave
+    );
+    match &selector {
+        Selector::Cards(names) => {
+            driven::refuse(names)?;
+            let mut line = Cards::open(names, HostClock::start())?;
+            line.set_spin(Span::us(arguments.spin_us));
+            stop.rings(&line.bell()).map_err(no_bell)?;
+            let real_time = Some(RealTime {
+                priority: (arguments.priority > 0).then_some(arguments.priority),
+                cpu: arguments.cpu,
+                lock_memory: arguments.priority > 0,
+            });
+            let options =
+                with_source(options, real_time, HostClock::start().started_at().rfc3339());
+            drive(
+                line,
+                names.len() > 1,
+                wanted,
+                &options,
+                application,
+                &stop,
+                &said,
+                arguments.json,
+                output,
+            )
+        }
+        Selector::Segment(path) => {
+            let line = virtual_line(path, lasts.is_some())?;
+            stop.rings(&line.bell()).map_err(no_bell)?;
+            let ring = line.count() > 1;
+            drive(line, ring, wanted, &options, application, &stop, &said, arguments.json, output)
+        }
+        Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
+            let reason = format!("`{selector}`: nothing can be driven there");
+            Err(Failure::new(reason, "name a network card, `--on eth0`, or `--on sim:plant.toml`"))
+        }
+    }
+}
+
+/// What is to be run.
+enum Source {
+    AsFound,
+    Project(Box<Project>),
+    Eni(Box<Plan>),
+}
+
+impl Source {
+    fn read(path: &Path) -> Result<Self, Failure> {
+        let bytes = files::bytes(path, "a project or an ENI file", MOST)?;
+        if !Eni::is_one(&bytes) {
+            return Ok(Self::Project(Box::new(files::project(path)?)));
+        }
+        let eni = Eni::parse(&bytes).map_err(|error| files::in_file(path, &error))?;
+        Ok(Self::Eni(Box::new(eni.plan)))
+    }
+}
+
+fn no_bell(error: std::io::Error) -> Failure {
+    Failure::new(format!("listening for Ctrl-C: {error}"), "")
+}
+
+/// The diagnosis learns by which clock times are given.
+fn with_source(
+    mut options: RunOptions,
+    real_time: Option<RealTime>,
+    start: Option<String>,
+) -> RunOptions {
+    options.real_time = real_time;
+    if let Some(setup) = &mut options.diagnose {
+        setup.clock = "host, monotonic".to_owned();
+        setup.host_counters = true;
+        setup.start = start;
+    }
+    options
+}
+
+/// The segment of a file; without an end it goes no faster than the host's clock.
+fn virtual_line(path: &Path, ends: bool) -> Result<VirtualLine, Failure> {
+    let ring = files::segment_file(path)?.ring.is_some();
+    let plant = files::Plant::open(path)?;
+    let wiring = Wiring::of(&plant.segment, &plant.project);
+    let pace = if ends { Pace::Free } else { Pace::Host };
+    VirtualLine::new(plant.segment, wiring, ring, pace).map_err(no_bell)
+}
+
+fn lasts(seconds: Option<f64>) -> Result<Option<Span>, Failure> {
+    let until = super::sim::until(seconds)?;
+    Ok(seconds.map(|_| until.since(linesman_proto::time::Instant::ZERO)))
+}
+
+/// Runs the line in a thread of its own, and tells what happens meanwhile.
+#[allow(clippy::too_many_arguments, reason = "called twice, from above")]
+fn drive<L: Line + Send>(
+    line: L,
+    ring: bool,
+    wanted: Wanted,
+    options: &RunOptions,
+    image: Option<PathBuf>,
+    stop: &Stop,
+    said: &str,
+    json: bool,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    let mut teller = Teller::new(json);
+    teller.line(said, output);
+    let (notes, told) = mpsc::channel();
+    let ended = std::thread::scope(|scope| {
+        let work = move || match image {
+            None => running::run(line, ring, wanted, Idle, options, stop, notes),
+            Some(path) => running::run(line, ring, wanted, Shared::at(path), options, stop, notes),
+        };
+        let thread = scope.spawn(work);
+        for note in told {
+            teller.note(&note, output);
+        }
+        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    });
+    let Ended { report, diagnosis, error } = ended.map_err(|error| failure(&error, &options.on))?;
+    if json {
+        output.json(&report);
+    } else {
+        output.text(&told::summary(&report));
+    }
+    if let Some(error) = error {
+        return Err(failure(&error, &options.on));
+    }
+    let faulty = diagnosis.is_some_and(|diagnosis| diagnosis.verdict == Verdict::Faulty);
+    Ok(if faulty || report.reached_ns.is_none() { Status::Findings } else { Status::Good })
+}
+
+fn failure(error: &running::RunError, on: &str) -> Failure {
+    let mut failure = driven::nobody(error);
+    if !failure.reason.starts_with(on) {
+        failure.reason = format!("{on}: {}", failure.reason);
+    }
+    failure
+}

@@ -1,0 +1,136 @@
+//! A line on real cards: listen first, scan, then serve.
+
+use std::collections::VecDeque;
+
+use linesman_config::inventory::Inventory;
+use linesman_diagnosis::{FrameSeen, HostObservation};
+use linesman_link::clock::HostClock;
+use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
+use linesman_maindevice::{Event, MainDevice};
+use linesman_proto::address::DeviceId;
+use linesman_proto::time::{Instant, Span};
+use linesman_runtime::drive::{Audience, Driver};
+use linesman_runtime::stop::Stop;
+
+use super::known::{self, Known};
+use super::{Line, NotDone};
+use crate::command::driven;
+use crate::failure::Failure;
+
+/// A scan of a thousand SubDevices takes a few seconds.
+const SCAN_PATIENCE: Span = Span::s(60);
+/// Every step of a service has a limit of its own; a large file takes many of them.
+const SERVICE_PATIENCE: Span = Span::s(24 * 3_600);
+
+/// A line on cards.
+pub(super) struct Cards {
+    driver: Driver,
+    stop: Stop,
+    asking: Asking,
+    name: String,
+}
+
+/// Opens and scans the line.
+pub(super) fn open(names: &[String]) -> Result<(Cards, Vec<Known>), Failure> {
+    driven::refuse(names)?;
+    let stop = driven::stop()?;
+    let driver = Driver::open(names, HostClock::start())?;
+    let mut cards = Cards { driver, stop, asking: Asking::default(), name: names.join("+") };
+    cards.asking.order = Some(Order::Scan);
+    cards.run(SCAN_PATIENCE)?;
+    let inventory = match cards.asking.scanned.take() {
+        Some(Ok(inventory)) => inventory,
+        Some(Err(failure)) => {
+            let reason = format!("{}: {}", cards.name, failure.reason);
+            return Err(Failure { reason, ..failure });
+        }
+        None => return Err(cards.interrupted()),
+    };
+    cards.asking.order = Some(Order::Attend(Box::new(super::plan(&inventory))));
+    Ok((cards, known::all(&inventory, &[])))
+}
+
+impl Cards {
+    fn run(&mut self, patience: Span) -> Result<(), Failure> {
+        let until = self.driver.clock().now() + patience;
+        self.asking.done = false;
+        self.driver.run(until, &self.stop, &mut self.asking)?;
+        Ok(())
+    }
+
+    fn interrupted(&self) -> Failure {
+        let reason = format!("{}: the command was ended before it was done", self.name);
+        Failure::new(reason, "look at the SubDevice's state, then repeat the command")
+    }
+}
+
+impl Line for Cards {
+    fn ask(
+        &mut self,
+        id: DeviceId,
+        service: Service,
+    ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
+        self.asking.service = Some((id, service));
+        self.run(SERVICE_PATIENCE)?;
+        let served = self.asking.served.take().ok_or_else(|| self.interrupted())?;
+        Ok(served.map_err(|failure| NotDone::from(&failure)))
+    }
+
+    fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
+        self.asking.emergencies.drain(..).collect()
+    }
+}
+
+enum Order {
+    Scan,
+    Attend(Box<linesman_config::plan::Plan>),
+}
+
+/// Gives one command at a time and waits for its end.
+#[derive(Default)]
+struct Asking {
+    order: Option<Order>,
+    service: Option<(DeviceId, Service)>,
+    ticket: Option<ServiceTicket>,
+    done: bool,
+    scanned: Option<Result<Inventory, Failure>>,
+    served: Option<Result<ServiceAnswer, ServiceFailure>>,
+    emergencies: VecDeque<(DeviceId, String)>,
+}
+
+impl Audience for Asking {
+    fn frame(&mut self, _: &FrameSeen<'_>) {}
+
+    fn host(&mut self, _: &HostObservation) {}
+
+    fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
+        if let Event::Scanned(inventory) = event {
+            (self.scanned, self.done) = (Some(Ok(*inventory)), true);
+        } else if let Event::ScanFailed(error) = event {
+            (self.scanned, self.done) = (Some(Err(driven::nobody(&error))), true);
+        } else if let Event::Emergency { id, emergency } = event {
+            self.emergencies.push_back((id, emergency.to_string()));
+        } else if let Event::Served { ticket, result, .. } = event
+            && self.ticket == Some(ticket)
+        {
+            (self.served, self.done) = (Some(*result), true);
+        }
+    }
+
+    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
+        match self.order.take() {
+            // It looks, with nothing but reads, before it writes.
+            Some(Order::Scan) => main.scan(now),
+            Some(Order::Attend(plan)) => main.attend(now, *plan),
+            None => {}
+        }
+        if let Some((id, service)) = self.service.take() {
+            self.ticket = Some(main.serve(now, id, service));
+        }
+        !self.done
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
+}

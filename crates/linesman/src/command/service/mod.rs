@@ -1,0 +1,242 @@
+//! What the commands for single SubDevices share: a line that is served without being driven.
+
+mod address;
+mod cards;
+mod known;
+mod mailbox;
+mod refusal;
+mod segment;
+
+use linesman_config::inventory::{FoundDevice, Inventory};
+use linesman_config::plan::{DevicePlan, Plan, PlanOptions};
+use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer, ServiceFailure};
+use linesman_proto::address::DeviceId;
+use linesman_proto::state::AlState;
+use linesman_runtime::selector::Selector;
+use serde::Serialize;
+
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::output::Output;
+
+pub(crate) use known::Known;
+pub(crate) use refusal::{Refusal, Report as RefusalReport};
+
+/// Where the line is, and whom the service is for.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Place {
+    /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
+    #[arg(value_name = "WHERE")]
+    pub(crate) line: String,
+    /// The SubDevice: its number (3), station address (0x1003), alias (alias:7), or name
+    #[arg(value_name = "DEVICE")]
+    pub(crate) device: String,
+}
+
+/// A line whose SubDevices can be asked.
+pub(crate) trait Line {
+    /// Does one service, to its end.
+    fn ask(
+        &mut self,
+        id: DeviceId,
+        service: Service,
+    ) -> Result<Result<ServiceAnswer, NotDone>, Failure>;
+    /// Emergencies that SubDevices sent meanwhile, in words.
+    fn take_emergencies(&mut self) -> Vec<(DeviceId, String)>;
+}
+
+/// A service that was not done.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct NotDone {
+    /// Why, with what to do.
+    told: Failure,
+    /// The SubDevice's own code, if it has said no itself.
+    refusal: Option<(RefusalKind, u32)>,
+}
+
+impl From<&ServiceFailure> for NotDone {
+    fn from(failure: &ServiceFailure) -> Self {
+        Self { told: Failure::from_error(failure), refusal: failure.refusal() }
+    }
+}
+
+/// A line that is served.
+pub(crate) struct Session {
+    line: Box<dyn Line>,
+    devices: Vec<Known>,
+    place: String,
+    kind: Kind,
+}
+
+/// What becomes of a line when the command ends.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    /// It stays as it is.
+    Cards,
+    /// A virtual segment of a file begins anew with each command.
+    Passing,
+}
+
+/// A SubDevice in a report.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DeviceReport {
+    /// Its number, from 1.
+    pub(crate) no: u32,
+    /// Its station address.
+    pub(crate) station: u16,
+    /// What people call it; `null` without a project or segment file.
+    pub(crate) name: Option<String>,
+    /// Its order designation, as its SII says.
+    pub(crate) r#type: String,
+}
+
+/// Why there is no answer.
+#[derive(Debug)]
+pub(crate) enum Trouble {
+    /// The SubDevice says no: exit status 1.
+    Refused(Box<Refusal>),
+    /// Nothing could be done: exit status 2.
+    Failed(Failure),
+}
+
+impl Trouble {
+    /// Why, in words.
+    pub(crate) fn reason(&self) -> &str {
+        match self {
+            Self::Refused(refusal) => &refusal.failure.reason,
+            Self::Failed(failure) => &failure.reason,
+        }
+    }
+}
+
+impl From<Failure> for Trouble {
+    fn from(failure: Failure) -> Self {
+        Self::Failed(failure)
+    }
+}
+
+impl Session {
+    /// Scans the line and begins to serve it.
+    pub(crate) fn open(place: &str) -> Result<Self, Failure> {
+        let selector: Selector = place.parse()?;
+        let (line, devices, kind): (Box<dyn Line>, _, _) = match &selector {
+            Selector::Cards(names) => {
+                let (line, devices) = cards::open(names)?;
+                (Box::new(line), devices, Kind::Cards)
+            }
+            Selector::Segment(path) => {
+                let (line, devices) = segment::open(path)?;
+                (Box::new(line), devices, Kind::Passing)
+            }
+            Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
+                let reason =
+                    format!("`{selector}`: a service sends frames, and nobody answers there");
+                return Err(Failure::new(reason, "name a network card, or sim:plant.toml"));
+            }
+        };
+        Ok(Self { line, devices, place: place.to_owned(), kind })
+    }
+
+    /// Whether what is written is gone when the command ends.
+    pub(crate) fn is_passing(&self) -> bool {
+        self.kind == Kind::Passing
+    }
+
+    /// All SubDevices.
+    pub(crate) fn devices(&self) -> &[Known] {
+        &self.devices
+    }
+
+    /// The SubDevice that a word means.
+    pub(crate) fn device(&self, word: &str) -> Result<DeviceId, Failure> {
+        address::find(&self.devices, &self.place, word)
+    }
+
+    /// What is known of a SubDevice.
+    pub(crate) fn known(&self, id: DeviceId) -> Option<&Known> {
+        self.devices.iter().find(|known| known.id == id)
+    }
+
+    /// `3 (EL3204)`, or `3 (B3)` where it has a name.
+    pub(crate) fn label(&self, id: DeviceId) -> String {
+        self.known(id).map_or_else(|| id.no().to_string(), Known::label)
+    }
+
+    /// A SubDevice for a report.
+    pub(crate) fn report(&self, id: DeviceId) -> DeviceReport {
+        let nobody = || DeviceReport { no: id.no(), station: 0, name: None, r#type: String::new() };
+        self.known(id).map_or_else(nobody, Known::report)
+    }
+
+    /// Does one service.
+    pub(crate) fn ask(&mut self, id: DeviceId, service: Service) -> Result<ServiceAnswer, Trouble> {
+        match self.line.ask(id, service)? {
+            Ok(answer) => Ok(answer),
+            Err(NotDone { told, refusal: Some(refusal) }) => {
+                let (device, label) = (self.report(id), self.label(id));
+                Err(Trouble::Refused(Box::new(Refusal::new(device, &label, refusal, told))))
+            }
+            Err(NotDone { told, refusal: None }) => {
+                let reason = refusal::named(id, &self.label(id), &told.reason);
+                let reason = format!("{}: {reason}", self.place);
+                Err(Trouble::Failed(Failure { reason, ..told }))
+            }
+        }
+    }
+
+    /// Does a service that gives bytes.
+    pub(crate) fn bytes(&mut self, id: DeviceId, service: Service) -> Result<Vec<u8>, Trouble> {
+        match self.ask(id, service)? {
+            ServiceAnswer::Data(data) => Ok(data),
+            ServiceAnswer::Done | ServiceAnswer::State { .. } | ServiceAnswer::Written { .. } => {
+                Ok(Vec::new())
+            }
+        }
+    }
+
+    /// Emergencies that came meanwhile, in words.
+    pub(crate) fn emergencies(&mut self) -> Vec<String> {
+        let all = self.line.take_emergencies();
+        all.into_iter().map(|(id, text)| format!("{}: {text}", self.label(id))).collect()
+    }
+}
+
+/// What the SubDevices of an inventory are served by: their plans, each to stay where it is.
+fn plan(inventory: &Inventory) -> Plan {
+    let planned = inventory.planned(AlState::Op);
+    let tree = inventory.tree().clone();
+    match Plan::build(&planned, tree.clone(), &PlanOptions::default()) {
+        Ok(plan) => plan,
+        // A line that cannot exchange process data can be served all the same.
+        Err(_) => {
+            let device = |found: &FoundDevice| DevicePlan {
+                name: found.label(),
+                station: found.station,
+                mailbox: found.profile.mailbox,
+                device_emulation: found.profile.device_emulation,
+                ..DevicePlan::bare(found.id)
+            };
+            Plan { devices: inventory.devices.iter().map(device).collect(), ..Plan::empty(tree) }
+        }
+    }
+}
+
+/// How a command ends: a refusal of the SubDevice is an answer, everything else is none.
+pub(crate) fn end(
+    outcome: Result<(), Trouble>,
+    json: bool,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    match outcome {
+        Ok(()) => Ok(Status::Good),
+        Err(Trouble::Failed(failure)) => Err(failure),
+        Err(Trouble::Refused(refusal)) => {
+            if json {
+                output.json(&refusal.report);
+            }
+            output.complain(&refusal.failure);
+            Ok(Status::Findings)
+        }
+    }
+}

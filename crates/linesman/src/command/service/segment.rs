@@ -1,0 +1,128 @@
+//! A virtual segment, served in virtual time.
+
+use std::path::{Path, PathBuf};
+
+use linesman_config::inventory::Inventory;
+use linesman_lab::lab::Lab;
+use linesman_lab::options::{Begin, LabOptions};
+use linesman_maindevice::Event;
+use linesman_maindevice::service::{Service, ServiceAnswer};
+use linesman_proto::address::DeviceId;
+use linesman_proto::time::Span;
+
+use super::known::{self, Known};
+use super::{Line, NotDone};
+use crate::command::driven;
+use crate::failure::Failure;
+use crate::files;
+
+/// Virtual seconds cost little.
+const SCAN_PATIENCE: Span = Span::s(60);
+/// Every step of a service has a limit of its own.
+const SERVICE_PATIENCE: Span = Span::s(3_600);
+/// Between two looks whether it is done.
+const STEP: Span = Span::ms(1);
+
+/// A virtual segment.
+pub(super) struct Virtual {
+    lab: Lab,
+    path: PathBuf,
+    /// Events up to here have been looked through.
+    seen: usize,
+    told: usize,
+}
+
+/// Builds and scans the segment.
+pub(super) fn open(path: &Path) -> Result<(Virtual, Vec<Known>), Failure> {
+    let file = files::segment_file(path)?;
+    let options = LabOptions { begin: Begin::Idle, ..LabOptions::default() };
+    let lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
+    let mut segment = Virtual { lab, path: path.to_owned(), seen: 0, told: 0 };
+    let now = segment.lab.now();
+    segment.lab.main_mut().scan(now);
+    let scanned = segment.until(SCAN_PATIENCE, |event| {
+        if let Event::Scanned(inventory) = event {
+            Some(Ok((**inventory).clone()))
+        } else if let Event::ScanFailed(error) = event {
+            Some(Err(driven::nobody(error)))
+        } else {
+            None
+        }
+    })?;
+    let inventory = scanned?;
+    let now = segment.lab.now();
+    segment.lab.main_mut().attend(now, super::plan(&inventory));
+    let names = names(&segment.lab, &inventory);
+    Ok((segment, known::all(&inventory, &names)))
+}
+
+/// The names of the file, if the line is as the file says: else they would be those of others.
+fn names(lab: &Lab, inventory: &Inventory) -> Vec<String> {
+    let devices = &lab.project().devices;
+    if devices.len() != inventory.devices.len() {
+        return Vec::new();
+    }
+    devices.iter().map(|device| device.name.clone()).collect()
+}
+
+impl Virtual {
+    /// Lets time pass until an event gives what is looked for.
+    fn until<T>(
+        &mut self,
+        patience: Span,
+        pick: impl Fn(&Event) -> Option<T>,
+    ) -> Result<T, Failure> {
+        let seen = self.seen;
+        let ended =
+            |lab: &Lab| lab.events().iter().skip(seen).any(|(_, event)| pick(event).is_some());
+        let run = self.lab.run_while(patience, STEP, ended);
+        run.map_err(|error| files::in_file(&self.path, &error))?;
+        let found = self.lab.events().iter().enumerate().skip(seen);
+        let found =
+            found.filter_map(|(at, (_, event))| pick(event).map(|found| (at, found))).next();
+        match found {
+            Some((at, found)) => {
+                self.seen = at + 1;
+                Ok(found)
+            }
+            None => {
+                let path = self.path.display();
+                let reason = format!("{path}: not done after {patience} of virtual time");
+                let advice = "this is a fault of the program, please report it with the file";
+                Err(Failure::new(reason, advice))
+            }
+        }
+    }
+}
+
+impl Line for Virtual {
+    fn ask(
+        &mut self,
+        id: DeviceId,
+        service: Service,
+    ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
+        let now = self.lab.now();
+        let wanted = self.lab.main_mut().serve(now, id, service);
+        self.until(SERVICE_PATIENCE, |event| {
+            if let Event::Served { ticket, result, .. } = event
+                && *ticket == wanted
+            {
+                Some((**result).clone().map_err(|failure| NotDone::from(&failure)))
+            } else {
+                None
+            }
+        })
+    }
+
+    fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
+        let new = self.lab.events().iter().skip(self.told);
+        let told = new
+            .filter_map(|(_, event)| {
+                let Event::Emergency { id, emergency } = event else { return None };
+                Some((*id, emergency.to_string()))
+            })
+            .collect();
+        self.told = self.lab.events().len();
+        told
+    }
+}

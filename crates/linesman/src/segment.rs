@@ -1,0 +1,215 @@
+//! A line that is opened: scanned, planned, run.
+
+use std::path::Path;
+use std::sync::mpsc;
+
+use linesman_config::eni::Eni;
+use linesman_config::inventory::Inventory;
+use linesman_config::project::Project;
+use linesman_link::clock::HostClock;
+use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
+use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
+use linesman_runtime::listen::is_driven;
+use linesman_runtime::run::report::RunReport;
+use linesman_runtime::run::{
+    self as running, Application, Choices, MakePlan, RealTime, RunOptions, Wanted,
+};
+use linesman_runtime::selector::Selector;
+use linesman_runtime::stop::Stop;
+use linesman_runtime::wiring::Wiring;
+use linesman_sim::segment::Segment as VirtualSegment;
+use linesman_sim::segment_file::SegmentFile;
+
+use crate::{Error, Io, Next, Plan, Scan};
+
+/// Opens a line: `eth0`, `eth0+eth1` (a ring) or `sim:line.toml` (a virtual segment, in virtual time
+/// that goes as fast as the work is done). Nothing is sent yet.
+///
+/// # Errors
+/// When there is no such card or file, the right is missing, or another MainDevice drives the line.
+pub fn open(place: &str) -> Result<Segment, Error> {
+    let (line, ring) = match place.parse()? {
+        Selector::Cards(names) => {
+            if is_driven(&names)?.is_some() {
+                return Err(Error::Driven { card: names.join("+") });
+            }
+            (Where::Cards(Cards::open(&names, HostClock::start())?), names.len() > 1)
+        }
+        Selector::Segment(path) => virtual_line(&path)?,
+        Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
+            return Err(Error::NotDrivable { given: place.to_owned() });
+        }
+    };
+    Ok(Segment { line, ring, place: place.to_owned(), stop: Stop::default() })
+}
+
+fn virtual_line(path: &Path) -> Result<(Where, bool), Error> {
+    let refuse = |why: String| Error::File { path: path.to_owned(), why };
+    let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
+    let file = SegmentFile::parse(&text).map_err(|error| refuse(error.to_string()))?;
+    let project = file.project().map_err(|error| refuse(error.to_string()))?;
+    let segment = VirtualSegment::build(&file).map_err(|error| refuse(error.to_string()))?;
+    let ring = file.ring.is_some();
+    let wiring = Wiring::of(&segment, &project);
+    let line = VirtualLine::new(segment, wiring, ring, Pace::Free)
+        .map_err(|source| Error::System { doing: "making a virtual line", source })?;
+    Ok((Where::Virtual(Box::new(line)), ring))
+}
+
+enum Where {
+    Cards(Cards),
+    Virtual(Box<VirtualLine>),
+}
+
+impl Where {
+    fn line(&mut self) -> &mut dyn Line {
+        match self {
+            Self::Cards(cards) => cards,
+            Self::Virtual(line) => &mut **line,
+        }
+    }
+}
+
+/// A line.
+pub struct Segment {
+    line: Where,
+    ring: bool,
+    place: String,
+    stop: Stop,
+}
+
+/// How often, and how.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Cycle {
+    time: Span,
+    misses: u32,
+    real_time: RealTime,
+    leave: AlState,
+}
+
+impl Cycle {
+    /// A cycle of so many microseconds.
+    #[must_use]
+    pub fn us(micros: u64) -> Self {
+        let time = Span::us(micros.max(1));
+        Self { time, misses: 2, real_time: RealTime::default(), leave: AlState::Init }
+    }
+
+    /// How many cycles in a row the application may be late before its outputs are withheld.
+    #[must_use]
+    pub const fn allow_misses(mut self, misses: u32) -> Self {
+        self.misses = misses;
+        self
+    }
+
+    /// Keeps the cycle on this CPU, counted from 0.
+    #[must_use]
+    pub const fn on_cpu(mut self, cpu: usize) -> Self {
+        self.real_time.cpu = Some(cpu);
+        self
+    }
+
+    /// Real-time priority, 1 to 99; `None` for none. It is 80 unless said, and where the right is
+    /// missing the line runs without: the report says so.
+    #[must_use]
+    pub const fn priority(mut self, priority: Option<u8>) -> Self {
+        self.real_time.priority = priority;
+        self
+    }
+
+    /// The state in which SubDevices are left at the end, INIT unless said.
+    #[must_use]
+    pub const fn leave_in(mut self, state: AlState) -> Self {
+        self.leave = state;
+        self
+    }
+}
+
+impl Segment {
+    /// Finds out what is there. SubDevices get station addresses, and keep their states.
+    ///
+    /// # Errors
+    /// When nobody answers.
+    pub fn scan(&mut self) -> Result<Scan, Error> {
+        let inventory = running::scan(self.line.line(), self.ring, &self.stop)?;
+        Ok(Scan { inventory })
+    }
+
+    /// The plan of a project (TOML), if what it says is there; or of an ENI file.
+    ///
+    /// # Errors
+    /// When the file is wrong, or another SubDevice is there than it says.
+    pub fn load(&mut self, path: impl AsRef<Path>) -> Result<Plan, Error> {
+        let path = path.as_ref();
+        let refuse = |why: String| Error::File { path: path.to_owned(), why };
+        let bytes = std::fs::read(path).map_err(|error| refuse(error.to_string()))?;
+        if Eni::is_one(&bytes) {
+            return Plan::load(path);
+        }
+        let text = String::from_utf8(bytes).map_err(|_| refuse("no text in UTF-8".to_owned()))?;
+        let project = Project::parse(&text).map_err(|error| refuse(error.to_string()))?;
+        let Wanted::Found(make) = Choices::default().project(project) else {
+            return Err(refuse("it makes no plan".to_owned()));
+        };
+        let inventory: Inventory = running::scan(self.line.line(), self.ring, &self.stop)?;
+        let make: MakePlan = make;
+        Ok(make(&inventory).map_err(refuse)?.into())
+    }
+
+    /// Brings the line up and calls `application` once a cycle, until it stops, or somebody calls
+    /// [`stop`](Self::stopper); then stops the line. Cycles begin before all SubDevices are up:
+    /// [`Io::is_settled`](crate::Io::is_settled) tells.
+    ///
+    /// # Errors
+    /// When the line cannot be run, or its interface fails.
+    pub fn run(
+        &mut self,
+        plan: Plan,
+        cycle: Cycle,
+        application: impl FnMut(&mut Io<'_>) -> Next,
+    ) -> Result<RunReport, Error> {
+        self.run_application(plan, cycle, application)
+    }
+
+    /// The same for an application that is more than a closure.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn run_application(
+        &mut self,
+        plan: Plan,
+        cycle: Cycle,
+        application: impl Application,
+    ) -> Result<RunReport, Error> {
+        let mut plan = plan.plan;
+        // The first task is the application's; an imported one keeps the times of its others.
+        if let Some(task) = plan.tasks.first_mut() {
+            task.cycle = cycle.time;
+        }
+        let options = RunOptions {
+            on: self.place.clone(),
+            leave: cycle.leave,
+            lasts: None,
+            real_time: matches!(self.line, Where::Cards(_)).then_some(cycle.real_time),
+            allowed_misses: Some(cycle.misses),
+            diagnose: None,
+        };
+        // Nobody listens to notes here; they go nowhere.
+        let (notes, _) = mpsc::channel();
+        let wanted = Wanted::Plan(Box::new(plan));
+        let line = self.line.line();
+        let ended =
+            running::run(line, self.ring, wanted, application, &options, &self.stop, notes)?;
+        match ended.error {
+            Some(error) => Err(error.into()),
+            None => Ok(ended.report),
+        }
+    }
+
+    /// Something to stop a run with, from another thread or a signal handler.
+    #[must_use]
+    pub fn stopper(&self) -> Stop {
+        self.stop.clone()
+    }
+}

@@ -1,0 +1,78 @@
+//! Doing a service.
+
+use std::sync::{Arc, Mutex};
+
+use linesman_config::plan::{DevicePlan, Plan};
+use linesman_proto::address::DeviceId;
+
+use super::failure::ServiceFailure;
+use super::{Service, ServiceAnswer, state};
+use crate::exchange::Target;
+use crate::executor::Wire;
+use crate::mailbox::Queues;
+use crate::procedure;
+use crate::supervisor::Line;
+
+/// Whoever does services.
+#[derive(Clone)]
+pub(crate) struct Servant {
+    pub(crate) wire: Wire,
+    pub(crate) plan: Arc<Plan>,
+    pub(crate) line: Arc<Mutex<Line>>,
+    pub(crate) mailboxes: Queues,
+    /// A plan runs: SubDevices are kept where they shall be, and what is known of them is known to
+    /// those who do so.
+    pub(crate) driven: bool,
+    pub(crate) options: Arc<crate::options::Options>,
+}
+
+/// Does a service for a SubDevice.
+pub(crate) async fn perform(
+    servant: &Servant,
+    id: DeviceId,
+    service: Service,
+) -> Result<ServiceAnswer, ServiceFailure> {
+    let Some(device) = servant.plan.device(id) else {
+        return Err(ServiceFailure::Unknown { id });
+    };
+    let (wire, target) = (&servant.wire, Target::Station(device.station));
+    match service {
+        Service::Mailbox(request) => {
+            state::learn(servant, device).await;
+            Ok(ServiceAnswer::Data(servant.mailboxes.ask(id, request).await?))
+        }
+        Service::State => state::look(servant, device).await,
+        Service::Enter(to) => state::enter(servant, device, to).await,
+        Service::Acknowledge => state::acknowledge(servant, device).await,
+        Service::ReadRegister { address, len } => {
+            let reply = wire.read_one(target, address, len).await;
+            reply.map(|reply| ServiceAnswer::Data(reply.data)).map_err(|error| register(id, error))
+        }
+        Service::WriteRegister { address, data } => {
+            let reply = wire.write_one(target, address, &data).await;
+            reply.map(|_| ServiceAnswer::Done).map_err(|error| register(id, error))
+        }
+        Service::ReadSii { whole } => {
+            let bytes = procedure::sii::read_bytes(wire, target, whole).await;
+            bytes.map(ServiceAnswer::Data).map_err(|error| ServiceFailure::Sii { id, error })
+        }
+        Service::WriteSii { at, data } => write_sii(wire, device, at, &data).await,
+    }
+}
+
+fn register(id: DeviceId, error: crate::exchange::ExchangeError) -> ServiceFailure {
+    ServiceFailure::Register { id, error }
+}
+
+async fn write_sii(
+    wire: &Wire,
+    device: &DevicePlan,
+    at: linesman_proto::sii::WordAddress,
+    data: &[u8],
+) -> Result<ServiceAnswer, ServiceFailure> {
+    let target = Target::Station(device.station);
+    match procedure::sii_write::write(wire, target, at, data).await {
+        Ok(words) => Ok(ServiceAnswer::Written { words }),
+        Err(error) => Err(ServiceFailure::Sii { id: device.id, error }),
+    }
+}

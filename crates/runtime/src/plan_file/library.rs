@@ -1,0 +1,156 @@
+//! A folder of device descriptions (ESI): indexed by a look at the headers of its files, read when a
+//! device of a file is asked for.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use linesman_config::esi::Esi;
+use linesman_config::esi::header::{EsiHeader, headers};
+use linesman_config::project::{Described, ProjectDevice};
+
+/// Longest description that is read, in bytes; the largest of vendors have 50 MB.
+const MAX_LEN: u64 = 128 * 1024 * 1024;
+/// How deep folders may lie in folders.
+const DEPTH: usize = 4;
+
+/// Device descriptions.
+#[derive(Default, Debug)]
+pub struct Library {
+    files: Vec<PathBuf>,
+    /// Headers with the file they are in.
+    index: Vec<(EsiHeader, usize)>,
+    read: BTreeMap<usize, Esi>,
+    notes: Vec<String>,
+}
+
+impl Library {
+    /// Indexes a folder with its folders, or a file.
+    ///
+    /// # Errors
+    /// What cannot be read. A file that is no device description is passed over.
+    pub fn add(&mut self, place: &Path) -> std::io::Result<()> {
+        let mut files = Vec::new();
+        collect(place, DEPTH, &mut files)?;
+        files.sort();
+        for path in files {
+            let bytes = std::fs::read(&path)?;
+            let at = self.files.len();
+            self.index.extend(headers(&bytes).into_iter().map(|header| (header, at)));
+            self.files.push(path);
+        }
+        Ok(())
+    }
+
+    /// How many devices it knows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.index.len()
+    }
+
+    /// Whether it knows none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.index.is_empty()
+    }
+
+    /// What was odd since the last time.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// What is known of a device of a project; nothing when no description fits.
+    ///
+    /// # Errors
+    /// Why a description cannot be used, in words.
+    pub fn find(&mut self, device: &ProjectDevice) -> Result<Option<Described>, String> {
+        let Some((header, file)) = self.header(device) else {
+            if self.index.is_empty() {
+                return Ok(None);
+            }
+            let product = device.product_code.map(|code| format!(", product 0x{code:08X}"));
+            return Err(format!(
+                "none of {} device descriptions is of type `{}`{}. Do: put the description of its maker into \
+                 the folder, or write [device.description]",
+                self.index.len(),
+                device.type_name,
+                product.unwrap_or_default()
+            ));
+        };
+        let header = header.clone();
+        if let Some(wanted) = device.revision.filter(|wanted| *wanted != header.revision) {
+            self.notes.push(format!(
+                "{}: no description of revision 0x{wanted:08X}, that of 0x{:08X} is taken",
+                device.name, header.revision
+            ));
+        }
+        let esi = self.esi(file)?;
+        let found = esi.usable().find(|one| {
+            (one.product_code, one.revision) == (header.product_code, header.revision)
+                && one.type_name == header.type_name
+        });
+        match found {
+            Some(found) => Described::from_esi(esi, found, device).map(Some),
+            None => {
+                let broken = esi.devices.iter().filter_map(|one| one.as_ref().err());
+                let reasons: Vec<_> = broken.take(1).map(ToString::to_string).collect();
+                let path = self.files[file].display();
+                Err(format!("{path}: its description cannot be used: {}", reasons.join("")))
+            }
+        }
+    }
+
+    /// The header that fits best: the same product, or else the same type; of these the same revision,
+    /// else the newest before it, else the newest.
+    fn header(&self, device: &ProjectDevice) -> Option<(&EsiHeader, usize)> {
+        let fits = |header: &EsiHeader| {
+            let vendor = device.vendor_id.is_none_or(|vendor| vendor == header.vendor_id);
+            let same = match device.product_code {
+                Some(code) => code == header.product_code,
+                None => header.type_name.eq_ignore_ascii_case(&device.type_name),
+            };
+            vendor && same
+        };
+        let rank = |header: &EsiHeader| match device.revision {
+            Some(wanted) if header.revision == wanted => (2, header.revision),
+            Some(wanted) if header.revision < wanted => (1, header.revision),
+            Some(_) | None => (0, header.revision),
+        };
+        let fitting = self.index.iter().filter(|(header, _)| fits(header));
+        let best = fitting.max_by_key(|(header, _)| rank(header));
+        best.map(|(header, file)| (header, *file))
+    }
+
+    fn esi(&mut self, file: usize) -> Result<&Esi, String> {
+        if !self.read.contains_key(&file) {
+            let path = &self.files[file];
+            let wrong = |error: String| format!("{}: {error}", path.display());
+            let bytes = std::fs::read(path).map_err(|error| wrong(error.to_string()))?;
+            let esi = Esi::parse(&bytes).map_err(|error| wrong(error.to_string()))?;
+            self.read.insert(file, esi);
+        }
+        self.read.get(&file).ok_or_else(|| "the description went away".to_owned())
+    }
+}
+
+/// XML files of a place.
+fn collect(place: &Path, depth: usize, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    let about = std::fs::metadata(place)?;
+    if about.is_file() {
+        if about.len() <= MAX_LEN {
+            files.push(place.to_owned());
+        }
+        return Ok(());
+    }
+    for entry in std::fs::read_dir(place)? {
+        let path = entry?.path();
+        let is_xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
+        if path.is_dir() {
+            if depth > 0 {
+                collect(&path, depth - 1, files)?;
+            }
+        } else if is_xml {
+            collect(&path, 0, files)?;
+        }
+    }
+    Ok(())
+}

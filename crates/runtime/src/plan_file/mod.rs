@@ -1,0 +1,150 @@
+//! The file that a line is planned with: a project (TOML), or a network configuration of another tool
+//! (ENI).
+
+pub mod library;
+
+use std::path::{Path, PathBuf};
+
+use linesman_config::eni::{Eni, EniError};
+use linesman_config::plan::Plan;
+use linesman_config::project::{Project, ProjectError, ResolveError};
+
+use self::library::Library;
+
+/// Longest file that is read, in bytes; the largest configurations have some 20 MB.
+const MAX_LEN: u64 = 256 * 1024 * 1024;
+
+/// What a file says.
+#[derive(Clone, Debug)]
+pub struct PlanFile {
+    /// What the network is called.
+    pub name: String,
+    /// What follows.
+    pub plan: Plan,
+    /// The project, if it is one.
+    pub project: Option<Project>,
+    /// What was odd, for people.
+    pub notes: Vec<String>,
+}
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanFileError {
+    /// The file cannot be read.
+    #[error("{path}: reading a project or network configuration: {source}. Do: check the path")]
+    Read {
+        /// Which.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is too long for what it should be.
+    #[error(
+        "{path}: {len} bytes, expected a project (TOML) or a network configuration (ENI). Do: check the path"
+    )]
+    TooLong {
+        /// Which.
+        path: String,
+        /// Bytes.
+        len: u64,
+    },
+    /// It is no text.
+    #[error(
+        "{path}: at byte {at}: no text in UTF-8, expected a project in TOML. Do: check that this is the right \
+         file"
+    )]
+    NoText {
+        /// Which.
+        path: String,
+        /// Where.
+        at: usize,
+    },
+    /// It is a network configuration that cannot be used.
+    #[error("{path}: {source}")]
+    Eni {
+        /// Which.
+        path: String,
+        /// Why.
+        source: EniError,
+    },
+    /// It is no project.
+    #[error("{path}: {source}")]
+    Project {
+        /// Which.
+        path: String,
+        /// Why.
+        source: Box<ProjectError>,
+    },
+    /// The project cannot be planned.
+    #[error("{path}: {source}")]
+    Resolve {
+        /// Which.
+        path: String,
+        /// Why.
+        source: Box<ResolveError>,
+    },
+    /// Descriptions cannot be read.
+    #[error(
+        "{path}: esi = \"{folder}\": {reason}. Do: name a folder of XML files, or one of them, relative to the project"
+    )]
+    Descriptions {
+        /// Of which project.
+        path: String,
+        /// Which folder.
+        folder: String,
+        /// Why.
+        reason: String,
+    },
+}
+
+impl PlanFile {
+    /// Reads a file and makes its plan.
+    ///
+    /// # Errors
+    /// [`PlanFileError`] says where and why.
+    pub fn open(path: &Path) -> Result<Self, PlanFileError> {
+        let shown = path.display().to_string();
+        let read = |source| PlanFileError::Read { path: shown.clone(), source };
+        let len = std::fs::metadata(path).map_err(read)?.len();
+        if len > MAX_LEN {
+            return Err(PlanFileError::TooLong { path: shown, len });
+        }
+        let bytes = std::fs::read(path).map_err(read)?;
+        let is_xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
+        if is_xml || Eni::is_one(&bytes) {
+            let eni = Eni::parse(&bytes);
+            let Eni { name, plan, notes } =
+                eni.map_err(|source| PlanFileError::Eni { path: shown, source })?;
+            return Ok(Self { name, plan, project: None, notes });
+        }
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let at = error.utf8_error().valid_up_to();
+            PlanFileError::NoText { path: shown.clone(), at }
+        })?;
+        let project = Project::parse(&text).map_err(|source| PlanFileError::Project {
+            path: shown.clone(),
+            source: Box::new(source),
+        })?;
+        let mut library = library_of(&project, path, &shown)?;
+        let plan = project
+            .plan(&mut |device| library.find(device))
+            .map_err(|source| PlanFileError::Resolve { path: shown, source: Box::new(source) })?;
+        let notes = library.take_notes();
+        Ok(Self { name: project.name.clone(), plan, project: Some(project), notes })
+    }
+}
+
+/// The descriptions that a project names, relative to where it is.
+fn library_of(project: &Project, path: &Path, shown: &str) -> Result<Library, PlanFileError> {
+    let beside = path.parent().unwrap_or(Path::new(""));
+    let mut library = Library::default();
+    for folder in &project.esi {
+        let place: PathBuf = beside.join(folder);
+        library.add(&place).map_err(|source| PlanFileError::Descriptions {
+            path: shown.to_owned(),
+            folder: folder.clone(),
+            reason: format!("{}: {source}", place.display()),
+        })?;
+    }
+    Ok(library)
+}

@@ -1,0 +1,150 @@
+//! What the application sees of a cycle, and does in it.
+
+use linesman_config::plan::Plan;
+use linesman_maindevice::{FrameStatus, MainDevice, Quality, Statistics};
+use linesman_proto::address::DeviceId;
+use linesman_proto::time::Instant;
+
+use crate::image::{Input, Output, Value};
+
+/// Whether the application goes on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Next {
+    /// With the next cycle.
+    Continue,
+    /// The line is stopped: outputs to zero, states back.
+    Stop,
+}
+
+/// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
+/// sent.
+pub trait Application {
+    /// The line is about to be started: the process image has so many bytes of inputs and outputs.
+    ///
+    /// # Errors
+    /// Why it cannot be started.
+    fn begin(&mut self, _inputs: usize, _outputs: usize) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// One cycle: inputs are those that have just come back, outputs leave with the next frames.
+    fn cycle(&mut self, io: &mut Io<'_>) -> Next;
+
+    /// Whether it gives outputs at all. One that does not is not watched for being late.
+    fn is_idle(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody: outputs stay zero.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Idle;
+
+impl Application for Idle {
+    fn cycle(&mut self, _: &mut Io<'_>) -> Next {
+        Next::Continue
+    }
+
+    fn is_idle(&self) -> bool {
+        true
+    }
+}
+
+impl<F: FnMut(&mut Io<'_>) -> Next> Application for F {
+    fn cycle(&mut self, io: &mut Io<'_>) -> Next {
+        self(io)
+    }
+}
+
+/// The process data of a cycle.
+pub struct Io<'a> {
+    pub(crate) main: &'a mut MainDevice,
+    pub(crate) now: Instant,
+    pub(crate) missed: u64,
+    pub(crate) withheld: bool,
+    pub(crate) old: bool,
+}
+
+impl Io<'_> {
+    /// The value of an input.
+    #[must_use]
+    pub fn get<T: Value>(&self, input: Input<T>) -> T {
+        input.get(self.main.inputs())
+    }
+
+    /// Sets an output.
+    pub fn set<T: Value>(&mut self, output: Output<T>, value: T) {
+        output.set(self.main.image_mut(), value);
+    }
+
+    /// All inputs as bytes, laid out as the plan says.
+    #[must_use]
+    pub fn inputs(&self) -> &[u8] {
+        self.main.inputs()
+    }
+
+    /// All outputs as bytes, laid out as the plan says.
+    pub fn outputs_mut(&mut self) -> &mut [u8] {
+        self.main.image_mut()
+    }
+
+    /// The same, for a look at them; they count as given anew only if
+    /// [`outputs_are_old`](Self::outputs_are_old) is not called.
+    pub(crate) fn outputs_unchanged(&mut self) -> &mut [u8] {
+        self.main.image_mut()
+    }
+
+    /// Says that nobody has given outputs in this cycle. Otherwise an application that returns in time
+    /// counts as having given them, changed or not.
+    pub fn outputs_are_old(&mut self) {
+        self.old = true;
+    }
+
+    /// Whether outputs are withheld because they were not given in time.
+    #[must_use]
+    pub const fn is_withheld(&self) -> bool {
+        self.withheld
+    }
+
+    /// How good the process data of a SubDevice are, and how old.
+    #[must_use]
+    pub fn quality(&self, id: DeviceId) -> Quality {
+        self.main.quality(id)
+    }
+
+    /// How a frame of a task went the last time.
+    #[must_use]
+    pub fn frame_status(&self, task: usize, frame: usize) -> Option<FrameStatus> {
+        self.main.frame_status(task, frame)
+    }
+
+    /// Whether every SubDevice is in its target state.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.main.is_settled()
+    }
+
+    /// The time of the run.
+    #[must_use]
+    pub const fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// Cycles that were left out so far because the host was late.
+    #[must_use]
+    pub const fn missed(&self) -> u64 {
+        self.missed
+    }
+
+    /// What has been sent and received so far.
+    #[must_use]
+    pub fn statistics(&self) -> Statistics {
+        self.main.statistics()
+    }
+
+    /// The plan that runs.
+    #[must_use]
+    pub fn plan(&self) -> Option<&Plan> {
+        self.main.plan()
+    }
+}

@@ -1,0 +1,397 @@
+//! Who runs a machine: finds the line, makes the plan, starts, calls the application, stops.
+
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+
+use linesman_config::inventory::Inventory;
+use linesman_config::plan::{IoAt, Plan};
+use linesman_diagnosis::{Diagnosis, FrameSeen, HostObservation, Setup};
+use linesman_link::error::LinkError;
+use linesman_maindevice::{Event, MainDevice, Options};
+use linesman_proto::state::AlState;
+use linesman_proto::time::{Instant, Span};
+
+use super::io::{Application, Io, Next};
+use super::judge::judge;
+use super::real_time::{Granted, RealTime};
+use super::report::{Counts, RunReport, SCHEMA, of_plan};
+use super::tap::{Tap, tap};
+use crate::drive::{Audience, Driver};
+use crate::line::Line;
+use crate::serve::lateness::Lateness;
+use crate::stop::Stop;
+
+/// How long a scan of a line may take.
+const SCAN_PATIENCE: Span = Span::s(60);
+/// How long SubDevices may take to go down at the end.
+const LEAVE_PATIENCE: Span = Span::s(5);
+/// So many cycles carry zeros before the exchange ends.
+const SAFE_CYCLES: u64 = 3;
+
+/// What is to be run.
+pub enum Wanted {
+    /// A plan that is made already.
+    Plan(Box<Plan>),
+    /// One that is made of what a scan finds; or why it cannot be made.
+    Found(MakePlan),
+}
+
+/// Makes a plan of what was found.
+pub type MakePlan = Box<dyn FnOnce(&Inventory) -> Result<Plan, String> + Send>;
+
+/// How it is to be run.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// What the report calls the line.
+    pub on: String,
+    /// The state in which SubDevices are left at the end.
+    pub leave: AlState,
+    /// How long it runs; `None`: until somebody stops it.
+    pub lasts: Option<Span>,
+    /// What is asked of the host; `None` in virtual time.
+    pub real_time: Option<RealTime>,
+    /// Cycles in a row in which the application may be late before outputs are withheld; `None`: as
+    /// many as it likes.
+    pub allowed_misses: Option<u32>,
+    /// How the line is judged while it runs; `None`: it is not.
+    pub diagnose: Option<Setup>,
+}
+
+/// Something to be told while it runs.
+#[derive(Clone, Debug)]
+pub enum Note {
+    /// What the scan found.
+    Scanned(Box<Inventory>),
+    /// The plan that is started.
+    Planned(Arc<Plan>),
+    /// The MainDevice tells something.
+    Event(Instant, Box<Event>),
+    /// The diagnosis tells something.
+    Finding(Box<linesman_diagnosis::Event>),
+    /// The line is being stopped.
+    Leaving(Instant),
+}
+
+/// Why a line cannot be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// The line does not answer.
+    #[error("{0}")]
+    Scan(String),
+    /// What is there is not what is wanted.
+    #[error("{0}")]
+    Plan(String),
+    /// The interface.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The system has no more threads.
+    #[error("starting the diagnosis: {0}. Do: end other programs")]
+    Thread(std::io::Error),
+}
+
+/// A MainDevice's operator. It is the [`Audience`] of a [`Driver`].
+pub struct Operator<A> {
+    wanted: Option<Wanted>,
+    application: A,
+    io_at: IoAt,
+    notes: Sender<Note>,
+    tap: Option<Tap>,
+    plan: Option<Arc<Plan>>,
+    begun: bool,
+    reached_at: Option<Instant>,
+    failure: Option<RunError>,
+    lateness: Lateness,
+    /// The application has enough, or the line is being stopped.
+    ended: bool,
+    leaving: bool,
+    withheld: bool,
+    scan_until: Instant,
+}
+
+impl<A: Application> Operator<A> {
+    fn start(&mut self, now: Instant, plan: Plan, main: &mut MainDevice) {
+        if let Err(why) = self.application.begin(plan.inputs_len, plan.outputs_len) {
+            self.failure = Some(RunError::Plan(why));
+            return;
+        }
+        self.io_at = plan.tasks.first().map(|task| task.io_at).unwrap_or_default();
+        let plan = Arc::new(plan);
+        self.note(Note::Planned(Arc::clone(&plan)));
+        main.start(now, (*plan).clone());
+        self.plan = Some(plan);
+    }
+
+    fn note(&self, note: Note) {
+        // Whoever listened may have gone: the machine runs on.
+        let _ = self.notes.send(note);
+    }
+
+    fn scanned(&mut self, now: Instant, inventory: &Inventory, main: &mut MainDevice) {
+        self.note(Note::Scanned(Box::new(inventory.clone())));
+        let Some(Wanted::Found(make)) = self.wanted.take() else { return };
+        match make(inventory) {
+            Ok(plan) => self.start(now, plan, main),
+            Err(why) => self.failure = Some(RunError::Plan(why)),
+        }
+    }
+
+    /// Calls the application when it is its turn.
+    fn call(&mut self, now: Instant, main: &mut MainDevice) {
+        // The first task is that of the application; others exchange beside it.
+        let due = match self.io_at {
+            IoAt::TaskBegin => main.take_exchanged(0),
+            IoAt::TaskEnd => main.next_cycle(0).is_some_and(|due| due <= now),
+        };
+        if !due {
+            return;
+        }
+        let missed = main.statistics().cycles_missed;
+        let mut io = Io { main, now, missed, withheld: self.withheld, old: false };
+        if self.application.cycle(&mut io) == Next::Stop {
+            self.ended = true;
+        }
+        if !io.old && !self.application.is_idle() {
+            main.outputs_mut();
+        }
+    }
+}
+
+impl<A: Application> Audience for Operator<A> {
+    #[inline]
+    fn frame(&mut self, frame: &FrameSeen<'_>) {
+        if let Some(tap) = &mut self.tap {
+            tap.frame(frame);
+        }
+    }
+
+    fn host(&mut self, observation: &HostObservation) {
+        if let Some(tap) = &mut self.tap {
+            tap.host(observation);
+        }
+    }
+
+    #[allow(clippy::wildcard_enum_match_arm, reason = "all but a few are only passed on")]
+    fn event(&mut self, now: Instant, event: Event, main: &mut MainDevice) {
+        match &event {
+            Event::Scanned(inventory) => return self.scanned(now, inventory, main),
+            Event::ScanFailed(error) => self.failure = Some(RunError::Scan(error.to_string())),
+            Event::AllReached => {
+                self.reached_at.get_or_insert(now);
+            }
+            Event::OutputsWithheld { .. } => self.withheld = true,
+            Event::OutputsResumed { .. } => self.withheld = false,
+            Event::Stopped => self.ended = true,
+            _ => {}
+        }
+        self.note(Note::Event(now, Box::new(event)));
+    }
+
+    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
+        if let Some(tap) = &mut self.tap {
+            tap.turn(now);
+        }
+        if !self.begun {
+            self.begun = true;
+            self.scan_until = now + SCAN_PATIENCE;
+            match self.wanted.take() {
+                Some(Wanted::Plan(plan)) => self.start(now, *plan, main),
+                other => {
+                    self.wanted = other;
+                    main.scan(now);
+                }
+            }
+        }
+        if self.plan.is_none() && now > self.scan_until && self.failure.is_none() {
+            let words =
+                "the scan was not done after 60 s. Do: look at the line with `linesman scan`";
+            self.failure = Some(RunError::Scan(words.to_owned()));
+        }
+        if self.plan.is_some() && !self.leaving {
+            self.call(now, main);
+        }
+        self.failure.is_none() && !self.ended
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
+
+    #[inline]
+    fn late(&mut self, late: Span) {
+        self.lateness.note(late);
+    }
+}
+
+/// Finds out what is on a line: it gets station addresses, and keeps its states.
+///
+/// # Errors
+/// When it does not answer, or the interface fails.
+pub fn scan<L: Line>(line: L, ring: bool, stop: &Stop) -> Result<Inventory, RunError> {
+    let mut driver = Driver::new(line, Options { ring, ..Options::default() });
+    let mut scanning = Scanning { begun: false, result: None };
+    let until = driver.now() + SCAN_PATIENCE;
+    driver.run(until, stop, &mut scanning)?;
+    let ended = "the scan was ended before it was done. Do: scan again";
+    scanning.result.unwrap_or_else(|| Err(RunError::Scan(ended.to_owned())))
+}
+
+/// Waits for the one result.
+struct Scanning {
+    begun: bool,
+    result: Option<Result<Inventory, RunError>>,
+}
+
+impl Audience for Scanning {
+    fn frame(&mut self, _: &FrameSeen<'_>) {}
+
+    fn host(&mut self, _: &HostObservation) {}
+
+    fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
+        if let Event::Scanned(inventory) = event {
+            self.result = Some(Ok(*inventory));
+        } else if let Event::ScanFailed(error) = event {
+            self.result = Some(Err(RunError::Scan(error.to_string())));
+        }
+    }
+
+    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
+        if !std::mem::replace(&mut self.begun, true) {
+            // It looks, with nothing but reads, before it writes.
+            main.scan(now);
+        }
+        self.result.is_none()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
+}
+
+/// A run that has ended.
+pub struct Ended {
+    /// How it went.
+    pub report: RunReport,
+    /// What was wrong with the line, where that was judged.
+    pub diagnosis: Option<Diagnosis>,
+    /// What ended it, if it was not the time, a wish, or the application.
+    pub error: Option<RunError>,
+}
+
+/// Runs a line until its time is over, `stop`, or the application has enough; then stops it: outputs
+/// to zero, SubDevices back to where they shall be left.
+///
+/// # Errors
+/// When nothing could be run: the line does not answer, or is not what was wanted.
+pub fn run<L: Line, A: Application>(
+    line: L,
+    ring: bool,
+    wanted: Wanted,
+    application: A,
+    options: &RunOptions,
+    stop: &Stop,
+    notes: Sender<Note>,
+) -> Result<Ended, RunError> {
+    let is_virtual = options.real_time.is_none();
+    let (tap, judging) = match &options.diagnose {
+        None => (None, None),
+        Some(setup) => {
+            let (tap, listener) = tap(is_virtual);
+            let thread = judge(setup.clone(), listener, notes.clone()).map_err(RunError::Thread)?;
+            (Some(tap), Some(thread))
+        }
+    };
+    // Threads started from here on would be real-time ones.
+    let granted = options.real_time.map(RealTime::ask).unwrap_or_default();
+    let allowed_misses = options.allowed_misses.filter(|_| !application.is_idle());
+    let settings = Options { ring, allowed_misses, ..Options::default() };
+    let mut driver = Driver::new(line, settings);
+    let mut operator = Operator {
+        wanted: Some(wanted),
+        application,
+        io_at: IoAt::default(),
+        notes,
+        tap,
+        plan: None,
+        begun: false,
+        reached_at: None,
+        failure: None,
+        lateness: Lateness::default(),
+        ended: false,
+        leaving: false,
+        withheld: false,
+        scan_until: Instant::MAX,
+    };
+    let begun = driver.now();
+    let until = options.lasts.map_or(Instant::MAX, |lasts| begun + lasts);
+    let ran = driver.run(until, stop, &mut operator);
+    let mut report = report(&operator, &mut driver, begun, &granted, &options.on);
+    let error = match (operator.failure.take(), ran) {
+        (Some(failure), _) => Some(failure),
+        (None, Err(error)) => Some(error.into()),
+        (None, Ok(())) => leave(&mut driver, &mut operator, options.leave).err().map(Into::into),
+    };
+    if let Some(error) = &error {
+        report.error = Some(error.to_string());
+    }
+    let planned = operator.plan.is_some();
+    // Ends the tap, and with it the thread that judges.
+    drop(operator);
+    let diagnosis = judging.and_then(|thread| thread.join().ok());
+    match error {
+        Some(error) if !planned => Err(error),
+        error => Ok(Ended { report, diagnosis, error }),
+    }
+}
+
+/// Outputs to zero, then the exchange ends, then the states.
+fn leave<L: Line, A: Application>(
+    driver: &mut Driver<L>,
+    operator: &mut Operator<A>,
+    to: AlState,
+) -> Result<(), LinkError> {
+    let Some(plan) = operator.plan.clone() else { return Ok(()) };
+    // A second wish ends the program at once; until then it takes the time it takes.
+    let nobody = Stop::default();
+    (operator.leaving, operator.ended) = (true, false);
+    let now = driver.now();
+    operator.note(Note::Leaving(now));
+    let cycle = plan.tasks.iter().map(|task| task.cycle).max().unwrap_or_default();
+    for count in 1..=SAFE_CYCLES {
+        driver.main_mut().outputs_mut().fill(0);
+        driver.run(now + cycle * count, &nobody, operator)?;
+    }
+    let now = driver.now();
+    driver.main_mut().stop(now, to);
+    driver.run(now + LEAVE_PATIENCE, &nobody, operator)
+}
+
+fn report<L: Line, A: Application>(
+    operator: &Operator<A>,
+    driver: &mut Driver<L>,
+    begun: Instant,
+    granted: &Granted,
+    on: &str,
+) -> RunReport {
+    let now = driver.now();
+    let main = driver.main_mut();
+    let (devices, frames) = match &operator.plan {
+        Some(plan) => of_plan(plan, main, now),
+        None => (Vec::new(), Vec::new()),
+    };
+    RunReport {
+        schema: SCHEMA.to_owned(),
+        error: None,
+        on: on.to_owned(),
+        time_ns: now.since(begun).as_nanos(),
+        reached_ns: operator.reached_at.map(|at| at.since(begun).as_nanos()),
+        settled: main.is_settled(),
+        outputs_withheld: operator.withheld,
+        devices,
+        frames,
+        responding: main.responding().map(|count| count.0),
+        counts: Counts::of(&main.statistics(), operator.tap.as_ref().map_or(0, Tap::left_out)),
+        lateness: operator.lateness.report(),
+        host: granted.into(),
+    }
+}

@@ -1,0 +1,184 @@
+//! How a run went, as JSON and for people.
+
+use linesman_config::plan::Plan;
+use linesman_maindevice::{MainDevice, Statistics};
+use linesman_proto::time::{Instant, Span};
+use serde::{Deserialize, Serialize};
+
+use super::real_time::Granted;
+use crate::serve::lateness::LatenessReport;
+
+/// Name and version of the format.
+pub const SCHEMA: &str = "linesman.run/1";
+
+/// How a run went, or goes.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunReport {
+    /// `linesman.run/1`.
+    pub schema: String,
+    /// Why nothing could be run; `null` when it could.
+    pub error: Option<String>,
+    /// The line: `eth0`, `sim:plant.toml`.
+    pub on: String,
+    /// How long it has run, in ns.
+    pub time_ns: u64,
+    /// When all SubDevices had reached their targets, in ns since the start; `null`: they have not.
+    pub reached_ns: Option<u64>,
+    /// Whether every SubDevice is in its target state.
+    pub settled: bool,
+    /// Whether outputs are withheld because the application is late.
+    pub outputs_withheld: bool,
+    /// The SubDevices of the plan.
+    pub devices: Vec<DeviceReport>,
+    /// The cyclic frames, task by task.
+    pub frames: Vec<FrameReport>,
+    /// How many SubDevices answered the last cyclic broadcast read; `null`: there is none.
+    pub responding: Option<u16>,
+    /// What was sent and received.
+    pub counts: Counts,
+    /// How late cycles began.
+    pub lateness: LatenessReport,
+    /// What the host granted.
+    pub host: HostReport,
+}
+
+/// A SubDevice of a running plan.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DeviceReport {
+    /// Its number, from 1.
+    pub no: u32,
+    /// Its name.
+    pub name: String,
+    /// Its station address.
+    pub station: u16,
+    /// The state it is driven to.
+    pub target: String,
+    /// Whether its process data came back right the last time.
+    pub valid: bool,
+    /// How old its inputs are, in ns; `null`: it has none, or never gave any.
+    pub age_ns: Option<u64>,
+}
+
+/// A cyclic frame.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FrameReport {
+    /// Its task.
+    pub task: String,
+    /// Its number within the task, from 0.
+    pub frame: usize,
+    /// Datagrams that were sent without their outputs, a bit each; 0x8000: the frame was not sent.
+    pub not_sent: u16,
+    /// Datagrams with a wrong working counter, a bit each; 0x8000: the frame did not come back.
+    pub wrong_counter: u16,
+}
+
+/// Counts since the start.
+#[derive(
+    Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the names are those of Statistics, which explains them")]
+pub struct Counts {
+    pub cycles: u64,
+    pub cycles_missed: u64,
+    pub cycles_withheld: u64,
+    pub deadlines_missed: u64,
+    pub working_counter_errors: u64,
+    pub frames_sent: u64,
+    pub frames_received: u64,
+    pub cyclic_sent: u64,
+    pub cyclic_lost: u64,
+    pub cyclic_unsent: u64,
+    pub frames_lost: u64,
+    pub frames_late: u64,
+    pub frames_duplicate: u64,
+    pub frames_spare: u64,
+    pub frames_stray: u64,
+    pub frames_truncated: u64,
+    pub frames_foreign: u64,
+    pub repeats: u64,
+    /// Frames that the diagnosis did not see because it was busy.
+    pub undiagnosed: u64,
+}
+
+/// What the host granted.
+#[derive(Clone, PartialEq, Eq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HostReport {
+    /// Real-time priority; `null`: none.
+    pub priority: Option<u8>,
+    /// The CPU that the cycle stays on; `null`: any.
+    pub cpu: Option<usize>,
+    /// Whether memory is kept in RAM.
+    pub memory_locked: bool,
+    /// What was not granted, each with what to do about it.
+    pub refused: Vec<String>,
+}
+
+impl From<&Granted> for HostReport {
+    fn from(granted: &Granted) -> Self {
+        Self {
+            priority: granted.priority,
+            cpu: granted.cpu,
+            memory_locked: granted.memory,
+            refused: granted.refused.clone(),
+        }
+    }
+}
+
+impl Counts {
+    pub(super) fn of(statistics: &Statistics, undiagnosed: u64) -> Self {
+        Self {
+            cycles: statistics.cycles,
+            cycles_missed: statistics.cycles_missed,
+            cycles_withheld: statistics.cycles_withheld,
+            deadlines_missed: statistics.deadlines_missed,
+            working_counter_errors: statistics.working_counter_errors,
+            frames_sent: statistics.frames_sent,
+            frames_received: statistics.frames_received,
+            cyclic_sent: statistics.cyclic_sent,
+            cyclic_lost: statistics.cyclic_lost,
+            cyclic_unsent: statistics.cyclic_unsent,
+            frames_lost: statistics.frames_lost,
+            frames_late: statistics.frames_late,
+            frames_duplicate: statistics.frames_duplicate,
+            frames_spare: statistics.frames_spare,
+            frames_stray: statistics.frames_stray,
+            frames_truncated: statistics.frames_truncated,
+            frames_foreign: statistics.frames_foreign,
+            repeats: statistics.repeats,
+            undiagnosed,
+        }
+    }
+}
+
+/// The SubDevices and frames of a running plan.
+pub(super) fn of_plan(
+    plan: &Plan,
+    main: &MainDevice,
+    now: Instant,
+) -> (Vec<DeviceReport>, Vec<FrameReport>) {
+    let device = |device: &linesman_config::plan::DevicePlan| {
+        let quality = main.quality(device.id);
+        DeviceReport {
+            no: device.id.no(),
+            name: device.name.clone(),
+            station: device.station.0,
+            target: device.target.to_string(),
+            valid: quality.valid,
+            age_ns: quality.age(now).map(Span::as_nanos),
+        }
+    };
+    let mut frames = Vec::new();
+    for (at, task) in plan.tasks.iter().enumerate() {
+        for frame in 0..task.frames.len() {
+            let status = main.frame_status(at, frame).unwrap_or_default();
+            let (not_sent, wrong_counter) = (status.not_sent, status.wrong_counter);
+            frames.push(FrameReport { task: task.name.clone(), frame, not_sent, wrong_counter });
+        }
+    }
+    (plan.devices.iter().map(device).collect(), frames)
+}

@@ -1,0 +1,65 @@
+//! The application of a line is another program, which sees the process image in a file.
+
+use std::path::PathBuf;
+
+use linesman_link::shared_image::{ImageState, SharedImage};
+
+use super::io::{Application, Io, Next};
+
+/// Inputs for whoever wants to read them, outputs from the one program that gives them. The file is
+/// made in the first cycle and removed at the end.
+pub struct Shared {
+    path: PathBuf,
+    image: Option<SharedImage>,
+    /// Count of the outputs that were taken last.
+    last: u64,
+    state: ImageState,
+}
+
+impl Shared {
+    /// An image in a file at `path`.
+    #[must_use]
+    pub fn at(path: PathBuf) -> Self {
+        Self { path, image: None, last: 0, state: ImageState::default() }
+    }
+}
+
+impl Application for Shared {
+    fn begin(&mut self, inputs: usize, outputs: usize) -> Result<(), String> {
+        let image = SharedImage::create(&self.path, inputs, outputs).map_err(|error| {
+            let path = self.path.display();
+            format!("{path}: making the process image: {error}. Do: name a file in /dev/shm")
+        })?;
+        self.image = Some(image);
+        Ok(())
+    }
+
+    fn cycle(&mut self, io: &mut Io<'_>) -> Next {
+        let Some(image) = &self.image else { return Next::Stop };
+        self.state = ImageState {
+            cycles: io.statistics().cycles,
+            time_ns: io.now().as_nanos(),
+            settled: io.is_settled(),
+            withheld: io.is_withheld(),
+            ended: false,
+        };
+        image.publish(io.inputs(), &self.state);
+        // Its first outputs count; what stays as it was is old.
+        if !image.take_outputs(io.outputs_unchanged(), &mut self.last) {
+            io.outputs_are_old();
+        }
+        Next::Continue
+    }
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        if let Some(image) = &self.image {
+            let mut inputs = vec![0; image.inputs_len()];
+            // Whoever looks on learns that nothing will change any more.
+            if image.read_inputs(&mut inputs).is_some() {
+                image.publish(&inputs, &ImageState { ended: true, ..self.state });
+            }
+        }
+    }
+}

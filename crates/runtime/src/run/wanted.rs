@@ -1,0 +1,103 @@
+//! From a project and what a scan found to the plan that is run.
+
+use linesman_config::identity::{mismatch, text};
+use linesman_config::inventory::Inventory;
+use linesman_config::plan::{Plan, PlanOptions};
+use linesman_config::project::Project;
+use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
+
+use super::operator::{MakePlan, Wanted};
+
+/// Choices beside the project.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Choices {
+    /// The state that SubDevices are driven to.
+    pub target: AlState,
+    /// Cycle time; `None`: that of the plan.
+    pub cycle: Option<Span>,
+}
+
+impl Default for Choices {
+    fn default() -> Self {
+        Self { target: AlState::Op, cycle: None }
+    }
+}
+
+impl Choices {
+    fn plan(self, inventory: &Inventory, project: Option<&Project>) -> Result<Plan, String> {
+        let mut planned = inventory.planned(self.target);
+        if let Some(project) = project {
+            // A plan numbers SubDevices in the order in which frames pass them.
+            let tree = project.tree().map_err(|error| error.to_string())?;
+            for (at, node) in tree.order().iter().enumerate() {
+                let wanted = &project.devices[*node];
+                let Some(device) = planned.get_mut(at) else {
+                    return Err(too_few(project, &wanted.name, inventory));
+                };
+                if let Some(identity) = wanted.identity() {
+                    let found = device.identity;
+                    if let Some(what) = mismatch(&identity, &found, wanted.rule()) {
+                        return Err(format!(
+                            "place {}: expected {} with {}, found {} with {}: another {what}. Do: \
+                             check that the right SubDevice is there, or scan again with \
+                             `linesman scan --save`",
+                            at + 1,
+                            wanted.name,
+                            text(&identity),
+                            device.name,
+                            text(&found),
+                        ));
+                    }
+                    device.identity = identity;
+                    device.revision_rule = wanted.rule();
+                }
+                device.name.clone_from(&wanted.name);
+            }
+            if planned.len() > project.devices.len() {
+                let extra = &planned[project.devices.len()].name;
+                return Err(format!(
+                    "found {} SubDevices, the project has {}; the first that it does not have is \
+                     {extra}. Do: add it to the project, or take it out",
+                    planned.len(),
+                    project.devices.len(),
+                ));
+            }
+        }
+        let mut options = PlanOptions::default();
+        options.cycle = self.cycle.unwrap_or(options.cycle);
+        Plan::build(&planned, inventory.tree().clone(), &options)
+            .map_err(|error| format!("{error}. Do: see `linesman plan`"))
+    }
+
+    /// What is there is run, as it is.
+    #[must_use]
+    pub fn as_found(self) -> Wanted {
+        let make: MakePlan = Box::new(move |inventory| self.plan(inventory, None));
+        Wanted::Found(make)
+    }
+
+    /// What is there is run, if it is what the project says.
+    #[must_use]
+    pub fn project(self, project: Project) -> Wanted {
+        let make: MakePlan = Box::new(move |inventory| self.plan(inventory, Some(&project)));
+        Wanted::Found(make)
+    }
+
+    /// The plan of what was found.
+    ///
+    /// # Errors
+    /// Why none can be made.
+    pub fn plan_of(self, inventory: &Inventory) -> Result<Plan, String> {
+        self.plan(inventory, None)
+    }
+}
+
+fn too_few(project: &Project, missing: &str, inventory: &Inventory) -> String {
+    format!(
+        "found {} SubDevices, the project has {}; the first that is missing is {missing}. Do: check \
+         cable and supply there, or look with `linesman diagnose --project`",
+        inventory.devices.len(),
+        project.devices.len(),
+    )
+}

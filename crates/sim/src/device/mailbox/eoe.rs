@@ -1,0 +1,133 @@
+//! EoE of a device with Ethernet ports of its own: addresses are set and read, frames leave by the
+//! port.
+//!
+//! Read first: ETG.1000.6, EoE; facts 6.6. Nothing is plugged into the port, so a frame that came
+//! together is gone; whoever wants to know when it left is told, at once.
+
+use linesman_proto::mailbox::ErrorReplyCode;
+use linesman_proto::mailbox::eoe::{
+    ADDRESS_LEN, Assembly, EOE_HEADER_LEN, EoeError, EoeResult, Fragment, IpParameters, Message,
+    Setting,
+};
+use linesman_proto::time::Instant;
+
+use super::Answers;
+
+/// The port.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub(super) struct EoePort {
+    addresses: IpParameters,
+    assembly: Assembly,
+}
+
+impl EoePort {
+    /// Answers a message, if it asks for an answer.
+    pub(super) fn answer(
+        &mut self,
+        request: &[u8],
+        now: Instant,
+    ) -> Result<Answers, ErrorReplyCode> {
+        match Message::parse(request) {
+            Ok(Message::Fragment(fragment)) => Ok(self.take(&fragment, now)),
+            Ok(Message::Request { port, about, parameters }) => {
+                Ok(vec![self.set_or_get(port, about, parameters)])
+            }
+            // What a device sends, nobody sends to a device.
+            Ok(Message::Response { .. } | Message::TimeStamp { .. }) => {
+                Err(ErrorReplyCode::ServiceNotSupported)
+            }
+            Err(EoeError::CutOff { .. }) => Err(ErrorReplyCode::SizeTooShort),
+            Err(EoeError::UnknownType(_)) => Err(ErrorReplyCode::InvalidHeader),
+        }
+    }
+
+    /// A frame of which a piece is missing is forgotten without a word, as on any Ethernet.
+    fn take(&mut self, fragment: &Fragment<'_>, now: Instant) -> Answers {
+        let sent = matches!(self.assembly.take(fragment), Ok(Some(_)));
+        if !(sent && fragment.time_requested) {
+            return Vec::new();
+        }
+        let time = now.as_nanos() as u32;
+        let stamp = Message::TimeStamp { port: fragment.port, frame: fragment.frame, time };
+        vec![write(&stamp)]
+    }
+
+    fn set_or_get(&mut self, port: u8, about: Setting, parameters: &[u8]) -> Vec<u8> {
+        let mut bytes = [0; ADDRESS_LEN];
+        let (result, len) = match about {
+            Setting::SetIp => match IpParameters::parse(parameters) {
+                Some(newer) => {
+                    self.addresses = self.addresses.merged(newer);
+                    (EoeResult::SUCCESS, 0)
+                }
+                None => (EoeResult::UNSPECIFIED, 0),
+            },
+            Setting::GetIp => match self.addresses.write(&mut bytes) {
+                Ok(len) => (EoeResult::SUCCESS, len),
+                Err(_) => (EoeResult::UNSPECIFIED, 0),
+            },
+            Setting::SetFilter | Setting::GetFilter => (EoeResult::NO_FILTER, 0),
+        };
+        write(&Message::Response { port, about, result, parameters: &bytes[..len] })
+    }
+}
+
+fn write(message: &Message<'_>) -> Vec<u8> {
+    let mut buffer = vec![0; EOE_HEADER_LEN + ADDRESS_LEN];
+    let len = message.write(&mut buffer).unwrap_or(0);
+    buffer.truncate(len);
+    buffer
+}
+
+#[cfg(test)]
+mod tests {
+    use linesman_proto::mailbox::eoe::fragments;
+
+    use super::*;
+
+    fn ask(port: &mut EoePort, message: &Message<'_>) -> Vec<Vec<u8>> {
+        let mut buffer = [0; 2_000];
+        let len = message.write(&mut buffer).unwrap();
+        port.answer(&buffer[..len], Instant::from_nanos(77)).unwrap()
+    }
+
+    #[test]
+    fn addresses_that_were_set_are_read() {
+        let mut port = EoePort::default();
+        let get = Message::Request { port: 0, about: Setting::GetIp, parameters: &[] };
+        assert_eq!(ask(&mut port, &get), [vec![0x07, 0x01, 0, 0, 0, 0, 0, 0]]);
+        let ip = Some([192, 168, 1, 11]);
+        let mut bytes = [0; ADDRESS_LEN];
+        let len = IpParameters { ip, ..IpParameters::default() }.write(&mut bytes).unwrap();
+        let set = Message::Request { port: 0, about: Setting::SetIp, parameters: &bytes[..len] };
+        assert_eq!(ask(&mut port, &set), [vec![0x03, 0x01, 0, 0]]);
+        let answer = &ask(&mut port, &get)[0];
+        let Ok(Message::Response { result, parameters, .. }) = Message::parse(answer) else {
+            panic!("{answer:02X?}")
+        };
+        assert_eq!((result, IpParameters::parse(parameters).unwrap().ip), (EoeResult::SUCCESS, ip));
+        let cut_off =
+            Message::Request { port: 0, about: Setting::SetIp, parameters: &[2, 0, 0, 0] };
+        assert_eq!(ask(&mut port, &cut_off), [vec![0x03, 0x01, 0x01, 0x00]]);
+        let filter = Message::Request { port: 0, about: Setting::SetFilter, parameters: &[] };
+        assert_eq!(ask(&mut port, &filter), [vec![0x05, 0x01, 0x01, 0x04]]);
+        let err = port.answer(&[0x0F, 0, 0, 0], Instant::ZERO).unwrap_err();
+        assert_eq!(err, ErrorReplyCode::InvalidHeader);
+    }
+
+    #[test]
+    fn frames_leave_and_tell_when_if_asked() {
+        let mut port = EoePort::default();
+        let frame = [0x55; 300];
+        for asked in [false, true] {
+            let pieces: Vec<_> = fragments(&frame, 1, 4, 132).collect();
+            let mut answers = Vec::new();
+            for mut piece in pieces {
+                piece.time_requested = asked;
+                answers.extend(ask(&mut port, &Message::Fragment(piece)));
+            }
+            let stamp = vec![0x11, 0x00, 0x00, 0x40, 77, 0, 0, 0];
+            assert_eq!(answers, if asked { vec![stamp] } else { Vec::new() });
+        }
+    }
+}
