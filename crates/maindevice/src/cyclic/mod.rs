@@ -352,8 +352,7 @@ impl Cyclic {
             departure.next_at =
                 if by < 0 { departure.next_at.before(span) } else { departure.next_at + span };
         }
-        self.next_at =
-            self.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
+        self.next_at = self.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
     }
 
     /// A frame did not come back.
