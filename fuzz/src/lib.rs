@@ -7,10 +7,12 @@ mod capture;
 mod device;
 mod device_builder;
 mod diagnosis;
+mod eni;
 mod esi;
 mod frame;
 mod mailbox;
 mod observation_file;
+mod project;
 mod segment;
 mod segment_file;
 mod series;
@@ -19,10 +21,12 @@ mod sii;
 pub use capture::capture;
 pub use device_builder::device_builder;
 pub use diagnosis::diagnosis;
+pub use eni::eni;
 pub use esi::esi;
 pub use frame::frame;
 pub use mailbox::mailbox;
 pub use observation_file::observation_file;
+pub use project::project;
 pub use segment::segment;
 pub use segment_file::segment_file;
 pub use sii::sii;
@@ -35,10 +39,12 @@ pub const TARGETS: &[Target] = &[
     ("capture", capture),
     ("device_builder", device_builder),
     ("diagnosis", diagnosis),
+    ("eni", eni),
     ("esi", esi),
     ("frame", frame),
     ("mailbox", mailbox),
     ("observation_file", observation_file),
+    ("project", project),
     ("segment", segment),
     ("segment_file", segment_file),
     ("sii", sii),

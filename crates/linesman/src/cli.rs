@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, demo, diagnose, explain, fault, foe, history, interfaces, lab, plan, reg, run,
+    completion, demo, diagnose, explain, fault, foe, history, interfaces, lab, log, plan, reg, run,
     scan, schema, sdo, sii, sim, state,
 };
 use crate::version::VERSION;
@@ -77,6 +77,8 @@ pub(crate) enum Command {
     Fault(fault::Arguments),
     /// Stories, swarms and recordings in virtual time
     Lab(lab::Arguments),
+    /// What happened on networks: the event log of `run`
+    Log(log::Arguments),
     /// JSON schema of a file or output
     Schema(schema::Arguments),
     /// Shell completion: write it to where your shell looks for it
@@ -94,6 +96,7 @@ impl Command {
             Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
             Self::Lab(arguments) => arguments.wants_json(),
+            Self::Log(arguments) => arguments.json,
             Self::Sim(arguments) => arguments.json,
             Self::State(arguments) => arguments.json,
             Self::Sdo(arguments) => arguments.json,

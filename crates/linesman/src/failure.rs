@@ -2,6 +2,7 @@
 
 use linesman_link::capture::CaptureError;
 use linesman_link::error::LinkError;
+use linesman_runtime::event_log::EventLogError;
 use linesman_runtime::selector::SelectorError;
 use serde::Serialize;
 
@@ -68,7 +69,7 @@ macro_rules! failures {
     };
 }
 
-failures!(CaptureError, LinkError, SelectorError);
+failures!(CaptureError, EventLogError, LinkError, SelectorError);
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,7 @@
 //! `linesman lab replay`: recordings of real lines, whole, cut, doubled, one-sided, and what is none.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
+
 mod support;
 
 use std::ffi::OsStr;

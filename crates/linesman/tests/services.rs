@@ -71,7 +71,7 @@ fn text(path: &Path) -> String {
     path.display().to_string()
 }
 
-// proves: DIA-08
+// proves: DIA-08 partial: every state is asked for; clearing an error is not tried
 #[test]
 fn states_are_asked_for_and_errors_cleared() {
     let plant = Plant::new();
@@ -208,7 +208,7 @@ fn registers_are_read_with_their_meaning() {
     assert_eq!(wrote["bytes"], "01 02 03 04");
 }
 
-// proves: SW-11, SW-14
+// proves: SW-11, SW-14 partial: files both ways, every error named; in BOOT no firmware is taken
 #[test]
 fn files_go_to_and_from_a_subdevice_and_errors_say_why() {
     let plant = Plant::new();
@@ -234,7 +234,7 @@ fn files_go_to_and_from_a_subdevice_and_errors_say_why() {
     assert_eq!(again.status, 2, "no local file is overwritten: {}", again.all());
 }
 
-// proves: SW-08
+// proves: SW-08 partial: one message, not the five of the source
 #[test]
 fn a_history_is_read_with_texts_exported_and_acknowledged() {
     let plant = Plant::new();

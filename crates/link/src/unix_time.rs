@@ -38,6 +38,12 @@ impl UnixTime {
         (nanos >= 0).then(|| Span::ns(u64::try_from(nanos).unwrap_or(u64::MAX)))
     }
 
+    /// The time that an RFC 3339 text names; `None` when it names none.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        Some(Self(text.parse::<jiff::Timestamp>().ok()?.as_nanosecond()))
+    }
+
     /// As RFC 3339 with nanoseconds, in UTC; `None` outside the years -9999..=9999.
     #[must_use]
     pub fn rfc3339(self) -> Option<String> {

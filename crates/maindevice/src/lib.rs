@@ -20,6 +20,7 @@ pub mod procedure;
 pub mod service;
 pub mod statistics;
 mod supervisor;
+pub mod watch;
 
 pub use cyclic::{FrameStatus, Quality};
 pub use event::Event;
@@ -28,3 +29,4 @@ pub use main_device::{MainDevice, ProbeRequest};
 pub use options::Options;
 pub use statistics::Statistics;
 pub use supervisor::{BringUpTimes, DeviceTimes, Phase, StartUpError};
+pub use watch::Watch;

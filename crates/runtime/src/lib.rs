@@ -11,6 +11,7 @@ pub mod capture;
 pub mod control;
 mod desk;
 pub mod drive;
+pub mod event_log;
 pub mod host_watch;
 pub mod image;
 pub mod journal;

@@ -10,7 +10,7 @@ use linesman_proto::register::{FmmuConfig, SYSTEM_TIME};
 use linesman_proto::sii::Direction;
 use linesman_proto::time::Span;
 
-use super::slave::{FileDevice, ImageBits};
+use super::sub_device::{FileDevice, ImageBits};
 use super::{OWN, clean};
 use crate::esi::EsiError;
 use crate::esi::value;

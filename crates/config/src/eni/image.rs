@@ -3,7 +3,7 @@
 use linesman_proto::sii::Direction;
 
 use super::clean;
-use super::slave::{FileDevice, fmmus_of};
+use super::sub_device::{FileDevice, fmmus_of};
 use crate::esi::EsiError;
 use crate::esi::xml::Element;
 use crate::plan::{Plan, Variable};

@@ -11,8 +11,8 @@ mod cyclic;
 mod error;
 mod image;
 mod own;
-mod slave;
 mod state;
+mod sub_device;
 mod wiring;
 mod write;
 
@@ -20,7 +20,7 @@ pub use error::EniError;
 pub use write::write;
 
 use self::cyclic::FileTask;
-use self::slave::FileDevice;
+use self::sub_device::FileDevice;
 use crate::esi::encoding;
 use crate::esi::xml::{self, Element};
 use crate::plan::Plan;
@@ -118,7 +118,7 @@ impl File {
             }
             "Slave" => {
                 let number = self.devices.len() + 1;
-                let device = slave::slave(&element, number, &mut self.notes);
+                let device = sub_device::sub_device(&element, number, &mut self.notes);
                 self.devices.push(device.map_err(|error| error.within("Config"))?);
             }
             "Cyclic" => {

@@ -8,7 +8,7 @@ use linesman_proto::register::{AL_STATUS, FmmuConfig};
 use linesman_proto::sii::Direction;
 
 use super::cyclic::{FileDatagram, FileTask};
-use super::slave::{FileDevice, fmmus_of};
+use super::sub_device::{FileDevice, fmmus_of};
 use crate::esi::EsiError;
 use crate::plan::layout::{DEFAULT_UNIT, MAILBOX_STATES};
 use crate::plan::{

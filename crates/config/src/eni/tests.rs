@@ -367,3 +367,22 @@ fn what_is_no_eni_is_refused_in_clear_words() {
     assert!(Eni::parse(b"").is_err());
     assert!(Eni::is_one(b"<?xml version=\"1.0\"?><EtherCATConfig/>") && !Eni::is_one(b"name = 1"));
 }
+
+#[test]
+fn fmmus_follow_from_the_process_image_where_no_command_sets_them() {
+    let text = r#"<EtherCATConfig><Config><Slave><Info><Name>A</Name><PhysAddr>1001</PhysAddr></Info>
+        <ProcessData><Send><BitStart>88</BitStart><BitLength>16</BitLength></Send>
+        <Sm2><Type>Outputs</Type><DefaultSize>2</DefaultSize><StartAddress>#x1100</StartAddress>
+        <ControlByte>#x64</ControlByte><Enable>1</Enable></Sm2></ProcessData></Slave>
+        <Cyclic><CycleTime>1000</CycleTime><Frame><Cmd><Cmd>11</Cmd><Addr>65536</Addr>
+        <DataLength>3</DataLength><Cnt>1</Cnt><OutputOffs>0</OutputOffs></Cmd></Frame></Cyclic>
+        <Unknown><Deep/></Unknown></Config></EtherCATConfig>"#;
+    // A header of ten bytes stands before the data in this image: bit 88 is their second byte.
+    let plan = Eni::parse(text.as_bytes()).unwrap().plan;
+    let (_, fmmu) = plan.devices[0].fmmus[0];
+    assert_eq!((fmmu.logical_start, fmmu.length), (LogicalAddress(65537), 2));
+    assert_eq!(fmmu.physical_start, RegisterAddress(0x1100));
+    let beyond = text.replace("<BitStart>88", "<BitStart>880");
+    let error = Eni::parse(beyond.as_bytes()).unwrap_err().to_string();
+    assert!(error.contains("bit 880") && error.contains("line 2"), "{error}");
+}

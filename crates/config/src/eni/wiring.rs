@@ -6,7 +6,7 @@ use linesman_proto::address::Path;
 use linesman_proto::port::Port;
 use linesman_proto::topology::{End, Tree, Wired};
 
-use super::slave::FileDevice;
+use super::sub_device::FileDevice;
 use crate::esi::EsiError;
 
 /// Brings the SubDevices into the order of their positions, where the file says them.

@@ -14,6 +14,9 @@ pub mod settings;
 pub mod task;
 pub mod variable;
 
+#[cfg(test)]
+mod tables;
+
 use std::ops::Range;
 
 use linesman_proto::address::{DeviceId, StationAddress};

@@ -265,6 +265,24 @@ impl ProjectDevice {
         Ok(())
     }
 
+    /// Whether it says more than who it is and where.
+    #[must_use]
+    pub fn chooses(&self) -> bool {
+        let plain = Self {
+            type_name: self.type_name.clone(),
+            vendor_id: self.vendor_id,
+            product_code: self.product_code,
+            revision: self.revision,
+            revision_rule: self.revision_rule,
+            serial: self.serial,
+            entry: self.entry.clone(),
+            station: self.station,
+            description: self.description.clone(),
+            ..Self::at(&self.name, self.on.clone())
+        };
+        *self != plain
+    }
+
     /// How far it is driven; `None` for a state that does not exist.
     #[must_use]
     pub fn target(&self) -> Option<AlState> {

@@ -179,6 +179,15 @@ impl Project {
         Self { name: name.to_owned(), esi, network, tasks, devices, ring }
     }
 
+    /// Whether it says more than who is where, and what that is: tasks, settings, descriptions of makers.
+    #[must_use]
+    pub fn chooses(&self) -> bool {
+        !self.esi.is_empty()
+            || !self.tasks.is_empty()
+            || self.network != Network::default()
+            || self.devices.iter().any(ProjectDevice::chooses)
+    }
+
     /// Whether what refers to something refers to something that is there, and numbers make sense.
     fn check(&self) -> Result<(), ProjectError> {
         let value = |whose: String, reason: &str| {
@@ -371,5 +380,108 @@ serial = 4711
         }
         assert!(broken("\"K1.C\"", "\"K1.B\"").contains("does not fit together"));
         assert!(broken("vendor_id = 2", "vendor_id = \"x\"").contains("line 10"), "line is named");
+    }
+
+    const CHOICES: &str = r#"
+name = "machine"
+esi = ["descriptions"]
+
+[network]
+layout = "compact"
+on_wrong_counter = "clear"
+
+[[task]]
+name = "fast"
+cycle_us = 500
+separate_inputs = true
+pre_ticks = 1
+
+[[device]]
+name = "Drive"
+on = "maindevice"
+state = "SAFEOP"
+task = "fast"
+sync_unit = "axes"
+access = "separate"
+frame_repeat = true
+addressing = "alias"
+watchdog = { process_data = 500 }
+clock = { assign_activate = 0x0700, sync0_cycle_us = 500, reference = true }
+pdos = [0x1601, 0x1A00]
+modules = ["", "M2"]
+
+[[device.mapping]]
+pdo = 0x1601
+entries = [{ index = 0x6040, bits = 16, name = "Control" }, { index = 0x607A, bits = 32, type = "DINT" }]
+
+[[device.start_up]]
+transition = "PS"
+index = 0x6060
+data = "08"
+comment = "mode"
+
+[device.description]
+ebus_current_ma = 120
+ports = "YY"
+mailbox = { receive = [0x1000, 128], send = [0x1080, 128], protocols = ["CoE"] }
+sync_managers = [
+    { index = 2, direction = "outputs", start = 0x1100, control = 0x64 },
+    { index = 3, direction = "inputs", start = 0x1400, control = 0x20 },
+]
+pdos = [
+    { index = 0x1600, direction = "outputs", sync_manager = 2, entries = [{ index = 0x6040, bits = 16 }] },
+    { index = 0x1601, direction = "outputs" },
+    { index = 0x1A00, direction = "inputs", sync_manager = 3, entries = [{ index = 0x6041, bits = 16, name = "Status" }] },
+]
+"#;
+
+    #[test]
+    fn choices_read_and_write_themselves() {
+        let text = CHOICES.replace("pre_ticks = 1", "pre_ticks = 0");
+        let project = Project::parse(&text).unwrap();
+        assert_eq!(Project::parse(&project.to_toml()), Ok(project.clone()));
+        assert!(project.chooses() && !Project::parse(PLANT).unwrap().chooses());
+        let broken =
+            |from: &str, to: &str| Project::parse(&text.replace(from, to)).unwrap_err().to_string();
+        for (from, to, expected) in [
+            ("task = \"fast\"", "task = \"slow\"", "no [[task]] of that name"),
+            ("state = \"SAFEOP\"", "state = \"RUN\"", "expected INIT, PREOP, SAFEOP, OP or BOOT"),
+            ("transition = \"PS\"", "transition = \"X\"", "letters I, P, S, O, B"),
+            ("data = \"08\"", "data = \"8\"", "two for each byte"),
+            ("cycle_us = 500", "cycle_us = 0", "expected a cycle time"),
+            ("index = 0x6060", "", "either `index` or `register`"),
+            ("layout = \"compact\"", "layout = \"tight\"", "unknown variant `tight`"),
+            (
+                "watchdog = { process_data",
+                "watchdog = { proces_data",
+                "unknown field `proces_data`",
+            ),
+        ] {
+            let error = broken(from, to);
+            assert!(error.contains(expected), "{to}: {error}");
+        }
+    }
+
+    #[test]
+    fn chosen_pdos_are_planned_assigned_and_mapped() {
+        let text = CHOICES.replace("separate_inputs = true\npre_ticks = 1\n", "");
+        let project = Project::parse(&text).unwrap();
+        let plan = project.plan(&mut |_| Ok(None)).unwrap();
+        assert_eq!((plan.outputs_len, plan.inputs_len), (6, 2));
+        let names: Vec<&str> = plan.variables.iter().map(|one| one.name.as_str()).collect();
+        assert_eq!(names.last(), Some(&"Status"));
+        let told: Vec<String> = plan.devices[0].start_up.iter().map(ToString::to_string).collect();
+        let all = told.join("\n");
+        // The mapping, the assignment of both SyncManagers, and the user's own command at the end.
+        for expected in ["10 00 40 60", "20 00 7A 60", "01 16", "00 1A"] {
+            assert!(all.contains(expected), "{expected}: {all}");
+        }
+        assert!(told.last().unwrap().contains("(mode)"), "{all}");
+        let device = &plan.devices[0];
+        assert_eq!(device.settings.on_wrong_counter, crate::plan::OnWrongCounter::Clear);
+        assert_eq!(device.target, linesman_proto::state::AlState::SafeOp);
+        let wrong = text.replace("pdos = [0x1601, 0x1A00]", "pdos = [0x1605]");
+        let error = Project::parse(&wrong).unwrap().plan(&mut |_| Ok(None)).unwrap_err();
+        assert!(error.to_string().contains("no PDO 0x1605; it has 0x1600"), "{error}");
     }
 }

@@ -3,7 +3,8 @@
 mod told;
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 use linesman_config::eni::Eni;
 use linesman_config::plan::Plan;
@@ -13,7 +14,9 @@ use linesman_diagnosis::report::Verdict;
 use linesman_link::clock::HostClock;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
+use linesman_runtime::event_log::{EventLog, EventLogWriter};
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
+use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{
     self as running, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
 };
@@ -27,6 +30,10 @@ use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
+use crate::version;
+
+/// After so long without news, what was waited with is told.
+const QUIET: Duration = Duration::from_millis(100);
 
 /// Longest ENI file that is read, in bytes.
 const MOST: u64 = 256 * 1024 * 1024;
@@ -78,6 +85,9 @@ pub(crate) struct Arguments {
     /// Do not judge the line meanwhile
     #[arg(long)]
     no_diagnosis: bool,
+    /// Keep what happens in an event log, for `linesman log`; runs are added to a file that is there
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
     /// At the end one JSON object, schema linesman.run/1, and nothing else
     #[arg(long)]
     pub(crate) json: bool,
@@ -103,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         (Source::Project(project), Some(path)) => {
             format!("{} SubDevices of {}", project.devices.len(), path.display())
         }
-        (Source::Eni(plan), Some(path)) => {
+        (Source::Planned(plan), Some(path)) => {
             format!("{} SubDevices of {}", plan.devices.len(), path.display())
         }
         _ => "what is there".to_owned(),
@@ -111,7 +121,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let setup = (!arguments.no_diagnosis).then(|| Setup {
         project: match &source {
             Source::Project(project) => Some((**project).clone()),
-            Source::AsFound | Source::Eni(_) => None,
+            Source::AsFound | Source::Planned(_) => None,
         },
         source: arguments.on.clone(),
         ..Setup::default()
@@ -126,9 +136,22 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     };
     let wanted = match source {
         Source::Project(project) => choices.project(*project),
-        Source::Eni(plan) => Wanted::Plan(plan),
+        Source::Planned(plan) => Wanted::Plan(plan),
         Source::AsFound => choices.as_found(),
     };
+    let began = HostClock::start().started_at();
+    let log = match &arguments.log {
+        Some(path) => {
+            let project = arguments
+                .file
+                .as_deref()
+                .map_or_else(String::new, |file| file.display().to_string());
+            let log = EventLog::create(path)?;
+            Some(EventLogWriter::start(log, began, &arguments.on, &project, &version::tool())?)
+        }
+        None => None,
+    };
+    let teller = Teller::new(arguments.json, began, log);
     let application = arguments.image.clone();
     let stop = driven::stop()?;
     let said = format!(
@@ -156,7 +179,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
                 application,
                 &stop,
                 &said,
-                arguments.json,
+                teller,
                 output,
             )
         }
@@ -164,7 +187,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let line = virtual_line(path, lasts.is_some())?;
             stop.rings(&line.bell()).map_err(no_bell)?;
             let ring = line.count() > 1;
-            drive(line, ring, wanted, &options, application, &stop, &said, arguments.json, output)
+            drive(line, ring, wanted, &options, application, &stop, &said, teller, output)
         }
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             let reason = format!("`{selector}`: nothing can be driven there");
@@ -177,17 +200,22 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 enum Source {
     AsFound,
     Project(Box<Project>),
-    Eni(Box<Plan>),
+    Planned(Box<Plan>),
 }
 
 impl Source {
     fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = files::bytes(path, "a project or an ENI file", MOST)?;
         if !Eni::is_one(&bytes) {
-            return Ok(Self::Project(Box::new(files::project(path)?)));
+            let project = files::project(path)?;
+            // One that chooses more than who is where is planned from what it says.
+            if project.chooses() {
+                return Ok(Self::Planned(Box::new(PlanFile::open(path)?.plan)));
+            }
+            return Ok(Self::Project(Box::new(project)));
         }
         let eni = Eni::parse(&bytes).map_err(|error| files::in_file(path, &error))?;
-        Ok(Self::Eni(Box::new(eni.plan)))
+        Ok(Self::Planned(Box::new(eni.plan)))
     }
 }
 
@@ -234,10 +262,9 @@ fn drive<L: Line + Send>(
     image: Option<PathBuf>,
     stop: &Stop,
     said: &str,
-    json: bool,
+    mut teller: Teller,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    let mut teller = Teller::new(json);
     teller.line(said, output);
     let (notes, told) = mpsc::channel();
     let ended = std::thread::scope(|scope| {
@@ -246,13 +273,25 @@ fn drive<L: Line + Send>(
             Some(path) => running::run(line, ring, wanted, Shared::at(path), options, stop, notes),
         };
         let thread = scope.spawn(work);
-        for note in told {
-            teller.note(&note, output);
+        loop {
+            match told.recv_timeout(QUIET) {
+                Ok(note) => teller.note(&note, output),
+                Err(RecvTimeoutError::Timeout) => teller.flush(output),
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
         }
+        teller.flush(output);
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     });
+    let lasted = ended.as_ref().map_or(Span::ZERO, |ended| Span::ns(ended.report.time_ns));
+    if let Some(log) = teller.finish(lasted)
+        && (log.dropped > 0 || log.failure.is_some())
+    {
+        let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
+        output.warn(&format!("{} entries are missing in the event log: {why}", log.dropped));
+    }
     let Ended { report, diagnosis, error } = ended.map_err(|error| failure(&error, &options.on))?;
-    if json {
+    if teller.is_json() {
         output.json(&report);
     } else {
         output.text(&told::summary(&report));

@@ -13,6 +13,7 @@ use schemars::{Schema, schema_for};
 use super::diagnose::follow::EventReport;
 use super::interfaces;
 use super::lab::replay::ReplayReport;
+use super::log::LogReport;
 use super::plan::report::PlanReport;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
@@ -58,6 +59,8 @@ pub(crate) enum Name {
     Truth,
     /// A line that the control socket of `sim` takes
     Control,
+    /// `log --json`
+    Log,
     /// `run --json`
     Run,
     /// `interfaces --json`
@@ -103,6 +106,7 @@ fn schema(name: Name) -> Schema {
         Name::Sim => schema_for!(SimStatus),
         Name::Truth => schema_for!(TruthEvent),
         Name::Control => schema_for!(Request),
+        Name::Log => schema_for!(LogReport),
         Name::Run => schema_for!(RunReport),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::States => schema_for!(state::Report),

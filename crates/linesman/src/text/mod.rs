@@ -2,7 +2,6 @@
 
 pub(crate) mod diagnosis;
 pub(crate) mod drawing;
-pub(crate) mod event;
 pub(crate) mod finding;
 pub(crate) mod names;
 pub(crate) mod quantity;

@@ -24,6 +24,12 @@ impl Names {
         }
     }
 
+    /// The bare name; empty when it has none.
+    pub(crate) fn plain(&self, no: u32) -> &str {
+        let index = (no as usize).checked_sub(1);
+        index.and_then(|index| self.0.get(index)).map_or("", String::as_str)
+    }
+
     /// `14 (B3) port A`, `MainDevice card A`.
     pub(crate) fn end(&self, end: EndReport) -> String {
         let kind = if end.no == 0 { "card" } else { "port" };

@@ -8,7 +8,7 @@ use linesman_proto::register::FmmuConfig;
 use linesman_proto::sii::Direction;
 
 use crate::eni::OWN;
-use crate::eni::slave::fmmus_of;
+use crate::eni::sub_device::fmmus_of;
 use crate::plan::{DatagramPlan, DevicePlan, IoAt, PathView, Plan, Presence, Role, expect};
 use crate::xml_writer::Xml;
 

@@ -6,7 +6,7 @@
 
 mod cyclic;
 mod main_device;
-mod slave;
+mod sub_device;
 mod transition;
 
 use self::cyclic::Image;
@@ -23,7 +23,7 @@ pub fn write(name: &str, plan: &Plan) -> String {
         xml.element("Config", &[], |xml| {
             main_device::write(xml, name, plan);
             for device in &plan.devices {
-                slave::write(xml, device, plan, &image);
+                sub_device::write(xml, device, plan, &image);
             }
             cyclic::write(xml, plan, &image);
             cyclic::write_image(xml, plan, &image);

@@ -1,14 +1,18 @@
 //! What a run tells while it lasts, and at its end.
 
+use std::sync::Arc;
+
 use linesman_diagnosis::report::Severity;
-use linesman_maindevice::Event;
-use linesman_proto::time::Instant;
+use linesman_link::unix_time::UnixTime;
+use linesman_maindevice::watch::EntryKind;
+use linesman_maindevice::{Event, Watch};
+use linesman_proto::time::{Instant, Span};
+use linesman_runtime::event_log::{EventLogWriter, WriterReport};
 use linesman_runtime::run::Note;
 use linesman_runtime::run::report::{Counts, RunReport};
 
 use crate::command::diagnose::follow::Follower;
 use crate::output::Output;
-use crate::text::event::words;
 use crate::text::names::Names;
 use crate::text::quantity::{count, grouped, time};
 
@@ -17,12 +21,21 @@ pub(super) struct Teller {
     json: bool,
     names: Names,
     follower: Follower,
-    up: bool,
+    watch: Option<Watch>,
+    /// When the run began, by the wall clock.
+    began: UnixTime,
+    log: Option<EventLogWriter>,
 }
 
 impl Teller {
-    pub(super) fn new(json: bool) -> Self {
-        Self { json, names: Names::default(), follower: Follower::new(false), up: false }
+    pub(super) fn new(json: bool, began: UnixTime, log: Option<EventLogWriter>) -> Self {
+        let follower = Follower::new(false);
+        Self { json, names: Names::default(), follower, watch: None, began, log }
+    }
+
+    /// Whether people are not to be told.
+    pub(super) fn is_json(&self) -> bool {
+        self.json
     }
 
     /// A line for people.
@@ -37,6 +50,7 @@ impl Teller {
         match note {
             Note::Scanned(_) => {}
             Note::Planned(plan) => {
+                self.watch = Some(Watch::new(Arc::clone(plan)));
                 self.names = Names::new(plan.devices.iter().map(|device| device.name.clone()));
                 for task in &plan.tasks {
                     let frames = count(task.frames.len() as u64, "frame");
@@ -56,15 +70,37 @@ impl Teller {
     }
 
     fn event(&mut self, at: Instant, event: &Event, output: &mut Output) {
-        let state = matches!(event, Event::DeviceState { status, .. } if !status.error());
-        // Until all are up each would be told of four times.
-        if state && !self.up {
-            return;
+        let Some(watch) = &mut self.watch else { return };
+        watch.handle_event(at, event);
+        self.entries(output);
+    }
+
+    /// Nothing has come for a while, or nothing more will: what was waited with is told.
+    pub(super) fn flush(&mut self, output: &mut Output) {
+        let Some(watch) = &mut self.watch else { return };
+        watch.flush();
+        self.entries(output);
+    }
+
+    fn entries(&mut self, output: &mut Output) {
+        while let Some(entry) = self.watch.as_mut().and_then(Watch::poll_entry) {
+            // That each is there is told once, of all; the log has each.
+            let quiet = entry.kind == EntryKind::State && entry.device.is_some();
+            if !quiet {
+                self.said(entry.at, &entry.text, output);
+            }
+            if let Some(log) = &self.log {
+                let name = entry.device.map(|id| self.names.plain(id.no()).to_owned());
+                let at = self.began + entry.at.since(Instant::ZERO);
+                log.write(at, entry, name.as_deref());
+            }
         }
-        self.up |= matches!(event, Event::AllReached);
-        if let Some(words) = words(event, &self.names) {
-            self.said(at, &words, output);
-        }
+    }
+
+    /// Ends the log; gives how the writing went.
+    pub(super) fn finish(&mut self, ended: Span) -> Option<WriterReport> {
+        let log = self.log.take()?;
+        Some(log.finish(self.began + ended))
     }
 
     fn said(&self, at: Instant, words: &str, output: &mut Output) {

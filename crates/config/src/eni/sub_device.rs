@@ -68,7 +68,7 @@ pub(super) fn fmmus_of(
 }
 
 /// The SubDevice of an element; `number` counts from 1.
-pub(super) fn slave(
+pub(super) fn sub_device(
     element: &Element,
     number: usize,
     notes: &mut Vec<String>,

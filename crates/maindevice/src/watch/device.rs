@@ -1,0 +1,248 @@
+//! What is known of one SubDevice.
+
+use std::collections::VecDeque;
+
+use linesman_config::plan::{DevicePlan, Plan};
+use linesman_proto::address::DeviceId;
+use linesman_proto::port::{Port, PortMap};
+use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters};
+use linesman_proto::state::{AlState, AlStatusCode, DeviceState, StateValue};
+use linesman_proto::time::Instant;
+
+use super::CounterTotals;
+use crate::event::Event;
+
+/// So many abnormal changes are remembered of each SubDevice.
+const REMEMBERED: usize = 16;
+
+/// A SubDevice left the state it was to be in.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct AbnormalChange {
+    /// When it was seen.
+    pub at: Instant,
+    /// Where it was.
+    pub from: AlState,
+    /// Where it went.
+    pub to: StateValue,
+    /// Why, as it says; [`AlStatusCode::NO_ERROR`] when it gives no reason.
+    pub code: AlStatusCode,
+}
+
+/// What is known of one SubDevice.
+#[derive(Clone, Debug)]
+pub struct WatchedDevice {
+    id: DeviceId,
+    /// Which ports have a neighbour in the plan.
+    planned: PortMap<bool>,
+    present: Option<bool>,
+    status: Option<AlStatus>,
+    code: AlStatusCode,
+    wrong_identity: bool,
+    init_error: bool,
+    links: Option<DlStatus>,
+    counters: CounterTotals,
+    abnormal: u64,
+    not_present: u64,
+    history: VecDeque<AbnormalChange>,
+}
+
+impl WatchedDevice {
+    pub(super) fn new(plan: &Plan, device: &DevicePlan) -> Self {
+        let node = device.id.index();
+        let is_planned =
+            |port| node < plan.tree.len() && plan.tree.open_ports(node).any(|open| open == port);
+        Self {
+            id: device.id,
+            planned: PortMap::from_fn(is_planned),
+            present: None,
+            status: None,
+            code: AlStatusCode::NO_ERROR,
+            wrong_identity: false,
+            init_error: false,
+            links: None,
+            counters: CounterTotals::default(),
+            abnormal: 0,
+            not_present: 1,
+            history: VecDeque::new(),
+        }
+    }
+
+    /// Who it is.
+    #[must_use]
+    pub fn id(&self) -> DeviceId {
+        self.id
+    }
+
+    /// Whether it answers; `None` before it was looked for.
+    #[must_use]
+    pub fn is_present(&self) -> Option<bool> {
+        self.present
+    }
+
+    /// The state word: software in the low byte, wiring in the high byte.
+    #[must_use]
+    pub fn state(&self) -> DeviceState {
+        let here = self.present == Some(true) || self.wrong_identity;
+        let state = match self.status {
+            Some(status) if here => status.state(),
+            Some(_) | None => StateValue::Known(AlState::Init),
+        };
+        let mut word = DeviceState::new(state);
+        let bit = |set: bool, bits: u16| if set { bits } else { 0 };
+        let error = here && self.status.is_some_and(AlStatus::error);
+        word = word
+            .with(bit(error, DeviceState::ERROR))
+            .with(bit(self.wrong_identity, DeviceState::WRONG_IDENTITY))
+            .with(bit(self.init_error, DeviceState::INIT_ERROR))
+            .with(bit(!here, DeviceState::NOT_PRESENT));
+        let Some(links) = self.links.filter(|_| here) else { return word };
+        for port in Port::ALL {
+            let seen = links.port_state(port);
+            let planned = self.planned[port];
+            let bits = match (planned, seen.link, seen.communication) {
+                (true, false, _) => DeviceState::MISSING_LINK,
+                (true, true, false) => DeviceState::LINK_ERROR,
+                (false, _, true) => DeviceState::ADDITIONAL_LINK,
+                (true, true, true) | (false, _, false) => continue,
+            };
+            word = word.with(bits).at_port(port);
+        }
+        word
+    }
+
+    /// Why it signals an error; [`AlStatusCode::NO_ERROR`] when it does not.
+    #[must_use]
+    pub fn code(&self) -> AlStatusCode {
+        self.code
+    }
+
+    /// Whether it signals an error, is not there, or is somebody else.
+    pub(super) fn has_error(&self) -> bool {
+        let faults = [
+            DeviceState::ERROR,
+            DeviceState::WRONG_IDENTITY,
+            DeviceState::INIT_ERROR,
+            DeviceState::NOT_PRESENT,
+        ];
+        let word = self.state();
+        faults.into_iter().any(|bit| word.contains(bit))
+    }
+
+    /// Its ports as they were read last.
+    #[must_use]
+    pub fn links(&self) -> Option<DlStatus> {
+        self.links
+    }
+
+    /// Its error counters, summed up.
+    #[must_use]
+    pub fn counters(&self) -> &CounterTotals {
+        &self.counters
+    }
+
+    /// The first of the two change counters of the online list: how often it left a state by itself. 0 is healthy.
+    #[must_use]
+    pub fn abnormal_changes(&self) -> u64 {
+        self.abnormal
+    }
+
+    /// The second: 1 from the start, and one more each time it stopped answering.
+    #[must_use]
+    pub fn presence_changes(&self) -> u64 {
+        self.not_present
+    }
+
+    /// The last abnormal changes, the oldest first, with the reasons that it gave.
+    pub fn history(&self) -> impl Iterator<Item = &AbnormalChange> {
+        self.history.iter()
+    }
+
+    #[allow(clippy::wildcard_enum_match_arm, reason = "the others say nothing of a SubDevice")]
+    pub(super) fn handle_event(&mut self, now: Instant, event: &Event) {
+        match event {
+            Event::DeviceState { status, code, .. } => {
+                self.present = Some(true);
+                self.status = Some(*status);
+                self.code = *code;
+            }
+            Event::AbnormalState { from, status, code, .. } => {
+                self.abnormal += 1;
+                if self.history.len() == REMEMBERED {
+                    self.history.pop_front();
+                }
+                let to = status.state();
+                self.history.push_back(AbnormalChange { at: now, from: *from, to, code: *code });
+            }
+            Event::TargetReached { .. } => {
+                self.present = Some(true);
+                self.wrong_identity = false;
+                self.init_error = false;
+            }
+            Event::Refused { status, code, .. } => {
+                self.init_error = true;
+                self.status = Some(*status);
+                self.code = *code;
+            }
+            Event::StepTimedOut { status, .. } | Event::StartUpFailed { status, .. } => {
+                self.init_error = true;
+                self.status = Some(*status);
+            }
+            Event::DeviceLost { .. } => {
+                if self.present == Some(true) {
+                    self.not_present += 1;
+                }
+                self.present = Some(false);
+                self.links = None;
+            }
+            Event::DeviceBack { restarted, .. } => {
+                self.present = Some(true);
+                self.wrong_identity = false;
+                if *restarted {
+                    self.counters.restarted();
+                }
+            }
+            Event::WrongDevice { .. } => self.wrong_identity = true,
+            Event::Links { status, .. } => {
+                self.present = Some(true);
+                self.links = Some(*status);
+            }
+            Event::Counters { counters, .. } => {
+                self.counters.record(counters);
+            }
+            _ => {}
+        }
+    }
+
+    /// By how much the counters rise with this reading.
+    pub(super) fn rises(&self, reading: &ErrorCounters) -> Vec<(ErrorCounter, u64)> {
+        self.counters.clone().record(reading)
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.counters.clear();
+        self.abnormal = 0;
+        self.not_present = 1;
+    }
+}
+
+/// Whom an event is about.
+#[allow(clippy::wildcard_enum_match_arm, reason = "the others are of the network")]
+pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
+    match event {
+        Event::DeviceState { id, .. }
+        | Event::TargetReached { id, .. }
+        | Event::Refused { id, .. }
+        | Event::StepTimedOut { id, .. }
+        | Event::StartUpFailed { id, .. }
+        | Event::AbnormalState { id, .. }
+        | Event::DeviceLost { id }
+        | Event::DeviceBack { id, .. }
+        | Event::WrongDevice { id, .. }
+        | Event::Counters { id, .. }
+        | Event::Links { id, .. }
+        | Event::Emergency { id, .. }
+        | Event::SdoUploaded { id, .. }
+        | Event::SdoDownloaded { id, .. } => Some(*id),
+        _ => None,
+    }
+}

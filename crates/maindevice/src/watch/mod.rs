@@ -1,0 +1,223 @@
+//! The watch: what a person or a control program wants to see of a running network.
+//!
+//! [`Watch`] is an engine that is fed with the [`Event`]s of a MainDevice. It keeps the state words
+//! of each SubDevice and of the network, the error counters as totals that survive clears and
+//! restarts, the change counters of the vendor's online list, and it words what happened as
+//! [`LogEntry`]s. It knows no clock and asks for nothing: it costs the cycle nothing.
+//!
+//! Read first: `facts` 3.1 and 3.2 of the vendor interface (online list, message texts).
+
+mod counters;
+mod device;
+mod entry;
+mod wording;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use linesman_config::plan::Plan;
+use linesman_proto::address::{DeviceId, Path, WorkingCounter};
+use linesman_proto::state::{AlState, NetworkState, StateValue};
+use linesman_proto::time::{Instant, Span};
+
+use crate::event::Event;
+
+pub use counters::CounterTotals;
+pub use device::{AbnormalChange, WatchedDevice};
+pub use entry::{EntryKind, LogEntry, Severity};
+
+/// So many entries wait for somebody who fetches them; older ones are dropped and counted.
+const WAITING_ENTRIES: usize = 10_000;
+/// SubDevices that get lost within this time are told of together: a cable takes all behind it.
+const LOST_TOGETHER: Span = Span::ms(20);
+
+/// The watch over one network.
+#[derive(Debug)]
+pub struct Watch {
+    plan: Arc<Plan>,
+    devices: Vec<WatchedDevice>,
+    /// Bits that do not follow from the SubDevices.
+    own: NetworkState,
+    responding: Option<WorkingCounter>,
+    /// SubDevices that got lost and were not told of yet, and since when.
+    lost: Vec<DeviceId>,
+    lost_at: Instant,
+    entries: VecDeque<LogEntry>,
+    dropped: u64,
+}
+
+impl Watch {
+    /// A watch over the SubDevices of a plan, of which nothing is known yet.
+    #[must_use]
+    pub fn new(plan: Arc<Plan>) -> Self {
+        let devices = plan.devices.iter().map(|device| WatchedDevice::new(&plan, device)).collect();
+        Self {
+            plan,
+            devices,
+            own: NetworkState::default(),
+            responding: None,
+            lost: Vec::new(),
+            lost_at: Instant::ZERO,
+            entries: VecDeque::new(),
+            dropped: 0,
+        }
+    }
+
+    // ---- getters ----
+
+    /// What is known of each SubDevice, by [`DeviceId`].
+    #[must_use]
+    pub fn devices(&self) -> &[WatchedDevice] {
+        &self.devices
+    }
+
+    /// What is known of one SubDevice.
+    #[must_use]
+    pub fn device(&self, id: DeviceId) -> Option<&WatchedDevice> {
+        self.devices.get(id.index())
+    }
+
+    /// The network's state word.
+    #[must_use]
+    pub fn network_state(&self) -> NetworkState {
+        let mut word = self.own;
+        for device in &self.devices {
+            let state = device.state();
+            let bit = match state.state() {
+                StateValue::Known(AlState::PreOp) => NetworkState::SOME_PREOP,
+                StateValue::Known(AlState::SafeOp) => NetworkState::SOME_SAFEOP,
+                StateValue::Known(AlState::Op) => 0,
+                StateValue::Known(AlState::Init | AlState::Boot) | StateValue::Unknown(_) => {
+                    NetworkState::SOME_INIT
+                }
+            };
+            word = word.with(bit, true);
+            if device.has_error() {
+                word = word.with(NetworkState::SOME_ERROR, true);
+            }
+        }
+        word
+    }
+
+    /// How many SubDevices answered the last broadcast read.
+    #[must_use]
+    pub fn responding(&self) -> Option<WorkingCounter> {
+        self.responding
+    }
+
+    /// How many entries were dropped because nobody fetched them.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    // ---- what comes in ----
+
+    /// Something happened.
+    #[allow(clippy::wildcard_enum_match_arm, reason = "the others are of one SubDevice")]
+    pub fn handle_event(&mut self, now: Instant, event: &Event) {
+        self.handle_timeout(now);
+        if let Event::DeviceLost { id } = event {
+            if self.lost.is_empty() {
+                self.lost_at = now;
+            }
+            self.lost.push(*id);
+        }
+        match event {
+            Event::Responding { now: count, .. } => self.responding = Some(*count),
+            Event::Ring { intact } => {
+                self.own = self.own.with(NetworkState::REDUNDANCY_FRAME_MISSING, !intact);
+            }
+            Event::OutputsWithheld { .. } => self.own = self.own.with(NetworkState::WATCHDOG, true),
+            Event::OutputsResumed { .. } => self.own = self.own.with(NetworkState::WATCHDOG, false),
+            _ => {}
+        }
+        // The wording may need what was before.
+        let entries = wording::of(now, event, self);
+        if let Some(id) = device::concerned(event)
+            && let Some(device) = self.devices.get_mut(id.index())
+        {
+            device.handle_event(now, event);
+        }
+        for entry in entries {
+            self.push(entry);
+        }
+    }
+
+    /// The carrier of a card came or went.
+    pub fn handle_carrier(&mut self, now: Instant, card: Path, carrier: bool) {
+        let bit = match card {
+            Path::A => NetworkState::LINK_ERROR,
+            Path::B => NetworkState::REDUNDANCY_LINK_ERROR,
+        };
+        let before = self.own;
+        self.own = before.with(bit, !carrier);
+        if self.own != before {
+            self.push(wording::carrier(now, card, carrier));
+        }
+    }
+
+    /// The card took a frame, or did not.
+    pub fn handle_send_failure(&mut self, failing: bool) {
+        self.own = self.own.with(NetworkState::OUT_OF_SEND_RESOURCES, failing);
+    }
+
+    /// The clocks are further apart than the window allows, or are not any more.
+    pub fn handle_clocks(&mut self, now: Instant, apart: bool) {
+        let before = self.own;
+        self.own = before.with(NetworkState::CLOCKS_APART, apart);
+        if self.own != before {
+            self.push(wording::clocks(now, apart));
+        }
+    }
+
+    /// Time has passed: what was waited with is told.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        if now >= self.lost_at + LOST_TOGETHER {
+            self.flush();
+        }
+    }
+
+    /// What is waited with is told at once: nothing more will come.
+    pub fn flush(&mut self) {
+        let mut lost = std::mem::take(&mut self.lost);
+        lost.sort_unstable();
+        for entry in wording::lost(self.lost_at, &lost, &self.plan) {
+            self.push(entry);
+        }
+    }
+
+    // ---- commands ----
+
+    /// All error counters and change counters of the list begin at 0 again. Nothing is written to
+    /// the SubDevices: other tools go on as they were, and no count is lost.
+    pub fn clear(&mut self) {
+        for device in &mut self.devices {
+            device.clear();
+        }
+    }
+
+    // ---- what goes out ----
+
+    /// The next entry of the log.
+    pub fn poll_entry(&mut self) -> Option<LogEntry> {
+        self.entries.pop_front()
+    }
+
+    /// When [`handle_timeout`](Self::handle_timeout) has something to do.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        (!self.lost.is_empty()).then(|| self.lost_at + LOST_TOGETHER)
+    }
+
+    fn push(&mut self, entry: LogEntry) {
+        if self.entries.len() >= WAITING_ENTRIES {
+            self.entries.pop_front();
+            self.dropped += 1;
+        }
+        self.entries.push_back(entry);
+    }
+}
+
+#[cfg(test)]
+mod tests;

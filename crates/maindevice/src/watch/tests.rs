@@ -1,0 +1,299 @@
+use linesman_config::identity::Mismatch;
+use linesman_config::plan::DevicePlan;
+use linesman_proto::mailbox::coe::{Emergency, ErrorRegister};
+use linesman_proto::port::Port;
+use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters};
+use linesman_proto::sii::Identity;
+use linesman_proto::state::AlStatusCode;
+use linesman_proto::topology::{End, Tree, Wired};
+
+use super::*;
+
+/// A coupler and six terminals behind it, as in the message window of the sources.
+fn watch() -> Watch {
+    let names = ["EK1100", "EL1002", "EL2004", "EL7041-0001", "EL7041", "EL2252", "EL1262"];
+    let wired: Vec<_> = (0..names.len())
+        .map(|node| {
+            let on = match node {
+                0 => End::MainDevice(Path::A),
+                1 => End::Controller(0, Port::B),
+                node => End::Controller(node - 1, Port::B),
+            };
+            Wired { on, entry: Port::A }
+        })
+        .collect();
+    let mut plan = Plan::empty(Tree::from_wiring(&wired, None).unwrap());
+    for (index, kind) in names.iter().enumerate() {
+        let mut device = DevicePlan::bare(DeviceId(index as u32));
+        device.name = format!("Term {}", 64 + index);
+        device.type_name = (*kind).to_owned();
+        device.station = linesman_proto::address::StationAddress(0x1015 + index as u16);
+        plan.devices.push(device);
+    }
+    Watch::new(Arc::new(plan))
+}
+
+fn at(ms: u64) -> Instant {
+    Instant::ZERO + Span::ms(ms)
+}
+
+fn texts(watch: &mut Watch) -> Vec<String> {
+    std::iter::from_fn(|| watch.poll_entry()).map(|entry| entry.text).collect()
+}
+
+fn state(id: u32, state: AlState, error: bool, code: u16) -> Event {
+    let status = AlStatus::new(state).with_error(error);
+    Event::DeviceState { id: DeviceId(id), status, code: AlStatusCode(code) }
+}
+
+fn links(id: u32, ports: &[Port]) -> Event {
+    let mut status = DlStatus(0);
+    for port in Port::ALL {
+        let open = ports.contains(&port);
+        status = status.with_port(
+            port,
+            linesman_proto::register::PortState { link: open, closed: !open, communication: open },
+        );
+    }
+    Event::Links { id: DeviceId(id), status }
+}
+
+fn counters(values: [u8; ErrorCounters::LEN]) -> Event {
+    let counters = ErrorCounters::from_bytes(&values, ErrorCounters::START);
+    Event::Counters { id: DeviceId(1), counters }
+}
+
+// The message window of S1 L412-422.
+// proves: DIA-13 partial: the words; the file is tested with the log
+#[test]
+fn a_cable_that_is_pulled_and_plugged_is_told_as_the_sources_do() {
+    let mut watch = watch();
+    for id in 0..7 {
+        watch.handle_event(at(0), &state(id, AlState::Op, false, 0));
+        watch.handle_event(at(0), &Event::TargetReached { id: DeviceId(id), state: AlState::Op });
+    }
+    texts(&mut watch);
+    for id in 0..7 {
+        watch.handle_event(at(182 + u64::from(id)), &Event::DeviceLost { id: DeviceId(id) });
+    }
+    assert_eq!(texts(&mut watch), Vec::<String>::new(), "waits whether more get lost");
+    assert_eq!(watch.poll_timeout(), Some(at(202)));
+    watch.handle_timeout(at(202));
+    let entry = watch.poll_entry().unwrap();
+    assert_eq!(entry.at, at(182));
+    assert_eq!(
+        entry.text,
+        "'Term 64 (EK1100)' (1015) - 'Term 70 (EL1262)' (101b) Communication interrupted"
+    );
+    for (id, ms) in (0..7).zip((5274..).step_by(2)) {
+        let event = Event::DeviceBack { id: DeviceId(id), restarted: false };
+        watch.handle_event(at(ms), &event);
+    }
+    let back = texts(&mut watch);
+    assert_eq!(back.len(), 7);
+    assert_eq!(back[6], "'Term 70 (EL1262)' (101b) Communication re-established");
+}
+
+#[test]
+fn those_who_are_no_neighbours_are_told_of_apart() {
+    let mut watch = watch();
+    for id in [1, 4, 5] {
+        watch.handle_event(at(1), &Event::DeviceLost { id: DeviceId(id) });
+    }
+    watch.handle_timeout(at(30));
+    assert_eq!(
+        texts(&mut watch),
+        [
+            "'Term 65 (EL1002)' (1016) Communication interrupted",
+            "'Term 68 (EL7041)' (1019) - 'Term 69 (EL2252)' (101a) Communication interrupted"
+        ]
+    );
+}
+
+// S0 L2230-2233 and L2240-2245.
+// proves: SW-02 partial: the words, SW-03 partial: the words
+#[test]
+fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
+    let mut watch = watch();
+    let status = AlStatus::new(AlState::Init).with_error(true);
+    let refused = Event::Refused {
+        id: DeviceId(1),
+        from: Some(AlState::Init),
+        to: AlState::PreOp,
+        status,
+        code: AlStatusCode(0x0014),
+    };
+    watch.handle_event(at(1), &refused);
+    let lines = texts(&mut watch);
+    assert_eq!(
+        lines[0],
+        "'Term 65 (EL1002)' (1016): state change aborted (requested 'PREOP', back to 'INIT')."
+    );
+    assert!(
+        lines[1].starts_with(
+            "'Term 65 (EL1002)' (1016): 'INIT to PREOP' failed! Error: 'check device state for PREOP'. AL Status \
+             '0x0011' read and '0x0002' expected. AL Status Code '0x0014 - "
+        ),
+        "{}",
+        lines[1]
+    );
+    watch.handle_event(at(2), &state(2, AlState::Op, false, 0));
+    watch.handle_event(at(2), &Event::TargetReached { id: DeviceId(2), state: AlState::Op });
+    texts(&mut watch);
+    watch.handle_event(at(3), &state(2, AlState::SafeOp, true, 0x001B));
+    let fell = Event::AbnormalState {
+        id: DeviceId(2),
+        from: AlState::Op,
+        status: AlStatus::new(AlState::SafeOp).with_error(true),
+        code: AlStatusCode(0x001B),
+    };
+    watch.handle_event(at(3), &fell);
+    let lines = texts(&mut watch);
+    assert!(
+        lines[0].starts_with(
+            "'Term 66 (EL2004)' (1017): abnormal state change (from 'OP' to 'SAFEOP') with code 0x1b"
+        ),
+        "{lines:?}"
+    );
+    let device = watch.device(DeviceId(2)).unwrap();
+    assert_eq!(device.state().to_string(), "ERR SAFEOP");
+    assert_eq!((device.abnormal_changes(), device.presence_changes()), (1, 1));
+    assert_eq!(device.history().next().unwrap().code, AlStatusCode(0x001B));
+}
+
+// proves: HW-12 partial: the numbers, PLC-16 partial: the numbers
+#[test]
+fn the_change_counters_begin_at_nought_and_one() {
+    let mut watch = watch();
+    let changes = |watch: &Watch| {
+        let device = watch.device(DeviceId(3)).unwrap();
+        (device.abnormal_changes(), device.presence_changes())
+    };
+    // Not found at first, then found: that is how each start looks.
+    watch.handle_event(at(0), &Event::DeviceLost { id: DeviceId(3) });
+    watch.handle_event(at(1), &state(3, AlState::Init, false, 0));
+    assert_eq!(changes(&watch), (0, 1));
+    for time in [2, 4] {
+        watch.handle_event(at(time), &Event::DeviceLost { id: DeviceId(3) });
+        let back = Event::DeviceBack { id: DeviceId(3), restarted: true };
+        watch.handle_event(at(time + 1), &back);
+    }
+    assert_eq!(changes(&watch), (0, 3));
+    watch.clear();
+    assert_eq!(changes(&watch), (0, 1));
+}
+
+// proves: PLC-05 partial: from events, PLC-06 partial: from events
+#[test]
+fn state_words_follow_from_plan_and_ports() {
+    let mut watch = watch();
+    let text = |watch: &Watch, id| watch.device(DeviceId(id)).unwrap().state().to_string();
+    assert_eq!(text(&watch, 0), "INIT NO_COMM", "nobody has seen it");
+    for id in 0..7 {
+        watch.handle_event(at(0), &state(id, AlState::Op, false, 0));
+    }
+    watch.handle_event(at(1), &links(0, &[Port::A, Port::B]));
+    watch.handle_event(at(1), &links(6, &[Port::A]));
+    assert_eq!((text(&watch, 0), text(&watch, 6)), ("OP".into(), "OP".into()));
+    watch.handle_event(at(2), &links(0, &[Port::A, Port::C]));
+    assert_eq!(text(&watch, 0), "OP LNK_MIS LNK_ADD B C");
+    watch.handle_event(at(2), &links(0, &[Port::A]));
+    assert_eq!(text(&watch, 0), "OP LNK_MIS B");
+    assert_eq!(watch.device(DeviceId(0)).unwrap().state().0, 0x2408);
+    watch.handle_event(at(3), &state(6, AlState::Init, true, 0x0014));
+    let refused = Event::Refused {
+        id: DeviceId(6),
+        from: Some(AlState::Init),
+        to: AlState::PreOp,
+        status: AlStatus::new(AlState::Init).with_error(true),
+        code: AlStatusCode(0x0014),
+    };
+    watch.handle_event(at(3), &refused);
+    let stranger = Event::WrongDevice {
+        id: DeviceId(6),
+        mismatch: Mismatch::Product,
+        expected: Identity::default(),
+        found: Identity::default(),
+    };
+    watch.handle_event(at(4), &stranger);
+    assert_eq!(text(&watch, 6), "ERR INIT VPRS INIT_ERR");
+    assert_eq!(watch.device(DeviceId(6)).unwrap().state().0, 0x0071);
+}
+
+// proves: PLC-07 partial: from events
+#[test]
+fn the_network_word_sums_up() {
+    let mut watch = watch();
+    for id in 0..7 {
+        watch.handle_event(at(0), &state(id, AlState::Op, false, 0));
+    }
+    assert_eq!(watch.network_state().to_string(), "OK");
+    watch.handle_event(at(1), &state(4, AlState::SafeOp, true, 0x001B));
+    assert_eq!(watch.network_state().0, 0x0C00);
+    watch.handle_carrier(at(2), Path::A, false);
+    watch.handle_event(at(2), &Event::Ring { intact: false });
+    assert_eq!(watch.network_state().0, 0x0C09);
+    watch.handle_carrier(at(3), Path::A, true);
+    watch.handle_event(at(3), &Event::Ring { intact: true });
+    watch.handle_event(at(3), &Event::OutputsWithheld { task: 0 });
+    watch.handle_clocks(at(3), true);
+    watch.handle_send_failure(true);
+    assert_eq!(watch.network_state().0, 0x1C30);
+}
+
+// proves: DIA-09 partial: totals, HW-19 partial: totals
+#[test]
+fn counters_are_summed_up_through_clears_and_restarts() {
+    let mut watch = watch();
+    let mut values = [0; ErrorCounters::LEN];
+    values[0] = 200;
+    watch.handle_event(at(0), &counters(values));
+    let count = |watch: &Watch| {
+        let totals = watch.device(DeviceId(1)).unwrap().counters();
+        (totals.count(ErrorCounter::InvalidFrame(Port::A)).unwrap(), totals.is_lower_bound())
+    };
+    assert_eq!(count(&watch), (0, false), "what the power-on brought counts for nothing");
+    values[0] = 203;
+    watch.handle_event(at(1), &counters(values));
+    assert_eq!(count(&watch), (3, false));
+    assert_eq!(
+        texts(&mut watch),
+        ["'Term 65 (EL1002)' (1016): error counters rose: invalid frames, port A +3"]
+    );
+    // Another tool clears, then two more happen.
+    values[0] = 2;
+    watch.handle_event(at(2), &counters(values));
+    assert_eq!(count(&watch), (5, true), "what was between is lost, and that is said");
+    // A restart: 1 more.
+    watch.handle_event(at(3), &Event::DeviceBack { id: DeviceId(1), restarted: true });
+    values[0] = 1;
+    watch.handle_event(at(4), &counters(values));
+    assert_eq!(count(&watch).0, 6);
+    watch.clear();
+    assert_eq!(count(&watch).0, 0);
+    values[0] = 4;
+    watch.handle_event(at(5), &counters(values));
+    assert_eq!(count(&watch).0, 3);
+    let totals = watch.device(DeviceId(1)).unwrap().counters();
+    assert_eq!(totals.at_port(Port::A), Some(3));
+    assert_eq!(totals.registers().unwrap().value(ErrorCounter::InvalidFrame(Port::A)), Some(4));
+}
+
+#[test]
+fn an_emergency_is_told_with_its_class() {
+    let mut watch = watch();
+    let emergency = Emergency { code: 0x8611, register: ErrorRegister(0x20), data: [0; 5] };
+    watch.handle_event(at(0), &Event::Emergency { id: DeviceId(4), emergency });
+    let lines = texts(&mut watch);
+    assert!(lines[0].starts_with("'Term 68 (EL7041)' (1019): emergency 0x8611 ("), "{lines:?}");
+}
+
+#[test]
+fn a_log_that_nobody_reads_does_not_grow_without_end() {
+    let mut watch = watch();
+    for round in 0..WAITING_ENTRIES as u64 + 5 {
+        watch.handle_carrier(at(round), Path::A, round % 2 == 1);
+    }
+    assert_eq!(watch.dropped(), 5);
+    assert_eq!(texts(&mut watch).len(), WAITING_ENTRIES);
+}
