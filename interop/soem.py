@@ -13,9 +13,10 @@ def main():
     master = pysoem.Master()
     master.open(*asked.interfaces)
     try:
-        found = master.config_init()
-        if found <= 0:
-            peer.refuse(f"config_init found {found} SubDevices")
+        # A busy host may be late at the very first frame.
+        found = next((found for _ in range(3) if (found := master.config_init()) > 0), 0)
+        if not found:
+            peer.refuse("config_init found no SubDevice")
         devices = [[slave.man, slave.id, slave.rev] for slave in master.slaves]
         names = [slave.name for slave in master.slaves]
         clocks = soem_clocks.Clocks(master, asked.sync0_ns) if asked.sync0_ns else None

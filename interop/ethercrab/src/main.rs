@@ -32,6 +32,10 @@ fn main() -> Result<()> {
         [interface, "services"] => smol::block_on(services::run(interface)),
         [interface, "objects"] => smol::block_on(objects::run(interface)),
         [interface, "loss", cycle_us] => smol::block_on(loss::run(interface, micros(cycle_us)?)),
+        [interface, "speed", seconds, cycle_us] => {
+            let lasts = Duration::from_secs(seconds.parse()?);
+            smol::block_on(speed::run(interface, lasts, micros(cycle_us)?))
+        }
         [interface, cycles, cycle_us, file, options @ ..] => {
             let rounds = serde_json::from_str(&std::fs::read_to_string(file)?)?;
             let asked = rounds::Asked { cycles: cycles.parse()?, cycle: micros(cycle_us)?, rounds };
@@ -45,7 +49,8 @@ fn main() -> Result<()> {
         }
         _ => bail!(
             "usage: ethercrab-peer INTERFACE CYCLES CYCLE_US ROUNDS.json [sync0=NS], or \
-             INTERFACE services, or INTERFACE objects, or INTERFACE loss CYCLE_US"
+             INTERFACE services, or INTERFACE objects, or INTERFACE loss CYCLE_US, \
+             or INTERFACE speed SECONDS CYCLE_US"
         ),
     }
 }
