@@ -3,17 +3,18 @@
 use linesman_config::identity::Mismatch;
 use linesman_config::inventory::Inventory;
 use linesman_config::start_up::StartUpCommand;
-use linesman_proto::address::{DeviceId, Position, WorkingCounter};
+use linesman_proto::address::{DeviceId, Position, StationAddress, WorkingCounter};
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
 use linesman_proto::register::{AlStatus, DlStatus, ErrorCounters};
 use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode};
+use linesman_proto::time::Span;
 
 use crate::exchange::{ExchangeError, Reply};
 use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
-use crate::procedure::{Look, LookError, ScanError};
+use crate::procedure::{ClockError, Look, LookError, ScanError};
 use crate::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
 use crate::supervisor::StartUpError;
 
@@ -84,6 +85,30 @@ pub enum Event {
         command: Box<StartUpCommand>,
         /// What it answered.
         error: Box<StartUpError>,
+    },
+    /// Clocks were set, and follow this one.
+    ClocksSet {
+        /// Station address of the reference clock.
+        reference: StationAddress,
+    },
+    /// They could not be set. Those SubDevices that need them are tried again later.
+    ClocksNotSet {
+        /// Why.
+        error: ClockError,
+    },
+    /// The clock of a SubDevice does not follow the reference clock, so that it is not taken further.
+    /// It will be tried again later.
+    ClockOff {
+        /// Which.
+        id: DeviceId,
+        /// The state it was to enter.
+        to: AlState,
+        /// How far it is off (0x092C).
+        difference: Span,
+        /// How far it may be.
+        limit: Span,
+        /// How long it was waited for.
+        patience: Span,
     },
     /// A SubDevice has left the state in which it was, on its own.
     AbnormalState {

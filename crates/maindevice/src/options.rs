@@ -2,7 +2,7 @@
 
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::state::StateTimeouts;
-use linesman_proto::time::Span;
+use linesman_proto::time::{DcTime, Span};
 
 /// Choices for one network.
 #[derive(Clone, Debug)]
@@ -37,6 +37,17 @@ pub struct Options {
     /// No SubDevice goes beyond this state until [`MainDevice::release`](crate::MainDevice::release)
     /// is called, as for an application that is not ready yet.
     pub hold_at: Option<linesman_proto::state::AlState>,
+    /// The system time of distributed clocks when the run begins (at [`Instant`] zero).
+    ///
+    /// [`Instant`]: linesman_proto::time::Instant
+    pub clock_epoch: DcTime,
+    /// So many frames with the time of the reference clock are sent to compensate the drift of all
+    /// clocks before SubDevices that use them leave PREOP.
+    pub drift_frames: u32,
+    /// How far the clock of a SubDevice with SyncSignals may be off before OP (0x092C).
+    pub clock_limit: Span,
+    /// How long it is waited for.
+    pub clock_patience: Span,
     /// After a refused step: when it is tried again; the wait doubles up to the second value.
     pub retry_after: [Span; 2],
 }
@@ -61,6 +72,10 @@ impl Default for Options {
             restore_states: true,
             reinitialise: true,
             hold_at: None,
+            clock_epoch: DcTime(0),
+            drift_frames: 15_000,
+            clock_limit: Span::us(1),
+            clock_patience: Span::s(10),
             retry_after: [Span::s(1), Span::s(16)],
         }
     }

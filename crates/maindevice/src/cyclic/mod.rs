@@ -13,6 +13,7 @@ mod application;
 mod datagram;
 mod quality;
 mod run;
+mod steer;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -28,6 +29,7 @@ use self::application::Application;
 use self::datagram::{Datagram, clear_lost};
 use self::quality::Share;
 use self::run::Run;
+use self::steer::Steer;
 use crate::event::Event;
 use crate::exchange::Exchange;
 use crate::exchange::prebuilt::data_offsets;
@@ -99,6 +101,7 @@ pub(crate) struct Cyclic {
     /// What the last broadcast read brought.
     responding: Option<(WorkingCounter, u8)>,
     shares: Vec<Share>,
+    steer: Steer,
     pub(crate) outputs: Vec<u8>,
     pub(crate) inputs: Vec<u8>,
 }
@@ -150,6 +153,7 @@ impl Cyclic {
             version: u64::MAX,
             responding: None,
             shares: quality::shares(&plan),
+            steer: Steer::default(),
             outputs: vec![0; plan.outputs_len],
             inputs: vec![0; plan.inputs_len],
             plan,
@@ -169,6 +173,7 @@ impl Cyclic {
             let mut line = lock(&self.line);
             self.version = line.version();
             line.take_changes(&mut self.least, &mut self.most);
+            self.steer.set_base(line.clock_base());
         }
     }
 
@@ -293,6 +298,7 @@ impl Cyclic {
             frame.take_over(plan, index, least, most, shares, inputs);
         }
         frame.status.wrong_counter = 0;
+        let mut moved = 0;
         for (at, datagram) in frame.datagrams.iter_mut().enumerate() {
             let Some(wkc) = datagram.counter(reply) else { return };
             let bit = FrameStatus::bit(at);
@@ -303,6 +309,12 @@ impl Cyclic {
                         self.responding = Some((wkc, states));
                         watch_line(line, wkc, states, events);
                     }
+                }
+                if datagram.role == Role::ReferenceClock && wkc.0 > 0 {
+                    let cycle = plan.tasks.get(task).map_or(Span::ZERO, |task| task.cycle);
+                    let low = reply.get(datagram.data_at..).and_then(<[u8]>::first_chunk);
+                    let low = u32::from_le_bytes(low.copied().unwrap_or_default());
+                    moved += self.steer.correction(now, low, cycle);
                 }
                 datagram.good = true;
                 frame.status.input_toggle ^= bit;
@@ -328,6 +340,19 @@ impl Cyclic {
                 lock(line).alert();
             }
         }
+        if moved != 0 {
+            self.shift(moved);
+        }
+    }
+
+    /// Moves all departures, by ns.
+    fn shift(&mut self, by: i64) {
+        for departure in &mut self.departures {
+            let span = Span::ns(by.unsigned_abs());
+            departure.next_at =
+                if by < 0 { departure.next_at.before(span) } else { departure.next_at + span };
+        }
+        self.next_at = self.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
     }
 
     /// A frame did not come back.

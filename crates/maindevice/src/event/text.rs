@@ -34,10 +34,23 @@ impl Event {
                     format!("{name}: {transition} failed at start-up command {command}: {error}"),
                 ]
             }
+            Self::ClocksSet { reference } => {
+                vec![format!("clocks set; station {reference} is the reference clock")]
+            }
+            Self::ClocksNotSet { error } => vec![format!("clocks not set: {error}")],
+            Self::ClockOff { id, to, difference, limit, patience } => vec![format!(
+                "{}: not taken to {to}: its clock is {difference} off the reference clock after \
+                 {patience}, expected {limit} at most; check that cyclic frames carry the time of \
+                 the reference clock, and the SubDevice's quartz (0x0932)",
+                name(*id)
+            )],
             Self::AbnormalState { id, from, status, code } => {
+                let (name, to) = (name(*id), status.state());
                 let reason = reason(*status, *code);
-                let to = status.state();
-                vec![format!("{}: abnormal state change (from {from} to {to}){reason}", name(*id))]
+                let change = format!("{name}: abnormal state change (from {from} to {to}){reason}");
+                let action = code.explain().actions.first().filter(|_| status.error());
+                let action = action.map(|action| format!("{name}: {action}"));
+                std::iter::once(change).chain(action).collect()
             }
             Self::TargetReached { id, state } => vec![format!("{}: {state} reached", name(*id))],
             Self::WrongDevice { id, mismatch, expected, found } => {
@@ -146,12 +159,12 @@ mod tests {
             status: AlStatus(0x0014),
             code: AlStatusCode(0x001B),
         };
+        let lines = lines(&event);
         assert_eq!(
-            lines(&event),
-            [
-                "SubDevice 1: abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog"
-            ]
+            lines[0],
+            "SubDevice 1: abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog"
         );
+        assert_eq!(lines.len(), 2, "and what to do: {lines:?}");
     }
 
     #[test]

@@ -33,7 +33,11 @@ pub(crate) fn pack(
     while packed.len() < most
         && let Some(next) = queue.front()
     {
-        let Request { command, address, data, .. } = &next.request;
+        let Request { command, address, data, alone, .. } = &next.request;
+        let alone = *alone;
+        if alone && !packed.is_empty() {
+            return;
+        }
         size += data.len() + DATAGRAM_OVERHEAD;
         if size > room && !packed.is_empty() {
             return;
@@ -45,6 +49,9 @@ pub(crate) fn pack(
         if let Some(mut queued) = queue.pop_front() {
             queued.frames += 1;
             packed.push(queued);
+        }
+        if alone {
+            return;
         }
     }
 }

@@ -89,6 +89,8 @@ pub struct Request {
     pub card: Option<Path>,
     /// How often it is sent again when its frame does not come back.
     pub repeats: u8,
+    /// It has a frame of its own.
+    pub alone: bool,
 }
 
 impl Request {
@@ -101,6 +103,7 @@ impl Request {
             data: vec![0; usize::from(len)],
             card: target.card(),
             repeats: 0,
+            alone: false,
         }
     }
 
@@ -113,6 +116,7 @@ impl Request {
             data: data.to_vec(),
             card: target.card(),
             repeats: 0,
+            alone: false,
         }
     }
 

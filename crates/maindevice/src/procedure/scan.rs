@@ -4,17 +4,21 @@
 //! command registers of the EEPROM interface (0x0500 to 0x0507), and once the broadcast that latches
 //! receive times (0x0900). States, outputs and counters stay as they are.
 
+use std::collections::BTreeMap;
+
 use linesman_config::inventory::{FoundDevice, Inventory};
 use linesman_config::profile::DeviceProfile;
 use linesman_proto::address::{DeviceId, Network, Path, Position, StationAddress};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{self, AlStatus, DlStatus};
+use linesman_proto::sii::Image;
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::DcTime32;
 use linesman_proto::topology::derive::Doubt;
 use linesman_proto::topology::{Reconstruction, SeenController, Tree, Wired};
 
 use super::look::{self, Look, LookError, LookedDevice};
+use super::sii::{Head, SiiAccessError};
 use super::{address, sii};
 use crate::exchange::{ExchangeError, Target};
 use crate::executor::Wire;
@@ -73,16 +77,11 @@ async fn scan_once(wire: &Wire, network: Network) -> Result<Inventory, ScanError
     let on_b = |device: &LookedDevice| device.target.card() == Some(Path::B);
     let half = look.devices.iter().position(on_b).unwrap_or(look.devices.len());
     let seen = latch(wire, &look, &stations).await;
-    let reading: Vec<_> = (look.devices.into_iter().zip(0..))
-        .zip(&stations)
-        .map(|((looked, id), station)| {
-            wire.spawn(found(wire.clone(), DeviceId(id), looked, *station))
-        })
+    let images = images(wire, &stations).await;
+    let devices: Vec<_> = (look.devices.into_iter().zip(0..))
+        .zip(stations.iter().zip(images))
+        .map(|((looked, id), (station, image))| found(DeviceId(id), looked, *station, image))
         .collect();
-    let mut devices = Vec::with_capacity(reading.len());
-    for device in reading {
-        devices.push(device.await);
-    }
     let before = devices.len() as u16;
     let (after, _) = look::count(wire, network).await?;
     if after != before {
@@ -184,13 +183,55 @@ fn open_ports(status: DlStatus) -> PortMap<bool> {
     PortMap::from_fn(|port| status.port_state(port).is_active())
 }
 
-async fn found(
-    wire: Wire,
+/// The EEPROMs of all: each is looked at, but of those that are alike one only is read to its end.
+async fn images(wire: &Wire, stations: &[StationAddress]) -> Vec<Result<Image, SiiAccessError>> {
+    let targets = || stations.iter().map(|station| Target::Station(*station));
+    let reading: Vec<_> = targets()
+        .map(|target| {
+            let wire = wire.clone();
+            wire.clone().spawn(async move { sii::read_head(&wire, target).await })
+        })
+        .collect();
+    let mut heads = Vec::with_capacity(reading.len());
+    for head in reading {
+        heads.push(head.await);
+    }
+    let read_rest = |target: Target, head: &Head| {
+        let (wire, head) = (wire.clone(), head.clone());
+        wire.clone().spawn(async move { sii::read_rest(&wire, target, &head).await })
+    };
+    let mut kinds = BTreeMap::new();
+    for (target, head) in targets().zip(&heads) {
+        let Ok(head) = head else { continue };
+        kinds.entry(head.kind()).or_insert_with(|| read_rest(target, head));
+    }
+    let mut read = BTreeMap::new();
+    for (kind, reading) in kinds {
+        read.insert(kind, reading.await);
+    }
+    let mut images = Vec::with_capacity(heads.len());
+    for (target, head) in targets().zip(heads) {
+        images.push(match head {
+            Err(error) => Err(error),
+            Ok(head) => match read.get(&head.kind()) {
+                Some(Ok(bytes)) => Ok(bytes.clone()),
+                // Its equal could not be read; it may be all right itself.
+                Some(Err(_)) | None => read_rest(target, &head).await,
+            }
+            .and_then(|bytes| {
+                head.image_like(&bytes).map_err(|error| SiiAccessError::Image { target, error })
+            }),
+        });
+    }
+    images
+}
+
+fn found(
     id: DeviceId,
     looked: LookedDevice,
     station: StationAddress,
+    image: Result<Image, SiiAccessError>,
 ) -> FoundDevice {
-    let image = sii::read_image(&wire, Target::Station(station)).await;
     let (identity, profile, trouble) = match image {
         Ok(image) => {
             let odd: Vec<String> = image.oddities.iter().map(ToString::to_string).collect();

@@ -8,7 +8,7 @@
 use linesman_proto::register::{
     SII_ACCESS_ECAT, SII_ADDRESS, SII_CONTROL_STATUS, SII_DATA, SiiCommand, SiiControl,
 };
-use linesman_proto::sii::word::{SIZE, VENDOR_ID};
+use linesman_proto::sii::word::{CHECKSUM, SERIAL_NUMBER, SIZE, STATION_ALIAS, VENDOR_ID};
 use linesman_proto::sii::{Identity, Image, Reader, SiiError, Size, WordAddress};
 use linesman_proto::time::Span;
 
@@ -95,15 +95,74 @@ pub enum SiiAccessError {
     },
 }
 
-/// Reads the used part of an EEPROM.
+/// What tells whether two EEPROMs are alike: configuration, identity, size. Read of every SubDevice.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Head {
+    /// Words 0 to 15.
+    first: Vec<u8>,
+    /// Words 0x3C to 0x3F, with size and version.
+    size: Vec<u8>,
+}
+
+const HEAD_WORDS: u32 = 16;
+/// Of those four words of 16 bits, size is the third.
+const SIZE_GROUP: WordAddress = WordAddress(SIZE.0 - 2);
+
+impl Head {
+    /// What is equal in the EEPROMs of equal SubDevices: all of it but alias, serial number and the
+    /// checksum, which follows from the alias.
+    #[must_use]
+    pub fn kind(&self) -> Vec<u8> {
+        let mut kind = self.first.clone();
+        for (word, words) in [(STATION_ALIAS, 1), (CHECKSUM, 1), (SERIAL_NUMBER, 2)] {
+            if let Some(own) = kind.get_mut(word.byte()..word.byte() + 2 * words) {
+                own.fill(0);
+            }
+        }
+        kind.extend_from_slice(&self.size);
+        kind
+    }
+
+    /// The image of a SubDevice whose equal has this one.
+    ///
+    /// # Errors
+    /// As [`Image::parse`].
+    pub fn image_like(&self, other: &[u8]) -> Result<Image, SiiError> {
+        let rest = other.get(self.first.len()..).unwrap_or_default();
+        Image::parse(&[self.first.as_slice(), rest].concat())
+    }
+}
+
+/// Reads what tells of which kind an EEPROM is.
+///
+/// # Errors
+/// [`SiiAccessError`].
+pub async fn read_head(wire: &Wire, target: Target) -> Result<Head, SiiAccessError> {
+    let mut session = Session::open(wire, target).await?;
+    let read = async {
+        let first = session.words(WordAddress(0), HEAD_WORDS).await?;
+        let size = session.words(SIZE_GROUP, 4).await?;
+        Ok(Head { first, size })
+    };
+    let outcome = read.await;
+    session.close().await;
+    outcome
+}
+
+/// Reads the used part of an EEPROM behind its head; gives all of it.
 ///
 /// The right to the EEPROM is taken from the SubDevice's processor if it has it, and given back.
 ///
 /// # Errors
 /// [`SiiAccessError`].
-pub async fn read_image(wire: &Wire, target: Target) -> Result<Image, SiiAccessError> {
+pub async fn read_rest(
+    wire: &Wire,
+    target: Target,
+    head: &Head,
+) -> Result<Vec<u8>, SiiAccessError> {
     let mut session = Session::open(wire, target).await?;
     let mut reader = Reader::new();
+    reader.supply(&head.first);
     let read = async {
         while let Some(words) = reader.needs() {
             let chunk = session.read(words.start).await?;
@@ -114,7 +173,7 @@ pub async fn read_image(wire: &Wire, target: Target) -> Result<Image, SiiAccessE
     let outcome: Result<(), SiiAccessError> = read.await;
     session.close().await;
     outcome?;
-    reader.finish().map_err(|error| SiiAccessError::Image { target, error })
+    Ok(reader.bytes().to_vec())
 }
 
 /// Reads an EEPROM as it is: its used part, or as much as its size word says there is.
@@ -203,12 +262,21 @@ impl<'a> Session<'a> {
         }
     }
 
-    async fn identity(&mut self) -> Result<Identity, SiiAccessError> {
-        let mut bytes = Vec::with_capacity(16);
-        while bytes.len() < 16 {
-            let word = WordAddress(VENDOR_ID.0 + bytes.len() as u32 / 2);
-            bytes.extend(self.read(word).await?);
+    /// So many words from `start` on.
+    async fn words(&mut self, start: WordAddress, count: u32) -> Result<Vec<u8>, SiiAccessError> {
+        let len = count as usize * 2;
+        let mut bytes = Vec::with_capacity(len);
+        while bytes.len() < len {
+            let word = WordAddress(start.0 + bytes.len() as u32 / 2);
+            let chunk = self.read(word).await?;
+            bytes.extend(chunk);
         }
+        bytes.truncate(len);
+        Ok(bytes)
+    }
+
+    async fn identity(&mut self) -> Result<Identity, SiiAccessError> {
+        let bytes = self.words(VENDOR_ID, 8).await?;
         let long = |at: usize| {
             let four = bytes.get(at..at + 4).and_then(|slice| slice.first_chunk());
             u32::from_le_bytes(four.copied().unwrap_or_default())

@@ -38,6 +38,16 @@ pub enum StepError {
         /// Where it is.
         status: AlStatus,
     },
+    /// Its clock does not follow the reference clock.
+    #[error("clock {difference} off the reference after {patience}, expected {limit} at most")]
+    ClockOff {
+        /// How far it is off (0x092C).
+        difference: Span,
+        /// How far it may be.
+        limit: Span,
+        /// How long it was waited for.
+        patience: Span,
+    },
     /// It does not take a command that belongs to the step.
     #[error("start-up command {command}: {error}")]
     StartUp {

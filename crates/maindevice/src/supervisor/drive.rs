@@ -5,12 +5,13 @@ use linesman_proto::register::AlStatus;
 use linesman_proto::state::transition::next_step;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 
+use super::clocks;
 use super::keeper::Keeper;
 use super::start_up::{Moment, execute};
 use super::times::Phase;
 use crate::executor::lock;
-use crate::procedure::set_up;
 use crate::procedure::state::{self, StepError};
+use crate::procedure::{set_up, sync_signal};
 
 /// A step that was not made.
 pub(super) struct Failed {
@@ -78,8 +79,23 @@ impl Keeper<'_> {
             (Some(AlState::PreOp), AlState::SafeOp) => {
                 self.commands(current, next, Moment::Before).await?;
                 let began = wire.now();
+                clocks::ready(context).await;
+                clocks::set_one(context, device.id).await;
+                if let Some(settings) = &device.settings.clock {
+                    sync_signal::set(wire, device.station, settings).await?;
+                }
+                if wire.now() > began {
+                    self.note(Phase::Clocks, began);
+                }
+                let began = wire.now();
                 set_up::before_safe_op(wire, device).await?;
                 self.note(Phase::SetUp(next), began);
+            }
+            (Some(AlState::SafeOp), AlState::Op) => {
+                clocks::settle(context, device.id).await?;
+                if wire.now() > began {
+                    self.note(Phase::ClockSettling, began);
+                }
             }
             (
                 None

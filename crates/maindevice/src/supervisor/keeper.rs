@@ -160,6 +160,11 @@ impl Keeper<'_> {
                 wire.emit(Event::StepTimedOut { id, from, to, status });
                 Some(status)
             }
+            StepError::ClockOff { difference, limit, patience } => {
+                let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
+                wire.emit(Event::ClockOff { id, to, difference, limit, patience });
+                Some(status)
+            }
             StepError::StartUp { command, error } => {
                 let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
                 wire.emit(Event::StartUpFailed { id, to, status, command, error });

@@ -13,7 +13,7 @@ use linesman_config::plan::{DevicePlan, Plan};
 use linesman_proto::address::{DeviceId, Path, WorkingCounter};
 use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, OredStates};
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::time::{DcTime, Instant, Span};
 
 use super::times::{BringUpTimes, Phase};
 use crate::executor::lock;
@@ -46,6 +46,8 @@ struct Live {
     /// How often its mailbox was opened: each time both ends begin to count anew.
     openings: u32,
     mailbox: bool,
+    /// Its clock was set since it was last without power.
+    clock_set: bool,
     /// That is the one of BOOT, for files only.
     boots: bool,
     /// How far it is to be driven; what the plan says unless asked for otherwise.
@@ -78,6 +80,9 @@ pub(crate) struct Line {
     /// No SubDevice goes beyond it for the time being.
     hold: Option<AlState>,
     times: Option<BringUpTimes>,
+    /// How often clocks were set, and the system time at the start of the run.
+    clock_base: Option<(u32, DcTime)>,
+    clocks_ready: bool,
 }
 
 impl Line {
@@ -142,9 +147,19 @@ impl Line {
         };
         let losses = live.losses + u32::from(found == Found::Lost && before != Found::Lost);
         // What was seen and asked for outlives a loss; what it serves does not.
-        let Live { openings, reached, target, requests, .. } = *live;
-        let new =
-            Live { found, settled, openings, reached, target, requests, losses, ..Live::default() };
+        let Live { openings, reached, target, requests, clock_set, .. } = *live;
+        let clock_set = clock_set && found != Found::There { restarted: true };
+        let new = Live {
+            found,
+            settled,
+            openings,
+            reached,
+            target,
+            requests,
+            losses,
+            clock_set,
+            ..Live::default()
+        };
         *live = new;
         self.set_at_target(id, false);
         before
@@ -219,6 +234,41 @@ impl Line {
     /// Whether all have been at their targets at once.
     pub(crate) fn all_have_been_reached(&self) -> bool {
         self.all_reached
+    }
+
+    /// The clock of a SubDevice was set.
+    pub(crate) fn set_clock(&mut self, id: DeviceId) {
+        if let Some(live) = self.live(id) {
+            live.clock_set = true;
+        }
+    }
+
+    /// Whether the clock of a SubDevice was set, and has had power since.
+    pub(crate) fn has_clock_set(&self, id: DeviceId) -> bool {
+        self.devices.get(id.index()).is_some_and(|live| live.clock_set)
+    }
+
+    /// Clocks were set to a time that was `epoch` when the run began.
+    pub(crate) fn set_clock_epoch(&mut self, epoch: DcTime) {
+        let times = self.clock_base.map_or(0, |(times, _)| times);
+        self.clock_base = Some((times + 1, epoch));
+        self.version.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// How often clocks were set, and the system time at the start of the run.
+    pub(crate) fn clock_base(&self) -> Option<(u32, DcTime)> {
+        self.clock_base
+    }
+
+    /// Clocks were set for the first time, or there are none to be set.
+    pub(crate) fn set_clocks_ready(&mut self) {
+        self.clocks_ready = true;
+        self.alert();
+    }
+
+    /// Whether SubDevices may use their clocks.
+    pub(crate) fn are_clocks_ready(&self) -> bool {
+        self.clocks_ready
     }
 
     /// The state in which a SubDevice shall be now.

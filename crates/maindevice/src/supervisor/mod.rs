@@ -5,6 +5,7 @@
 //! out; [`supervise`] starts them and looks for those that are lost. [`mod@line`] is what they know.
 
 mod align;
+mod clocks;
 mod drive;
 pub(crate) mod keeper;
 pub(crate) mod line;
@@ -72,6 +73,12 @@ pub(crate) async fn supervise(context: Context) {
             lose(&context, device.id);
         }
         context.wire.sleep(SEARCH_INTERVAL).await;
+    }
+    if clocks::wanted(&context.plan) {
+        let setting = context.clone();
+        context.wire.spawn(async move { clocks::set_all(&setting).await });
+    } else {
+        lock(&context.line).set_clocks_ready();
     }
     for device in &context.plan.devices {
         // Who is not there yet has its keeper, too: it waits.

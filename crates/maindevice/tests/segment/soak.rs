@@ -67,3 +67,91 @@ fn link_above(file: &linesman_sim::segment_file::SegmentFile, name: &str) -> Str
     let found = found.unwrap_or_else(|| panic!("no {name}"));
     format!("{}-{}.{}", found.on, found.name, found.entry.as_deref().unwrap_or("A"))
 }
+
+/// A coupler and eight digital inputs, behind them a second group: what the soak breaks and heals.
+fn inputs() -> String {
+    let mut text = "name = \"soak\"\n".to_owned();
+    let mut on = "maindevice".to_owned();
+    for number in 0..10 {
+        let kind = if number % 5 == 0 { "EK1100" } else { "EL1008" };
+        if number == 5 {
+            on = "D0.C".to_owned();
+        }
+        text += &format!("[[device]]\nname = \"D{number}\"\ntype = \"{kind}\"\non = \"{on}\"\n");
+        on = format!("D{number}.B");
+    }
+    text
+}
+
+/// Random faults for so many hours of virtual time: what is shown as fresh is fresh, and whoever has
+/// healed comes back to OP. Run it in slices with other seeds:
+/// `LINESMAN_SOAK="SEED HOURS" cargo test -p linesman-maindevice --release --test segment hours -- --ignored`
+#[test]
+#[ignore = "hours of virtual time take minutes"]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_macros,
+    reason = "its length is chosen from outside"
+)]
+fn hours_of_random_faults() {
+    let choice = std::env::var("LINESMAN_SOAK").unwrap_or_else(|_| "1 1".to_owned());
+    let mut numbers = choice.split_whitespace().map(|word| word.parse::<u64>().expect("a number"));
+    let (seed, hours) = (numbers.next().unwrap_or(1), numbers.next().unwrap_or(1));
+    let text = inputs();
+    let file = linesman_sim::segment_file::SegmentFile::parse(&text).unwrap();
+    let mut bench = Bench::of(&file, Options::default());
+    let plan = bench.start(AlState::Op);
+    let mut stream = Seed(seed).stream("hours");
+    let end = bench.now + Span::s(hours * 3_600);
+    let (mut faults, mut shown, mut withheld) = (0_u64, 0_u64, 0_u64);
+    while bench.now < end {
+        let name = format!("D{}", stream.between(0, 9));
+        let kind = ["link-open", "device-off", "brown-out", "link-flapping", "emc-noise"]
+            [stream.between(0, 4) as usize];
+        let entry = FaultEntry::new(kind.parse().unwrap());
+        let entry = match kind {
+            "device-off" | "brown-out" => entry.device(&name),
+            _ => entry.at(link_above(&file, &name)),
+        };
+        bench.events.clear();
+        let fault = bench.segment.inject(bench.now, &entry).unwrap();
+        faults += 1;
+        for step in 0..stream.between(3, 30) {
+            // A pattern that changes each time; two cycles later it is in the image, or it is not fresh.
+            let pattern = (step * 37 + 11) as i32 & 0xFF;
+            for id in plan.devices.iter().map(|device| device.id) {
+                for (bit, signal) in bench.segment.inputs(id).to_vec().into_iter().enumerate() {
+                    bench.segment.signals_mut().set(signal, pattern >> bit & 1);
+                }
+            }
+            bench.run_for(Span::ms(stream.between(10, 100)));
+            for device in plan.devices.iter().filter(|device| !device.inputs.is_empty()) {
+                let quality = bench.device.quality(device.id);
+                let fresh = quality.age(bench.now).is_some_and(|age| age <= Span::ms(2));
+                if !(quality.valid && fresh) {
+                    withheld += 1;
+                    continue;
+                }
+                let image = bench.device.inputs()[device.inputs.start];
+                assert_eq!(
+                    i32::from(image),
+                    pattern,
+                    "{} at {} during {kind} at {name}",
+                    device.name,
+                    bench.now
+                );
+                shown += 1;
+            }
+        }
+        bench.segment.heal(bench.now, fault);
+        let until = bench.now + Span::s(60);
+        while !bench.device.is_settled() && bench.now < until {
+            bench.run_for(Span::ms(100));
+        }
+        assert!(bench.device.is_settled(), "not back after {kind} at {name} at {}", bench.now);
+        bench.run_for(Span::s(stream.between(1, 20)));
+    }
+    println!(
+        "seed {seed}: {hours} h, {faults} faults; {shown} images fresh and right, {withheld} not fresh"
+    );
+}

@@ -1,0 +1,202 @@
+//! Distributed clocks: receive times latched, delays measured, offsets set, drift compensated.
+//!
+//! One broadcast write to 0x0900 latches at every controller when that frame came in at each port and
+//! at the processing unit. From the ports follow the delays (`proto::topology::delay`), from the unit
+//! what each clock has to add to show the time of the reference clock. A burst of frames that carry
+//! the reference's time then teaches each clock its speed; the cyclic frames do so for good.
+//! Reference: S1 9.1; S2 2.15.
+
+use linesman_proto::address::{Network, Path, StationAddress};
+use linesman_proto::command::Command;
+use linesman_proto::frame::builder::DatagramAddress;
+use linesman_proto::port::{Port, PortMap};
+use linesman_proto::register::{self, DlStatus, EscInformation};
+use linesman_proto::time::{DcTime32, Instant, Span};
+use linesman_proto::topology::{DelayError, Delays, Reconstruction, SeenController};
+
+use super::look::{self, LookError};
+use super::set_up::write_all;
+use crate::exchange::{ExchangeError, Reply, Request, Target};
+use crate::executor::Wire;
+
+/// How much longer a frame takes through a controller whose processing unit it passes (S1 9.1.2).
+const THROUGH_UNIT: Span = Span::ns(20);
+/// The bandwidth of the time loop (0x0930) that writing it anew resets all filters to.
+const SPEED_START: u16 = 0x1000;
+/// 0x092C without its sign.
+const MAGNITUDE: u32 = 0x7FFF_FFFF;
+/// From one frame that compensates drift to the next, at least.
+const SPACING: Span = Span::us(50);
+
+/// Clocks that could not be set.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum ClockError {
+    /// There is nobody.
+    #[error(transparent)]
+    Line(#[from] LookError),
+    /// One does not answer.
+    #[error(transparent)]
+    Exchange(#[from] ExchangeError),
+    /// The receive times do not give delays.
+    #[error("propagation delays cannot be measured: {0}")]
+    Delay(#[from] DelayError),
+    /// Nobody has a clock that could be the reference.
+    #[error("no reference clock: {0}")]
+    NoReference(&'static str),
+}
+
+/// One controller as a latch found it.
+#[derive(Clone, Debug)]
+pub(crate) struct SeenClock {
+    pub(crate) station: StationAddress,
+    /// It has a clock.
+    pub(crate) has_clock: bool,
+    /// Local time at which its processing unit saw the latching frame.
+    pub(crate) latched: u64,
+    /// How long after the first clock of its line it did. `None` without a clock.
+    pub(crate) delay: Option<Span>,
+}
+
+/// What a latch found, in the order of processing.
+#[derive(Clone, Debug)]
+pub(crate) struct Latch {
+    /// When the latching frame left.
+    pub(crate) at: Instant,
+    pub(crate) clocks: Vec<SeenClock>,
+}
+
+/// Latches receive times and measures the delays of all that are there.
+///
+/// # Errors
+/// [`ClockError`].
+pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockError> {
+    let (places, _) = look::places(wire, network).await?;
+    let reading: Vec<_> = (places.iter())
+        .map(|place| {
+            let len = EscInformation::LEN as u16;
+            [
+                wire.read(*place, register::ESC_TYPE.address, len),
+                wire.read(*place, register::STATION_ADDRESS.address, 2),
+                wire.read(*place, register::DL_STATUS.address, 2),
+            ]
+        })
+        .collect();
+    let mut seen = Vec::with_capacity(places.len());
+    for [information, station, dl_status] in reading {
+        let information = EscInformation::from_bytes(information.await?.bytes(0));
+        let station = StationAddress(station.await?.word(0));
+        let dl_status = DlStatus(dl_status.await?.word(0));
+        seen.push((information.features.distributed_clocks(), station, dl_status));
+    }
+    let at = wire.now();
+    let all = register::RECEIVE_TIME.address;
+    wire.ask(Request::write(Target::All, all, &[0; 4])).await?;
+    let reading: Vec<_> = (places.iter().zip(&seen))
+        .map(|(place, (has_clock, ..))| {
+            has_clock.then(|| {
+                [
+                    wire.read(*place, register::RECEIVE_TIME.address, 16),
+                    wire.read(*place, register::RECEIVE_TIME_PROCESSING_UNIT.address, 8),
+                ]
+            })
+        })
+        .collect();
+    let (mut clocks, mut controllers) = (Vec::new(), Vec::new());
+    for (reading, (has_clock, station, dl_status)) in reading.into_iter().zip(seen) {
+        let open = PortMap::from_fn(|port| dl_status.port_state(port).is_active());
+        let (mut times, mut latched) = (None, 0);
+        if let Some([ports, unit]) = reading {
+            let (ports, unit) = (ports.await?, unit.await?);
+            latched = u64::from_le_bytes(unit.bytes(0));
+            times = Some(ports).filter(Reply::answered);
+        }
+        let has_clock = has_clock && times.is_some();
+        let received = |port: Port| {
+            let times = times.as_ref().filter(|_| open[port])?;
+            Some(DcTime32(u32::from_le_bytes(times.bytes(4 * port.index()))))
+        };
+        controllers.push(SeenController { open, received: PortMap::from_fn(received) });
+        clocks.push(SeenClock { station, has_clock, latched, delay: None });
+    }
+    let half = places.iter().position(|place| place.card() == Some(Path::B));
+    let half = half.filter(|_| wire.ring_intact() == Some(false)).unwrap_or(places.len());
+    for (path, range) in [(Path::A, 0..half), (Path::B, half..places.len())] {
+        if range.is_empty() {
+            continue;
+        }
+        let seen = &controllers[range.clone()];
+        let received: Vec<_> = seen.iter().map(|seen| seen.received).collect();
+        let tree = Reconstruction::of(path, seen).tree;
+        let delays = Delays::measure(&tree, path, &received, THROUGH_UNIT)?;
+        for (node, clock) in clocks[range].iter_mut().enumerate() {
+            clock.delay = delays.of(node).map(|delay| delay.from_reference);
+        }
+    }
+    Ok(Latch { at, clocks })
+}
+
+/// Sets the clock of one SubDevice: what it has to add to its local time, and how far it is from the
+/// reference.
+///
+/// # Errors
+/// [`ExchangeError`] when it does not answer.
+pub(crate) async fn set(
+    wire: &Wire,
+    station: StationAddress,
+    offset: u64,
+    delay: Span,
+) -> Result<(), ExchangeError> {
+    let delay = u32::try_from(delay.as_nanos()).unwrap_or(u32::MAX);
+    let writes = vec![
+        (register::SYSTEM_TIME_OFFSET.address, offset.to_le_bytes().to_vec()),
+        (register::SYSTEM_TIME_DELAY.address, delay.to_le_bytes().to_vec()),
+        (register::SPEED_COUNTER_START.address, SPEED_START.to_le_bytes().to_vec()),
+    ];
+    write_all(wire, Target::Station(station), writes).await
+}
+
+/// Sends the reference's time to all in `frames` frames of their own, one after another. Closer
+/// together than [`SPACING`] clocks that count in steps of 10 ns learn nothing of their speed.
+pub(crate) async fn compensate(wire: &Wire, reference: StationAddress, frames: u32) {
+    let address = DatagramAddress::Physical(reference.0, register::SYSTEM_TIME.address);
+    for _ in 0..frames {
+        let next_at = wire.now() + SPACING;
+        let request = Request {
+            command: Command::Frmw,
+            address,
+            data: vec![0; 8],
+            card: None,
+            repeats: 0,
+            alone: true,
+        };
+        // A lost one is one less.
+        let _ = wire.submit(request).await;
+        wire.sleep_until(next_at).await;
+    }
+}
+
+/// How far a clock is off, from 0x092C.
+///
+/// # Errors
+/// [`ExchangeError`] when it does not answer.
+pub(crate) async fn difference(
+    wire: &Wire,
+    station: StationAddress,
+) -> Result<Span, ExchangeError> {
+    let address = register::SYSTEM_TIME_DIFFERENCE.address;
+    let reply = wire.read_one(Target::Station(station), address, 4).await?;
+    Ok(Span::ns(u64::from(u32::from_le_bytes(reply.bytes(0)) & MAGNITUDE)))
+}
+
+/// A register of eight bytes of the time loop.
+///
+/// # Errors
+/// [`ExchangeError`] when it does not answer.
+pub(crate) async fn time(
+    wire: &Wire,
+    station: StationAddress,
+    register: &register::Register,
+) -> Result<u64, ExchangeError> {
+    let reply = wire.read_one(Target::Station(station), register.address, 8).await?;
+    Ok(u64::from_le_bytes(reply.bytes(0)))
+}

@@ -1,0 +1,188 @@
+//! The clocks of a network: who is the reference, when they are set, whether they follow.
+
+use linesman_config::plan::{ClockSettings, Plan, Role};
+use linesman_proto::address::{DeviceId, Position, StationAddress};
+use linesman_proto::frame::builder::DatagramAddress;
+use linesman_proto::port::Port;
+use linesman_proto::register::{self, DlControl, LoopMode};
+use linesman_proto::time::Span;
+
+use super::times::Phase;
+use super::{Context, Found};
+use crate::event::Event;
+use crate::exchange::Target;
+use crate::executor::lock;
+use crate::procedure::clock::{self, ClockError, Latch, SeenClock};
+use crate::procedure::state::StepError;
+
+/// How often a clock that settles is looked at.
+const LOOK: Span = Span::ms(2);
+
+/// Whether the plan makes use of clocks at all.
+pub(super) fn wanted(plan: &Plan) -> bool {
+    reference_in_frames(plan).is_some()
+        || plan.devices.iter().any(|device| device.settings.clock.is_some())
+}
+
+/// The SubDevice whose time the cyclic frames spread.
+fn reference_in_frames(plan: &Plan) -> Option<DeviceId> {
+    let (.., datagram) = plan.datagrams().find(|(.., one)| one.role == Role::ReferenceClock)?;
+    let DatagramAddress::Physical(adp, _) = datagram.address else { return None };
+    let at = match datagram.command.increments_position() {
+        true => usize::from(Position::from_auto_increment(adp).0),
+        false => plan.devices.iter().position(|device| device.station.0 == adp)?,
+    };
+    plan.devices.get(at).map(|device| device.id)
+}
+
+/// Who is to be the reference clock: whom the cyclic frames name, else whom the user chose, else the
+/// first that has a clock.
+fn choose(plan: &Plan, clocks: &[SeenClock]) -> Result<StationAddress, ClockError> {
+    let chosen = |settings: &Option<ClockSettings>| settings.is_some_and(|it| it.reference);
+    let by_user = || plan.devices.iter().find(|device| chosen(&device.settings.clock));
+    let named = reference_in_frames(plan).and_then(|id| plan.device(id)).or_else(by_user);
+    let is_there = |station| clocks.iter().any(|it| it.has_clock && it.station == station);
+    match named {
+        Some(device) if is_there(device.station) => Ok(device.station),
+        Some(_) => Err(ClockError::NoReference(
+            "the SubDevice chosen for it has no clock, or does not answer; choose another one",
+        )),
+        None => {
+            let first = clocks.iter().find(|clock| clock.has_clock).map(|clock| clock.station);
+            first.ok_or(ClockError::NoReference("no SubDevice has distributed clocks"))
+        }
+    }
+}
+
+/// Sets the clocks of all that are there, and compensates their drift.
+pub(super) async fn set_all(context: &Context) {
+    let began = context.wire.now();
+    let outcome = set(context, None).await;
+    tell(context, &outcome);
+    if let Ok(reference) = outcome {
+        clock::compensate(&context.wire, reference, context.options.drift_frames).await;
+    }
+    context.note(Phase::Clocks, began);
+    lock(&context.line).set_clocks_ready();
+}
+
+/// Waits until the clocks of the network have been set for the first time.
+pub(super) async fn ready(context: &Context) {
+    loop {
+        let seen = context.alerts();
+        if lock(&context.line).are_clocks_ready() {
+            return;
+        }
+        context.nap(seen, LOOK).await;
+    }
+}
+
+fn tell(context: &Context, outcome: &Result<StationAddress, ClockError>) {
+    context.wire.emit(match outcome {
+        Ok(reference) => Event::ClocksSet { reference: *reference },
+        Err(error) => Event::ClocksNotSet { error: error.clone() },
+    });
+}
+
+/// Sets the clocks of all, or of one that came back later.
+async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress, ClockError> {
+    let wire = &context.wire;
+    let opened = open_ring(context).await?;
+    let latched = clock::latch(wire, context.network).await;
+    if let Some((station, control)) = opened {
+        let bytes = control.to_bytes();
+        let _ = wire.write_one(station, register::DL_CONTROL.address, &bytes).await;
+    }
+    let Latch { at, clocks } = latched?;
+    let epoch = context.options.clock_epoch;
+    let reference = choose(&context.plan, &clocks)?;
+    let found = |clock: &&SeenClock| clock.station == reference;
+    let of_reference = clocks.iter().find(found).cloned();
+    let of_reference = of_reference.ok_or(ClockError::NoReference("it does not answer"))?;
+    let zero = of_reference.delay.unwrap_or_default();
+    // The reference shows the MainDevice's time, unless it runs already.
+    let time =
+        match one.filter(|id| context.plan.device(*id).is_some_and(|it| it.station != reference)) {
+            None => epoch.0.wrapping_add(at.as_nanos()),
+            Some(_) => {
+                let offset = clock::time(wire, reference, &register::SYSTEM_TIME_OFFSET).await?;
+                offset.wrapping_add(of_reference.latched)
+            }
+        };
+    let setting: Vec<_> = (context.plan.devices.iter())
+        .filter(|device| one.is_none_or(|one| one == device.id))
+        .filter(|device| matches!(lock(&context.line).found(device.id), Found::There { .. }))
+        .filter_map(|device| {
+            let station = device.station;
+            let clock = clocks.iter().find(|clock| clock.has_clock && clock.station == station)?;
+            // Who comes before the reference never sees its time.
+            let delay = clock.delay.filter(|delay| *delay >= zero)?.saturating_sub(zero);
+            let offset = time.wrapping_add(delay.as_nanos()).wrapping_sub(clock.latched);
+            let (wire, id) = (wire.clone(), device.id);
+            let setting = async move { clock::set(&wire, station, offset, delay).await };
+            Some((id, context.wire.spawn(setting)))
+        })
+        .collect();
+    for (id, set) in setting {
+        // Who does not answer is found out by its keeper.
+        if set.await.is_ok() {
+            lock(&context.line).set_clock(id);
+        }
+    }
+    // The cycle follows from now on.
+    lock(&context.line).set_clock_epoch(epoch);
+    Ok(reference)
+}
+
+/// In a closed ring no frame comes back to the ports it left by: the last port is closed for as long
+/// as the measurement takes. Gives who it was and how its ports were.
+async fn open_ring(context: &Context) -> Result<Option<(Target, DlControl)>, ClockError> {
+    let wire = &context.wire;
+    if wire.ring_intact() != Some(true) {
+        return Ok(None);
+    }
+    let closes_at: Option<(usize, Port)> = context.plan.tree.closes_at();
+    let Some((node, port)) = closes_at else { return Ok(None) };
+    let Some(device) = context.plan.devices.get(node) else { return Ok(None) };
+    let target = Target::Station(device.station);
+    let control = register::DL_CONTROL;
+    let reply = wire.read_one(target, control.address, control.len).await?;
+    let before = DlControl::from_bytes(reply.bytes(0));
+    let closed = before.with_loop_mode(port, LoopMode::Closed).to_bytes();
+    wire.write_one(target, control.address, &closed).await?;
+    Ok(Some((target, before)))
+}
+
+/// Sets the clock of one SubDevice that came back without it.
+pub(super) async fn set_one(context: &Context, id: DeviceId) {
+    if !wanted(&context.plan) || lock(&context.line).has_clock_set(id) {
+        return;
+    }
+    let outcome = set(context, Some(id)).await;
+    if outcome.is_err() {
+        tell(context, &outcome);
+    }
+}
+
+/// Waits until the clock of a SubDevice follows the reference.
+///
+/// # Errors
+/// [`StepError::ClockOff`] when it does not in time.
+pub(super) async fn settle(context: &Context, id: DeviceId) -> Result<(), StepError> {
+    let Some(device) = context.plan.device(id) else { return Ok(()) };
+    if device.settings.clock.is_none_or(|clock| clock.assign_activate == 0) {
+        return Ok(());
+    }
+    let (limit, patience) = (context.options.clock_limit, context.options.clock_patience);
+    let until = context.wire.now() + patience;
+    loop {
+        let difference = clock::difference(&context.wire, device.station).await?;
+        if difference <= limit {
+            return Ok(());
+        }
+        if context.wire.now() >= until {
+            return Err(StepError::ClockOff { difference, limit, patience });
+        }
+        context.wire.sleep(LOOK).await;
+    }
+}

@@ -1,0 +1,201 @@
+//! Distributed clocks as our MainDevice sets them up.
+
+use crate::bench::Bench;
+use linesman_config::fault::FaultName;
+use linesman_config::plan::{ClockSettings, DatagramPlan, FramePlan, Plan, PlanOptions, Role};
+use linesman_maindevice::{Event, Options};
+use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::command::Command;
+use linesman_proto::frame::builder::DatagramAddress;
+use linesman_proto::state::AlState;
+use linesman_proto::time::{DcTime, Span};
+use linesman_sim::segment_file::FaultEntry;
+
+const CYCLE: Span = Span::ms(1);
+const SHIFT_NS: i64 = 300_000;
+
+/// Couplers and terminals with quartzes as bad as they come, 20 m of cable in between.
+fn plant() -> String {
+    let mut text = "name = \"clocks\"\nseed = 5\n".to_owned();
+    let mut on = "maindevice".to_owned();
+    for number in 0..12 {
+        let (kind, cable) = match number {
+            0 | 6 => ("EK1100", "cable_m = 20.0\n"),
+            _ if number % 2 == 0 => ("EL4102", ""),
+            _ => ("EL3102", ""),
+        };
+        if number == 6 {
+            on = "D0.C".to_owned();
+        }
+        let ppm = (number * 37 % 101) as f64 - 50.0;
+        text += &format!(
+            "[[device]]\nname = \"D{number}\"\ntype = \"{kind}\"\non = \"{on}\"\n{cable}\
+             clock_ppm = {ppm:.1}\nclock = {{ ramp_ppm_per_s = 0.02, ramp_s = 600.0, jitter_ns = 5 }}\n"
+        );
+        on = format!("D{number}.B");
+    }
+    text
+}
+
+/// A plan in which every second terminal beats with SYNC0, and the first clock is spread.
+pub(crate) fn plan(bench: &mut Bench, clocked: impl Fn(&str) -> bool) -> Plan {
+    let inventory = bench.scan();
+    let tree = inventory.tree().clone();
+    let mut planned = inventory.planned(AlState::Op);
+    for device in planned.iter_mut().filter(|device| clocked(&device.profile.type_name)) {
+        device.settings.clock = Some(ClockSettings {
+            assign_activate: 0x0300,
+            sync0_cycle: CYCLE,
+            sync0_shift_ns: SHIFT_NS,
+            ..ClockSettings::default()
+        });
+    }
+    let mut plan = Plan::build(&planned, tree, &PlanOptions::default()).expect("a plan");
+    if plan.datagrams().all(|(.., one)| one.role != Role::ReferenceClock) {
+        let reference = plan.devices[0].station;
+        let time = DatagramPlan {
+            command: Command::Frmw,
+            address: DatagramAddress::Physical(reference.0, RegisterAddress(0x0910)),
+            len: 4,
+            role: Role::ReferenceClock,
+            sync_unit: None,
+            ownership: Vec::new(),
+        };
+        let frames: &mut Vec<FramePlan> = &mut plan.tasks[0].frames;
+        frames[0].datagrams.insert(0, time);
+    }
+    plan
+}
+
+pub(crate) fn start(bench: &mut Bench, plan: Plan) {
+    bench.device.start(bench.now, plan);
+    let all = bench.run_until(Span::s(20), |event| matches!(event, Event::AllReached));
+    let name = |id: DeviceId| format!("SubDevice {}", id.no());
+    let lines: Vec<_> =
+        bench.events.iter().flat_map(|(_, event)| event.state_lines(name)).collect();
+    assert!(all, "{lines:#?}");
+}
+
+/// How far the system times are apart at this moment, seen from outside.
+fn spread(bench: &Bench, plan: &Plan) -> i64 {
+    let times: Vec<u64> = (plan.devices.iter())
+        .filter(|device| device.settings.clock.is_some() || device.id == DeviceId(0))
+        .map(|device| bench.segment.controller(device.id).unwrap().system_time(bench.now))
+        .collect();
+    let off = times.iter().map(|time| i64::from(time.wrapping_sub(times[0]) as u32 as i32));
+    off.clone().max().unwrap() - off.min().unwrap()
+}
+
+fn is_terminal(kind: &str) -> bool {
+    kind.starts_with("EL")
+}
+
+// proves: DC-01 partial: our MainDevice's set-up, quartzes of ±50 ppm that warm up; DC-03 partial, DC-04 partial, DC-07 partial
+#[test]
+fn clocks_are_aligned_to_100_ns_and_stay_so() {
+    let epoch = DcTime(850_000_000_123_456_789);
+    let mut bench =
+        Bench::with_options(&plant(), Options { clock_epoch: epoch, ..Options::default() });
+    let plan = plan(&mut bench, is_terminal);
+    start(&mut bench, plan.clone());
+    let time = bench.segment.controller(DeviceId(0)).unwrap().system_time(bench.now);
+    let off = time.abs_diff(epoch.0 + bench.now.as_nanos());
+    assert!(off < 200_000, "the reference shows the MainDevice's time: {off} ns off");
+    let times = bench.device.bring_up_times().unwrap();
+    assert!(times.took().unwrap() < Span::s(2), "{}", times.took().unwrap());
+    bench.run_for(Span::s(3));
+    let mut worst = 0;
+    for _ in 0..100 {
+        bench.run_for(Span::us(10_007));
+        worst = worst.max(spread(&bench, &plan));
+    }
+    assert!(worst <= 100, "{worst} ns apart");
+    // The MainDevice follows, too: frames are at the reference when its cycle begins.
+    let before = bench.device.statistics();
+    bench.events.clear();
+    bench.run_for(Span::s(10));
+    let after = bench.device.statistics();
+    assert_eq!(after.working_counter_errors, before.working_counter_errors);
+    assert_eq!(after.cyclic_lost, before.cyclic_lost);
+    let fell =
+        bench.events.iter().filter(|(_, event)| matches!(event, Event::AbnormalState { .. }));
+    assert_eq!(fell.count(), 0);
+    for device in plan.devices.iter().filter(|device| device.settings.clock.is_some()) {
+        assert_eq!(bench.state(&format!("D{}", device.id.index())), "OP");
+    }
+}
+
+#[test]
+fn a_subdevice_that_comes_back_gets_its_clock_anew() {
+    let mut bench = Bench::new(&plant());
+    let plan = plan(&mut bench, is_terminal);
+    start(&mut bench, plan.clone());
+    let entry = FaultEntry::new(FaultName::DeviceOff).device("D8");
+    let fault = bench.segment.inject(bench.now, &entry).unwrap();
+    bench.run_for(Span::s(1));
+    bench.segment.heal(bench.now, fault);
+    // Its quartz has to be learnt anew by the cyclic frames alone: four times 4,096 of them.
+    bench.run_for(Span::s(40));
+    assert_eq!(bench.state("D8"), "OP");
+    assert!(spread(&bench, &plan) <= 150, "{} ns apart", spread(&bench, &plan));
+}
+
+#[test]
+fn without_a_clock_there_is_no_reference() {
+    let text = "name = \"plain\"\n[[device]]\nname = \"K\"\ntype = \"EP2308-0001\"\n\
+                on = \"maindevice\"\n";
+    let mut bench = Bench::new(text);
+    let plan = plan(&mut bench, is_terminal);
+    bench.device.start(bench.now, plan);
+    bench.run_for(Span::s(2));
+    let told = bench
+        .events
+        .iter()
+        .any(|(_, event)| matches!(event, Event::ClocksNotSet { .. } | Event::ClocksSet { .. }));
+    assert!(told, "{:#?}", bench.events);
+}
+
+const RING: &str = r#"
+name = "ring"
+[[device]]
+name = "B1"
+type = "EK1100"
+on = "maindevice"
+clock_ppm = 12.0
+[[device]]
+name = "B2"
+type = "EK1100"
+on = "B1.C"
+cable_m = 50.0
+clock_ppm = -30.0
+[[device]]
+name = "B3"
+type = "EK1100"
+on = "B2.C"
+cable_m = 10.0
+clock_ppm = 40.0
+[ring]
+closes_at = "B3.C"
+"#;
+
+// proves: DC-01 partial: in a closed ring
+#[test]
+fn in_a_ring_delays_are_measured_with_its_end_closed_for_a_moment() {
+    let mut bench = Bench::with_options(RING, Options { ring: true, ..Options::default() });
+    let mut plan = plan(&mut bench, |_| false);
+    for device in &mut plan.devices {
+        // Followers without SyncSignals.
+        device.settings.clock = Some(ClockSettings::default());
+    }
+    start(&mut bench, plan.clone());
+    let set = bench.events.iter().any(|(_, event)| matches!(event, Event::ClocksSet { .. }));
+    assert!(set, "{:#?}", bench.events);
+    bench.run_for(Span::s(10));
+    assert!(spread(&bench, &plan) <= 100, "{} ns apart", spread(&bench, &plan));
+    let ring: Vec<bool> = (bench.events.iter())
+        .filter_map(
+            |(_, event)| if let Event::Ring { intact } = event { Some(*intact) } else { None },
+        )
+        .collect();
+    assert_eq!(ring.last(), Some(&true), "it is closed again: {ring:?}");
+}
