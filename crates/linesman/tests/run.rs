@@ -1,5 +1,7 @@
 //! `linesman run` on virtual segments.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
 mod support;
 
 use std::fs;

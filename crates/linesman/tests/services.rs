@@ -1,5 +1,7 @@
 //! `state`, `sdo`, `foe`, `sii`, `reg` and `history` on a virtual segment.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
 mod support;
 
 use std::path::{Path, PathBuf};

@@ -6,6 +6,8 @@
 //! instructions: the difference of two runs is that of the cycles between.
 //! `scripted` is the same loop without a MainDevice: what the harness itself costs.
 
+#![allow(clippy::type_complexity, reason = "tables of a bench")]
+
 use std::hint::black_box;
 use std::time::Instant as HostInstant;
 

@@ -78,7 +78,10 @@ fn one(
     Ok(DatagramPlan { command, address, len, role, sync_unit, ownership })
 }
 
-#[allow(clippy::wildcard_enum_match_arm, reason = "what the guards do not take is other, whatever its command")]
+#[allow(
+    clippy::wildcard_enum_match_arm,
+    reason = "what the guards do not take is other, whatever its command"
+)]
 fn role(file: &FileDatagram, states: u32, ownership: &[Ownership]) -> Role {
     let at_al_status =
         matches!(file.address, DatagramAddress::Physical(_, at) if at == AL_STATUS.address);

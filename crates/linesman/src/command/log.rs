@@ -149,7 +149,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let runs = log.runs()?;
     let filter = filter(arguments, &runs)?;
     let entries = if arguments.runs { Vec::new() } else { log.entries(&filter)? };
-    let of = log.len()?;
+    let of = log.count()?;
     let shown = |run: &&Run| arguments.runs || entries.iter().any(|entry| entry.run == run.id);
     if arguments.json {
         output.json(&LogReport {

@@ -66,6 +66,7 @@ pub enum ServiceFailure {
     },
 }
 
+#[allow(clippy::wildcard_enum_match_arm, reason = "only a refusal has a code with advice")]
 fn advice(error: &StepError) -> String {
     match error {
         StepError::Refused { code, .. } => code
@@ -111,6 +112,7 @@ impl RefusalKind {
 impl ServiceFailure {
     /// The SubDevice's own code, if it has said no itself.
     #[must_use]
+    #[allow(clippy::wildcard_enum_match_arm, reason = "all others are no answers of the SubDevice")]
     pub fn refusal(&self) -> Option<(RefusalKind, u32)> {
         match self {
             Self::Mailbox(failure) => match &failure.why {

@@ -1,11 +1,14 @@
 //! A MainDevice on a virtual segment, in virtual time.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
 mod al_errors;
 mod bench;
 mod clocks;
 mod described;
 mod library;
 mod mailbox;
+#[allow(clippy::disallowed_macros, reason = "it prints a table for people")]
 mod many;
 mod ring;
 mod robust;

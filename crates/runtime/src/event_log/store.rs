@@ -138,7 +138,7 @@ impl EventLog {
         let connection = Connection::open(path).map_err(|error| at(path, "opening it", error))?;
         let log = Self { path: path.to_owned(), connection };
         log.prepare()?;
-        if log.is_empty()? {
+        if log.has_no_tables()? {
             log.batch("making its tables", TABLES)?;
             log.pragma("application_id", APPLICATION)?;
             log.pragma("user_version", VERSION)?;
@@ -287,7 +287,7 @@ impl EventLog {
     ///
     /// # Errors
     /// [`EventLogError`].
-    pub fn len(&self) -> Result<u64, EventLogError> {
+    pub fn count(&self) -> Result<u64, EventLogError> {
         let count =
             self.connection.query_row("SELECT count(*) FROM entry", (), |row| row.get::<_, i64>(0));
         count.map(i64::unsigned_abs).map_err(|error| at(&self.path, "counting its entries", error))
@@ -298,7 +298,7 @@ impl EventLog {
             .map_err(|error| at(&self.path, "opening it", error))
     }
 
-    fn is_empty(&self) -> Result<bool, EventLogError> {
+    fn has_no_tables(&self) -> Result<bool, EventLogError> {
         let sql = "SELECT count(*) FROM sqlite_schema";
         let count: i64 = (self.connection.query_row(sql, (), |row| row.get(0)))
             .map_err(|error| at(&self.path, "reading it", error))?;

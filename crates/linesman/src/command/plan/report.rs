@@ -1,5 +1,8 @@
 //! A plan as JSON, `linesman.plan/1`.
 
+mod clock;
+mod ebus;
+
 use linesman_config::plan::{
     DatagramPlan, DevicePlan, Doubt, FramePlan, IoAt, PathView, Plan, Presence, Role, Severity,
     Task, expect,
@@ -11,6 +14,8 @@ use linesman_proto::sii::Direction;
 use linesman_runtime::plan_file::PlanFile;
 use serde::Serialize;
 
+use self::clock::ClockReport;
+use self::ebus::EbusReport;
 use crate::version;
 
 /// A plan.
@@ -185,54 +190,6 @@ struct OwnerReport {
     masks: [u8; 2],
 }
 
-/// A feeder of the E-bus and those it feeds.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct EbusReport {
-    /// Number of the feeder.
-    feeder: u32,
-    supply_ma: i32,
-    members: Vec<EbusMemberReport>,
-    /// The first for whom too little is left.
-    first_negative: Option<u32>,
-    /// What to do about that.
-    advice: Option<String>,
-}
-
-/// A SubDevice that is fed.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct EbusMemberReport {
-    no: u32,
-    name: String,
-    current_ma: i32,
-    remaining_ma: i32,
-}
-
-/// The distributed clocks.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct ClockReport {
-    /// Number of the reference clock.
-    reference: u32,
-    /// Shift of the outputs that is usual: 30 % of the cycle of the first task with a clock.
-    outputs_shift_ns: u64,
-    /// What the line delays a frame at least, without cables and jitter: outputs cannot be there sooner.
-    least_outputs_shift_ns: u64,
-    devices: Vec<ClockDeviceReport>,
-}
-
-/// A SubDevice with a distributed clock.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct ClockDeviceReport {
-    no: u32,
-    assign_activate: u16,
-    sync0_cycle_ns: u64,
-    sync0_shift_ns: i64,
-    sync1_cycle_ns: u64,
-}
-
 /// Something doubtful.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -246,9 +203,6 @@ struct FindingReport {
     text: String,
     action: String,
 }
-
-/// Share of a cycle that is usual for the shift of outputs (SYN-11).
-const USUAL_SHIFT_PERCENT: u64 = 30;
 
 /// The report of a plan.
 pub(super) fn report(file: &PlanFile, doubts: &[Doubt]) -> PlanReport {
@@ -279,8 +233,8 @@ pub(super) fn report(file: &PlanFile, doubts: &[Doubt]) -> PlanReport {
                 frames: frames(task),
             })
             .collect(),
-        ebus: ebus(plan),
-        clock: clock(plan),
+        ebus: ebus::of(plan),
+        clock: clock::of(plan),
         findings: doubts.iter().map(finding).collect(),
         notes: file.notes.clone(),
     }
@@ -465,52 +419,4 @@ fn device_report(device: &DevicePlan, plan: &Plan) -> DeviceReport {
             })
             .collect(),
     }
-}
-
-fn ebus(plan: &Plan) -> Vec<EbusReport> {
-    let name = |id: DeviceId| plan.device(id).map_or("", |device| device.name.as_str());
-    let groups = plan.ebus_groups().into_iter();
-    groups
-        .map(|group| {
-            let first = group.first_negative();
-            EbusReport {
-                feeder: group.feeder.no(),
-                supply_ma: group.supply_ma,
-                first_negative: first.map(DeviceId::no),
-                advice: first
-                    .map(|id| format!("insert a power feed terminal (EL94xx) before {}", name(id))),
-                members: group
-                    .members
-                    .iter()
-                    .map(|member| EbusMemberReport {
-                        no: member.device.no(),
-                        name: name(member.device).to_owned(),
-                        current_ma: member.current_ma,
-                        remaining_ma: member.remaining_ma,
-                    })
-                    .collect(),
-            }
-        })
-        .collect()
-}
-
-fn clock(plan: &Plan) -> Option<ClockReport> {
-    let reference = plan.reference_clock()?;
-    let clocked = || plan.devices.iter().filter_map(|one| Some((one, one.settings.clock?)));
-    let task = clocked().find_map(|(device, _)| plan.task_of(device.id));
-    let cycle = task.or(plan.tasks.first()).map_or(0, |task| task.cycle.as_nanos());
-    Some(ClockReport {
-        reference: reference.no(),
-        outputs_shift_ns: cycle * USUAL_SHIFT_PERCENT / 100,
-        least_outputs_shift_ns: plan.least_delay().as_nanos(),
-        devices: clocked()
-            .map(|(device, clock)| ClockDeviceReport {
-                no: device.id.no(),
-                assign_activate: clock.assign_activate,
-                sync0_cycle_ns: clock.sync0_cycle.as_nanos(),
-                sync0_shift_ns: clock.sync0_shift_ns,
-                sync1_cycle_ns: clock.sync1_cycle.as_nanos(),
-            })
-            .collect(),
-    })
 }

@@ -65,9 +65,8 @@ fn object(
     if depth < Depth::Entries {
         return Ok(listed);
     }
-    let last = about.as_ref().map_or(0, |about| match about.object_code {
-        ObjectCode::Variable => 0,
-        _ => about.max_subindex,
+    let last = about.as_ref().map_or(0, |about| {
+        if about.object_code == ObjectCode::Variable { 0 } else { about.max_subindex }
     });
     let range = only.map_or(0..=last, |only| only..=only);
     for subindex in range {

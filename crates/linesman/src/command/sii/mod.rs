@@ -115,10 +115,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             output.text(&report.text(&session.label(id), output));
         }
     });
-    match end(outcome, arguments.json, output)? {
-        Status::Good if differs => Ok(Status::Findings),
-        status => Ok(status),
-    }
+    let status = end(outcome, arguments.json, output)?;
+    Ok(if status == Status::Good && differs { Status::Findings } else { status })
 }
 
 /// An image of a file: whole words, at least the fixed ones.

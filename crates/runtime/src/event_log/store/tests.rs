@@ -34,7 +34,7 @@ fn entries_outlive_the_program_and_are_found_by_each_property() {
         log.end(run, time((base + 9) * 1_000_000_000)).unwrap();
     }
     let log = EventLog::open(&path).unwrap();
-    assert_eq!(log.len().unwrap(), 6);
+    assert_eq!(log.count().unwrap(), 6);
     let runs = log.runs().unwrap();
     assert_eq!((runs.len(), runs[1].line.as_str()), (2, "eth0"));
     assert_eq!(runs[1].ended, Some(time(109_000_000_000)));
@@ -90,6 +90,6 @@ fn one_writes_while_another_reads() {
     let run = log.begin(time(0), "eth0", "", "linesman 1").unwrap();
     let reader = EventLog::open(&path).unwrap();
     log.append(&[entry(run, 1, Severity::Info, EntryKind::State, 1)]).unwrap();
-    assert_eq!(reader.len().unwrap(), 1);
+    assert_eq!(reader.count().unwrap(), 1);
     assert_eq!(reader.runs().unwrap()[0].ended, None);
 }
