@@ -88,7 +88,9 @@ fn people_read_what_happens() {
     let place = Place::new(PLANT);
     let run = place.run(None, &["--seconds", "1", "--to", "safeop"]);
     assert_eq!(run.status, 0, "{}", run.all());
-    for words in ["to SAFEOP", "all SubDevices are where they shall be", "stopping", "none lost"] {
+    for words in
+        ["to SAFEOP", "all 3 SubDevices have reached their states", "stopping", "none lost"]
+    {
         assert!(run.stdout.contains(words), "{words}: {}", run.stdout);
     }
 }
@@ -115,7 +117,7 @@ fn a_fault_while_it_runs_is_told_and_gives_status_1() {
     let place = Place::new(&format!("{PLANT}{fault}"));
     let run = place.run(None, &["--seconds", "4"]);
     assert_eq!(run.status, 1, "{}", run.all());
-    for words in ["does not answer", "answers again"] {
+    for words in ["Communication interrupted", "Communication re-established"] {
         assert!(run.stdout.contains(words), "{words}: {}", run.stdout);
     }
 }

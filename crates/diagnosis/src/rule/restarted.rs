@@ -93,8 +93,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for device in &line.devices {
         let mut own = device.al.changes.iter().filter(|change| change.is_own_fall());
         if let Some(change) = own.next_back() {
-            let is_restart = change.to.state().state() == Some(AlState::Init);
-            let gone = if is_restart { outage(line, device, change) } else { None };
+            // Who was gone and is seen on its way up again was in INIT in between, read or not.
+            let gone = outage(line, device, change);
+            let is_restart = change.to.state().state() == Some(AlState::Init) || gone.is_some();
             falls.push(Fall { device, change, is_restart, gone });
         }
     }

@@ -99,7 +99,8 @@ pub struct Listener {
 /// Both ends. In virtual time a tap may wait; on a real line it must not.
 #[must_use]
 pub fn tap(waits: bool) -> (Tap, Listener) {
-    let (full, from_cycle) = mpsc::sync_channel(LOGS);
+    // One more than there are: the last one is handed over without another to go on with.
+    let (full, from_cycle) = mpsc::sync_channel(LOGS + 1);
     let (to_cycle, empty) = mpsc::sync_channel(LOGS + 1);
     for _ in 0..LOGS {
         // There is room for all of them.
@@ -178,7 +179,11 @@ impl Tap {
 
 impl Drop for Tap {
     fn drop(&mut self) {
-        self.hand_over();
+        // Nobody may listen any more.
+        let _ = self.full.try_send(std::mem::replace(
+            &mut self.log,
+            Log { bytes: Vec::new(), records: Vec::new(), host: Vec::new() },
+        ));
     }
 }
 
