@@ -56,7 +56,8 @@ impl Plan {
     /// Share of the wire's time that all cyclic frames take, in percent.
     #[must_use]
     pub fn load_percent(&self) -> f64 {
-        self.tasks.iter().map(|task| self.task_load_percent(task)).sum()
+        // A sum of nothing is -0.
+        self.tasks.iter().map(|task| self.task_load_percent(task)).sum::<f64>() + 0.0
     }
 
     /// The least time a frame needs for the way out and back, without cables: what the SubDevices

@@ -92,6 +92,14 @@ impl Check<'_> {
                     self.value(item, says, &format!("{at}[{index}]"));
                 }
             }
+            "minItems" | "maxItems" => {
+                let len = value.as_array().map_or(0, Vec::len) as u64;
+                let says = says.as_u64().unwrap_or_default();
+                let bad = if keyword == "minItems" { len < says } else { len > says };
+                if value.is_array() && bad {
+                    self.fault(at, format!("{value} has {len} items"));
+                }
+            }
             "anyOf" | "oneOf" => self.some_of(value, keyword, says, at),
             "allOf" => {
                 for schema in says.as_array().into_iter().flatten() {

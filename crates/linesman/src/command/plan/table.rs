@@ -149,7 +149,7 @@ fn ebus(plan: &Plan, output: &Output) -> String {
             table.row([
                 id.no().to_string(),
                 device.name.clone(),
-                device.station.0.to_string(),
+                format!("0x{:04X}", device.station.0),
                 device.type_name.clone(),
                 current.to_string(),
                 if left < 0 { paint.bad(&format!("{left} !")) } else { left.to_string() },
