@@ -1,7 +1,7 @@
 //! What a running MainDevice is asked, and what it answers: lines of JSON.
 
 use linesman_maindevice::mailbox::MailboxRequest;
-use linesman_maindevice::service::{Service, ServiceAnswer};
+use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer};
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::coe::information::{ListKind, ValueInfo};
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
@@ -99,8 +99,8 @@ pub struct Answer {
     pub schema: String,
     /// Why it was not done, with what to do; `null` when it was.
     pub error: Option<String>,
-    /// Whether the SubDevice itself has said no.
-    pub refused: bool,
+    /// The SubDevice's own code, if it has said no itself; `null` for any other reason.
+    pub refusal: Option<RefusalCode>,
     /// Bytes, hexadecimal; `null` where the service gives none.
     pub data: Option<String>,
     /// Its AL status and AL status code; `null` where the service does not tell.
@@ -109,6 +109,16 @@ pub struct Answer {
     pub words: Option<u32>,
     /// How the run goes; `null` unless that was asked.
     pub run: Option<Box<RunReport>>,
+}
+
+/// By what code a SubDevice has said no.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RefusalCode {
+    /// Whose code it is: `sdo-abort`, `foe-error`, `mailbox-error` or `al-status`.
+    pub kind: String,
+    /// The code.
+    pub code: u32,
 }
 
 impl Answer {
@@ -138,8 +148,10 @@ impl Answer {
             }
             Ok(ServiceAnswer::Written { words }) => Self { words: Some(*words), ..Self::empty() },
             Err(failure) => {
-                let refused = failure.is_refusal();
-                Self { error: Some(failure.to_string()), refused, ..Self::empty() }
+                let refusal = failure.refusal();
+                let refusal =
+                    refusal.map(|(kind, code)| RefusalCode { kind: kind.name().to_owned(), code });
+                Self { error: Some(failure.to_string()), refusal, ..Self::empty() }
             }
         }
     }
@@ -147,10 +159,14 @@ impl Answer {
     /// What the service gave, as if it had been asked for in this process; or why it was not done.
     ///
     /// # Errors
-    /// The words of whoever refused, and whether that was the SubDevice itself.
-    pub fn given(&self) -> Result<ServiceAnswer, (String, bool)> {
+    /// The words of whoever refused, and the code, if that was the SubDevice itself.
+    pub fn given(&self) -> Result<ServiceAnswer, (String, Option<(RefusalKind, u32)>)> {
         if let Some(error) = &self.error {
-            return Err((error.clone(), self.refused));
+            let known = |refusal: &RefusalCode| {
+                let kind = RefusalKind::ALL.into_iter().find(|kind| kind.name() == refusal.kind)?;
+                Some((kind, refusal.code))
+            };
+            return Err((error.clone(), self.refusal.as_ref().and_then(known)));
         }
         if let Some([status, code]) = self.state {
             return Ok(ServiceAnswer::State { status: AlStatus(status), code: AlStatusCode(code) });
@@ -159,7 +175,7 @@ impl Answer {
             return Ok(ServiceAnswer::Written { words });
         }
         match &self.data {
-            Some(data) => from_hex(data).map(ServiceAnswer::Data).map_err(|why| (why, false)),
+            Some(data) => from_hex(data).map(ServiceAnswer::Data).map_err(|why| (why, None)),
             None => Ok(ServiceAnswer::Done),
         }
     }

@@ -6,6 +6,7 @@ mod known;
 mod mailbox;
 mod refusal;
 mod segment;
+mod socket;
 
 use linesman_config::inventory::{FoundDevice, Inventory};
 use linesman_config::plan::{DevicePlan, Plan, PlanOptions};
@@ -25,7 +26,7 @@ pub(crate) use refusal::{Refusal, Report as RefusalReport};
 /// Where the line is, and whom the service is for.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Place {
-    /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
+    /// Where the line is: eth0, eth0+eth1 (a ring), sim:plant.toml, or the socket of `run --control`
     #[arg(value_name = "WHERE")]
     pub(crate) line: String,
     /// The SubDevice: its number (3), station address (0x1003), alias (alias:7), or name
@@ -75,6 +76,8 @@ enum Kind {
     Cards,
     /// A virtual segment of a file begins anew with each command.
     Passing,
+    /// A running MainDevice drives it.
+    Driven,
 }
 
 /// A SubDevice in a report.
@@ -119,6 +122,11 @@ impl From<Failure> for Trouble {
 impl Session {
     /// Scans the line and begins to serve it.
     pub(crate) fn open(place: &str) -> Result<Self, Failure> {
+        if socket::is_one(place) {
+            let (line, devices) = socket::open(place)?;
+            let line = Box::new(line);
+            return Ok(Self { line, devices, place: place.to_owned(), kind: Kind::Driven });
+        }
         let selector: Selector = place.parse()?;
         let (line, devices, kind): (Box<dyn Line>, _, _) = match &selector {
             Selector::Cards(names) => {

@@ -1,0 +1,76 @@
+//! A line that a MainDevice drives: services go through its control socket, beside the cycle.
+
+use std::os::unix::fs::FileTypeExt as _;
+use std::path::{Path, PathBuf};
+
+use linesman_maindevice::service::{Service, ServiceAnswer};
+use linesman_proto::address::DeviceId;
+use linesman_runtime::service;
+
+use super::known::Known;
+use super::{Line, NotDone};
+use crate::failure::Failure;
+
+/// A running MainDevice.
+pub(super) struct Driven {
+    path: PathBuf,
+}
+
+/// Whether there is a socket of that name.
+pub(super) fn is_one(place: &str) -> bool {
+    std::fs::metadata(place).is_ok_and(|found| found.file_type().is_socket())
+}
+
+/// Asks the MainDevice for its SubDevices.
+pub(super) fn open(place: &str) -> Result<(Driven, Vec<Known>), Failure> {
+    let path = PathBuf::from(place);
+    let answer = service::status(&path).map_err(|error| silent(&path, &error))?;
+    let Some(run) = answer.run else {
+        let why = answer.error.unwrap_or_else(|| "it does not say how the run goes".to_owned());
+        return Err(Failure::new(format!("{place}: {why}"), "ask again once the line is up"));
+    };
+    if run.devices.is_empty() {
+        let reason = format!("{place}: the MainDevice does not know its SubDevices yet");
+        return Err(Failure::new(reason, "ask again in a moment"));
+    }
+    let known = |device: &linesman_runtime::run::report::DeviceReport| Known {
+        id: DeviceId(device.no.saturating_sub(1)),
+        station: device.station,
+        alias: 0,
+        name: Some(device.name.clone()),
+        type_name: String::new(),
+        identity: None,
+        mailbox: true,
+    };
+    Ok((Driven { path }, run.devices.iter().map(known).collect()))
+}
+
+impl Line for Driven {
+    fn ask(
+        &mut self,
+        id: DeviceId,
+        service: Service,
+    ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
+        let answer = service::ask(&self.path, id.no(), &service)
+            .map_err(|error| silent(&self.path, &error))?;
+        Ok(answer.given().map_err(|(why, refusal)| {
+            let told = match why.rsplit_once(". Do: ") {
+                Some((reason, next_step)) => Failure::new(reason, next_step),
+                None => Failure::new(why, ""),
+            };
+            NotDone { told, refusal }
+        }))
+    }
+
+    fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
+        // The run tells them itself.
+        Vec::new()
+    }
+}
+
+fn silent(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::new(
+        format!("{}: asking the MainDevice behind this socket: {error}", path.display()),
+        "is it still running? `linesman run ... --control SOCKET` opens one",
+    )
+}
