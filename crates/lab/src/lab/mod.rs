@@ -37,6 +37,10 @@ const AT_ONE_INSTANT: u32 = 100_000;
 /// The largest frame, without check sequence.
 const FRAME: usize = 1_514;
 
+/// Frames that compensate the drift of clocks before SubDevices go beyond PREOP: fewer than on a real
+/// line, where the bring-up may take its time.
+const DRIFT_FRAMES: u32 = 2_000;
+
 /// Sees every frame as the diagnosis does.
 pub type Tap = Box<dyn FnMut(&FrameSeen<'_>) + Send>;
 
@@ -101,7 +105,11 @@ impl Lab {
             start: None,
             clock: "virtual".to_owned(),
         };
-        let main = MainDevice::new(network, Options { ring: paths == 2, ..by_length(&segment) });
+        let mut choices = Options { ring: paths == 2, ..by_length(&segment) };
+        if options.clocks {
+            choices.drift_frames = DRIFT_FRAMES;
+        }
+        let main = MainDevice::new(network, choices);
         let mut lab = Self {
             now: Instant::ZERO,
             network,
