@@ -130,7 +130,7 @@ mod tests {
             .map(|node: usize| {
                 let on = match node {
                     0 => None,
-                    _ if node % 3 == 0 => Some((node - 3, Port::C)),
+                    _ if node.is_multiple_of(3) => Some((node - 3, Port::C)),
                     _ => Some((node - 1, Port::B)),
                 };
                 (on, Port::A)
