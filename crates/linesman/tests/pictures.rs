@@ -65,7 +65,7 @@ fn elements(svg: &str) -> Vec<Element> {
                 open.pop().unwrap();
             }
             Event::Eof => break,
-            _ => {}
+            other => assert!(matches!(other, Event::Decl(_)), "{other:?} in a drawing"),
         }
     }
     assert!(open.is_empty(), "elements are left open");
