@@ -347,6 +347,7 @@ impl<'a> Play<'a> {
     /// The SubDevice that is planned at a port.
     fn pushed_on(&self, on: &str) -> Option<TruthPlace> {
         let tree = self.lab.tree();
+        let on = on.trim_matches('"');
         let end = match on.split_once('.') {
             None => End::MainDevice(linesman_proto::address::Path::A),
             Some((name, port)) => {
