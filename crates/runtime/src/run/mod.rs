@@ -4,6 +4,7 @@
 //! sees in a cycle; [`tap`] shows the frames to the diagnosis, which judges in a thread of its own
 //! ([`judge`](mod@judge)); [`shared`] lets another program be the application; [`report`] is what is told at the end and in between.
 
+pub mod bring_up;
 pub mod io;
 pub mod judge;
 pub mod operator;
