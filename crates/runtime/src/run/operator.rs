@@ -16,6 +16,7 @@ use super::io::{Application, Io, Next};
 use super::judge::judge;
 use super::real_time::{Granted, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
+use super::scan;
 use super::tap::{Tap, tap};
 use crate::drive::{Audience, Driver};
 use crate::line::Line;
@@ -23,8 +24,6 @@ use crate::serve::lateness::Lateness;
 use crate::service::ServiceDesk;
 use crate::stop::Stop;
 
-/// How long a scan of a line may take.
-const SCAN_PATIENCE: Span = Span::s(60);
 /// How long SubDevices may take to go down at the end.
 const LEAVE_PATIENCE: Span = Span::s(5);
 /// So many cycles carry zeros before the exchange ends.
@@ -240,7 +239,7 @@ impl<A: Application> Audience for Operator<A> {
         }
         if !self.begun {
             self.begun = true;
-            self.scan_until = now + SCAN_PATIENCE;
+            self.scan_until = now + scan::PATIENCE;
             match self.wanted.take() {
                 Some(Wanted::Plan(plan)) => self.start(now, *plan, main),
                 other => {
@@ -271,51 +270,6 @@ impl<A: Application> Audience for Operator<A> {
     }
 }
 
-/// Finds out what is on a line: it gets station addresses, and keeps its states.
-///
-/// # Errors
-/// When it does not answer, or the interface fails.
-pub fn scan<L: Line>(line: L, ring: bool, stop: &Stop) -> Result<Inventory, RunError> {
-    let mut driver = Driver::new(line, Options { ring, ..Options::default() });
-    let mut scanning = Scanning { begun: false, result: None };
-    let until = driver.now() + SCAN_PATIENCE;
-    driver.run(until, stop, &mut scanning)?;
-    let ended = "the scan was ended before it was done. Do: scan again";
-    scanning.result.unwrap_or_else(|| Err(RunError::Scan(ended.to_owned())))
-}
-
-/// Waits for the one result.
-struct Scanning {
-    begun: bool,
-    result: Option<Result<Inventory, RunError>>,
-}
-
-impl Audience for Scanning {
-    fn frame(&mut self, _: &FrameSeen<'_>) {}
-
-    fn host(&mut self, _: &HostObservation) {}
-
-    fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
-        if let Event::Scanned(inventory) = event {
-            self.result = Some(Ok(*inventory));
-        } else if let Event::ScanFailed(error) = event {
-            self.result = Some(Err(RunError::Scan(error.to_string())));
-        }
-    }
-
-    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
-        if !std::mem::replace(&mut self.begun, true) {
-            // It looks, with nothing but reads, before it writes.
-            main.scan(now);
-        }
-        self.result.is_none()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        None
-    }
-}
-
 /// A run that has ended.
 pub struct Ended {
     /// How it went.
@@ -343,7 +297,6 @@ pub struct Beside<'a> {
 /// When nothing could be run: the line does not answer, or is not what was wanted.
 pub fn run<L: Line, A: Application>(
     line: L,
-    ring: bool,
     wanted: Wanted,
     application: A,
     options: &RunOptions,
@@ -362,7 +315,7 @@ pub fn run<L: Line, A: Application>(
     // Threads started from here on would be real-time ones.
     let granted = options.real_time.map(RealTime::ask).unwrap_or_default();
     let allowed_misses = options.allowed_misses.filter(|_| !application.is_idle());
-    let settings = Options { ring, allowed_misses, ..Options::default() };
+    let settings = Options { allowed_misses, ..line.options() };
     let mut driver = Driver::new(line, settings);
     let begun = driver.now();
     let mut operator = Operator {

@@ -9,16 +9,14 @@ use linesman_maindevice::{Event, MainDevice, Target};
 use linesman_proto::address::Position;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::drive::{Audience, Driver};
-use linesman_runtime::line::{Cards, Line, Pace as VirtualPace, VirtualLine};
+use linesman_runtime::line::{Cards, Line, Pace as VirtualPace};
 use linesman_runtime::online::Looker;
 use linesman_runtime::online::report::OnlineReport;
-use linesman_runtime::wiring::Wiring;
 
 use super::live::{Live, Pace};
 use super::{Arguments, interval, lasts};
 use crate::command::driven;
 use crate::failure::Failure;
-use crate::files;
 use crate::output::Output;
 
 /// A look takes milliseconds; a line that is silent for so long is.
@@ -43,13 +41,10 @@ pub(super) fn segment(
     arguments: &Arguments,
     output: &mut Output,
 ) -> Result<OnlineReport, Failure> {
-    let ring = files::segment_file(path)?.ring.is_some();
-    let plant = files::Plant::open(path)?;
-    let wiring = Wiring::of(&plant.segment, &plant.project);
-    let names = plant.project.devices.iter().map(|device| device.name.clone()).collect();
     let pace = if arguments.live { VirtualPace::Host } else { VirtualPace::Free };
-    let line = VirtualLine::new(plant.segment, wiring, ring, pace)
-        .map_err(|error| Failure::new(format!("making a virtual line: {error}"), ""))?;
+    let line = driven::virtual_line(path, pace)?;
+    let segment = line.segment();
+    let names = segment.devices().map(|id| segment.name(id).to_owned()).collect();
     look(line, Looker::new(place, names), place, arguments, output)
 }
 
@@ -61,8 +56,7 @@ fn look<L: Line>(
     output: &mut Output,
 ) -> Result<OnlineReport, Failure> {
     let stop = driven::stop()?;
-    let ring = place.contains('+');
-    let options = linesman_maindevice::Options { ring, ..linesman_maindevice::Options::default() };
+    let options = line.options();
     let mut driver = Driver::new(line, options);
     let lasts = lasts(arguments)?;
     let span = lasts.map(|lasts| Span::ns(lasts.as_nanos() as u64));

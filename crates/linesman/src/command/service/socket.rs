@@ -53,13 +53,9 @@ impl Line for Driven {
     ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
         let answer = service::ask(&self.path, id.no(), &service)
             .map_err(|error| silent(&self.path, &error))?;
-        Ok(answer.given().map_err(|(why, refusal)| {
-            let told = match why.rsplit_once(". Do: ") {
-                Some((reason, next_step)) => Failure::new(reason, next_step),
-                None => Failure::new(why, ""),
-            };
-            NotDone { told, refusal }
-        }))
+        Ok(answer
+            .given()
+            .map_err(|(why, refusal)| NotDone { told: Failure::from_text(&why), refusal }))
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
