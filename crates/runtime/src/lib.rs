@@ -19,6 +19,7 @@ pub mod line;
 pub mod listen;
 pub mod named_files;
 pub mod names;
+pub mod online;
 pub mod plan_file;
 pub mod record;
 pub mod run;

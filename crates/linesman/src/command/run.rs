@@ -17,6 +17,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
 use linesman_runtime::line::{Cards, Line, Pace};
+use linesman_runtime::online::Board;
 use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{
     self as running, Beside, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
@@ -31,6 +32,7 @@ use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
+use crate::text::quantity::count;
 use crate::version;
 
 /// After so long without news, what was waited with is told.
@@ -115,10 +117,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let choices = Choices { target: arguments.to, cycle: arguments.cycle_us.map(Span::us) };
     let title = match (&source, &arguments.file) {
         (Source::Project(project), Some(path)) => {
-            format!("{} SubDevices of {}", project.devices.len(), path.display())
+            format!("{} of {}", count(project.devices.len() as u64, "SubDevice"), path.display())
         }
         (Source::Planned(plan), Some(path)) => {
-            format!("{} SubDevices of {}", plan.devices.len(), path.display())
+            format!("{} of {}", count(plan.devices.len() as u64, "SubDevice"), path.display())
         }
         _ => "what is there".to_owned(),
     };
@@ -156,7 +158,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
         None => None,
     };
-    let teller = Teller::new(arguments.json, began, log);
+    let board = Board::new(&arguments.on);
+    let teller = Teller::new(arguments.json, began, log, board.clone());
     let application = arguments.image.clone();
     let stop = driven::stop()?;
     let said = format!(
@@ -169,7 +172,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let mut line = Cards::open(names, clock)?;
             line.set_spin(Span::us(arguments.spin_us));
             stop.rings(&line.bell()).map_err(driven::no_bell)?;
-            let desk = desk(arguments.control.as_deref(), line.bell())?;
+            let desk = desk(arguments.control.as_deref(), line.bell(), board)?;
             let real_time = Some(RealTime {
                 priority: (arguments.priority > 0).then_some(arguments.priority),
                 cpu: arguments.cpu,
@@ -183,7 +186,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let pace = if lasts.is_some() { Pace::Free } else { Pace::Host };
             let line = driven::virtual_line(path, pace)?;
             stop.rings(&line.bell()).map_err(driven::no_bell)?;
-            let desk = desk(arguments.control.as_deref(), line.bell())?;
+            let desk = desk(arguments.control.as_deref(), line.bell(), board)?;
             drive(line, wanted, &options, application, desk, &stop, &said, teller, output)
         }
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
@@ -217,9 +220,9 @@ impl Source {
 }
 
 /// The socket for services, if one is wanted.
-fn desk(path: Option<&Path>, bell: Bell) -> Result<Option<ServiceDesk>, Failure> {
+fn desk(path: Option<&Path>, bell: Bell, board: Board) -> Result<Option<ServiceDesk>, Failure> {
     let Some(path) = path else { return Ok(None) };
-    let desk = ServiceDesk::open(path, bell).map_err(|error| {
+    let desk = ServiceDesk::open(path, bell, board).map_err(|error| {
         let reason = format!("{}: opening the socket: {error}", path.display());
         Failure::new(reason, "name a path where nothing is, in a folder that you may write to")
     })?;
@@ -290,7 +293,7 @@ fn drive<L: Line + Send>(
     if teller.is_json() {
         output.json(&report);
     } else {
-        output.text(&told::summary(&report));
+        output.text(&told::summary(&report, output.paint()));
     }
     if let Some(error) = error {
         return Err(driven::nobody(&error).at(&options.on));

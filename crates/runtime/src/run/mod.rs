@@ -5,6 +5,7 @@
 //! ([`judge`](mod@judge)); [`shared`] lets another program be the application; [`report`] is what is told at the end and in between;
 //! [`scan`](mod@scan) is for those who only look.
 
+pub mod bring_up;
 pub mod io;
 pub mod judge;
 pub mod operator;

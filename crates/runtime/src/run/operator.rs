@@ -11,6 +11,7 @@ use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
+use super::bring_up::BringUpReport;
 use super::io::{Application, Io, Next};
 use super::judge::judge;
 use super::real_time::{Granted, RealTime};
@@ -66,6 +67,8 @@ pub enum Note {
     Planned(Arc<Plan>),
     /// The MainDevice tells something.
     Event(Instant, Box<Event>),
+    /// The host has noticed something.
+    Host(HostObservation),
     /// The diagnosis tells something.
     Finding(Box<linesman_diagnosis::Event>),
     /// The line is being stopped.
@@ -153,6 +156,7 @@ impl<A: Application> Operator<A> {
             on: self.on.clone(),
             time_ns: now.since(self.begun_at).as_nanos(),
             reached_ns: self.reached_at.map(|at| at.since(self.begun_at).as_nanos()),
+            bring_up: None,
             settled: main.is_settled(),
             outputs_withheld: self.withheld,
             devices,
@@ -201,6 +205,7 @@ impl<A: Application> Audience for Operator<A> {
     }
 
     fn host(&mut self, observation: &HostObservation) {
+        self.note(Note::Host(*observation));
         if let Some(tap) = &mut self.tap {
             tap.host(observation);
         }
@@ -337,6 +342,8 @@ pub fn run<L: Line, A: Application>(
     let ran = driver.run(until, stop, &mut operator);
     let now = driver.now();
     let mut report = operator.report(now, driver.main_mut());
+    let times = operator.plan.as_deref().zip(driver.main_mut().bring_up_times());
+    report.bring_up = times.map(|(plan, times)| BringUpReport::of(plan, &times));
     let error = match (operator.failure.take(), ran) {
         (Some(failure), _) => Some(failure),
         (None, Err(error)) => Some(error.into()),

@@ -17,7 +17,7 @@ pub(super) struct Driven {
 }
 
 /// Whether there is a socket of that name.
-pub(super) fn is_one(place: &str) -> bool {
+pub(crate) fn is_one(place: &str) -> bool {
     std::fs::metadata(place).is_ok_and(|found| found.file_type().is_socket())
 }
 
@@ -64,7 +64,7 @@ impl Line for Driven {
     }
 }
 
-fn silent(path: &Path, error: &std::io::Error) -> Failure {
+pub(crate) fn silent(path: &Path, error: &std::io::Error) -> Failure {
     Failure::new(
         format!("{}: asking the MainDevice behind this socket: {error}", path.display()),
         "is it still running? `linesman run ... --control SOCKET` opens one",
