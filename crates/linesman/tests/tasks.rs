@@ -103,7 +103,8 @@ fn a_drive_that_fails_costs_the_data_of_its_sync_unit_only() {
     // Its watchdog expires: it goes to SAFEOP by itself and takes no outputs any more.
     let fails = "[[fault]]\nkind = \"watchdog-starved\"\ndevice = \"Drive 5\"\nwatchdog_ms = 0.5\n\
                  from_ms = 500\nto_ms = 600\n";
-    let units: [(fn(usize) -> &'static str, &[u32]); 2] = [
+    type Unit = fn(usize) -> &'static str;
+    let units: [(Unit, &[u32]); 2] = [
         (|_| "all", &[2, 3, 4, 5, 6, 7]),
         (|drive| if drive <= 3 { "left" } else { "right" }, &[5, 6, 7]),
     ];
