@@ -37,6 +37,10 @@ const AT_ONE_INSTANT: u32 = 100_000;
 /// The largest frame, without check sequence.
 const FRAME: usize = 1_514;
 
+/// Frames that compensate the drift of clocks before SubDevices go beyond PREOP: fewer than on a real
+/// line, where the bring-up may take its time.
+const DRIFT_FRAMES: u32 = 2_000;
+
 /// Sees every frame as the diagnosis does.
 pub type Tap = Box<dyn FnMut(&FrameSeen<'_>) + Send>;
 
@@ -87,7 +91,10 @@ impl Lab {
             start: None,
             clock: "virtual".to_owned(),
         };
-        let settings = Options { ring: paths == 2, ..Options::default() };
+        let mut settings = Options { ring: paths == 2, ..Options::default() };
+        if options.clocks {
+            settings.drift_frames = DRIFT_FRAMES;
+        }
         let settings = settings.on_line(segment.tree().len(), segment.longest_way());
         let main = MainDevice::new(network, settings);
         let mut lab = Self {

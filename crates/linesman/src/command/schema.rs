@@ -3,6 +3,7 @@
 use linesman_config::project::Project;
 use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
+use linesman_lab::score::ScoreReport;
 use linesman_runtime::control::message::{Faults, Request, SignalTable};
 use linesman_runtime::journal::TruthEvent;
 use linesman_runtime::online::report::OnlineReport;
@@ -50,6 +51,8 @@ pub(crate) enum Name {
     Event,
     /// `lab replay --json`
     Replay,
+    /// `lab score --json`
+    Score,
     /// `fault … inject|heal|list --json`
     Faults,
     /// `fault … signals|set|release --json`
@@ -108,6 +111,7 @@ fn schema(name: Name) -> Schema {
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),
         Name::Replay => schema_for!(ReplayReport),
+        Name::Score => schema_for!(ScoreReport),
         Name::Faults => schema_for!(Faults),
         Name::Signals => schema_for!(SignalTable),
         Name::Sim => schema_for!(SimStatus),
