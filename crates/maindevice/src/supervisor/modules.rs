@@ -26,12 +26,17 @@ pub(super) async fn compare(context: &Context, device: &DevicePlan) -> Result<()
                 bytes.iter_mut().zip(&data).for_each(|(byte, came)| *byte = *came);
                 u32::from_le_bytes(bytes)
             }
-            Err(failure) => match failure.why {
-                Why::Aborted { code } if code == SdoAbortCode::NO_OBJECT => return Ok(()),
+            Err(failure) => {
+                let code = if let Why::Aborted { code } = failure.why { Some(code) } else { None };
+                if code == Some(SdoAbortCode::NO_OBJECT) {
+                    return Ok(());
+                }
                 // Slots behind the last one that is used need not be listed.
-                Why::Aborted { code } if code == SdoAbortCode::NO_SUBINDEX => 0,
-                _ => return Err(StepError::Unread(Box::new(StartUpError::Object(failure)))),
-            },
+                if code != Some(SdoAbortCode::NO_SUBINDEX) {
+                    return Err(StepError::Unread(Box::new(StartUpError::Object(failure))));
+                }
+                0
+            }
         };
         if found != *expected {
             return Err(StepError::Module { slot, expected: *expected, found });
