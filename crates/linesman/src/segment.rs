@@ -204,7 +204,7 @@ impl Segment {
             diagnose: None,
         };
         // Nobody listens to notes here; they go nowhere.
-        let (notes, _) = mpsc::channel();
+        let (notes, _) = mpsc::sync_channel(1);
         let wanted = Wanted::Plan(Box::new(plan));
         let line = self.line.line();
         let beside = Beside { stop: &self.stop, notes, desk: None };

@@ -48,6 +48,22 @@ pub enum StepError {
         /// How long it was waited for.
         patience: Span,
     },
+    /// A slot holds another module than planned.
+    #[error(
+        "slot {slot} holds module 0x{found:08X}, expected 0x{expected:08X} (object 0xF050:{slot:02X}; 0 is an \
+         empty slot)"
+    )]
+    Module {
+        /// The slot, from 1.
+        slot: u8,
+        /// The planned module.
+        expected: u32,
+        /// The one that is there.
+        found: u32,
+    },
+    /// It does not say which modules it has.
+    #[error("asking for its modules: {0}")]
+    Unread(Box<StartUpError>),
     /// It does not take a command that belongs to the step.
     #[error("start-up command {command}: {error}")]
     StartUp {
