@@ -165,7 +165,15 @@ impl Book {
     fn open(&mut self, condition: Condition) -> Finding {
         self.opened += 1;
         let opened = condition.since;
-        Finding { id: self.opened, condition, opened, confirmed: None, closed: None, settled: None, parent: None }
+        Finding {
+            id: self.opened,
+            condition,
+            opened,
+            confirmed: None,
+            closed: None,
+            settled: None,
+            parent: None,
+        }
     }
 
     /// Hangs each finding beneath the one that explains all of its symptoms.
@@ -207,9 +215,8 @@ impl Book {
                 && !self.follows(other, effect.id)
         };
         let all = 0..self.findings.len();
-        let is_covered = symptoms
-            .iter()
-            .all(|symptom| all.clone().any(|other| explained(other, symptom)));
+        let is_covered =
+            symptoms.iter().all(|symptom| all.clone().any(|other| explained(other, symptom)));
         let share = |other: &usize| {
             let explained = symptoms.iter().filter(|symptom| explained(*other, symptom)).count();
             (explained, std::cmp::Reverse(*other))

@@ -195,9 +195,8 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
         }
         condition = condition.explaining(follows);
     } else {
-        condition = condition
-            .about([Symptom::StateLost(device.id)])
-            .explaining(consequences(line, fall));
+        condition =
+            condition.about([Symptom::StateLost(device.id)]).explaining(consequences(line, fall));
     }
     if is_back(fall)
         && let Some(status) = device.al.status

@@ -82,8 +82,7 @@ pub fn best_finding<'a>(
     let began = company.began.unwrap_or(Instant::ZERO).as_nanos();
     let of_its_time =
         |finding: &&FindingReport| finding.closed_ns.is_none_or(|closed| closed.0 >= began);
-    let is_common =
-        |finding: &&FindingReport| company.is_shared && may_be_common(finding.cause);
+    let is_common = |finding: &&FindingReport| company.is_shared && may_be_common(finding.cause);
     let beneath = diagnosis.findings.iter().filter(is_common).flat_map(|f| &f.consequences);
     let all = diagnosis.findings.iter().chain(beneath);
     let graded = all.filter(of_its_time).map(|finding| {
