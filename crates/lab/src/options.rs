@@ -22,6 +22,8 @@ pub struct LabOptions {
     pub target: AlState,
     /// Cycle of the process data.
     pub cycle: Span,
+    /// Whether the diagnosis listens. Where nobody asks it, a long line is scanned much sooner without.
+    pub diagnosis: bool,
     /// Whether the counters of the card are shown to the diagnosis. Without them nobody counts what
     /// is spoiled on the last hop.
     pub host_counters: bool,
@@ -40,6 +42,7 @@ impl Default for LabOptions {
         Self {
             target: AlState::Op,
             cycle: Span::ms(2),
+            diagnosis: true,
             host_counters: true,
             project: true,
             probes: true,

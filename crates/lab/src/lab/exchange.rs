@@ -81,7 +81,9 @@ impl Lab {
             truncated: false,
             bytes,
         };
-        self.engine.handle_frame(&seen);
+        if self.options.diagnosis {
+            self.engine.handle_frame(&seen);
+        }
         if let Some(tap) = &mut self.tap {
             tap(&seen);
         }
@@ -128,6 +130,9 @@ impl Lab {
 
     /// Turns what the cards counted since the last look into host observations.
     pub(super) fn look_at_cards(&mut self) {
+        if !self.options.diagnosis {
+            return;
+        }
         for path in Path::ALL.into_iter().take(self.paths) {
             let port = self.segment.host(path);
             let before = self.host_last[path.index()].replace(port);

@@ -20,7 +20,8 @@ const STEP: Span = Span::ms(1);
 /// Scans the segment of a file.
 pub(super) fn scan(path: &Path) -> Result<Scan, Failure> {
     let file = files::segment_file(path)?;
-    let options = LabOptions { begin: Begin::Scan, ..LabOptions::default() };
+    // Nobody asks what is wrong with the line.
+    let options = LabOptions { begin: Begin::Scan, diagnosis: false, ..LabOptions::default() };
     let mut lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
     let ended = |lab: &Lab| lab.events().iter().any(|(_, event)| outcome(event).is_some());
     let patience = Span::s(PATIENCE_S + lab.segment().tree().len() as u64);
