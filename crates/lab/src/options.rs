@@ -22,8 +22,6 @@ pub struct LabOptions {
     pub target: AlState,
     /// Cycle of the process data.
     pub cycle: Span,
-    /// Whether the diagnosis listens. Where nobody asks it, a long line is scanned much sooner without.
-    pub diagnosis: bool,
     /// Whether the counters of the card are shown to the diagnosis. Without them nobody counts what
     /// is spoiled on the last hop.
     pub host_counters: bool,
@@ -31,6 +29,8 @@ pub struct LabOptions {
     pub project: bool,
     /// Whether the diagnosis may ask for registers by itself.
     pub probes: bool,
+    /// Whether SubDevices with distributed clocks are brought into step with SYNC0, one event a cycle.
+    pub clocks: bool,
     /// What is done with the line from the start.
     pub begin: Begin,
     /// What the report says was looked at; empty for the segment's name.
@@ -42,10 +42,10 @@ impl Default for LabOptions {
         Self {
             target: AlState::Op,
             cycle: Span::ms(2),
-            diagnosis: true,
             host_counters: true,
             project: true,
             probes: true,
+            clocks: false,
             begin: Begin::Run,
             source: String::new(),
         }
