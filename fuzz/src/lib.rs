@@ -11,7 +11,6 @@ mod eni;
 mod esi;
 mod frame;
 mod mailbox;
-mod mailbox_client;
 mod observation_file;
 mod project;
 mod segment;
@@ -26,7 +25,6 @@ pub use eni::eni;
 pub use esi::esi;
 pub use frame::frame;
 pub use mailbox::mailbox;
-pub use mailbox_client::mailbox_client;
 pub use observation_file::observation_file;
 pub use project::project;
 pub use segment::segment;
@@ -45,7 +43,6 @@ pub const TARGETS: &[Target] = &[
     ("esi", esi),
     ("frame", frame),
     ("mailbox", mailbox),
-    ("mailbox_client", mailbox_client),
     ("observation_file", observation_file),
     ("project", project),
     ("segment", segment),
