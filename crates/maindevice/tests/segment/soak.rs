@@ -96,8 +96,11 @@ enum Where {
     Host,
 }
 
-/// What breaks and can heal, with parameters.
-const BREAKS: [(&str, Where, &[(&str, f64)]); 14] = [
+/// A kind of fault, its place and its parameters.
+type Break = (&'static str, Where, &'static [(&'static str, f64)]);
+
+/// What breaks and can heal.
+const BREAKS: [Break; 14] = [
     ("link-open", Where::Link, &[]),
     ("link-flapping", Where::Link, &[]),
     ("emc-noise", Where::Link, &[]),
