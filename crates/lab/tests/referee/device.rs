@@ -236,7 +236,7 @@ impl Device {
         }
         for (at, byte) in range.zip(data) {
             // A register takes its value when the frame has ended: locks are those from before.
-            if at >= SM0 && at < SM0 + 0x80 && at % 8 == SM_ACTIVATE {
+            if (SM0..SM0 + 0x80).contains(&at) && at % 8 == SM_ACTIVATE {
                 self.memory.insert(at, *byte);
                 self.full &= at != SM0 + 8 + SM_ACTIVATE || byte & 1 != 0;
             }
@@ -284,7 +284,7 @@ impl Device {
                 self.memory.insert(CONTROL + 1, BUSY | command.bits());
                 self.sii = Some((now + took, command, word));
             }
-            _ => {
+            SiiCommand::Write | SiiCommand::Reload | SiiCommand::Reserved(_) => {
                 remarks.unrecorded.insert((number, CONTROL));
                 return false;
             }
@@ -386,8 +386,8 @@ impl Device {
             Some((buffer[HEADER - 1] & 0x0F, message.data.to_vec()))
         };
         let same = |(_, one): &(usize, &Dialogue)| asked(&one.request) == asked(data);
-        let all = self.tape.dialogues.iter().enumerate().filter(same);
-        let place = all.clone().find(|(at, _)| !self.asked.contains(at)).or(all.last());
+        let mut all = self.tape.dialogues.iter().enumerate().filter(same);
+        let place = all.clone().find(|(at, _)| !self.asked.contains(at)).or(all.next_back());
         let Some((at, dialogue)) = place else {
             let header = Header::parse(data);
             let body: Vec<String> =

@@ -133,14 +133,13 @@ fn uploads(tape: &Tape) -> Vec<(ObjectAddress, bool, Option<Vec<u8>>)> {
         else {
             return None;
         };
-        let value = match CoeMessage::parse(&answer).ok()? {
-            CoeMessage::SdoResponse(Response::Upload { initial, .. })
-                if initial.data().len() == initial.size() as usize =>
-            {
-                Some(initial.data().to_vec())
-            }
-            _ => None,
-        };
+        let parsed = CoeMessage::parse(&answer).ok()?;
+        let mut value = None;
+        if let CoeMessage::SdoResponse(Response::Upload { initial, .. }) = parsed
+            && initial.data().len() == initial.size() as usize
+        {
+            value = Some(initial.data().to_vec());
+        }
         Some((object, complete, value))
     };
     tape.dialogues.iter().filter_map(|one_| one(&one_.request, &one_.answer)).collect()
