@@ -275,6 +275,7 @@ impl<'a> Episode<'a> {
                 | Effect::ClockRestarted
                 | Effect::ClockRestored
                 | Effect::SyncCut
+                | Effect::SyncBounces
                 | Effect::SyncBack
                 | Effect::WorkTakes { .. }
                 | Effect::WorkRestored
