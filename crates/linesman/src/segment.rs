@@ -11,6 +11,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
 use linesman_runtime::listen::is_driven;
+use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::run::{
     self as running, Application, Beside, Choices, MakePlan, RealTime, RunOptions, Wanted,
@@ -149,6 +150,11 @@ impl Segment {
         }
         let text = String::from_utf8(bytes).map_err(|_| refuse("no text in UTF-8".to_owned()))?;
         let project = Project::parse(&text).map_err(|error| refuse(error.to_string()))?;
+        // One that chooses more than who is where is planned from what it says.
+        if project.chooses() {
+            let file = PlanFile::open(path).map_err(|error| refuse(error.to_string()))?;
+            return Ok(file.plan.into());
+        }
         let Wanted::Found(make) = Choices::default().project(project) else {
             return Err(refuse("it makes no plan".to_owned()));
         };

@@ -46,7 +46,9 @@ pub(crate) async fn perform(
         Service::Acknowledge => state::acknowledge(servant, device).await,
         Service::ReadRegister { address, len } => {
             let reply = wire.read_one(target, address, len).await;
-            reply.map(|reply| ServiceAnswer::Data(reply.data)).map_err(|error| register(id, error))
+            reply
+                .map(|reply| ServiceAnswer::Data(reply.data.into_vec()))
+                .map_err(|error| register(id, error))
         }
         Service::WriteRegister { address, data } => {
             let reply = wire.write_one(target, address, &data).await;

@@ -17,4 +17,5 @@ mod scan;
 mod soak;
 mod software;
 mod start_up;
+mod tasks;
 mod wire_faults;
