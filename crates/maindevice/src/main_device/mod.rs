@@ -173,12 +173,12 @@ impl MainDevice {
     #[inline]
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.executor.advance(now);
-        match self.exchange.receive(now, path, frame) {
-            Received::Complete(slot) => {
-                self.statistics.frames_received += 1;
-                self.complete(now, slot, frame);
-            }
-            other => self.receive_other(now, other, frame),
+        let received = self.exchange.receive(now, path, frame);
+        if let Received::Complete(slot) = received {
+            self.statistics.frames_received += 1;
+            self.complete(now, slot, frame);
+        } else {
+            self.receive_other(now, received, frame);
         }
         if self.options.ring {
             self.watch_ring();
