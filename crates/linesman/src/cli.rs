@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, demo, diagnose, explain, fault, foe, history, interfaces, lab, log, plan, reg, run,
-    scan, schema, sdo, sii, sim, state,
+    completion, demo, diagnose, explain, fault, foe, history, interfaces, lab, log, online, plan,
+    reg, run, scan, schema, sdo, sii, sim, state,
 };
 use crate::version::VERSION;
 
@@ -71,6 +71,8 @@ pub(crate) enum Command {
     Reg(reg::Arguments),
     /// Drive a line: bring it up, exchange process data, watch it, stop it cleanly
     Run(run::Arguments),
+    /// A line as it is now: states, error counters, frames, mailboxes; once or live
+    Online(online::Arguments),
     /// Virtual segments on real interfaces, for any MainDevice
     Sim(sim::Arguments),
     /// Break, heal and watch a segment that runs on real interfaces
@@ -92,6 +94,7 @@ impl Command {
             Self::Scan(arguments) => arguments.json,
             Self::Plan(arguments) => arguments.json,
             Self::Run(arguments) => arguments.json,
+            Self::Online(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Fault(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,

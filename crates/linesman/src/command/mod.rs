@@ -11,6 +11,7 @@ pub(crate) mod history;
 pub(crate) mod interfaces;
 pub(crate) mod lab;
 pub(crate) mod log;
+pub(crate) mod online;
 pub(crate) mod plan;
 pub(crate) mod reg;
 pub(crate) mod run;
@@ -33,6 +34,7 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::Demo(arguments) => demo::run(&arguments, output),
         Command::Lab(arguments) => lab::run(&arguments, output),
         Command::Log(arguments) => log::run(&arguments, output),
+        Command::Online(arguments) => online::run(&arguments, output),
         Command::Run(arguments) => run::run(&arguments, output),
         Command::Plan(arguments) => plan::run(&arguments, output),
         Command::Scan(arguments) => scan::run(&arguments, output),

@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::expect::Presence;
 use linesman_config::plan::{Plan, Role};
-use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::address::WorkingCounter;
 use linesman_proto::sii::Direction;
 use linesman_proto::state::{AlState, OredStates};
 use linesman_proto::time::{Instant, Span};
@@ -34,6 +34,7 @@ use crate::event::Event;
 use crate::exchange::Exchange;
 use crate::exchange::prebuilt::data_offsets;
 use crate::executor::lock;
+use crate::mailbox::{MailboxBits, Queues};
 use crate::statistics::Statistics;
 use crate::supervisor::Line;
 
@@ -102,6 +103,7 @@ pub(crate) struct Cyclic {
     responding: Option<(WorkingCounter, u8)>,
     shares: Vec<Share>,
     steer: Steer,
+    mailboxes: MailboxBits,
     pub(crate) outputs: Vec<u8>,
     pub(crate) inputs: Vec<u8>,
 }
@@ -154,6 +156,7 @@ impl Cyclic {
             responding: None,
             shares: quality::shares(&plan),
             steer: Steer::default(),
+            mailboxes: MailboxBits::default(),
             outputs: vec![0; plan.outputs_len],
             inputs: vec![0; plan.inputs_len],
             plan,
@@ -164,6 +167,11 @@ impl Cyclic {
             cyclic.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
         cyclic.refresh();
         cyclic
+    }
+
+    /// Tells those who serve mailboxes which of them hold something, where the plan reads that.
+    pub(crate) fn serve(&mut self, mailboxes: Queues) {
+        self.mailboxes = MailboxBits::new(&self.plan, mailboxes);
     }
 
     /// Takes over who is present, if that has changed.
@@ -287,7 +295,7 @@ impl Cyclic {
     ) {
         self.refresh();
         let Self { plan, line, tasks, frames, inputs, least, most, .. } = self;
-        let Self { shares, version, responding, steer, .. } = self;
+        let Self { shares, mailboxes, version, responding, steer, .. } = self;
         let Some(frame) = frames.get_mut(index) else { return };
         let Some(state) = tasks.get_mut(frame.task) else { return };
         state.came(&mut frame.out);
@@ -314,6 +322,8 @@ impl Cyclic {
                 } else if datagram.role == Role::ReferenceClock && wkc.0 > 0 {
                     let cycle = plan.tasks.get(frame.task).map_or(Span::ZERO, |task| task.cycle);
                     moved += steer.correction(now, data, cycle);
+                } else if datagram.role == Role::MailboxStates && wkc.0 > 0 {
+                    mailboxes.take(index, at, data.get(..datagram.len).unwrap_or_default());
                 }
             } else if datagram.expected(withheld).fits(wkc) {
                 datagram.take(now, reply, inputs);
@@ -372,21 +382,6 @@ impl Cyclic {
     /// Whether the last answer of a frame was not as it should be.
     pub(crate) fn is_bad(&self, index: usize) -> bool {
         self.frames.get(index).is_some_and(|frame| frame.status.wrong_counter != 0)
-    }
-
-    /// How good the process data of a SubDevice are.
-    pub(crate) fn quality(&self, id: DeviceId) -> Quality {
-        let Some(share) = self.shares.get(id.index()) else { return Quality::default() };
-        share.quality(&self.least, id, |frame, at| {
-            let datagram = self.frames.get(frame).and_then(|frame| frame.datagrams.get(at));
-            datagram.map_or((false, None, 0), |one| (one.good, one.good_at, one.receipts))
-        })
-    }
-
-    /// How a frame of a task went the last time.
-    pub(crate) fn frame_status(&self, task: usize, number: usize) -> Option<FrameStatus> {
-        let frame = self.frames.iter().find(|one| one.task == task && one.number == number);
-        frame.map(|frame| frame.status)
     }
 
     /// How many answered the last broadcast read of the cycle.

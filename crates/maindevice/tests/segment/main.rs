@@ -18,4 +18,5 @@ mod soak;
 mod software;
 mod start_up;
 mod tasks;
+mod watch;
 mod wire_faults;
