@@ -11,6 +11,7 @@
 
 mod application;
 mod datagram;
+mod departure;
 mod quality;
 mod run;
 mod steer;
@@ -27,6 +28,7 @@ use linesman_proto::time::{Instant, Span};
 
 use self::application::Application;
 use self::datagram::{Datagram, Place, clear_lost};
+use self::departure::{Departure, LOST_IS_NEWS, TaskState};
 use self::quality::Share;
 use self::run::Run;
 use self::steer::Steer;
@@ -58,28 +60,6 @@ struct Frame {
     /// It is on its way.
     out: bool,
     status: FrameStatus,
-}
-
-/// Frames of a task that leave together.
-#[derive(Debug)]
-struct Departure {
-    task: usize,
-    next_at: Instant,
-    cycle: Span,
-    /// The cycle of the task begins with it.
-    begins: bool,
-    frames: Vec<usize>,
-}
-
-#[derive(Debug)]
-struct TaskState {
-    /// Frames lost in a row.
-    lost: u64,
-    /// Frames that are on their way.
-    out: u32,
-    /// The last of them has come back, or was given up.
-    exchanged: bool,
-    application: Application,
 }
 
 /// The engine.
@@ -390,37 +370,6 @@ impl Cyclic {
     }
 }
 
-impl Departure {
-    /// Cycles that were slept through are left out, not caught up: the grid stays. Gives how many.
-    #[cold]
-    fn catch_up(&mut self, now: Instant) -> u64 {
-        let behind = now.since(self.next_at).as_nanos() / self.cycle.as_nanos() + 1;
-        self.next_at += self.cycle * behind;
-        behind
-    }
-}
-
-impl TaskState {
-    /// Its frames come back again.
-    #[cold]
-    fn found(&mut self, task: usize, line: &Mutex<Line>, events: &mut impl FnMut(Event)) {
-        let lost = std::mem::take(&mut self.lost);
-        if lost >= LOST_IS_NEWS {
-            events(Event::CyclicFramesBack { task, lost });
-            lock(line).alert();
-        }
-    }
-
-    /// One of its frames is on its way no longer.
-    #[inline]
-    fn came(&mut self, out: &mut bool) {
-        if std::mem::replace(out, false) {
-            self.out = self.out.saturating_sub(1);
-            self.exchanged |= self.out == 0;
-        }
-    }
-}
-
 impl Frame {
     fn new(plan: &Plan, task: usize, number: usize) -> Self {
         let planned = &plan.tasks[task].frames[number];
@@ -475,9 +424,6 @@ impl Frame {
         }
     }
 }
-
-/// So many cyclic frames lost in a row are more than an accident.
-const LOST_IS_NEWS: u64 = 3;
 
 /// The broadcast read of the AL status tells how many are there and whether all is as it shall be.
 #[cold]
