@@ -14,6 +14,9 @@ const PLANT: &str = "\
 [[device]]\nname = \"T4\"\ntype = \"EL1008\"\non = \"T3.B\"\n\
 [[fault]]\nkind = \"device-off\"\ndevice = \"T4\"\nfrom_ms = 1000\n";
 
+/// Whether their working counter was wrong, their states, the frame's bits, the network, who is there.
+type Seen = ([bool; 3], [DeviceState; 3], u16, u16, usize);
+
 // S0 L2518-2532: one who does not answer makes the counter of the datagram wrong, and with it the WcState of
 // all that share it; the state word says who it is.
 // proves: PLC-02, PLC-03, PLC-04, PLC-18 partial: the example does the same
@@ -25,7 +28,7 @@ fn the_counter_accuses_all_and_the_state_the_one() {
     let mut segment = linesman::open(&format!("sim:{}", file.display())).unwrap();
     let plan = segment.scan().unwrap().plan().unwrap();
     let terminals = [1, 2, 3].map(DeviceId);
-    let mut seen: Vec<([bool; 3], [DeviceState; 3], u16, u16, usize)> = Vec::new();
+    let mut seen: Vec<Seen> = Vec::new();
     segment
         .run(plan, Cycle::us(1000), |io| {
             let settled = io.is_settled();
