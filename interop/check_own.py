@@ -17,7 +17,7 @@ def linesman_serves_subdevices_beside_its_own_run(line):
         run = line.start(
             line.near, LINESMAN, "run", "--on", NEAR, "--seconds", 60, "--cycle-us", 2000, "--control", control, "--json",
         )
-        wait_for(line, control, ["OP"] * len(LINE))
+        wait_for(line, run, control, ["OP"] * len(LINE))
         sdo = serve(line, control, "sdo", NUMBER, "read", "0x1018:01")
         assert [one["value"] for one in sdo["objects"]] == [VENDOR], sdo
         name = serve(line, control, "sdo", NUMBER, "read", "0x1008:00")
@@ -35,9 +35,9 @@ def linesman_serves_subdevices_beside_its_own_run(line):
         assert status == 1 and parse(out, err)["code"] == 0x06020000, (status, out)
         # One goes down and comes back while the others run on.
         serve(line, control, "state", NUMBER, "--to", "PREOP")
-        wait_for(line, control, ["PREOP" if number == NUMBER else "OP" for number in range(1, len(LINE) + 1)])
+        wait_for(line, run, control, ["PREOP" if number == NUMBER else "OP" for number in range(1, len(LINE) + 1)])
         serve(line, control, "state", NUMBER, "--to", "OP")
-        wait_for(line, control, ["OP"] * len(LINE))
+        wait_for(line, run, control, ["OP"] * len(LINE))
         status, out, err = line.stop(run)
         report = parse(out, err)
         assert status in (0, 1) and report["settled"], f"status {status}: {out[-600:]} {err[-300:]}"
@@ -74,10 +74,11 @@ def serve(line, where, command, *arguments):
     return parse(out, err)
 
 
-def wait_for(line, control, states):
+def wait_for(line, run, control, states):
     """Waits until a run says that the SubDevices are in these states."""
     end_at, told = time.monotonic() + 20, "no socket"
     while time.monotonic() < end_at:
+        assert run.poll() is None, f"the run has ended: {line.finish(run)}"
         if control.exists():
             status, out, err = line.run(line.near, LINESMAN, "state", control, "--json")
             told = parse(out, err)
