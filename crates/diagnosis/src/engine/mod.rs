@@ -66,6 +66,7 @@ impl Watched {
     fn is_watched(&self, now: Instant) -> bool {
         let is_open = self.conditions.iter().any(|condition| condition.ended.is_none());
         is_open
+            || self.line.devices.iter().any(|device| device.mailbox.is_open())
             || self.line.devices.iter().any(|device| {
                 device.counters.last_rise().is_some_and(|at| now < at + WATCHED_AFTER_RISE)
             })

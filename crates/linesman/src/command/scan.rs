@@ -1,5 +1,6 @@
 //! `linesman scan`: which SubDevices there are and how they are wired.
 
+mod against;
 mod cards;
 pub(crate) mod report;
 mod segment;
@@ -28,6 +29,9 @@ pub(crate) struct Arguments {
     /// Write what was found as a project, to hold the line against later
     #[arg(long, value_name = "machine.toml")]
     save: Option<PathBuf>,
+    /// Hold what was found against this project: exit status 1 when it differs
+    #[arg(long, value_name = "machine.toml", conflicts_with = "save")]
+    against: Option<PathBuf>,
     /// JSON, schema linesman.scan/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -45,6 +49,14 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     if let Some(path) = &arguments.save {
         files::refuse_to_overwrite(path)?;
     }
+    let planned = match &arguments.against {
+        Some(path) => {
+            let project = files::project(path)?;
+            let tree = project.tree().map_err(|error| files::in_file(path, &error))?;
+            Some((project, tree))
+        }
+        None => None,
+    };
     let scan = match &selector {
         Selector::Cards(names) => cards::scan(names)?,
         Selector::Segment(path) => segment::scan(path)?,
@@ -55,10 +67,15 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
     };
     let Scan { inventory, start } = &scan;
+    let against = planned.map(|(project, tree)| against::against(&project, &tree, inventory));
+    let is_as_planned = against.as_ref().is_none_or(against::Against::is_as_planned);
     if arguments.json {
-        output.json(&report::report(inventory, start.clone()));
+        output.json(&report::report(inventory, start.clone(), against));
     } else {
         output.text(&table::text(inventory, arguments.verbose, output));
+        if let Some(against) = &against {
+            output.text(&against.text(output));
+        }
     }
     if let Some(path) = &arguments.save {
         save(path, inventory)?;
@@ -66,7 +83,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             output.line(&format!("\nSaved as {}.", path.display()));
         }
     }
-    Ok(Status::Good)
+    Ok(if is_as_planned { Status::Good } else { Status::Findings })
 }
 
 fn save(path: &Path, inventory: &Inventory) -> Result<(), Failure> {
