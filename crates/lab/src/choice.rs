@@ -58,7 +58,7 @@ impl Ground<'_> {
         }
     }
 
-    fn name(&self, node: usize) -> &str {
+    pub(crate) fn name(&self, node: usize) -> &str {
         self.names.get(node).map_or("?", String::as_str)
     }
 
@@ -127,17 +127,17 @@ impl Ground<'_> {
         }
     }
 
-    fn any_link(&self, stream: &mut Stream) -> Option<usize> {
+    pub(crate) fn any_link(&self, stream: &mut Stream) -> Option<usize> {
         stream.pick(&(0..self.tree.links().len()).collect::<Vec<_>>()).copied()
     }
 
-    fn any_cable(&self, stream: &mut Stream) -> Option<usize> {
+    pub(crate) fn any_cable(&self, stream: &mut Stream) -> Option<usize> {
         let cabled = |link: &usize| self.cabled.get(*link).copied().unwrap_or(false);
         let cables: Vec<usize> = (0..self.tree.links().len()).filter(cabled).collect();
         stream.pick(&cables).copied()
     }
 
-    fn any_device(&self, stream: &mut Stream) -> Option<usize> {
+    pub(crate) fn any_device(&self, stream: &mut Stream) -> Option<usize> {
         stream.pick(self.tree.order()).copied()
     }
 
@@ -181,6 +181,23 @@ impl Choice {
     #[must_use]
     pub fn text(&self) -> String {
         text(&self.entry)
+    }
+}
+
+/// Whether two faults can both be seen: neither lies behind the other.
+#[must_use]
+pub fn are_apart(tree: &Tree, one: &Choice, other: &Choice) -> bool {
+    let node = |choice: &Choice| match (choice.device, choice.link) {
+        (Some(id), _) => Some(id.index()),
+        (None, Some(link)) => tree.links()[link].downstream.node(),
+        (None, None) => None,
+    };
+    match (node(one), node(other)) {
+        (Some(one), Some(other)) => {
+            let related = |a: usize, b: usize| a == b || tree.is_downstream_of(a, b);
+            !related(one, other) && !related(other, one) && tree.parent(one) != tree.parent(other)
+        }
+        (None, _) | (_, None) => false,
     }
 }
 

@@ -29,6 +29,8 @@ pub struct LabOptions {
     pub project: bool,
     /// Whether the diagnosis may ask for registers by itself.
     pub probes: bool,
+    /// Whether SubDevices with distributed clocks are brought into step with SYNC0, one event a cycle.
+    pub clocks: bool,
     /// What is done with the line from the start.
     pub begin: Begin,
     /// What the report says was looked at; empty for the segment's name.
@@ -43,6 +45,7 @@ impl Default for LabOptions {
             host_counters: true,
             project: true,
             probes: true,
+            clocks: false,
             begin: Begin::Run,
             source: String::new(),
         }

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     completion, counters, demo, diagnose, explain, fault, foe, history, host, interfaces, lab, log,
-    plan, probe, reg, run, scan, schema, sdo, sii, sim, state,
+    online, plan, probe, reg, run, scan, schema, sdo, sii, sim, state,
 };
 use crate::version::VERSION;
 
@@ -77,6 +77,8 @@ pub(crate) enum Command {
     Probe(probe::Arguments),
     /// Drive a line: bring it up, exchange process data, watch it, stop it cleanly
     Run(run::Arguments),
+    /// A line as it is now: states, error counters, frames, mailboxes; once or live
+    Online(online::Arguments),
     /// Virtual segments on real interfaces, for any MainDevice
     Sim(sim::Arguments),
     /// Break, heal and watch a segment that runs on real interfaces
@@ -98,6 +100,7 @@ impl Command {
             Self::Scan(arguments) => arguments.json,
             Self::Plan(arguments) => arguments.json,
             Self::Run(arguments) => arguments.json,
+            Self::Online(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Fault(arguments) => arguments.json,
             Self::Host(arguments) => arguments.json,

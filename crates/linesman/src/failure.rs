@@ -37,14 +37,26 @@ impl Failure {
         Self { reason: reason.into(), next_step: next_step.into() }
     }
 
-    /// From an error whose text ends with its advice, as all errors of this workspace do: `what is
+    /// From a text that ends with its advice, as those of all errors of this workspace do: `what is
     /// wrong. Do: what to do`.
-    pub(crate) fn from_error(error: &dyn std::error::Error) -> Self {
-        let text = error.to_string();
+    pub(crate) fn from_text(text: &str) -> Self {
         match text.rsplit_once(". Do: ") {
             Some((reason, next_step)) => Self::new(reason, next_step),
             None => Self::new(text, ""),
         }
+    }
+
+    /// From an error, by its text.
+    pub(crate) fn from_error(error: &dyn std::error::Error) -> Self {
+        Self::from_text(&error.to_string())
+    }
+
+    /// The same with where it happened in front, unless it is there already.
+    pub(crate) fn at(mut self, place: &str) -> Self {
+        if !self.reason.starts_with(place) {
+            self.reason = format!("{place}: {}", self.reason);
+        }
+        self
     }
 
     /// As JSON.

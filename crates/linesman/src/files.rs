@@ -130,11 +130,16 @@ pub(crate) fn project(path: &Path) -> Result<Project, Failure> {
     Project::parse(&text).map_err(|error| in_file(path, &error))
 }
 
-/// Refuses a path where something is already.
+/// Refuses a path where something is already, or in a folder that is not there.
 pub(crate) fn refuse_to_overwrite(path: &Path) -> Result<(), Failure> {
     if path.exists() {
         let reason = format!("{}: the file is there already", path.display());
         return Err(Failure::new(reason, "name another one, or move this one away"));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        let reason = format!("{}: there is no folder {}", path.display(), folder.display());
+        return Err(Failure::new(reason, "name a file in a folder that is there, or make it"));
     }
     Ok(())
 }

@@ -6,10 +6,12 @@
 
 mod cli;
 mod command;
+mod drawing;
 mod exit;
 mod failure;
 mod files;
 mod output;
+mod page;
 mod text;
 mod version;
 

@@ -12,6 +12,7 @@ use linesman_proto::time::Span;
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
 use linesman_runtime::listen::is_driven;
 use linesman_runtime::run::report::RunReport;
+use linesman_runtime::run::scan::PATIENCE;
 use linesman_runtime::run::{
     self as running, Application, Beside, Choices, MakePlan, RealTime, RunOptions, Wanted,
 };
@@ -29,22 +30,22 @@ use crate::{Error, Io, Next, Plan, Scan};
 /// # Errors
 /// When there is no such card or file, the right is missing, or another MainDevice drives the line.
 pub fn open(place: &str) -> Result<Segment, Error> {
-    let (line, ring) = match place.parse()? {
+    let line = match place.parse()? {
         Selector::Cards(names) => {
             if is_driven(&names)?.is_some() {
                 return Err(Error::Driven { card: names.join("+") });
             }
-            (Where::Cards(Cards::open(&names, HostClock::start())?), names.len() > 1)
+            Where::Cards(Cards::open(&names, HostClock::start())?)
         }
         Selector::Segment(path) => virtual_line(&path)?,
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             return Err(Error::NotDrivable { given: place.to_owned() });
         }
     };
-    Ok(Segment { line, ring, place: place.to_owned(), stop: Stop::default() })
+    Ok(Segment { line, place: place.to_owned(), stop: Stop::default() })
 }
 
-fn virtual_line(path: &Path) -> Result<(Where, bool), Error> {
+fn virtual_line(path: &Path) -> Result<Where, Error> {
     let refuse = |why: String| Error::File { path: path.to_owned(), why };
     let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
     let file = SegmentFile::parse(&text).map_err(|error| refuse(error.to_string()))?;
@@ -54,7 +55,7 @@ fn virtual_line(path: &Path) -> Result<(Where, bool), Error> {
     let wiring = Wiring::of(&segment, &project);
     let line = VirtualLine::new(segment, wiring, ring, Pace::Free)
         .map_err(|source| Error::System { doing: "making a virtual line", source })?;
-    Ok((Where::Virtual(Box::new(line)), ring))
+    Ok(Where::Virtual(Box::new(line)))
 }
 
 enum Where {
@@ -74,7 +75,6 @@ impl Where {
 /// A line.
 pub struct Segment {
     line: Where,
-    ring: bool,
     place: String,
     stop: Stop,
 }
@@ -132,7 +132,7 @@ impl Segment {
     /// # Errors
     /// When nobody answers.
     pub fn scan(&mut self) -> Result<Scan, Error> {
-        let inventory = running::scan(self.line.line(), self.ring, &self.stop)?;
+        let inventory = running::scan(self.line.line(), PATIENCE, &self.stop)?;
         Ok(Scan { inventory })
     }
 
@@ -152,7 +152,7 @@ impl Segment {
         let Wanted::Found(make) = Choices::default().project(project) else {
             return Err(refuse("it makes no plan".to_owned()));
         };
-        let inventory: Inventory = running::scan(self.line.line(), self.ring, &self.stop)?;
+        let inventory: Inventory = running::scan(self.line.line(), PATIENCE, &self.stop)?;
         let make: MakePlan = make;
         Ok(make(&inventory).map_err(refuse)?.into())
     }
@@ -200,7 +200,7 @@ impl Segment {
         let wanted = Wanted::Plan(Box::new(plan));
         let line = self.line.line();
         let beside = Beside { stop: &self.stop, notes, desk: None };
-        let ended = running::run(line, self.ring, wanted, application, &options, beside)?;
+        let ended = running::run(line, wanted, application, &options, beside)?;
         match ended.error {
             Some(error) => Err(error.into()),
             None => Ok(ended.report),

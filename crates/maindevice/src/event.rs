@@ -133,6 +133,13 @@ pub enum Event {
         /// It had lost its station address: it was without power.
         restarted: bool,
     },
+    /// A SubDevice has said who it is, and it is the one that is planned.
+    Identified {
+        /// Which.
+        id: DeviceId,
+        /// Who it is; where the rule allows it, of another revision than planned.
+        found: Identity,
+    },
     /// Where a SubDevice of the plan should be there is another. It is left alone; told once.
     WrongDevice {
         /// Which one is planned.
@@ -169,6 +176,13 @@ pub enum Event {
         /// Whose.
         id: DeviceId,
         /// As they stand.
+        counters: ErrorCounters,
+    },
+    /// A SubDevice's error counters were read and cleared in one go, because that was asked for.
+    CountersCleared {
+        /// Whose.
+        id: DeviceId,
+        /// What stood there.
         counters: ErrorCounters,
     },
     /// A SubDevice's ports have changed, or were read for the first time.

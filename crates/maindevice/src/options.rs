@@ -52,6 +52,21 @@ pub struct Options {
     pub retry_after: [Span; 2],
 }
 
+impl Options {
+    /// The same on a line of so many SubDevices, on which a frame is under way for so long: on one of
+    /// thousands that is longer than is usually waited for, and more frames have to be out at once.
+    #[must_use]
+    pub fn on_line(self, devices: usize, longest_way: Span) -> Self {
+        const DEVICES_A_FRAME: usize = 1_000;
+        const MOST_FRAMES: usize = 64;
+        Self {
+            patience: self.patience.max(longest_way * 2),
+            frames_at_once: self.frames_at_once.max((devices / DEVICES_A_FRAME).min(MOST_FRAMES)),
+            ..self
+        }
+    }
+}
+
 impl Default for Options {
     fn default() -> Self {
         Self {

@@ -14,6 +14,8 @@ pub struct Statistics {
     pub frames_lost: u64,
     /// Frames with process data that did not come back in time, or came back without their end.
     pub cyclic_lost: u64,
+    /// Frames of procedures that did not come back in time: state changes, registers, mailboxes.
+    pub queued_lost: u64,
     /// Frames that came back after they had been given up.
     pub frames_late: u64,
     /// Frames that came back once more.
@@ -41,4 +43,12 @@ pub struct Statistics {
     pub cyclic_unsent: u64,
     /// Cyclic datagrams whose working counter was not the expected one.
     pub working_counter_errors: u64,
+}
+
+impl Statistics {
+    /// Frames of procedures that were handed out: state changes, registers, mailboxes (HW-32).
+    #[must_use]
+    pub const fn queued_sent(&self) -> u64 {
+        self.frames_sent - self.cyclic_sent
+    }
 }

@@ -33,14 +33,20 @@ const CLIENTS: usize = 32;
 pub(crate) trait Protocol: Send + Sync + 'static {
     /// What can be asked.
     type Request: DeserializeOwned + Clone + Send;
+    /// What the thread that runs the line gives.
+    type Given: Send;
     /// What is answered.
-    type Answer: Serialize + Send;
+    type Answer: Serialize;
     /// Who is asked, for messages: `segment`.
     const WHO: &'static str;
     /// A request, for messages.
     const EXAMPLE: &'static str;
     /// How long an answer may take.
     const PATIENCE: Duration;
+
+    /// What is answered when this was given. Threads that talk to those who ask do that, so that the
+    /// one that runs the line need not put anything into words.
+    fn answer(&self, given: Self::Given) -> Self::Answer;
 
     /// Why a request was not done.
     fn refusal(&self, why: String) -> Self::Answer;
@@ -63,13 +69,13 @@ pub(crate) struct Desk<P: Protocol> {
 /// A request, and who waits for its answer.
 pub(crate) struct Asked<P: Protocol> {
     pub(crate) request: P::Request,
-    reply: Sender<P::Answer>,
+    reply: Sender<P::Given>,
 }
 
 impl<P: Protocol> Asked<P> {
-    pub(crate) fn answer(self, answer: P::Answer) {
+    pub(crate) fn give(self, given: P::Given) {
         // Whoever asked may have lost patience.
-        let _ = self.reply.send(answer);
+        let _ = self.reply.send(given);
     }
 }
 
@@ -209,10 +215,12 @@ impl<P: Protocol> Clerk<P> {
         self.bell.ring();
         let (who, seconds) = (P::WHO, P::PATIENCE.as_secs());
         match asked {
-            Ok(()) => answer.recv_timeout(P::PATIENCE).unwrap_or_else(|_| {
-                self.protocol
-                    .refusal(format!("the {who} gave no answer within {seconds} s: ask again"))
-            }),
+            Ok(()) => match answer.recv_timeout(P::PATIENCE) {
+                Ok(given) => self.protocol.answer(given),
+                Err(_) => self
+                    .protocol
+                    .refusal(format!("the {who} gave no answer within {seconds} s: ask again")),
+            },
             Err(_) => self
                 .protocol
                 .refusal(format!("too many requests at once, or the {who} has ended: ask again")),

@@ -18,6 +18,7 @@ pub mod journal;
 pub mod line;
 pub mod listen;
 pub mod names;
+pub mod online;
 pub mod plan_file;
 pub mod record;
 pub mod run;

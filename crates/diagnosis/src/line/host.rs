@@ -99,7 +99,11 @@ impl HostHistory {
 
     /// Takes an observation.
     pub fn record(&mut self, observation: &HostObservation) {
-        self.is_watched = true;
+        // Whoever tells of the link alone has not told of the counters.
+        self.is_watched |= matches!(
+            observation.what,
+            HostEvent::CardErrors { .. } | HostEvent::CardDrops(_) | HostEvent::SocketDrops(_)
+        );
         let at = observation.time;
         let card = &mut self.cards[observation.path.index()];
         match observation.what {

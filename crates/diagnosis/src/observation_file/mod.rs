@@ -278,11 +278,17 @@ impl ObservationFile {
     /// planned; without one the tree of the file is the plan.
     #[must_use]
     pub fn diagnosis(&self, setup: Setup) -> Diagnosis {
+        self.judged(setup).diagnosis()
+    }
+
+    /// The same with the line behind it: an engine that has come to its end.
+    #[must_use]
+    pub fn judged(&self, setup: Setup) -> Engine {
         let line = self.line(setup.project.as_ref());
         let at = line.now;
         let mut engine = Engine::with_line(setup, line);
         engine.finish(at, true);
-        engine.diagnosis()
+        engine
     }
 
     /// Gives each device its number and its place in the list.

@@ -7,7 +7,8 @@
 //! well; it is known from the time after the process data were set up. Who owns which part is known from
 //! the FMMUs (0x0600 and up) that were seen being written. A SubDevice that gives inputs adds 1; one
 //! that takes outputs adds 1 to an LWR and 2 to an LRW. The missing amount and what else is known of the
-//! owners (no answer, error, fallen state) tell who it is. When the MainDevice itself took a SubDevice
+//! owners (error or fallen state, a lost link on the way, no answer) tell who it is: those whose shares
+//! add up to just what is missing, and as few as possible. When the MainDevice itself took a SubDevice
 //! out of SAFEOP or OP, a lower working counter is what it wanted.
 //!
 //! **What it means.** By itself it says only *that* data are missing. Usually another finding says why,
@@ -24,6 +25,7 @@ use linesman_proto::time::{Instant, Span};
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::line::{Cyclic, Deficit, Device, Line, Owner, Trouble};
+use crate::locate::Drops;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -52,9 +54,13 @@ struct Suspects {
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     // Datagrams of one device fail together: one finding for each set of suspects.
     let mut groups: BTreeMap<Suspects, Vec<(&Cyclic, &Deficit)>> = BTreeMap::new();
+    if view.line.cyclic.iter().all(|cyclic| cyclic.deficits.is_empty()) {
+        return;
+    }
+    let lost = Drops::all(view.line);
     for cyclic in &view.line.cyclic {
         for deficit in &cyclic.deficits {
-            let suspects = suspects(view, cyclic, deficit);
+            let suspects = suspects(view, &lost, cyclic, deficit);
             groups.entry(suspects).or_default().push((cyclic, deficit));
         }
     }
@@ -63,11 +69,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
 }
 
-/// Which of the owners can explain what is missing.
-fn suspects(view: &View<'_>, cyclic: &Cyclic, deficit: &Deficit) -> Suspects {
+/// Which of the owners can explain what is missing: those with the strongest signs of trouble whose
+/// shares add up to just that, and as few as possible.
+fn suspects(view: &View<'_>, lost: &[Drops], cyclic: &Cyclic, deficit: &Deficit) -> Suspects {
     let line = view.line;
     let missing = deficit.expected - deficit.lowest;
-    let share = |owner: &Owner| cyclic.command.increment(owner.reads, owner.writes);
     let owners: Vec<_> = line.owners(cyclic).collect();
     if owners.is_empty() {
         // The set-up was not seen: whoever is in trouble right then.
@@ -79,43 +85,123 @@ fn suspects(view: &View<'_>, cyclic: &Cyclic, deficit: &Deficit) -> Suspects {
             .collect();
         return Suspects { is_certain: devices.len() == 1, devices };
     }
-    let in_trouble: Vec<_> = owners
-        .iter()
-        .filter(|owner| {
-            let device = line.device(owner.device);
-            device.is_some_and(|device| trouble(device, deficit, view.now).is_some())
-        })
-        .collect();
-    let is_enough = in_trouble.iter().map(|owner| share(owner)).sum::<u16>() >= missing;
-    if !in_trouble.is_empty() && is_enough {
-        let devices: Vec<_> = in_trouble.iter().map(|owner| owner.device).collect();
-        return Suspects { is_certain: true, devices };
+    let shares: Vec<(DeviceId, Vec<u16>)> =
+        owners.iter().map(|owner| (owner.device, shares(cyclic, owner))).collect();
+    let certain = |devices| Suspects { is_certain: true, devices };
+    let signs: Vec<Sign> =
+        owners.iter().map(|owner| sign(view, lost, owner.device, deficit)).collect();
+    for least in [Sign::Error, Sign::LinkLost, Sign::Absent] {
+        let suspected = shares.iter().zip(&signs).filter(|(_, sign)| **sign >= least);
+        let suspected: Vec<_> = suspected.map(|(share, _)| share.clone()).collect();
+        if let Some(devices) = fewest(&suspected, missing) {
+            return certain(devices);
+        }
     }
-    let all: u16 = owners.iter().map(share).sum();
-    if all == missing {
-        let devices = owners.iter().map(|owner| owner.device).collect();
-        return Suspects { is_certain: true, devices };
+    let full = |(_, shares): &(DeviceId, Vec<u16>)| shares.first().copied().unwrap_or(0);
+    let in_trouble = || shares.iter().zip(&signs).filter(|(_, sign)| **sign > Sign::None);
+    if in_trouble().map(|(share, _)| full(share)).sum::<u16>() >= missing {
+        return certain(in_trouble().map(|(share, _)| share.0).collect());
+    }
+    if shares.iter().map(full).sum::<u16>() == missing {
+        return certain(owners.iter().map(|owner| owner.device).collect());
     }
     // One device that fails loses its whole share, or one direction of it.
-    let fits = |owner: &&Owner| {
-        let inputs = cyclic.command.increment(owner.reads, false);
-        let outputs = cyclic.command.increment(false, owner.writes);
-        [share(owner), inputs, outputs].contains(&missing)
-    };
-    let alone: Vec<_> = owners.iter().filter(fits).map(|owner| owner.device).collect();
+    let alone = shares.iter().filter(|(_, shares)| shares.contains(&missing));
+    let alone: Vec<_> = alone.map(|(device, _)| *device).collect();
     match alone.len() {
         0 => Suspects {
             is_certain: false,
             devices: owners.iter().map(|owner| owner.device).collect(),
         },
-        1 => Suspects { is_certain: true, devices: alone },
+        1 => certain(alone),
         _ => Suspects { is_certain: false, devices: alone },
     }
 }
 
+/// What an owner can miss: its whole share first, then one direction of it.
+fn shares(cyclic: &Cyclic, owner: &Owner) -> Vec<u16> {
+    let share = |reads, writes| cyclic.command.increment(reads, writes);
+    let mut all = vec![share(owner.reads, owner.writes)];
+    for part in [share(owner.reads, false), share(false, owner.writes)] {
+        if part > 0 && !all.contains(&part) {
+            all.push(part);
+        }
+    }
+    all
+}
+
+/// The fewest devices whose shares add up to just `missing`; whole shares are preferred.
+fn fewest(shares: &[(DeviceId, Vec<u16>)], missing: u16) -> Option<Vec<DeviceId>> {
+    let missing = usize::from(missing);
+    let whole: usize =
+        shares.iter().filter_map(|(_, all)| all.first()).map(|at| usize::from(*at)).sum();
+    if whole == missing {
+        return Some(shares.iter().map(|(device, _)| *device).collect());
+    }
+    // By sum: the fewest devices so far that make it.
+    let mut best: Vec<Option<Vec<DeviceId>>> = vec![None; missing + 1];
+    best[0] = Some(Vec::new());
+    for (device, all) in shares {
+        for sum in (1..=missing).rev() {
+            for share in all.iter().map(|share| usize::from(*share)).filter(|share| *share <= sum) {
+                let Some(before) = best[sum - share].clone().filter(|with| !with.contains(device))
+                else {
+                    continue;
+                };
+                let is_better =
+                    best[sum].as_ref().is_none_or(|known| before.len() + 1 < known.len());
+                if is_better {
+                    best[sum] = Some(before.into_iter().chain([*device]).collect());
+                }
+            }
+        }
+    }
+    best.pop().flatten().filter(|devices| !devices.is_empty())
+}
+
+/// What is known of an owner at the time of a deficit, the stronger the later.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum Sign {
+    /// Nothing.
+    None,
+    /// It did not answer when it was asked; noise takes single answers, too.
+    Absent,
+    /// It lies behind a link that was lost.
+    LinkLost,
+    /// It signals an error, or has left its state.
+    Error,
+}
+
+fn sign(view: &View<'_>, lost: &[Drops], id: DeviceId, deficit: &Deficit) -> Sign {
+    let Some(device) = view.line.device(id) else { return Sign::None };
+    let trouble = trouble(device, deficit, view.now);
+    if let Some(Trouble::Error(_) | Trouble::Fall(_)) = trouble {
+        return Sign::Error;
+    }
+    let (from, to) = around(deficit, view.now);
+    let is_behind = |drops: &Drops| {
+        let tree = view.line.tree.as_ref()?;
+        let behind = tree.links()[drops.link].downstream.node()?;
+        Some(tree.subtree(behind).contains(&id.index()))
+    };
+    let was_lost = |drops: &&Drops| {
+        drops.first <= to && (drops.is_down || drops.last.max(drops.first) >= from)
+    };
+    let mut then = lost.iter().filter(was_lost);
+    match (then.any(|drops| is_behind(drops) == Some(true)), trouble) {
+        (true, _) => Sign::LinkLost,
+        (false, Some(_)) => Sign::Absent,
+        (false, None) => Sign::None,
+    }
+}
+
+/// The time in which what is seen of a SubDevice belongs to a deficit.
+fn around(deficit: &Deficit, now: Instant) -> (Instant, Instant) {
+    (deficit.first.at.before(AROUND), deficit.ended.unwrap_or(now) + AROUND)
+}
+
 fn trouble(device: &Device, deficit: &Deficit, now: Instant) -> Option<Trouble> {
-    let from = deficit.first.at.before(AROUND);
-    let to = deficit.ended.unwrap_or(now) + AROUND;
+    let (from, to) = around(deficit, now);
     device.trouble_within(from, to)
 }
 

@@ -1,11 +1,11 @@
 //! What goes from engine to engine: frames, events, probes, what the cards count.
 
 use linesman_config::inventory::Inventory;
-use linesman_config::plan::{Plan, PlanOptions};
+use linesman_config::plan::{ClockSettings, Plan, PlanOptions, PlannedDevice};
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_maindevice::{Event, ProbeRequest, Target};
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::{AT_ONE_INSTANT, Lab, LabError};
 use crate::options::Begin;
@@ -122,7 +122,13 @@ impl Lab {
                 device.name.clone_from(&wanted.name);
             }
         }
-        let options = PlanOptions { cycle: self.options.cycle, ..PlanOptions::default() };
+        let (cycle, clock_datagrams) = (self.options.cycle, self.options.clocks);
+        if clock_datagrams {
+            for device in &mut planned {
+                device.settings.clock = clocked(device, cycle);
+            }
+        }
+        let options = PlanOptions { cycle, clock_datagrams, ..PlanOptions::default() };
         Plan::build(&planned, inventory.tree().clone(), &options).map_err(|error| error.to_string())
     }
 
@@ -150,7 +156,22 @@ impl Lab {
                 if crc + other > 0 {
                     note(HostEvent::CardErrors { crc, other });
                 }
+                let dropped = port.rx_dropped - last.rx_dropped;
+                if dropped > 0 {
+                    note(HostEvent::CardDrops(dropped));
+                }
             }
         }
     }
+}
+
+/// The first operation mode of a SubDevice that has a SYNC0, with one event a cycle.
+fn clocked(device: &PlannedDevice, cycle: Span) -> Option<ClockSettings> {
+    let modes = device.profile.clock_modes.iter();
+    let synced = modes.map(|mode| ClockSettings {
+        assign_activate: mode.assign_activate,
+        sync0_cycle: cycle,
+        ..ClockSettings::default()
+    });
+    synced.into_iter().find(ClockSettings::sync0)
 }

@@ -37,6 +37,10 @@ const AT_ONE_INSTANT: u32 = 100_000;
 /// The largest frame, without check sequence.
 const FRAME: usize = 1_514;
 
+/// Frames that compensate the drift of clocks before SubDevices go beyond PREOP: fewer than on a real
+/// line, where the bring-up may take its time.
+const DRIFT_FRAMES: u32 = 2_000;
+
 /// Sees every frame as the diagnosis does.
 pub type Tap = Box<dyn FnMut(&FrameSeen<'_>) + Send>;
 
@@ -65,20 +69,6 @@ pub struct Lab {
     transmit: Vec<u8>,
 }
 
-/// On a line of thousands a frame is longer on its way than is usually waited for, and more of them
-/// are out at once.
-fn by_length(segment: &Segment) -> Options {
-    const DEVICES_A_FRAME: usize = 1_000;
-    const MOST_FRAMES: usize = 64;
-    let usual = Options::default();
-    let frames = (segment.tree().len() / DEVICES_A_FRAME).min(MOST_FRAMES);
-    Options {
-        patience: usual.patience.max(segment.longest_way() * 2),
-        frames_at_once: usual.frames_at_once.max(frames),
-        ..usual
-    }
-}
-
 impl Lab {
     /// A lab for a segment file.
     ///
@@ -101,7 +91,12 @@ impl Lab {
             start: None,
             clock: "virtual".to_owned(),
         };
-        let main = MainDevice::new(network, Options { ring: paths == 2, ..by_length(&segment) });
+        let mut settings = Options { ring: paths == 2, ..Options::default() };
+        if options.clocks {
+            settings.drift_frames = DRIFT_FRAMES;
+        }
+        let settings = settings.on_line(segment.tree().len(), segment.longest_way());
+        let main = MainDevice::new(network, settings);
         let mut lab = Self {
             now: Instant::ZERO,
             network,
@@ -225,6 +220,12 @@ impl Lab {
     #[must_use]
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
+    }
+
+    /// The engine that judges, with all that it knows of the line.
+    #[must_use]
+    pub const fn engine(&self) -> &Engine {
+        &self.engine
     }
 
     /// The diagnosis as it stands.

@@ -85,7 +85,7 @@ impl Lab {
     }
 
     /// Controllers that a frame of either card can get to: powered, with open ports all the way.
-    pub(super) fn reached(&self) -> BTreeSet<DeviceId> {
+    pub(crate) fn reached(&self) -> BTreeSet<DeviceId> {
         let tree = self.segment.tree();
         let ids: Vec<DeviceId> = self.segment.devices().collect();
         let is_open = |end: End| match end {

@@ -8,14 +8,14 @@ use linesman_diagnosis::observe::{Direction, FrameSeen};
 use linesman_diagnosis::report::{FindingState, Severity};
 use linesman_proto::frame::view::FrameView;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::{End, Tree};
+use linesman_proto::topology::End;
 use linesman_sim::seed::Stream;
 use linesman_sim::truth::{Effect, Entry, FaultId, FaultRecord, Place};
 
 use super::counter::{Kind, Returned, expected};
 use super::reach::Reach;
 use super::run::{SwarmOptions, cabled};
-use crate::choice::{AT_RUN_TIME, Choice, Ground};
+use crate::choice::{AT_RUN_TIME, Choice, Ground, are_apart};
 use crate::lab::{Lab, LabError};
 use crate::verdict::judge::{Company, best_finding, explains};
 use crate::verdict::{Match, Scene, Site, Truth};
@@ -360,22 +360,6 @@ impl<'a> Episode<'a> {
         if !self.violations.contains(&what) {
             self.violations.push(format!("at {}: {what}", self.lab.now()));
         }
-    }
-}
-
-/// Whether two faults can both be seen: neither lies behind the other.
-fn are_apart(tree: &Tree, one: &Choice, other: &Choice) -> bool {
-    let node = |choice: &Choice| match (choice.device, choice.link) {
-        (Some(id), _) => Some(id.index()),
-        (None, Some(link)) => tree.links()[link].downstream.node(),
-        (None, None) => None,
-    };
-    match (node(one), node(other)) {
-        (Some(one), Some(other)) => {
-            let related = |a: usize, b: usize| a == b || tree.is_downstream_of(a, b);
-            !related(one, other) && !related(other, one) && tree.parent(one) != tree.parent(other)
-        }
-        (None, _) | (_, None) => false,
     }
 }
 

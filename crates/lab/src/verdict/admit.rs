@@ -1,13 +1,19 @@
 //! What the evidence of a fault allows: the fault itself, and what looks the same on the wire.
 //!
-//! Each entry that is not the injected fault has its reason. The table knows the cause and the
-//! wiring, nothing of any rule of the diagnosis.
+//! Each entry that is not the injected fault belongs to one of the [`sets`], which has the reason. What
+//! is here knows the cause and the wiring, nothing of any rule of the diagnosis.
+
+#![expect(
+    clippy::wildcard_enum_match_arm,
+    reason = "each step is for a few causes of the catalogue"
+)]
 
 use linesman_config::fault::FaultName::{self, *};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
 use linesman_proto::topology::{End, Tree};
 
+use super::sets::{self, AdmittedSet};
 use super::site::{Site, named};
 
 /// A fault as it was injected, and what became of it.
@@ -24,6 +30,42 @@ pub struct Truth {
     pub blind: Vec<End<DeviceId>>,
     /// Devices that make a symbol error anew when they send a bad frame on.
     pub remaking: Vec<DeviceId>,
+    /// The hops on which it has hit symbols or frames so far, from sender to receiver.
+    pub hops: Vec<Hop>,
+    /// How often an end of a link found its signal gone.
+    pub signals_lost: u64,
+    /// Devices that it has taken the supply from, in order.
+    pub dark: Vec<DeviceId>,
+}
+
+/// One direction of a link: sender and receiver.
+pub type Hop = (End<DeviceId>, End<DeviceId>);
+
+impl Truth {
+    /// A fault at places, of which nothing more is known.
+    #[must_use]
+    pub fn new(name: FaultName, places: Vec<TruthPlace>) -> Self {
+        Self {
+            name,
+            places,
+            al_code: None,
+            blind: Vec::new(),
+            remaking: Vec::new(),
+            hops: Vec::new(),
+            signals_lost: 0,
+            dark: Vec::new(),
+        }
+    }
+
+    /// Whether a link was lost at most once: each of its ends finds out once.
+    fn opened_once(&self) -> bool {
+        self.signals_lost <= 2
+    }
+
+    /// Whether both directions of a link were hit.
+    fn hit_both_ways(&self, one: End<DeviceId>, other: End<DeviceId>) -> bool {
+        self.hops.contains(&(one, other)) && self.hops.contains(&(other, one))
+    }
 }
 
 /// Where a fault sits.
@@ -58,51 +100,37 @@ pub struct Admitted {
     pub cause: FaultName,
     /// The place that goes with it.
     pub site: Site,
-    /// Why it cannot be told from the injected fault; `None` for the injected fault itself.
-    pub why: Option<&'static str>,
+    /// The set that says why it cannot be told from the injected fault; `None` for the injected fault
+    /// itself.
+    pub set: Option<&'static AdmittedSet>,
 }
-
-const SILENT: &str = "whoever hangs behind a cut and whoever has no power are equally silent, and \
-                      the neighbour's port sees no signal in both cases";
-const SYMBOLS: &str = "a receiver sees symbol errors; whether the sender, the cable, the plug, its \
-                       own input or interference made them is not in the symbols";
-const CARD: &str = "the last hop is checked by the card only, and the first one begins in it";
-const LAST_HOP: &str = "on the last hop a card counts bad frames but no symbols";
-const UNCOUNTED: &str = "without the card's counters frames that the card drops just do not come \
-                         back";
-const MII: &str = "between its PHY and its controller the receiver may spoil what came clean";
-const MAY_COME_AGAIN: &str = "an opening that is over may have been the first of many";
-const BLIND: &str = "the receiver's symbol counter stood at its end, so nobody knows whether the \
-                     symbols were clean";
-const REMADE: &str = "the sender makes a symbol error anew for each bad frame, as if the frame had \
-                      been hit on the wire";
-const ONCE: &str = "each opening of a flapping contact is an open link";
-const RESTART: &str = "a dip of a supply and a short time without power are the same to a device";
-const SHARED: &str = "one device of a supply looks the same from outside as a supply of one device";
-const CODE: &str = "the status code that the device gives says so itself";
-const ALL_LINKS: &str = "interference that couples into several links has no single link as place";
 
 /// All that an honest diagnosis may say about `truth`; the injected fault comes first.
 #[must_use]
 pub fn admitted(truth: &Truth, scene: &Scene<'_>) -> Vec<Admitted> {
-    let mut set = Set { scene, entries: Vec::new() };
+    let mut list = List { scene, entries: Vec::new() };
     for place in &truth.places {
-        set.place(truth, *place);
+        list.place(truth, *place);
     }
-    if truth.name == EmcNoise && truth.places.len() > 1 {
-        set.add(EmcNoise, Site::Network, Some(ALL_LINKS));
-    }
-    set.entries
+    list.entries
 }
 
-struct Set<'a> {
+struct List<'a> {
     scene: &'a Scene<'a>,
     entries: Vec<Admitted>,
 }
 
-impl Set<'_> {
-    fn add(&mut self, cause: FaultName, site: Site, why: Option<&'static str>) {
-        self.entries.push(Admitted { cause, site, why });
+impl List<'_> {
+    /// The injected fault at a place.
+    fn exact(&mut self, cause: FaultName, site: Site) {
+        self.entries.push(Admitted { cause, site, set: None });
+    }
+
+    /// A cause at a place, if the set has it.
+    fn add(&mut self, cause: FaultName, site: Site, set: &'static AdmittedSet) {
+        if set.has(cause) {
+            self.entries.push(Admitted { cause, site, set: Some(set) });
+        }
     }
 
     fn place(&mut self, truth: &Truth, place: TruthPlace) {
@@ -110,176 +138,264 @@ impl Set<'_> {
         let name = truth.name;
         match place {
             TruthPlace::Link(one, other) => {
-                self.add(name, Site::link(tree, one, other), None);
-                if name == LinkFlapping {
-                    self.add(LinkOpen, Site::link(tree, one, other), Some(ONCE));
-                }
-                if matches!(name, LinkOpen | LinkFlapping) {
-                    self.open(one, other);
-                }
-                if matches!(name, CableDegraded | EmcNoise) {
-                    self.symbols(one, other);
-                    self.symbols(other, one);
-                }
-            }
-            TruthPlace::Hop(from, to) => {
-                self.add(name, Site::hop(tree, from, to), None);
-                if matches!(name, TransmitterDamaged | DeviceInternal) {
-                    self.end(name, from, None);
-                }
-                if name == ReceiverDamaged {
-                    self.end(name, to, None);
-                }
-                if name == DeviceInternal {
-                    self.clean(truth, from, to);
-                }
-                if name == NicDamaged {
-                    self.card(from, to);
-                }
-                if matches!(name, CableDegraded | EmcNoise | TransmitterDamaged | ReceiverDamaged) {
-                    self.symbols(from, to);
+                self.exact(name, Site::link(tree, one, other));
+                match name {
+                    LinkOpen | LinkFlapping | RingOpen => self.open(truth, one, other),
+                    CableDegraded | EmcNoise if truth.hit_both_ways(one, other) => {
+                        for cause in sets::BOTH_WAYS.causes {
+                            self.add(*cause, Site::link(tree, one, other), &sets::BOTH_WAYS);
+                        }
+                    }
+                    CableDegraded | EmcNoise => {
+                        self.symbols(truth, (one, other));
+                        self.symbols(truth, (other, one));
+                    }
+                    _ => {}
                 }
             }
+            TruthPlace::Hop(from, to) => self.hop(truth, (from, to)),
             TruthPlace::Device(id) => {
-                self.add(name, Site::Device(id), None);
+                self.exact(name, Site::Device(id));
                 self.device(truth, id);
             }
             TruthPlace::Host(path) => {
-                self.add(name, Site::Host, None);
-                let card = End::MainDevice(path);
-                let far = opposite(tree, card).filter(|_| name == NicDamaged);
-                if let Some(far) = far {
-                    self.card(card, far);
-                    self.card(far, card);
-                }
+                self.exact(name, Site::Host);
+                self.host(truth, path);
             }
         }
     }
 
-    /// A claim that names the device or card at `end` instead of the link.
-    fn end(&mut self, cause: FaultName, end: End<DeviceId>, why: Option<&'static str>) {
-        match end {
-            End::MainDevice(_) => self.add(cause, Site::Host, why),
-            End::Controller(id, _) => self.add(cause, Site::Device(id), why),
+    fn hop(&mut self, truth: &Truth, (from, to): Hop) {
+        let (tree, name) = (self.scene.tree, truth.name);
+        self.exact(name, Site::hop(tree, from, to));
+        match name {
+            CableDegraded | EmcNoise => self.symbols(truth, (from, to)),
+            TransmitterDamaged => {
+                self.exact(name, end_site(from));
+                self.symbols(truth, (from, to));
+            }
+            ReceiverDamaged => {
+                self.exact(name, end_site(to));
+                self.symbols(truth, (from, to));
+            }
+            DeviceInternal => {
+                self.exact(name, end_site(from));
+                self.clean(truth, (from, to));
+            }
+            LinkOpen | LinkFlapping if truth.signals_lost == 1 => {
+                self.exact(name, Site::link(tree, from, to));
+                self.add(FalseLink, Site::link(tree, from, to), &sets::ONE_PAIR);
+            }
+            LinkOpen | LinkFlapping => {
+                self.exact(name, Site::link(tree, from, to));
+                self.open(truth, from, to);
+            }
+            // Who else sends is not at a place of the line; its frames are everywhere on it.
+            SecondMainDevice | ForeignFrames => self.exact(name, Site::Network),
+            _ => {}
         }
     }
 
     /// No signal between two ends.
-    fn open(&mut self, one: End<DeviceId>, other: End<DeviceId>) {
+    fn open(&mut self, truth: &Truth, one: End<DeviceId>, other: End<DeviceId>) {
         let tree = self.scene.tree;
-        let Site::Link { b: Some(End::Controller(behind, _)), .. } = Site::link(tree, one, other)
-        else {
+        let link = Site::link(tree, one, other);
+        let is_ring = tree.link_at(one.map(DeviceId::index)).is_some_and(|at| tree.is_on_ring(at));
+        if is_ring {
+            // In a ring both neighbours of a dead device see it; a cut shows at two live ends.
+            for cause in sets::RING_CUT.causes {
+                if truth.opened_once() || *cause != LinkOpen {
+                    self.add(*cause, link, &sets::RING_CUT);
+                }
+            }
             return;
-        };
-        if self.scene.answered_again {
-            self.add(LinkFlapping, Site::link(tree, one, other), Some(MAY_COME_AGAIN));
         }
-        // In a ring both neighbours of a dead device see it; a cut shows at two live ends.
-        if tree.closes_at().is_none() && !self.scene.answered_again {
-            self.add(DeviceOff, Site::Device(behind), Some(SILENT));
-            self.add(SupplyOff, Site::Device(behind), Some(SILENT));
+        if !truth.opened_once() {
+            return;
+        }
+        if self.scene.answered_again {
+            for cause in sets::ONE_OPENING.causes {
+                self.add(*cause, link, &sets::ONE_OPENING);
+            }
+            return;
+        }
+        let Site::Link { b: Some(End::Controller(behind, _)), .. } = link else { return };
+        self.silent(link, behind, &sets::SILENT);
+    }
+
+    /// Silence behind a link.
+    fn silent(&mut self, link: Site, behind: DeviceId, set: &'static AdmittedSet) {
+        for cause in [LinkOpen, LinkFlapping] {
+            self.add(cause, link, set);
+        }
+        for cause in [DeviceOff, SupplyOff, BrownOut] {
+            self.add(cause, Site::Device(behind), set);
         }
     }
 
     /// Symbol errors on what `from` sends and `to` receives.
-    fn symbols(&mut self, from: End<DeviceId>, to: End<DeviceId>) {
-        let hop = Site::hop(self.scene.tree, from, to);
-        for cause in [CableDegraded, EmcNoise, TransmitterDamaged, ReceiverDamaged] {
-            self.add(cause, hop, Some(SYMBOLS));
+    fn symbols(&mut self, truth: &Truth, (from, to): Hop) {
+        let set = match (from, to) {
+            (End::MainDevice(_), _) if truth.name == TransmitterDamaged => &sets::CARD_OUTPUT,
+            (End::MainDevice(_), _) => &sets::FIRST_HOP,
+            (_, End::MainDevice(_)) => self.last_hop(truth),
+            (End::Controller(..), End::Controller(..)) => &sets::SYMBOLS,
+        };
+        self.on_hop((from, to), set);
+    }
+
+    fn last_hop(&self, truth: &Truth) -> &'static AdmittedSet {
+        match (self.scene.host_counters, truth.name) {
+            (true, ReceiverDamaged) => &sets::CARD_INPUT,
+            (true, DeviceInternal) => &sets::LAST_HOP_CLEAN,
+            (true, _) => &sets::LAST_HOP,
+            (false, TransmitterDamaged) => &sets::UNCOUNTED_OUTPUT,
+            (false, DeviceInternal) => &sets::UNCOUNTED_INSIDE,
+            (false, _) => &sets::UNCOUNTED,
         }
-        self.end(TransmitterDamaged, from, Some(SYMBOLS));
-        self.end(ReceiverDamaged, to, Some(SYMBOLS));
-        self.card(from, to);
+    }
+
+    /// All causes of a set on a hop, each at the places where it sits.
+    fn on_hop(&mut self, (from, to): Hop, set: &'static AdmittedSet) {
+        let hop = Site::hop(self.scene.tree, from, to);
+        for cause in set.causes {
+            match cause {
+                NicDamaged | HostDrops => self.add(*cause, Site::Host, set),
+                TransmitterDamaged | DeviceInternal => {
+                    self.add(*cause, hop, set);
+                    self.add(*cause, end_site(from), set);
+                }
+                ReceiverDamaged => {
+                    self.add(*cause, hop, set);
+                    self.add(*cause, end_site(to), set);
+                }
+                _ => self.add(*cause, hop, set),
+            }
+        }
     }
 
     /// Bad frames with clean symbols from `from` to `to`.
-    fn clean(&mut self, truth: &Truth, from: End<DeviceId>, to: End<DeviceId>) {
-        self.end(DeviceInternal, to, Some(MII));
-        let remade = from.node().is_some_and(|sender| truth.remaking.contains(&sender));
-        let why = if truth.blind.contains(&to) { Some(BLIND) } else { remade.then_some(REMADE) };
-        if why.is_some() {
-            let hop = Site::hop(self.scene.tree, from, to);
-            for cause in [CableDegraded, EmcNoise, TransmitterDamaged, ReceiverDamaged] {
-                self.add(cause, hop, why);
+    fn clean(&mut self, truth: &Truth, (from, to): Hop) {
+        let is_remade = from.node().is_some_and(|sender| truth.remaking.contains(&sender));
+        if let End::MainDevice(_) = to {
+            // Where it spoils frames on other ways, too, those tell.
+            if truth.hops.iter().all(|(_, to)| to.node().is_none()) {
+                self.on_hop((from, to), self.last_hop(truth));
             }
+        } else if truth.blind.contains(&to) {
+            self.on_hop((from, to), &sets::BLIND);
+        } else if is_remade {
+            self.on_hop((from, to), &sets::REMADE);
         }
-        self.card(from, to);
     }
 
-    /// What cannot be told where one of the ends is a card.
-    fn card(&mut self, from: End<DeviceId>, to: End<DeviceId>) {
-        let hop = Site::hop(self.scene.tree, from, to);
-        let host = |end| matches!(end, End::MainDevice(_));
-        if !host(from) && !host(to) {
-            return;
-        }
-        for cause in [NicDamaged, CableDegraded, EmcNoise, TransmitterDamaged, ReceiverDamaged] {
-            self.add(cause, hop, Some(CARD));
-            self.end(cause, from, Some(CARD));
-            self.end(cause, to, Some(CARD));
-        }
-        if host(to) {
-            self.add(DeviceInternal, hop, Some(LAST_HOP));
-            self.end(DeviceInternal, from, Some(LAST_HOP));
-            if !self.scene.host_counters {
-                self.add(HostDrops, Site::Host, Some(UNCOUNTED));
+    fn host(&mut self, truth: &Truth, path: Path) {
+        let card = End::MainDevice(path);
+        match truth.name {
+            NicDamaged => {
+                let Some(far) = opposite(self.scene.tree, card) else { return };
+                let was_hit = |hop| truth.hops.is_empty() || truth.hops.contains(&hop);
+                for hop in [(card, far), (far, card)].into_iter().filter(|hop| was_hit(*hop)) {
+                    self.symbols(truth, hop);
+                }
             }
+            HostDrops if !self.scene.host_counters => {
+                if let Some(far) = opposite(self.scene.tree, card) {
+                    self.on_hop((far, card), &sets::UNCOUNTED);
+                }
+            }
+            MainDeviceWrongPort => {
+                // The plug has two ends: the card's cable, and the port it sits in.
+                if let Some(far) = opposite(self.scene.tree, card) {
+                    self.exact(truth.name, Site::link(self.scene.tree, card, far));
+                    self.exact(truth.name, end_site(far));
+                }
+            }
+            HostJitter | LateFrames => {
+                for cause in sets::LATE.causes {
+                    self.add(*cause, Site::Host, &sets::LATE);
+                }
+            }
+            _ => {}
         }
     }
 
     fn device(&mut self, truth: &Truth, id: DeviceId) {
-        let name = truth.name;
-        if matches!(name, DeviceOff | SupplyOff | BrownOut) {
-            self.unpowered(name, id);
-        }
-        if name == DeviceInternal {
-            for (here, far) in self.links_of(id) {
-                self.add(DeviceInternal, Site::hop(self.scene.tree, here, far), None);
-                self.clean(truth, here, far);
+        match truth.name {
+            DeviceOff | SupplyOff | BrownOut => self.unpowered(truth, id),
+            EbusOverload => {
+                for fallen in truth.dark.iter().chain([&id]) {
+                    for cause in sets::OVERLOAD.causes {
+                        self.add(*cause, Site::Device(*fallen), &sets::OVERLOAD);
+                    }
+                }
             }
-        }
-        if name == TransmitterDamaged {
-            for (here, far) in self.links_of(id) {
-                self.symbols(here, far);
+            DeviceInternal => {
+                for (here, far) in self.links_of(id) {
+                    self.exact(DeviceInternal, Site::hop(self.scene.tree, here, far));
+                    self.clean(truth, (here, far));
+                }
             }
-        }
-        if name == ReceiverDamaged {
-            for (here, far) in self.links_of(id) {
-                self.symbols(far, here);
+            TransmitterDamaged => {
+                for (here, far) in self.links_of(id) {
+                    self.symbols(truth, (here, far));
+                }
             }
-        }
-        if name == InitRefused {
-            if truth.al_code.is_some_and(is_configuration) {
-                self.add(ConfigMismatch, Site::Device(id), Some(CODE));
+            ReceiverDamaged => {
+                for (here, far) in self.links_of(id) {
+                    self.symbols(truth, (far, here));
+                }
             }
-            if truth.al_code == Some(OUTPUT_WATCHDOG) {
-                self.add(WatchdogStarved, Site::Device(id), Some(CODE));
+            InitRefused if truth.al_code.is_some_and(is_configuration) => {
+                self.add(ConfigMismatch, Site::Device(id), &sets::REFUSAL);
             }
+            InitRefused if truth.al_code == Some(OUTPUT_WATCHDOG) => {
+                self.add(WatchdogStarved, Site::Device(id), &sets::WATCHDOG_CODE);
+            }
+            // What it refuses, it refuses for its settings: the codes of this fault all say so.
+            ConfigMismatch => self.add(InitRefused, Site::Device(id), &sets::REFUSAL),
+            FirmwareFault | CycleTooFast => {
+                for cause in sets::OVERRUN.causes {
+                    self.add(*cause, Site::Device(id), &sets::OVERRUN);
+                }
+            }
+            _ => {}
         }
     }
 
     /// A device that is, or was, without supply.
-    fn unpowered(&mut self, name: FaultName, id: DeviceId) {
-        let shared = |cause| if cause == SupplyOff || name == SupplyOff { SHARED } else { RESTART };
-        for cause in [DeviceOff, SupplyOff] {
-            self.add(cause, Site::Device(id), Some(shared(cause)));
-        }
+    fn unpowered(&mut self, truth: &Truth, id: DeviceId) {
+        let tree = self.scene.tree;
         if self.scene.answered_again {
-            self.add(BrownOut, Site::Device(id), Some(shared(BrownOut)));
+            let set = if truth.places.len() > 1 { &sets::SHARED_RESTART } else { &sets::RESTART };
+            for cause in set.causes {
+                self.add(*cause, Site::Device(id), set);
+            }
             return;
         }
-        // A dip is over by its nature: one that lasts is no dip, but may be a cut.
-        if let Some(above) = Site::above(self.scene.tree, id) {
-            self.add(LinkOpen, above, Some(SILENT));
-            self.add(DeviceOff, above, Some(SILENT));
+        let set = if truth.name == BrownOut { &sets::DIP_LASTS } else { &sets::SILENT };
+        for cause in [DeviceOff, SupplyOff] {
+            self.add(cause, Site::Device(id), set);
+        }
+        let is_ring = tree.link_above(id.index()).is_some_and(|link| tree.is_on_ring(link));
+        if let Some(above) = Site::above(tree, id).filter(|_| !is_ring) {
+            self.silent(above, id, set);
         }
     }
 
     /// The links of a device, its own end first.
-    fn links_of(&self, id: DeviceId) -> Vec<(End<DeviceId>, End<DeviceId>)> {
+    fn links_of(&self, id: DeviceId) -> Vec<Hop> {
         let here = Port::ALL.map(|port| End::Controller(id, port));
         let links = here.iter().map(|here| (*here, opposite(self.scene.tree, *here)));
         links.filter_map(|(here, far)| far.map(|far| (here, far))).collect()
+    }
+}
+
+/// The device or the computer at an end.
+fn end_site(end: End<DeviceId>) -> Site {
+    match end {
+        End::MainDevice(_) => Site::Host,
+        End::Controller(id, _) => Site::Device(id),
     }
 }
 
@@ -317,7 +433,7 @@ mod tests {
     }
 
     fn truth(name: FaultName, place: TruthPlace) -> Truth {
-        Truth { name, places: vec![place], al_code: None, blind: Vec::new(), remaking: Vec::new() }
+        Truth::new(name, vec![place])
     }
 
     fn grade(truth: &Truth, host_counters: bool, cause: FaultName, site: Site) -> Grade {

@@ -17,16 +17,29 @@ pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
         Place::Device(id) => TruthPlace::Device(id),
         Place::Host(path) => TruthPlace::Host(path),
     };
-    let al_code = log.entries().iter().rev().find_map(|entry| match entry {
-        Entry::Effect { fault: Some(id), effect: Effect::StateRefused { code }, .. }
-            if *id == fault.id =>
-        {
-            Some(*code)
+    let mut truth = Truth::new(fault.name, fault.places.iter().map(place).collect());
+    truth.signals_lost = fault.links_lost;
+    for entry in log.entries() {
+        let Entry::Effect { fault: Some(id), place, effect, .. } = entry else { continue };
+        if *id != fault.id {
+            continue;
         }
-        Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
-    });
-    let places = fault.places.iter().map(place).collect();
-    Truth { name: fault.name, places, al_code, blind: Vec::new(), remaking: Vec::new() }
+        match (effect, place) {
+            (Effect::StateRefused { code }, _) => truth.al_code = Some(*code),
+            (Effect::SymbolError | Effect::FrameSpoiled { .. }, Place::Direction(from, to)) => {
+                if !truth.hops.contains(&(*from, *to)) {
+                    truth.hops.push((*from, *to));
+                }
+            }
+            (Effect::PowerLost, Place::Device(id)) => {
+                if !truth.dark.contains(id) {
+                    truth.dark.push(*id);
+                }
+            }
+            (_, _) => {}
+        }
+    }
+    truth
 }
 
 /// When and in what company a fault acted.

@@ -2,14 +2,15 @@
 //!
 //! A verdict is right when it names what was injected. It is *admitted* when it names something
 //! that the same evidence allows: no reading on a live line tells a cut cable from a dead neighbour.
-//! What is admitted follows from physics ([`admit`]), never from what the diagnosis likes to say.
+//! What is admitted follows from physics ([`admit`], [`sets`]), never from what the diagnosis likes to say.
 
 pub mod admit;
 pub mod claim;
 pub mod judge;
+pub mod sets;
 pub mod site;
 
-pub use admit::{Admitted, Scene, Truth, TruthPlace};
+pub use admit::{Admitted, Hop, Scene, Truth, TruthPlace};
 pub use claim::Claim;
 pub use site::{Site, Way};
 
@@ -56,11 +57,11 @@ impl Match {
 #[must_use]
 pub fn matches(truth: &Truth, scene: &Scene<'_>, claim: Claim) -> Match {
     let mut best = Match::NONE;
-    for Admitted { cause, site, why } in admit::admitted(truth, scene) {
+    for Admitted { cause, site, set } in admit::admitted(truth, scene) {
         if !site.covers(claim.site) {
             continue;
         }
-        let grade = why.map_or(Grade::Exact, Grade::Admitted);
+        let grade = set.map_or(Grade::Exact, |set| Grade::Admitted(set.why));
         best.place = best.place.max(grade);
         if cause == claim.cause {
             best.cause = best.cause.max(grade);

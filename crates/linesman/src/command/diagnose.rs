@@ -20,10 +20,12 @@ use linesman_runtime::record::Recorder;
 use linesman_runtime::selector::Selector;
 
 use self::follow::Follower;
+use crate::drawing;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
-use crate::output::Output;
+use crate::output::{Output, Paint};
+use crate::page;
 use crate::text;
 use crate::text::finding::Writer;
 use crate::text::names::Names;
@@ -60,6 +62,12 @@ pub(crate) struct Arguments {
     /// On a virtual segment: the state that its SubDevices are driven to
     #[arg(long, value_enum, value_name = "STATE", ignore_case = true)]
     to: Option<Target>,
+    /// Write the diagnosis as a page of its own: drawing, time line, evidence, what to do
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+    /// Write a drawing of the line with what is wrong marked in it
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
     /// JSON, schema linesman.diagnosis/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -94,6 +102,9 @@ impl From<Target> for AlState {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selector = arguments.place.parse()?;
     refuse_misplaced(arguments, &selector)?;
+    for path in [&arguments.html, &arguments.svg].into_iter().flatten() {
+        files::refuse_to_overwrite(path)?;
+    }
     let project = arguments.project.as_deref().map(files::project).transpose()?;
     match &selector {
         Selector::Capture(path) => {
@@ -145,6 +156,8 @@ pub(crate) struct Session {
     follower: Option<Follower>,
     seconds: Option<f64>,
     record: Option<PathBuf>,
+    html: Option<PathBuf>,
+    svg: Option<PathBuf>,
     json: bool,
 }
 
@@ -152,8 +165,15 @@ impl Session {
     fn new(arguments: &Arguments, selector: &Selector, project: Option<Project>) -> Self {
         let setup = Setup { project, source: selector.to_string(), ..Setup::default() };
         let follower = arguments.follow.then(|| Follower::new(arguments.json));
-        let record = arguments.record.clone();
-        Self { setup, follower, seconds: arguments.seconds, record, json: arguments.json }
+        Self {
+            setup,
+            follower,
+            seconds: arguments.seconds,
+            record: arguments.record.clone(),
+            html: arguments.html.clone(),
+            svg: arguments.svg.clone(),
+            json: arguments.json,
+        }
     }
 
     /// Begins the recording, where that was asked for. `start` is the date of the run's time 0.
@@ -195,24 +215,49 @@ impl Session {
     ) -> Status {
         engine.finish(at, complete);
         self.follow(&mut engine, output);
-        self.answer(engine.diagnosis(), &names(&engine), at, output)
+        self.answer(&engine, &names(&engine), at, output)
     }
 
     /// Gives the answer.
-    fn answer(
-        &self,
-        mut diagnosis: Diagnosis,
-        names: &Names,
-        at: Instant,
-        output: &mut Output,
-    ) -> Status {
+    fn answer(&self, engine: &Engine, names: &Names, at: Instant, output: &mut Output) -> Status {
+        let mut diagnosis = engine.diagnosis();
         diagnosis.tool = version::tool();
         match (&self.follower, self.json) {
             (Some(follower), true) => follower.end(at, &diagnosis, output),
             (None, true) => output.json(&diagnosis),
             (_, false) => print(&diagnosis, names, output),
         }
+        // What was found holds, even if no file can be written of it.
+        if let Err(failure) = self.write_files(&diagnosis, engine, names, at) {
+            output.warn(&failure.reason);
+        }
         status(&diagnosis)
+    }
+
+    /// The page and the drawing, where they were asked for.
+    fn write_files(
+        &self,
+        diagnosis: &Diagnosis,
+        engine: &Engine,
+        names: &Names,
+        at: Instant,
+    ) -> Result<(), Failure> {
+        let line = engine.line(Network(0));
+        if let Some(path) = &self.html {
+            let timed = diagnosis.clock != NO_CLOCK;
+            let writer = Writer { names, paint: Paint::PLAIN, width: usize::MAX, timed };
+            let page = page::page(diagnosis, line, &writer, at);
+            files::write_new(path, "the report", &page)?;
+        }
+        if let Some(path) = &self.svg {
+            let scene = line.and_then(|line| page::scene::of_diagnosis(line, diagnosis, names));
+            let Some(scene) = scene else {
+                let reason = format!("{}: how the line is wired was not seen", path.display());
+                return Err(Failure::new(reason, "name the project, `--project machine.toml`"));
+            };
+            files::write_new(path, "the drawing", &drawing::file(&scene))?;
+        }
+        Ok(())
     }
 }
 

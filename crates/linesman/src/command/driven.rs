@@ -1,9 +1,14 @@
-//! Before a line is driven: does somebody else drive it?
+//! Lines that are driven: does somebody else drive them, the segment of a file, the wish to stop.
 
+use std::path::Path;
+
+use linesman_runtime::line::{Pace, VirtualLine};
 use linesman_runtime::listen::{Driven, is_driven};
 use linesman_runtime::stop::Stop;
+use linesman_runtime::wiring::Wiring;
 
 use crate::failure::Failure;
+use crate::files;
 use crate::text::quantity::{count, time};
 
 /// Refuses a line on which EtherCAT frames are heard.
@@ -38,7 +43,20 @@ pub(crate) fn nobody(error: &dyn std::error::Error) -> Failure {
     failure
 }
 
+/// The virtual segment of a file.
+pub(crate) fn virtual_line(path: &Path, pace: Pace) -> Result<VirtualLine, Failure> {
+    let ring = files::segment_file(path)?.ring.is_some();
+    let plant = files::Plant::open(path)?;
+    let wiring = Wiring::of(&plant.segment, &plant.project);
+    VirtualLine::new(plant.segment, wiring, ring, pace).map_err(no_bell)
+}
+
 /// The wish to stop.
 pub(crate) fn stop() -> Result<Stop, Failure> {
-    Stop::on_signals().map_err(|error| Failure::new(format!("listening for Ctrl-C: {error}"), ""))
+    Stop::on_signals().map_err(no_bell)
+}
+
+/// There is no way to be woken.
+pub(crate) fn no_bell(error: std::io::Error) -> Failure {
+    Failure::new(format!("listening for Ctrl-C: {error}"), "")
 }

@@ -1,6 +1,7 @@
-//! `linesman lab`: stories, swarms and recordings in virtual time.
+//! `linesman lab`: stories, swarms, scores and recordings in virtual time.
 
 pub(crate) mod replay;
+pub(crate) mod score;
 
 use std::collections::BTreeMap;
 use std::num::NonZero;
@@ -38,6 +39,8 @@ enum Command {
     },
     /// Play the requests of a recording against a virtual segment, and compare the answers
     Replay(replay::Arguments),
+    /// Measure how often the diagnosis is right, on plants and faults drawn by chance
+    Score(score::Arguments),
     /// Run plants and faults drawn by chance, and check what must always hold
     Swarm {
         /// From the first seed up to, not including, the second
@@ -58,6 +61,7 @@ impl Arguments {
     pub(crate) fn wants_json(&self) -> bool {
         match &self.command {
             Command::Replay(arguments) => arguments.json,
+            Command::Score(arguments) => arguments.json,
             Command::Run { .. } | Command::Swarm { .. } => false,
         }
     }
@@ -68,6 +72,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     match &arguments.command {
         Command::Run { stories } => run_stories(stories, output),
         Command::Replay(arguments) => replay::run(arguments, output),
+        Command::Score(arguments) => Ok(score::run(arguments, output)),
         Command::Swarm { seeds, physics: true, quiet } => {
             Ok(run_physics(seeds.clone(), *quiet, output))
         }

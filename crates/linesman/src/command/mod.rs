@@ -13,6 +13,7 @@ pub(crate) mod host;
 pub(crate) mod interfaces;
 pub(crate) mod lab;
 pub(crate) mod log;
+pub(crate) mod online;
 pub(crate) mod plan;
 pub(crate) mod probe;
 pub(crate) mod reg;
@@ -36,6 +37,7 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::Demo(arguments) => demo::run(&arguments, output),
         Command::Lab(arguments) => lab::run(&arguments, output),
         Command::Log(arguments) => log::run(&arguments, output),
+        Command::Online(arguments) => online::run(&arguments, output),
         Command::Run(arguments) => run::run(&arguments, output),
         Command::Plan(arguments) => plan::run(&arguments, output),
         Command::Scan(arguments) => scan::run(&arguments, output),

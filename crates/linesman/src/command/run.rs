@@ -16,7 +16,8 @@ use linesman_link::socket::Bell;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
-use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
+use linesman_runtime::line::{Cards, Line, Pace};
+use linesman_runtime::online::Board;
 use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{
     self as running, Beside, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
@@ -24,7 +25,6 @@ use linesman_runtime::run::{
 use linesman_runtime::selector::Selector;
 use linesman_runtime::service::ServiceDesk;
 use linesman_runtime::stop::Stop;
-use linesman_runtime::wiring::Wiring;
 
 use self::told::Teller;
 use super::driven;
@@ -32,6 +32,7 @@ use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
+use crate::text::quantity::count;
 use crate::version;
 
 /// After so long without news, what was waited with is told.
@@ -116,10 +117,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let choices = Choices { target: arguments.to, cycle: arguments.cycle_us.map(Span::us) };
     let title = match (&source, &arguments.file) {
         (Source::Project(project), Some(path)) => {
-            format!("{} SubDevices of {}", project.devices.len(), path.display())
+            format!("{} of {}", count(project.devices.len() as u64, "SubDevice"), path.display())
         }
         (Source::Planned(plan), Some(path)) => {
-            format!("{} SubDevices of {}", plan.devices.len(), path.display())
+            format!("{} of {}", count(plan.devices.len() as u64, "SubDevice"), path.display())
         }
         _ => "what is there".to_owned(),
     };
@@ -144,7 +145,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Source::Planned(plan) => Wanted::Plan(plan),
         Source::AsFound => choices.as_found(),
     };
-    let began = HostClock::start().started_at();
+    let clock = HostClock::start();
+    let began = clock.started_at();
     let log = match &arguments.log {
         Some(path) => {
             let project = arguments
@@ -156,7 +158,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
         None => None,
     };
-    let teller = Teller::new(arguments.json, began, log);
+    let board = Board::new(&arguments.on);
+    let teller = Teller::new(arguments.json, began, log, board.clone());
     let application = arguments.image.clone();
     let stop = driven::stop()?;
     let said = format!(
@@ -166,36 +169,25 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     match &selector {
         Selector::Cards(names) => {
             driven::refuse(names)?;
-            let mut line = Cards::open(names, HostClock::start())?;
+            let mut line = Cards::open(names, clock)?;
             line.set_spin(Span::us(arguments.spin_us));
-            stop.rings(&line.bell()).map_err(no_bell)?;
-            let desk = desk(arguments.control.as_deref(), line.bell())?;
+            stop.rings(&line.bell()).map_err(driven::no_bell)?;
+            let desk = desk(arguments.control.as_deref(), line.bell(), board)?;
             let real_time = Some(RealTime {
                 priority: (arguments.priority > 0).then_some(arguments.priority),
                 cpu: arguments.cpu,
                 lock_memory: arguments.priority > 0,
             });
-            let options =
-                with_source(options, real_time, HostClock::start().started_at().rfc3339());
-            drive(
-                line,
-                names.len() > 1,
-                wanted,
-                &options,
-                application,
-                desk,
-                &stop,
-                &said,
-                teller,
-                output,
-            )
+            let options = with_source(options, real_time, began.rfc3339());
+            drive(line, wanted, &options, application, desk, &stop, &said, teller, output)
         }
         Selector::Segment(path) => {
-            let line = virtual_line(path, lasts.is_some())?;
-            stop.rings(&line.bell()).map_err(no_bell)?;
-            let desk = desk(arguments.control.as_deref(), line.bell())?;
-            let ring = line.count() > 1;
-            drive(line, ring, wanted, &options, application, desk, &stop, &said, teller, output)
+            // Without an end it goes no faster than the host's clock, for a person to look on.
+            let pace = if lasts.is_some() { Pace::Free } else { Pace::Host };
+            let line = driven::virtual_line(path, pace)?;
+            stop.rings(&line.bell()).map_err(driven::no_bell)?;
+            let desk = desk(arguments.control.as_deref(), line.bell(), board)?;
+            drive(line, wanted, &options, application, desk, &stop, &said, teller, output)
         }
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             let reason = format!("`{selector}`: nothing can be driven there");
@@ -227,14 +219,10 @@ impl Source {
     }
 }
 
-fn no_bell(error: std::io::Error) -> Failure {
-    Failure::new(format!("listening for Ctrl-C: {error}"), "")
-}
-
 /// The socket for services, if one is wanted.
-fn desk(path: Option<&Path>, bell: Bell) -> Result<Option<ServiceDesk>, Failure> {
+fn desk(path: Option<&Path>, bell: Bell, board: Board) -> Result<Option<ServiceDesk>, Failure> {
     let Some(path) = path else { return Ok(None) };
-    let desk = ServiceDesk::open(path, bell).map_err(|error| {
+    let desk = ServiceDesk::open(path, bell, board).map_err(|error| {
         let reason = format!("{}: opening the socket: {error}", path.display());
         Failure::new(reason, "name a path where nothing is, in a folder that you may write to")
     })?;
@@ -256,15 +244,6 @@ fn with_source(
     options
 }
 
-/// The segment of a file; without an end it goes no faster than the host's clock.
-fn virtual_line(path: &Path, ends: bool) -> Result<VirtualLine, Failure> {
-    let ring = files::segment_file(path)?.ring.is_some();
-    let plant = files::Plant::open(path)?;
-    let wiring = Wiring::of(&plant.segment, &plant.project);
-    let pace = if ends { Pace::Free } else { Pace::Host };
-    VirtualLine::new(plant.segment, wiring, ring, pace).map_err(no_bell)
-}
-
 fn lasts(seconds: Option<f64>) -> Result<Option<Span>, Failure> {
     let until = super::sim::until(seconds)?;
     Ok(seconds.map(|_| until.since(linesman_proto::time::Instant::ZERO)))
@@ -274,7 +253,6 @@ fn lasts(seconds: Option<f64>) -> Result<Option<Span>, Failure> {
 #[allow(clippy::too_many_arguments, reason = "called twice, from above")]
 fn drive<L: Line + Send>(
     line: L,
-    ring: bool,
     wanted: Wanted,
     options: &RunOptions,
     image: Option<PathBuf>,
@@ -289,8 +267,8 @@ fn drive<L: Line + Send>(
     let ended = std::thread::scope(|scope| {
         let beside = Beside { stop, notes, desk };
         let work = move || match image {
-            None => running::run(line, ring, wanted, Idle, options, beside),
-            Some(path) => running::run(line, ring, wanted, Shared::at(path), options, beside),
+            None => running::run(line, wanted, Idle, options, beside),
+            Some(path) => running::run(line, wanted, Shared::at(path), options, beside),
         };
         let thread = scope.spawn(work);
         loop {
@@ -310,23 +288,16 @@ fn drive<L: Line + Send>(
         let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
         output.warn(&format!("{} entries are missing in the event log: {why}", log.dropped));
     }
-    let Ended { report, diagnosis, error } = ended.map_err(|error| failure(&error, &options.on))?;
+    let Ended { report, diagnosis, error } =
+        ended.map_err(|error| driven::nobody(&error).at(&options.on))?;
     if teller.is_json() {
         output.json(&report);
     } else {
-        output.text(&told::summary(&report));
+        output.text(&told::summary(&report, output.paint()));
     }
     if let Some(error) = error {
-        return Err(failure(&error, &options.on));
+        return Err(driven::nobody(&error).at(&options.on));
     }
     let faulty = diagnosis.is_some_and(|diagnosis| diagnosis.verdict == Verdict::Faulty);
     Ok(if faulty || report.reached_ns.is_none() { Status::Findings } else { Status::Good })
-}
-
-fn failure(error: &running::RunError, on: &str) -> Failure {
-    let mut failure = driven::nobody(error);
-    if !failure.reason.starts_with(on) {
-        failure.reason = format!("{on}: {}", failure.reason);
-    }
-    failure
 }

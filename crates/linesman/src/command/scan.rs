@@ -1,21 +1,27 @@
 //! `linesman scan`: which SubDevices there are and how they are wired.
 
 mod against;
-mod cards;
 pub(crate) mod report;
-mod segment;
 mod table;
 
 use std::path::{Path, PathBuf};
 
 use linesman_config::inventory::Inventory;
 use linesman_config::project::Project;
+use linesman_link::clock::HostClock;
+use linesman_proto::time::Span;
+use linesman_runtime::line::{Cards, Pace};
+use linesman_runtime::run as running;
+use linesman_runtime::run::scan::PATIENCE;
 use linesman_runtime::selector::Selector;
 
+use super::driven;
+use crate::drawing;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
+use crate::page;
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -32,6 +38,9 @@ pub(crate) struct Arguments {
     /// Hold what was found against this project: exit status 1 when it differs
     #[arg(long, value_name = "machine.toml", conflicts_with = "save")]
     against: Option<PathBuf>,
+    /// Write a drawing of the line
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
     /// JSON, schema linesman.scan/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -46,7 +55,7 @@ struct Scan {
 /// Scans what the selector names.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selector: Selector = arguments.place.parse()?;
-    if let Some(path) = &arguments.save {
+    for path in [&arguments.save, &arguments.svg].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
     }
     let planned = match &arguments.against {
@@ -58,8 +67,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         None => None,
     };
     let scan = match &selector {
-        Selector::Cards(names) => cards::scan(names)?,
-        Selector::Segment(path) => segment::scan(path)?,
+        Selector::Cards(names) => on_cards(names)?,
+        Selector::Segment(path) => on_segment(path)?,
         Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
             let reason = format!("`{selector}`: a scan sends frames, and nobody answers there");
             let advice = format!("judge it with `linesman diagnose {}`", arguments.place);
@@ -83,7 +92,32 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             output.line(&format!("\nSaved as {}.", path.display()));
         }
     }
+    if let Some(path) = &arguments.svg {
+        let drawing = drawing::file(&page::scene::of_scan(inventory));
+        files::write_new(path, "the drawing", &drawing)?;
+    }
     Ok(if is_as_planned { Status::Good } else { Status::Findings })
+}
+
+/// Scans the line on these cards: listens first, looks, then addresses and reads.
+fn on_cards(names: &[String]) -> Result<Scan, Failure> {
+    driven::refuse(names)?;
+    let stop = driven::stop()?;
+    let clock = HostClock::start();
+    let line = Cards::open(names, clock)?;
+    let inventory = running::scan(line, PATIENCE, &stop)
+        .map_err(|error| driven::nobody(&error).at(&names.join("+")))?;
+    Ok(Scan { inventory, start: clock.started_at().rfc3339() })
+}
+
+/// Scans the segment of a file, in virtual time.
+fn on_segment(path: &Path) -> Result<Scan, Failure> {
+    let line = driven::virtual_line(path, Pace::Free)?;
+    // Virtual seconds cost little.
+    let patience = PATIENCE + Span::s(line.segment().tree().len() as u64);
+    let inventory =
+        running::scan(line, patience, &driven::stop()?).map_err(|error| driven::nobody(&error))?;
+    Ok(Scan { inventory, start: None })
 }
 
 fn save(path: &Path, inventory: &Inventory) -> Result<(), Failure> {

@@ -3,8 +3,10 @@
 use linesman_config::project::Project;
 use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
+use linesman_lab::score::ScoreReport;
 use linesman_runtime::control::message::{Faults, Request, SignalTable};
 use linesman_runtime::journal::TruthEvent;
+use linesman_runtime::online::report::OnlineReport;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::serve::report::Status as SimStatus;
 use linesman_sim::segment_file::SegmentFile;
@@ -49,6 +51,8 @@ pub(crate) enum Name {
     Event,
     /// `lab replay --json`
     Replay,
+    /// `lab score --json`
+    Score,
     /// `fault … inject|heal|list --json`
     Faults,
     /// `fault … signals|set|release --json`
@@ -63,6 +67,8 @@ pub(crate) enum Name {
     Log,
     /// `run --json`
     Run,
+    /// `online --json`, and a line of `online --live --json`
+    Online,
     /// A line that the control socket of `run` takes
     ServiceRequest,
     /// What it answers
@@ -111,6 +117,7 @@ fn schema(name: Name) -> Schema {
         Name::Diagnosis => schema_for!(Diagnosis),
         Name::Event => schema_for!(EventReport<'_>),
         Name::Replay => schema_for!(ReplayReport),
+        Name::Score => schema_for!(ScoreReport),
         Name::Faults => schema_for!(Faults),
         Name::Signals => schema_for!(SignalTable),
         Name::Sim => schema_for!(SimStatus),
@@ -118,6 +125,7 @@ fn schema(name: Name) -> Schema {
         Name::Control => schema_for!(Request),
         Name::Log => schema_for!(LogReport),
         Name::Run => schema_for!(RunReport),
+        Name::Online => schema_for!(OnlineReport),
         Name::ServiceRequest => schema_for!(linesman_runtime::service::message::Request),
         Name::Service => schema_for!(linesman_runtime::service::message::Answer),
         Name::Interfaces => schema_for!(interfaces::Report),

@@ -10,7 +10,6 @@ pub(crate) struct Paint {
 
 impl Paint {
     /// Without colour.
-    #[cfg(test)]
     pub(crate) const PLAIN: Self = Self { on: false };
 
     /// For a stream: see <https://no-color.org>.

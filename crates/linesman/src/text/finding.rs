@@ -114,13 +114,7 @@ impl Writer<'_> {
             tail.push(format!("{}{port}", self.names.device(no)));
         }
         tail.extend(evidence.register.map(|register| format!("register 0x{register:04X}")));
-        // Counters are read as numbers, all else as bits and codes.
-        let largest = evidence.before.max(evidence.after).map_or(0, |Number(value)| value);
-        let is_code = evidence.register.is_some_and(|register| !COUNTERS.contains(&register));
-        let number = |value: u64| match is_code && largest > 9 {
-            true => format!("0x{value:04X}"),
-            false => grouped(value),
-        };
+        let number = |value: u64| register_value(evidence, value);
         match (evidence.before, evidence.after) {
             (Some(Number(before)), Some(Number(after))) => {
                 tail.push(format!("{} → {}", number(before), number(after)));
@@ -148,6 +142,14 @@ impl Writer<'_> {
     }
 }
 
+/// A value of the register that a piece of evidence is about: counters are read as numbers, all else
+/// as bits and codes.
+pub(crate) fn register_value(evidence: &EvidenceReport, value: u64) -> String {
+    let largest = evidence.before.max(evidence.after).map_or(0, |Number(value)| value);
+    let is_code = evidence.register.is_some_and(|register| !COUNTERS.contains(&register));
+    if is_code && largest > 9 { format!("0x{value:04X}") } else { grouped(value) }
+}
+
 fn flattened(all: &[FindingReport]) -> Vec<&FindingReport> {
     let mut flat = Vec::new();
     for finding in all {
@@ -162,11 +164,13 @@ fn cause(finding: &FindingReport) -> String {
     format!("{} ({percent}): {}", finding.cause, finding.cause.meaning())
 }
 
-fn percent(confidence: f64) -> String {
+/// `70 %`.
+pub(crate) fn percent(confidence: f64) -> String {
     format!("{:.0} %", confidence * 100.0)
 }
 
-fn when(finding: &FindingReport) -> String {
+/// From when to when a finding was there.
+pub(crate) fn when(finding: &FindingReport) -> String {
     let mut text = format!("from {}", time(finding.opened_ns.0));
     if let Some(Number(closed)) = finding.closed_ns {
         let lasted = closed.saturating_sub(finding.opened_ns.0);

@@ -15,6 +15,8 @@ pub(super) struct Datagram {
     pub(super) role: Role,
     /// Where its data begin in the frame.
     pub(super) data_at: usize,
+    /// How many bytes they are.
+    pub(super) len: usize,
     /// Where its working counter is in the frame.
     wkc_at: usize,
     /// What it must come back with: as planned, and with its outputs withheld.
@@ -72,6 +74,7 @@ impl Datagram {
         Self {
             role: datagram.role,
             data_at,
+            len: datagram.len,
             wkc_at: data_at + datagram.len,
             expected: [Expected::default(); 2],
             without_outputs: differs.then(|| DatagramPlan { command, ..datagram.clone() }),

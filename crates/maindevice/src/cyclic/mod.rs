@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::expect::Presence;
 use linesman_config::plan::{Plan, Role};
-use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::address::WorkingCounter;
 use linesman_proto::sii::Direction;
 use linesman_proto::state::{AlState, OredStates};
 use linesman_proto::time::{Instant, Span};
@@ -34,6 +34,7 @@ use crate::event::Event;
 use crate::exchange::Exchange;
 use crate::exchange::prebuilt::data_offsets;
 use crate::executor::lock;
+use crate::mailbox::{MailboxBits, Queues};
 use crate::statistics::Statistics;
 use crate::supervisor::Line;
 
@@ -102,6 +103,7 @@ pub(crate) struct Cyclic {
     responding: Option<(WorkingCounter, u8)>,
     shares: Vec<Share>,
     steer: Steer,
+    mailboxes: MailboxBits,
     pub(crate) outputs: Vec<u8>,
     pub(crate) inputs: Vec<u8>,
 }
@@ -154,6 +156,7 @@ impl Cyclic {
             responding: None,
             shares: quality::shares(&plan),
             steer: Steer::default(),
+            mailboxes: MailboxBits::default(),
             outputs: vec![0; plan.outputs_len],
             inputs: vec![0; plan.inputs_len],
             plan,
@@ -164,6 +167,11 @@ impl Cyclic {
             cyclic.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
         cyclic.refresh();
         cyclic
+    }
+
+    /// Tells those who serve mailboxes which of them hold something, where the plan reads that.
+    pub(crate) fn serve(&mut self, mailboxes: Queues) {
+        self.mailboxes = MailboxBits::new(&self.plan, mailboxes);
     }
 
     /// Takes over who is present, if that has changed.
@@ -281,7 +289,7 @@ impl Cyclic {
         events: &mut impl FnMut(Event),
     ) {
         self.refresh();
-        let Self { plan, line, tasks, frames, inputs, least, most, shares, .. } = self;
+        let Self { plan, line, tasks, frames, inputs, least, most, shares, mailboxes, .. } = self;
         let Some(frame) = frames.get_mut(index) else { return };
         let (task, number) = (frame.task, frame.number);
         let Some(state) = tasks.get_mut(task) else { return };
@@ -315,6 +323,10 @@ impl Cyclic {
                     let low = reply.get(datagram.data_at..).and_then(<[u8]>::first_chunk);
                     let low = u32::from_le_bytes(low.copied().unwrap_or_default());
                     moved += self.steer.correction(now, low, cycle);
+                }
+                if datagram.role == Role::MailboxStates && wkc.0 > 0 {
+                    let bits = reply.get(datagram.data_at..).unwrap_or_default();
+                    mailboxes.take(index, at, bits.get(..datagram.len).unwrap_or_default());
                 }
                 datagram.good = true;
                 frame.status.input_toggle ^= bit;
@@ -375,21 +387,6 @@ impl Cyclic {
     /// Whether the last answer of a frame was not as it should be.
     pub(crate) fn is_bad(&self, index: usize) -> bool {
         self.frames.get(index).is_some_and(|frame| frame.status.wrong_counter != 0)
-    }
-
-    /// How good the process data of a SubDevice are.
-    pub(crate) fn quality(&self, id: DeviceId) -> Quality {
-        let Some(share) = self.shares.get(id.index()) else { return Quality::default() };
-        share.quality(&self.least, id, |frame, at| {
-            let datagram = self.frames.get(frame).and_then(|frame| frame.datagrams.get(at));
-            datagram.map_or((false, None, 0), |one| (one.good, one.good_at, one.receipts))
-        })
-    }
-
-    /// How a frame of a task went the last time.
-    pub(crate) fn frame_status(&self, task: usize, number: usize) -> Option<FrameStatus> {
-        let frame = self.frames.iter().find(|one| one.task == task && one.number == number);
-        frame.map(|frame| frame.status)
     }
 
     /// How many answered the last broadcast read of the cycle.

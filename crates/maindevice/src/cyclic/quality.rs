@@ -6,6 +6,8 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::sii::Direction;
 use linesman_proto::time::{Instant, Span};
 
+use super::Cyclic;
+
 /// The process data of one SubDevice as the application sees them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Quality {
@@ -45,6 +47,23 @@ impl FrameStatus {
     #[must_use]
     pub const fn bit(datagram: usize) -> u16 {
         if datagram < 15 { 1 << datagram } else { 0 }
+    }
+}
+
+impl Cyclic {
+    /// How good the process data of a SubDevice are.
+    pub(crate) fn quality(&self, id: DeviceId) -> Quality {
+        let Some(share) = self.shares.get(id.index()) else { return Quality::default() };
+        share.quality(&self.least, id, |frame, at| {
+            let datagram = self.frames.get(frame).and_then(|frame| frame.datagrams.get(at));
+            datagram.map_or((false, None, 0), |one| (one.good, one.good_at, one.receipts))
+        })
+    }
+
+    /// How a frame of a task went the last time.
+    pub(crate) fn frame_status(&self, task: usize, number: usize) -> Option<FrameStatus> {
+        let frame = self.frames.iter().find(|one| one.task == task && one.number == number);
+        frame.map(|frame| frame.status)
     }
 }
 

@@ -29,10 +29,14 @@ impl Event {
             Self::StartUpFailed { id, to, status, command, error } => {
                 let name = name(*id);
                 let transition = command.transition;
-                vec![
+                let mut lines = vec![
                     format!("{name}: {}", aborted(*to, *status)),
                     format!("{name}: {transition} failed at start-up command {command}: {error}"),
-                ]
+                ];
+                if error.is_refusal() {
+                    lines.push(format!("{name}: {START_UP_LIST}"));
+                }
+                lines
             }
             Self::ClocksSet { reference } => {
                 vec![format!("clocks set; station {reference} is the reference clock")]
@@ -76,6 +80,8 @@ impl Event {
             | Self::Responding { .. }
             | Self::Ring { .. }
             | Self::Counters { .. }
+            | Self::CountersCleared { .. }
+            | Self::Identified { .. }
             | Self::Links { .. }
             | Self::WorkingCounter { .. }
             | Self::WorkingCounterGood { .. }
@@ -93,6 +99,10 @@ impl Event {
         }
     }
 }
+
+/// What to do about a start-up command that the SubDevice refuses.
+const START_UP_LIST: &str = "Remove the command from the start-up list, or take the list of the connected \
+     device's own description: it was probably made for another revision.";
 
 fn aborted(to: AlState, status: AlStatus) -> String {
     format!("state change aborted (requested {to}, back to {})", status.state())

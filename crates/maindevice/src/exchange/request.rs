@@ -42,6 +42,16 @@ impl Target {
         }
     }
 
+    /// The command that reads from it and writes to it in one go.
+    #[must_use]
+    pub const fn exchange_command(self) -> Command {
+        match self {
+            Self::Position(_) | Self::PositionOnB(_) => Command::Aprw,
+            Self::Station(_) => Command::Fprw,
+            Self::All => Command::Brw,
+        }
+    }
+
     /// The card whose frames reach it; `None`: either.
     #[must_use]
     pub const fn card(self) -> Option<Path> {
@@ -118,6 +128,12 @@ impl Request {
             repeats: 0,
             alone: false,
         }
+    }
+
+    /// Reads bytes from a register on and writes others there, in one go: nothing can happen in between.
+    #[must_use]
+    pub fn exchange(target: Target, address: RegisterAddress, data: &[u8]) -> Self {
+        Self { command: target.exchange_command(), ..Self::write(target, address, data) }
     }
 
     /// The same, sent again up to `repeats` times when its frame is lost.

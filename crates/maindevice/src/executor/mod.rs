@@ -168,6 +168,11 @@ impl Executor {
         }
     }
 
+    /// The time to which the engine was advanced last.
+    pub(crate) fn now(&self) -> Instant {
+        self.board.now()
+    }
+
     pub(crate) fn shared(&self) -> MutexGuard<'_, Shared> {
         lock(&self.board.shared)
     }

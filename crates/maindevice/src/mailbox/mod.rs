@@ -12,11 +12,13 @@ mod errand;
 mod failure;
 mod foe;
 mod information;
+mod mapped;
 pub(crate) mod multiplexer;
 mod protocol_errors;
 pub(crate) mod queue;
 
 use linesman_proto::address::DeviceId;
+use linesman_proto::time::Span;
 
 use crate::executor::lock;
 use crate::supervisor::Context;
@@ -25,18 +27,26 @@ pub use errand::{Errand, MailboxRequest};
 pub use failure::{MailboxFailure, Step, Why};
 pub use protocol_errors::{ProtocolError, ProtocolErrors};
 
+pub(crate) use mapped::MailboxBits;
 use multiplexer::Multiplexer;
 pub(crate) use queue::{Job, Outcome, Queues};
+
+/// A mailbox whose bit the cycle reads is looked into all the same once in so long.
+const UNHEARD: Span = Span::s(1);
 
 /// Serves the mailbox of one SubDevice; never ends.
 pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
     let plan = std::sync::Arc::clone(&context.plan);
     let Some(device) = plan.device(id) else { return };
-    let Some(mut multiplexer) = Multiplexer::new(&context.wire, device) else { return };
-    let interval = context.options.mailbox_interval;
+    let (wire, mailboxes) = (&context.wire, &context.mailboxes);
+    let Some(mut multiplexer) = Multiplexer::new(wire, mailboxes, device) else { return };
     let mut openings = 0;
     loop {
-        let job = context.mailboxes.next(id, context.wire.sleep(interval)).await;
+        let interval = match mailboxes.is_mapped(id) {
+            true => context.options.mailbox_interval.max(UNHEARD),
+            false => context.options.mailbox_interval,
+        };
+        let job = mailboxes.next(id, context.wire.sleep(interval)).await;
         let (open, boots, now) = {
             let line = lock(&context.line);
             (line.has_mailbox(id), line.boots(id), line.mailbox_openings(id))
@@ -50,7 +60,10 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
         match job {
             Some(job) => work(&context, &mut multiplexer, job, open).await,
             None if open => multiplexer.drain().await,
-            None => {}
+            // What is left of an earlier run is of no interest, and must not be looked at for ever.
+            None => {
+                mailboxes.take_full(id);
+            }
         }
     }
 }

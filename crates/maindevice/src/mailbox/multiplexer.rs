@@ -11,6 +11,7 @@ use linesman_proto::register::{SYNC_MANAGER, SmActivate, SmPdiControl, SmStatus}
 use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::time::{Instant, Span};
 
+use super::Queues;
 use super::failure::Why;
 use crate::event::Event;
 use crate::exchange::{ExchangeError, Request, Target};
@@ -24,6 +25,9 @@ const PDI_CONTROL_AT: u16 = 7;
 const FIRST_POLL: Span = Span::us(500);
 const SLOWEST_POLL: Span = Span::ms(10);
 const REPEAT_LIMIT: Span = Span::ms(100);
+/// A mailbox whose bit the cycle reads is looked into all the same once in so long while an answer is
+/// waited for: cyclic frames may be lost.
+const UNSEEN: Span = Span::ms(50);
 
 /// A register byte of one of the two SyncManagers.
 fn byte_of(manager: u16, at: u16) -> RegisterAddress {
@@ -33,6 +37,7 @@ fn byte_of(manager: u16, at: u16) -> RegisterAddress {
 /// One mailbox.
 pub(crate) struct Multiplexer {
     wire: Wire,
+    queues: Queues,
     id: DeviceId,
     target: Target,
     areas: MailboxPair,
@@ -52,10 +57,11 @@ pub(crate) struct Multiplexer {
 
 impl Multiplexer {
     /// `None` for a SubDevice without a mailbox.
-    pub(crate) fn new(wire: &Wire, device: &DevicePlan) -> Option<Self> {
+    pub(crate) fn new(wire: &Wire, queues: &Queues, device: &DevicePlan) -> Option<Self> {
         let mailbox = device.mailbox?;
         Some(Self {
             wire: wire.clone(),
+            queues: queues.clone(),
             id: device.id,
             target: Target::Station(device.station),
             areas: mailbox.areas,
@@ -220,8 +226,13 @@ impl Multiplexer {
             if self.wire.now() >= until {
                 return Ok(None);
             }
-            self.wire.sleep(pause).await;
-            pause = (pause * 2).min(SLOWEST_POLL);
+            if self.queues.is_mapped(self.id) {
+                let rest = until.since(self.wire.now());
+                self.queues.mail(self.id, self.wire.sleep(UNSEEN.min(rest))).await;
+            } else {
+                self.wire.sleep(pause).await;
+                pause = (pause * 2).min(SLOWEST_POLL);
+            }
         }
     }
 
@@ -239,7 +250,8 @@ impl Multiplexer {
 
     /// The message in the mailbox, if there is a new one.
     async fn fetch(&mut self) -> Result<Option<Vec<u8>>, ExchangeError> {
-        if !self.is_full(IN).await? {
+        // What the cycle has seen need not be asked for.
+        if !self.queues.take_full(self.id) && !self.is_full(IN).await? {
             return Ok(None);
         }
         let area = self.areas.send;

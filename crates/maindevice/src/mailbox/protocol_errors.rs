@@ -40,6 +40,11 @@ impl ProtocolErrors {
         self.standing.contains(&protocol).then(|| self.history.iter().rev().find(of)).flatten()
     }
 
+    /// The last error of each protocol whose newest access failed.
+    pub fn standing(&self) -> impl Iterator<Item = &ProtocolError> {
+        self.standing.iter().filter_map(|protocol| self.last(*protocol))
+    }
+
     /// The errors, oldest first; at most 64.
     pub fn history(&self) -> impl DoubleEndedIterator<Item = &ProtocolError> {
         self.history.iter()

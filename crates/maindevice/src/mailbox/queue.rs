@@ -11,7 +11,7 @@ use linesman_proto::time::Instant;
 
 use super::errand::MailboxRequest;
 use super::failure::{MailboxFailure, Step, Why};
-use super::protocol_errors::ProtocolErrors;
+use super::protocol_errors::{ProtocolError, ProtocolErrors};
 use crate::executor::lock;
 use crate::executor::wire::Sleep;
 
@@ -87,6 +87,10 @@ struct Queue {
     jobs: VecDeque<Job>,
     waker: Option<Waker>,
     errors: ProtocolErrors,
+    /// The cycle reads whether the mailbox holds something.
+    mapped: bool,
+    /// It was seen to hold something, and nobody has looked since.
+    full: bool,
 }
 
 /// The queues of all SubDevices with a mailbox. Clones mean the same queues.
@@ -126,6 +130,43 @@ impl Queues {
         NextJob { queues: self.clone(), id, sleep }
     }
 
+    /// Waits until a mailbox is seen to hold something, at most so long.
+    pub(crate) fn mail(&self, id: DeviceId, sleep: Sleep) -> Mail {
+        Mail { queues: self.clone(), id, sleep }
+    }
+
+    /// From now on the cycle reads whether these mailboxes hold something.
+    pub(crate) fn listen(&self, devices: impl Iterator<Item = DeviceId>) {
+        let mut queues = lock(&self.queues);
+        for id in devices {
+            if let Some(queue) = queues.get_mut(&id) {
+                queue.mapped = true;
+            }
+        }
+    }
+
+    /// The cycle has read whether these mailboxes hold something.
+    pub(crate) fn see(&self, mailboxes: impl Iterator<Item = (DeviceId, bool)>) {
+        let mut queues = lock(&self.queues);
+        for (id, full) in mailboxes {
+            let Some(queue) = queues.get_mut(&id) else { continue };
+            queue.full = full;
+            if full && let Some(waker) = queue.waker.take() {
+                waker.wake();
+            }
+        }
+    }
+
+    /// Whether the cycle reads if a mailbox holds something.
+    pub(crate) fn is_mapped(&self, id: DeviceId) -> bool {
+        lock(&self.queues).get(&id).is_some_and(|queue| queue.mapped)
+    }
+
+    /// Whether a mailbox was seen to hold something; it is about to be looked into.
+    pub(crate) fn take_full(&self, id: DeviceId) -> bool {
+        lock(&self.queues).get_mut(&id).is_some_and(|queue| std::mem::take(&mut queue.full))
+    }
+
     /// Notes how an access went.
     pub(crate) fn note(&self, id: DeviceId, at: Instant, request: &MailboxRequest, how: &Outcome) {
         if let Some(queue) = lock(&self.queues).get_mut(&id) {
@@ -134,6 +175,17 @@ impl Queues {
                 Err(failure) => queue.errors.failed(at, failure.clone()),
             }
         }
+    }
+
+    /// The mailboxes in which something went wrong so far: whose, how often, and what stands.
+    pub(crate) fn troubles(&self) -> Vec<(DeviceId, u64, Vec<ProtocolError>)> {
+        let queues = lock(&self.queues);
+        let failed = queues.iter().filter(|(_, queue)| queue.errors.total() > 0);
+        failed
+            .map(|(id, queue)| {
+                (*id, queue.errors.total(), queue.errors.standing().cloned().collect())
+            })
+            .collect()
     }
 
     /// What went wrong in a mailbox; `None` for a SubDevice without one.
@@ -156,8 +208,32 @@ impl Future for NextJob {
             if let Some(job) = queue.jobs.pop_front() {
                 return Poll::Ready(Some(job));
             }
+            if queue.full {
+                return Poll::Ready(None);
+            }
             queue.waker = Some(context.waker().clone());
         }
         Pin::new(&mut self.sleep).poll(context).map(|()| None)
+    }
+}
+
+/// Waits until a mailbox is seen to hold something.
+pub(crate) struct Mail {
+    queues: Queues,
+    id: DeviceId,
+    sleep: Sleep,
+}
+
+impl Future for Mail {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        if let Some(queue) = lock(&self.queues.queues).get_mut(&self.id) {
+            if queue.full {
+                return Poll::Ready(());
+            }
+            queue.waker = Some(context.waker().clone());
+        }
+        Pin::new(&mut self.sleep).poll(context)
     }
 }

@@ -14,10 +14,11 @@ use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::{Handle, Wire, lock};
 use crate::mailbox::queue::Pending;
-use crate::mailbox::{MailboxRequest, ProtocolErrors, Queues};
+use crate::mailbox::{MailboxRequest, ProtocolError, ProtocolErrors, Queues};
 use crate::procedure::{look, scan, state};
 use crate::service::{self, Attended, Servant, Service, ServiceFailure, ServiceTicket};
 use crate::supervisor::{self, Context, Line};
+use crate::watch::Standing;
 
 /// One register access beside the cycle, for those who want to know more.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -83,8 +84,10 @@ impl MainDevice {
         wire.spawn(supervisor::supervise(context));
         let allowed = self.options.allowed_misses;
         let (shared, known) = (Arc::clone(&plan), Arc::clone(&line));
-        let cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
-        self.running = Some(Running { cyclic, plan, line, mailboxes });
+        let mut cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
+        cyclic.serve(mailboxes.clone());
+        let standing = Standing::new(&plan);
+        self.running = Some(Running { cyclic, plan, line, mailboxes, standing });
         self.acyclic_left = self.options.frames_at_once;
         self.handle_timeout(now);
     }
@@ -265,5 +268,19 @@ impl MainDevice {
     #[must_use]
     pub fn protocol_errors(&self, id: DeviceId) -> Option<ProtocolErrors> {
         self.running.as_ref()?.mailboxes.errors(id)
+    }
+
+    /// The mailboxes of running SubDevices in which something went wrong so far: whose, how often, and
+    /// the errors that the next clean access erases.
+    #[must_use]
+    pub fn mailbox_troubles(&self) -> Vec<(DeviceId, u64, Vec<ProtocolError>)> {
+        self.running.as_ref().map(|running| running.mailboxes.troubles()).unwrap_or_default()
+    }
+
+    /// Error and change counters of [`MainDevice::standing`] begin at 0 again. No register is touched.
+    pub fn clear_counts(&mut self) {
+        if let Some(running) = &mut self.running {
+            running.standing.clear();
+        }
     }
 }

@@ -21,6 +21,7 @@ use crate::options::Options;
 use crate::service::Attended;
 use crate::statistics::Statistics;
 use crate::supervisor::{BringUpTimes, Line};
+use crate::watch::Standing;
 
 pub use command::ProbeRequest;
 
@@ -54,6 +55,7 @@ struct Running {
     plan: Arc<Plan>,
     line: Arc<Mutex<Line>>,
     mailboxes: Queues,
+    standing: Standing,
 }
 
 impl MainDevice {
@@ -266,6 +268,7 @@ impl MainDevice {
                 running.cyclic.lost(frame, &mut |event| shared.emit(event));
             }
             Purpose::Acyclic => {
+                self.statistics.queued_lost += u64::from(!self.exchange.slot(slot).truncated);
                 for queued in self.exchange.take_requests(slot) {
                     match self.exchange.again(queued) {
                         None => self.statistics.repeats += 1,
@@ -304,7 +307,11 @@ impl MainDevice {
     /// What has happened, oldest first.
     #[inline]
     pub fn poll_event(&mut self) -> Option<Event> {
-        self.executor.poll_event()
+        let event = self.executor.poll_event()?;
+        if let Some(running) = &mut self.running {
+            running.standing.handle_event(self.executor.now(), &event);
+        }
+        Some(event)
     }
 
     // ---- what is there ----
@@ -385,6 +392,13 @@ impl MainDevice {
     #[must_use]
     pub fn frame_status(&self, task: usize, frame: usize) -> Option<FrameStatus> {
         self.running.as_ref()?.cyclic.frame_status(task, frame)
+    }
+
+    /// How the network of the running plan stands: the state words of SubDevices and network, error
+    /// totals, change counters. It follows the events that were fetched. `None` unless a plan runs.
+    #[must_use]
+    pub fn standing(&self) -> Option<&Standing> {
+        self.running.as_ref().map(|running| &running.standing)
     }
 
     /// How many SubDevices answered the last cyclic broadcast read.

@@ -75,6 +75,15 @@ pub(crate) fn al_of(reply: &Reply) -> (AlStatus, AlStatusCode) {
     (AlStatus(reply.word(0)), AlStatusCode(reply.word(4)))
 }
 
+/// Error counters as they were read, those left out that the controller is known not to have.
+pub(crate) fn counters_of(reply: &Reply, information: Option<EscInformation>) -> ErrorCounters {
+    let counters = ErrorCounters::from_bytes(&reply.data, ErrorCounters::START);
+    match information.is_none_or(|known| known.features.separate_forwarded_errors()) {
+        true => counters,
+        false => counters.without_forwarded(),
+    }
+}
+
 /// How many SubDevices process frames, and their states.
 ///
 /// # Errors
@@ -149,7 +158,7 @@ async fn look_at(wire: Wire, target: Target, position: Position) -> LookedDevice
     let addresses = next();
     let dl_status = next().map(|reply| DlStatus(reply.word(0)));
     let al = next().map(|reply| al_of(&reply));
-    let counters = next().map(|reply| ErrorCounters::from_bytes(&reply.data, ErrorCounters::START));
+    let counters = next().map(|reply| counters_of(&reply, information));
     LookedDevice {
         position,
         target,

@@ -2,6 +2,7 @@
 
 pub mod address;
 pub mod clock;
+pub mod counters;
 pub mod look;
 pub mod scan;
 pub mod set_up;

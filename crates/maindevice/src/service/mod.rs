@@ -37,6 +37,9 @@ pub enum Service {
     Enter(AlState),
     /// Acknowledge an error, without another state; gives [`ServiceAnswer::State`].
     Acknowledge,
+    /// Read all error counters and clear them in one go; the totals of the watch keep what stood there.
+    /// Gives [`ServiceAnswer::Data`], the bytes of 0x0300 to 0x0313 as they were.
+    ClearCounters,
     /// Read registers, or the memory behind them; gives [`ServiceAnswer::Data`].
     ReadRegister {
         /// From where.

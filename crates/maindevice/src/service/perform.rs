@@ -7,8 +7,9 @@ use linesman_proto::address::DeviceId;
 
 use super::failure::ServiceFailure;
 use super::{Service, ServiceAnswer, state};
+use crate::event::Event;
 use crate::exchange::Target;
-use crate::executor::Wire;
+use crate::executor::{Wire, lock};
 use crate::mailbox::Queues;
 use crate::procedure;
 use crate::supervisor::Line;
@@ -44,6 +45,7 @@ pub(crate) async fn perform(
         Service::State => state::look(servant, device).await,
         Service::Enter(to) => state::enter(servant, device, to).await,
         Service::Acknowledge => state::acknowledge(servant, device).await,
+        Service::ClearCounters => clear_counters(servant, id, target).await,
         Service::ReadRegister { address, len } => {
             let reply = wire.read_one(target, address, len).await;
             reply.map(|reply| ServiceAnswer::Data(reply.data)).map_err(|error| register(id, error))
@@ -58,6 +60,19 @@ pub(crate) async fn perform(
         }
         Service::WriteSii { at, data } => write_sii(wire, device, at, &data).await,
     }
+}
+
+async fn clear_counters(
+    servant: &Servant,
+    id: DeviceId,
+    target: Target,
+) -> Result<ServiceAnswer, ServiceFailure> {
+    lock(&servant.line).note_clear(id);
+    let result = procedure::counters::read_and_clear(&servant.wire, target).await;
+    lock(&servant.line).note_clear(id);
+    let counters = result.map_err(|error| register(id, error))?;
+    servant.wire.emit(Event::CountersCleared { id, counters });
+    Ok(ServiceAnswer::Data(counters.to_bytes().to_vec()))
 }
 
 fn register(id: DeviceId, error: crate::exchange::ExchangeError) -> ServiceFailure {

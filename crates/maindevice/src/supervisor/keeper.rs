@@ -2,7 +2,7 @@
 
 use linesman_config::plan::DevicePlan;
 use linesman_proto::address::DeviceId;
-use linesman_proto::register::{self, AlStatus, DlStatus, ErrorCounters};
+use linesman_proto::register::{self, AlStatus, DlStatus, ErrorCounters, EscInformation};
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::{Instant, Span};
 
@@ -12,7 +12,7 @@ use super::{CALM, Context, Found, lose};
 use crate::event::Event;
 use crate::exchange::{Reply, Target};
 use crate::executor::lock;
-use crate::procedure::look::{AL_LEN, al_of};
+use crate::procedure::look::{AL_LEN, al_of, counters_of};
 use crate::procedure::state::StepError;
 
 /// What is known of the SubDevice, so that only changes are told.
@@ -21,6 +21,8 @@ pub(super) struct Known {
     al: Option<(AlStatus, AlStatusCode)>,
     dl: Option<DlStatus>,
     counters: Option<ErrorCounters>,
+    /// Its controller: which counters it has.
+    information: Option<EscInformation>,
 }
 
 /// Why the SubDevice has to be driven again.
@@ -251,6 +253,13 @@ impl Keeper<'_> {
     /// Reads state, ports and counters and tells what has changed. False when it does not answer.
     async fn read(&mut self) -> bool {
         let (wire, target, id) = (&self.context.wire, self.target(), self.device.id);
+        if self.known.information.is_none() {
+            let len = EscInformation::LEN as u16;
+            let reply = wire.read(target, register::ESC_TYPE.address, len).await.ok();
+            let reply = reply.filter(Reply::answered);
+            self.known.information = reply.map(|reply| EscInformation::from_bytes(reply.bytes(0)));
+        }
+        let clears = lock(&self.context.line).clears(id);
         let al = wire.read(target, register::AL_STATUS.address, AL_LEN);
         let dl = wire.read(target, register::DL_STATUS.address, register::DL_STATUS.len);
         let counters = wire.read(target, ErrorCounters::START, ErrorCounters::LEN as u16);
@@ -273,8 +282,9 @@ impl Keeper<'_> {
                 self.context.wire.emit(Event::Links { id, status });
             }
         }
-        if let Some(reply) = counters {
-            let counters = ErrorCounters::from_bytes(&reply.data, ErrorCounters::START);
+        let cleared = lock(&self.context.line).clears(id) != clears;
+        if let Some(reply) = counters.filter(|_| !cleared) {
+            let counters = counters_of(&reply, self.known.information);
             if self.known.counters.replace(counters) != Some(counters) {
                 self.context.wire.emit(Event::Counters { id, counters });
             }

@@ -56,6 +56,8 @@ struct Live {
     requests: u32,
     /// How often it was lost.
     losses: u32,
+    /// Changes when its error counters are about to be cleared, and when they are.
+    clears: u32,
 }
 
 /// The SubDevices of a network as they are.
@@ -307,6 +309,18 @@ impl Line {
     /// How often a SubDevice was lost.
     pub(crate) fn losses(&self, id: DeviceId) -> u32 {
         self.devices.get(id.index()).map_or(0, |live| live.losses)
+    }
+
+    /// The error counters of a SubDevice are about to be cleared, or were.
+    pub(crate) fn note_clear(&mut self, id: DeviceId) {
+        if let Some(live) = self.live(id) {
+            live.clears += 1;
+        }
+    }
+
+    /// Changes with each clear: a reading that was under way meanwhile may be from before it.
+    pub(crate) fn clears(&self, id: DeviceId) -> u32 {
+        self.devices.get(id.index()).map_or(0, |live| live.clears)
     }
 
     /// Notes what a phase of a SubDevice took.

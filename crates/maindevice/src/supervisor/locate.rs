@@ -146,6 +146,7 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
         let (id, found) = (planned[of], identities[at]);
         match differs(id, &found) {
             None => {
+                context.wire.emit(Event::Identified { id, found });
                 let (context, place) = (context.clone(), seen[at].place);
                 let wire = context.wire.clone();
                 giving.push(wire.spawn(async move { give_address(&context, place, id).await }));

@@ -19,6 +19,17 @@ pub enum StartUpError {
     Register(#[from] ExchangeError),
 }
 
+impl StartUpError {
+    /// Whether the SubDevice itself has said no.
+    #[must_use]
+    pub fn is_refusal(&self) -> bool {
+        match self {
+            Self::Object(failure) => failure.why.is_refusal(),
+            Self::Register(_) => false,
+        }
+    }
+}
+
 /// Where on the way of a transition commands are executed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Moment {

@@ -18,31 +18,42 @@ pub struct CounterTotals {
 }
 
 impl CounterTotals {
-    /// Takes a reading; gives by how much each counter rose, those that did not left out. A first
-    /// reading is history: what happened while the power came counts for nothing.
-    pub fn record(&mut self, reading: &ErrorCounters) -> Vec<(ErrorCounter, u64)> {
-        let mut risen = Vec::new();
-        let differences: Vec<_> = match &self.last {
-            Some(last) => reading.since(last).collect(),
-            None => Vec::new(),
-        };
+    /// By how much each counter rose from the last reading to this one, those that did not left out.
+    /// A first reading is history: what happened while the power came counts for nothing.
+    #[must_use]
+    pub fn rises(&self, reading: &ErrorCounters) -> Vec<(ErrorCounter, u64)> {
+        let Some(last) = &self.last else { return Vec::new() };
+        let risen = reading.since(last).filter(|(_, difference)| difference.rise > 0);
+        risen.map(|(counter, difference)| (counter, u64::from(difference.rise))).collect()
+    }
+
+    /// Takes a reading.
+    pub fn record(&mut self, reading: &ErrorCounters) {
+        let differences: Vec<_> = self.last.iter().flat_map(|last| reading.since(last)).collect();
         for (counter, total) in ErrorCounter::ALL.into_iter().zip(&mut self.totals) {
             let Some(value) = reading.value(counter) else { continue };
-            let cleared = differences
-                .iter()
-                .any(|(other, difference)| *other == counter && difference.cleared);
-            let difference =
-                if cleared { total.record_after_clear(value) } else { total.record(value) };
-            if let Some(difference) = difference.filter(|difference| difference.rise > 0) {
-                risen.push((counter, u64::from(difference.rise)));
+            let cleared = differences.iter().any(|(one, found)| *one == counter && found.cleared);
+            if cleared {
+                total.record_after_clear(value);
+            } else {
+                total.record(value);
             }
         }
         self.last = Some(*reading);
-        risen
+    }
+
+    /// We cleared all of them ourselves right after the last reading, in the same frame: the next one
+    /// counts from 0, and nothing is lost.
+    pub fn cleared_by_us(&mut self) {
+        self.begin_at_zero();
     }
 
     /// The SubDevice was without power: its counters begin at 0, and nobody cleared them.
     pub fn restarted(&mut self) {
+        self.begin_at_zero();
+    }
+
+    fn begin_at_zero(&mut self) {
         for total in &mut self.totals {
             if total.last().is_some() {
                 total.note_own_clear();
@@ -77,6 +88,12 @@ impl CounterTotals {
     #[must_use]
     pub fn registers(&self) -> Option<&ErrorCounters> {
         self.last.as_ref()
+    }
+
+    /// Frame and symbol errors of all ports together.
+    #[must_use]
+    pub fn sum(&self) -> u64 {
+        Port::ALL.into_iter().filter_map(|port| self.at_port(port)).sum()
     }
 
     /// What the online list shows for a port: damaged frames, whoever marked them, and symbols.

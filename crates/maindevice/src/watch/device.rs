@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use linesman_config::plan::{DevicePlan, Plan};
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::{Port, PortMap};
-use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters};
+use linesman_proto::register::{AlStatus, DlStatus};
+use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode, DeviceState, StateValue};
 use linesman_proto::time::Instant;
 
@@ -37,6 +38,7 @@ pub struct WatchedDevice {
     present: Option<bool>,
     status: Option<AlStatus>,
     code: AlStatusCode,
+    found: Option<Identity>,
     wrong_identity: bool,
     init_error: bool,
     links: Option<DlStatus>,
@@ -57,6 +59,7 @@ impl WatchedDevice {
             present: None,
             status: None,
             code: AlStatusCode::NO_ERROR,
+            found: None,
             wrong_identity: false,
             init_error: false,
             links: None,
@@ -77,6 +80,24 @@ impl WatchedDevice {
     #[must_use]
     pub fn is_present(&self) -> Option<bool> {
         self.present
+    }
+
+    /// Who is there, planned or not; `None` before it was asked.
+    #[must_use]
+    pub fn found(&self) -> Option<&Identity> {
+        self.found.as_ref()
+    }
+
+    /// Whether a port has a neighbour in the plan.
+    #[must_use]
+    pub fn is_planned(&self, port: Port) -> bool {
+        self.planned[port]
+    }
+
+    /// State and error as AL status says; `None` before it was read.
+    #[must_use]
+    pub fn al_status(&self) -> Option<AlStatus> {
+        self.status
     }
 
     /// The state word: software in the low byte, wiring in the high byte.
@@ -201,7 +222,14 @@ impl WatchedDevice {
                     self.counters.restarted();
                 }
             }
-            Event::WrongDevice { .. } => self.wrong_identity = true,
+            Event::Identified { found, .. } => {
+                self.found = Some(*found);
+                self.wrong_identity = false;
+            }
+            Event::WrongDevice { found, .. } => {
+                self.found = Some(*found);
+                self.wrong_identity = true;
+            }
             Event::Links { status, .. } => {
                 self.present = Some(true);
                 self.links = Some(*status);
@@ -209,13 +237,12 @@ impl WatchedDevice {
             Event::Counters { counters, .. } => {
                 self.counters.record(counters);
             }
+            Event::CountersCleared { counters, .. } => {
+                self.counters.record(counters);
+                self.counters.cleared_by_us();
+            }
             _ => {}
         }
-    }
-
-    /// By how much the counters rise with this reading.
-    pub(super) fn rises(&self, reading: &ErrorCounters) -> Vec<(ErrorCounter, u64)> {
-        self.counters.clone().record(reading)
     }
 
     pub(super) fn clear(&mut self) {
@@ -239,6 +266,8 @@ pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
         | Event::DeviceBack { id, .. }
         | Event::WrongDevice { id, .. }
         | Event::Counters { id, .. }
+        | Event::CountersCleared { id, .. }
+        | Event::Identified { id, .. }
         | Event::Links { id, .. }
         | Event::Emergency { id, .. }
         | Event::SdoUploaded { id, .. }

@@ -10,14 +10,15 @@
 mod counters;
 mod device;
 mod entry;
+mod standing;
 mod wording;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use linesman_config::plan::Plan;
-use linesman_proto::address::{DeviceId, Path, WorkingCounter};
-use linesman_proto::state::{AlState, NetworkState, StateValue};
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::state::NetworkState;
 use linesman_proto::time::{Instant, Span};
 
 use crate::event::Event;
@@ -25,6 +26,7 @@ use crate::event::Event;
 pub use counters::CounterTotals;
 pub use device::{AbnormalChange, WatchedDevice};
 pub use entry::{EntryKind, LogEntry, Severity};
+pub use standing::Standing;
 
 /// So many entries wait for somebody who fetches them; older ones are dropped and counted.
 const WAITING_ENTRIES: usize = 10_000;
@@ -35,10 +37,7 @@ const LOST_TOGETHER: Span = Span::ms(20);
 #[derive(Debug)]
 pub struct Watch {
     plan: Arc<Plan>,
-    devices: Vec<WatchedDevice>,
-    /// Bits that do not follow from the SubDevices.
-    own: NetworkState,
-    responding: Option<WorkingCounter>,
+    standing: Standing,
     /// SubDevices that got lost and were not told of yet, and since when.
     lost: Vec<DeviceId>,
     lost_at: Instant,
@@ -50,12 +49,9 @@ impl Watch {
     /// A watch over the SubDevices of a plan, of which nothing is known yet.
     #[must_use]
     pub fn new(plan: Arc<Plan>) -> Self {
-        let devices = plan.devices.iter().map(|device| WatchedDevice::new(&plan, device)).collect();
         Self {
+            standing: Standing::new(&plan),
             plan,
-            devices,
-            own: NetworkState::default(),
-            responding: None,
             lost: Vec::new(),
             lost_at: Instant::ZERO,
             entries: VecDeque::new(),
@@ -65,44 +61,16 @@ impl Watch {
 
     // ---- getters ----
 
-    /// What is known of each SubDevice, by [`DeviceId`].
+    /// How the network stands.
     #[must_use]
-    pub fn devices(&self) -> &[WatchedDevice] {
-        &self.devices
+    pub fn standing(&self) -> &Standing {
+        &self.standing
     }
 
-    /// What is known of one SubDevice.
+    /// The plan that is watched.
     #[must_use]
-    pub fn device(&self, id: DeviceId) -> Option<&WatchedDevice> {
-        self.devices.get(id.index())
-    }
-
-    /// The network's state word.
-    #[must_use]
-    pub fn network_state(&self) -> NetworkState {
-        let mut word = self.own;
-        for device in &self.devices {
-            let state = device.state();
-            let bit = match state.state() {
-                StateValue::Known(AlState::PreOp) => NetworkState::SOME_PREOP,
-                StateValue::Known(AlState::SafeOp) => NetworkState::SOME_SAFEOP,
-                StateValue::Known(AlState::Op) => 0,
-                StateValue::Known(AlState::Init | AlState::Boot) | StateValue::Unknown(_) => {
-                    NetworkState::SOME_INIT
-                }
-            };
-            word = word.with(bit, true);
-            if device.has_error() {
-                word = word.with(NetworkState::SOME_ERROR, true);
-            }
-        }
-        word
-    }
-
-    /// How many SubDevices answered the last broadcast read.
-    #[must_use]
-    pub fn responding(&self) -> Option<WorkingCounter> {
-        self.responding
+    pub fn plan(&self) -> &Plan {
+        &self.plan
     }
 
     /// How many entries were dropped because nobody fetched them.
@@ -114,7 +82,6 @@ impl Watch {
     // ---- what comes in ----
 
     /// Something happened.
-    #[allow(clippy::wildcard_enum_match_arm, reason = "the others are of one SubDevice")]
     pub fn handle_event(&mut self, now: Instant, event: &Event) {
         self.handle_timeout(now);
         if let Event::DeviceLost { id } = event {
@@ -123,22 +90,9 @@ impl Watch {
             }
             self.lost.push(*id);
         }
-        match event {
-            Event::Responding { now: count, .. } => self.responding = Some(*count),
-            Event::Ring { intact } => {
-                self.own = self.own.with(NetworkState::REDUNDANCY_FRAME_MISSING, !intact);
-            }
-            Event::OutputsWithheld { .. } => self.own = self.own.with(NetworkState::WATCHDOG, true),
-            Event::OutputsResumed { .. } => self.own = self.own.with(NetworkState::WATCHDOG, false),
-            _ => {}
-        }
         // The wording may need what was before.
-        let entries = wording::of(now, event, self);
-        if let Some(id) = device::concerned(event)
-            && let Some(device) = self.devices.get_mut(id.index())
-        {
-            device.handle_event(now, event);
-        }
+        let entries = wording::of(now, event, &self.plan, &self.standing);
+        self.standing.handle_event(now, event);
         for entry in entries {
             self.push(entry);
         }
@@ -150,23 +104,19 @@ impl Watch {
             Path::A => NetworkState::LINK_ERROR,
             Path::B => NetworkState::REDUNDANCY_LINK_ERROR,
         };
-        let before = self.own;
-        self.own = before.with(bit, !carrier);
-        if self.own != before {
+        if self.standing.set(bit, !carrier) {
             self.push(wording::carrier(now, card, carrier));
         }
     }
 
     /// The card took a frame, or did not.
     pub fn handle_send_failure(&mut self, failing: bool) {
-        self.own = self.own.with(NetworkState::OUT_OF_SEND_RESOURCES, failing);
+        self.standing.set(NetworkState::OUT_OF_SEND_RESOURCES, failing);
     }
 
     /// The clocks are further apart than the window allows, or are not any more.
     pub fn handle_clocks(&mut self, now: Instant, apart: bool) {
-        let before = self.own;
-        self.own = before.with(NetworkState::CLOCKS_APART, apart);
-        if self.own != before {
+        if self.standing.set(NetworkState::CLOCKS_APART, apart) {
             self.push(wording::clocks(now, apart));
         }
     }
@@ -192,9 +142,7 @@ impl Watch {
     /// All error counters and change counters of the list begin at 0 again. Nothing is written to
     /// the SubDevices: other tools go on as they were, and no count is lost.
     pub fn clear(&mut self) {
-        for device in &mut self.devices {
-            device.clear();
-        }
+        self.standing.clear();
     }
 
     // ---- what goes out ----

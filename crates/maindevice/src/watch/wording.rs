@@ -8,13 +8,12 @@ use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
 use linesman_proto::time::Instant;
 
-use super::{EntryKind, LogEntry, Severity, Watch};
+use super::{EntryKind, LogEntry, Severity, Standing};
 use crate::event::Event;
 
-/// The entries for an event; `watch` still stands as it was before it.
+/// The entries for an event; `standing` is that before it.
 #[allow(clippy::wildcard_enum_match_arm, reason = "answers are told by whoever asked")]
-pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
-    let plan = &watch.plan;
+pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -> Vec<LogEntry> {
     let about = |id: DeviceId, severity, kind, text: String| LogEntry {
         at,
         severity,
@@ -44,7 +43,10 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
         Event::AllReached => vec![line(
             Severity::Info,
             EntryKind::State,
-            format!("all {} SubDevices have reached their states", plan.devices.len()),
+            match plan.devices.len() {
+                1 => "the SubDevice has reached its state".to_owned(),
+                count => format!("all {count} SubDevices have reached their states"),
+            },
         )],
         Event::DeviceBack { id, restarted } => {
             let how = if *restarted { ", after a restart" } else { "" };
@@ -53,7 +55,10 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
         }
         Event::Responding { before, now } => {
             let severity = if now < before { Severity::Warning } else { Severity::Info };
-            let text = format!("{now} SubDevices answer, {before} did before");
+            let text = match now.0 {
+                1 => format!("1 SubDevice answers, {before} did before"),
+                _ => format!("{now} SubDevices answer, {before} did before"),
+            };
             vec![line(severity, EntryKind::Communication, text)]
         }
         Event::Ring { intact: true } => {
@@ -65,7 +70,7 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
             "the ring is open: frames come back to the card that sent them".into(),
         )],
         Event::Links { id, status } => {
-            let Some(before) = watch.device(*id).and_then(super::WatchedDevice::links) else {
+            let Some(before) = standing.device(*id).and_then(super::WatchedDevice::links) else {
                 return Vec::new();
             };
             let change = |port| {
@@ -80,8 +85,9 @@ pub(super) fn of(at: Instant, event: &Event, watch: &Watch) -> Vec<LogEntry> {
             };
             Port::ALL.into_iter().filter_map(change).collect()
         }
-        Event::Counters { id, counters } => {
-            let rises = watch.device(*id).map_or_else(Vec::new, |device| device.rises(counters));
+        Event::Counters { id, counters } | Event::CountersCleared { id, counters } => {
+            let rises = standing.counters(*id).map(|known| known.rises(counters));
+            let rises = rises.unwrap_or_default();
             let texts = rises.iter().map(|(counter, rise)| format!("{counter} +{rise}"));
             let texts: Vec<_> = texts.collect();
             if texts.is_empty() {

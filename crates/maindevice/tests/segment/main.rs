@@ -17,4 +17,5 @@ mod scan;
 mod soak;
 mod software;
 mod start_up;
+mod watch;
 mod wire_faults;

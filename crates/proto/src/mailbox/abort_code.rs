@@ -86,8 +86,8 @@ const CIA: &str = "CiA 301, SDO abort codes";
 
 const MANUAL_OF_OBJECT: &str =
     "Compare index, subindex, length and value with the object in the SubDevice's manual.";
-const START_UP_LIST: &str = "Remove the entry from the start-up list, or replace it by one of the \
-     connected device's description: the list was probably made for another revision.";
+const OWN_DICTIONARY: &str = "Look into the SubDevice's own dictionary (`linesman sdo WHERE DEVICE list`): \
+     objects differ between types and revisions.";
 const STATE_FIRST: &str = "Take the SubDevice to PREOP and repeat the request; assignments of PDOs \
      can be changed only there.";
 const PDO_SIZE: &str = "Map fewer or shorter objects into this PDO.";
@@ -126,7 +126,7 @@ abort_codes! {
         => "Do not read it; the manual names the object that shows the effect.";
     READ_ONLY 0x0601_0002 ETG, "Attempt to write a read only object";
         "The object cannot be written, or not in this revision of the device or in this state."
-        => START_UP_LIST;
+        => OWN_DICTIONARY;
     SUBINDEX_0_NOT_ZERO 0x0601_0003 ETG,
         "Subindex cannot be written, subindex 0 must be 0 for write access";
         "The list is in use: its number of entries stands in subindex 0 and is not 0."
@@ -143,7 +143,7 @@ abort_codes! {
     NO_OBJECT 0x0602_0000 ETG, "The object does not exist in the object dictionary";
         "The SubDevice has no such object, often because it is of another revision, or another \
          module is in the slot."
-        => START_UP_LIST;
+        => OWN_DICTIONARY;
     NOT_MAPPABLE 0x0604_0041 ETG, "The object cannot be mapped into the PDO";
         "The object may not be exchanged as process data, or not in this direction."
         => MANUAL_OF_OBJECT;
@@ -226,7 +226,7 @@ const fn class_of(code: u32) -> AbortCode {
         0x0601 => {
             ("Unknown access error", "The object cannot be accessed in this way.", MANUAL_OF_OBJECT)
         }
-        0x0602 => ("Unknown object error", "The object is not there.", START_UP_LIST),
+        0x0602 => ("Unknown object error", "The object is not there.", OWN_DICTIONARY),
         0x0604 => (
             "Unknown parameter error",
             "The value does not go with other settings.",

@@ -252,6 +252,16 @@ impl ErrorCounters {
         }
     }
 
+    /// Without the counters of forwarded errors: a controller that does not count them apart (feature
+    /// bit 7 of 0x0008) reads 0 there, which says nothing.
+    #[must_use]
+    pub fn without_forwarded(mut self) -> Self {
+        for port in Port::ALL {
+            *self.slot(ErrorCounter::Forwarded(port)) = None;
+        }
+        self
+    }
+
     /// The counters that were read, in order of addresses.
     pub fn iter(&self) -> impl Iterator<Item = (ErrorCounter, u8)> {
         ErrorCounter::ALL

@@ -28,10 +28,15 @@ pub(crate) struct Faulting(Reading);
 
 impl Protocol for Faulting {
     type Request = Request;
+    type Given = Answer;
     type Answer = Answer;
     const WHO: &'static str = "segment";
     const EXAMPLE: &'static str = "{\"do\":\"list\"}";
     const PATIENCE: Duration = Duration::from_secs(2);
+
+    fn answer(&self, given: Answer) -> Answer {
+        given
+    }
 
     fn refusal(&self, why: String) -> Answer {
         Answer::Faults(Faults::refusal(why))

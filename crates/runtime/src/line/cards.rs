@@ -4,6 +4,7 @@ use linesman_diagnosis::HostObservation;
 use linesman_link::clock::{HostClock, tighten_timers};
 use linesman_link::error::LinkError;
 use linesman_link::socket::{Bell, RawSocket, Ready, SocketOptions, Waitable, Waker, wait_any};
+use linesman_maindevice::Options;
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
@@ -93,6 +94,10 @@ impl Cards {
 }
 
 impl Line for Cards {
+    fn options(&self) -> Options {
+        Options { ring: self.cards.len() > 1, ..Options::default() }
+    }
+
     #[inline]
     fn now(&self) -> Instant {
         self.clock.now()

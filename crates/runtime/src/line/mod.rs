@@ -5,6 +5,7 @@ pub mod segment;
 
 use linesman_diagnosis::HostObservation;
 use linesman_link::error::LinkError;
+use linesman_maindevice::Options;
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
@@ -26,6 +27,9 @@ pub struct Arrived<'a> {
 
 /// A line, and the clock that it is driven by.
 pub trait Line {
+    /// How a MainDevice has to be set up for this line; all else is as usual.
+    fn options(&self) -> Options;
+
     /// Now.
     fn now(&self) -> Instant;
 
@@ -58,6 +62,10 @@ pub trait Line {
 }
 
 impl<L: Line + ?Sized> Line for &mut L {
+    fn options(&self) -> Options {
+        (**self).options()
+    }
+
     fn now(&self) -> Instant {
         (**self).now()
     }

@@ -9,6 +9,7 @@ use linesman_diagnosis::observe::HostEvent;
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
 use linesman_link::socket::{Bell, Waitable, Waker, wait_any};
+use linesman_maindevice::Options;
 use linesman_proto::address::{Network, Path};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::{HostPort, Segment};
@@ -79,12 +80,6 @@ impl VirtualLine {
         &mut self.segment
     }
 
-    /// How many cards there are.
-    #[must_use]
-    pub const fn count(&self) -> usize {
-        self.paths
-    }
-
     /// What wakes the thread that waits.
     #[must_use]
     pub fn bell(&self) -> Bell {
@@ -93,6 +88,11 @@ impl VirtualLine {
 }
 
 impl Line for VirtualLine {
+    fn options(&self) -> Options {
+        let usual = Options { ring: self.paths > 1, ..Options::default() };
+        usual.on_line(self.segment.tree().len(), self.segment.longest_way())
+    }
+
     fn now(&self) -> Instant {
         self.now
     }

@@ -11,10 +11,12 @@ use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
+use super::bring_up::BringUpReport;
 use super::io::{Application, Io, Next};
 use super::judge::judge;
 use super::real_time::{Granted, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
+use super::scan;
 use super::tap::{Tap, tap};
 use crate::drive::{Audience, Driver};
 use crate::line::Line;
@@ -22,8 +24,6 @@ use crate::serve::lateness::Lateness;
 use crate::service::ServiceDesk;
 use crate::stop::Stop;
 
-/// How long a scan of a line may take.
-const SCAN_PATIENCE: Span = Span::s(60);
 /// How long SubDevices may take to go down at the end.
 const LEAVE_PATIENCE: Span = Span::s(5);
 /// So many cycles carry zeros before the exchange ends.
@@ -67,6 +67,8 @@ pub enum Note {
     Planned(Arc<Plan>),
     /// The MainDevice tells something.
     Event(Instant, Box<Event>),
+    /// The host has noticed something.
+    Host(HostObservation),
     /// The diagnosis tells something.
     Finding(Box<linesman_diagnosis::Event>),
     /// The line is being stopped.
@@ -154,6 +156,7 @@ impl<A: Application> Operator<A> {
             on: self.on.clone(),
             time_ns: now.since(self.begun_at).as_nanos(),
             reached_ns: self.reached_at.map(|at| at.since(self.begun_at).as_nanos()),
+            bring_up: None,
             settled: main.is_settled(),
             outputs_withheld: self.withheld,
             devices,
@@ -202,6 +205,7 @@ impl<A: Application> Audience for Operator<A> {
     }
 
     fn host(&mut self, observation: &HostObservation) {
+        self.note(Note::Host(*observation));
         if let Some(tap) = &mut self.tap {
             tap.host(observation);
         }
@@ -235,7 +239,7 @@ impl<A: Application> Audience for Operator<A> {
         }
         if !self.begun {
             self.begun = true;
-            self.scan_until = now + SCAN_PATIENCE;
+            self.scan_until = now + scan::PATIENCE;
             match self.wanted.take() {
                 Some(Wanted::Plan(plan)) => self.start(now, *plan, main),
                 other => {
@@ -266,51 +270,6 @@ impl<A: Application> Audience for Operator<A> {
     }
 }
 
-/// Finds out what is on a line: it gets station addresses, and keeps its states.
-///
-/// # Errors
-/// When it does not answer, or the interface fails.
-pub fn scan<L: Line>(line: L, ring: bool, stop: &Stop) -> Result<Inventory, RunError> {
-    let mut driver = Driver::new(line, Options { ring, ..Options::default() });
-    let mut scanning = Scanning { begun: false, result: None };
-    let until = driver.now() + SCAN_PATIENCE;
-    driver.run(until, stop, &mut scanning)?;
-    let ended = "the scan was ended before it was done. Do: scan again";
-    scanning.result.unwrap_or_else(|| Err(RunError::Scan(ended.to_owned())))
-}
-
-/// Waits for the one result.
-struct Scanning {
-    begun: bool,
-    result: Option<Result<Inventory, RunError>>,
-}
-
-impl Audience for Scanning {
-    fn frame(&mut self, _: &FrameSeen<'_>) {}
-
-    fn host(&mut self, _: &HostObservation) {}
-
-    fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
-        if let Event::Scanned(inventory) = event {
-            self.result = Some(Ok(*inventory));
-        } else if let Event::ScanFailed(error) = event {
-            self.result = Some(Err(RunError::Scan(error.to_string())));
-        }
-    }
-
-    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
-        if !std::mem::replace(&mut self.begun, true) {
-            // It looks, with nothing but reads, before it writes.
-            main.scan(now);
-        }
-        self.result.is_none()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        None
-    }
-}
-
 /// A run that has ended.
 pub struct Ended {
     /// How it went.
@@ -338,7 +297,6 @@ pub struct Beside<'a> {
 /// When nothing could be run: the line does not answer, or is not what was wanted.
 pub fn run<L: Line, A: Application>(
     line: L,
-    ring: bool,
     wanted: Wanted,
     application: A,
     options: &RunOptions,
@@ -357,7 +315,7 @@ pub fn run<L: Line, A: Application>(
     // Threads started from here on would be real-time ones.
     let granted = options.real_time.map(RealTime::ask).unwrap_or_default();
     let allowed_misses = options.allowed_misses.filter(|_| !application.is_idle());
-    let settings = Options { ring, allowed_misses, ..Options::default() };
+    let settings = Options { allowed_misses, ..line.options() };
     let mut driver = Driver::new(line, settings);
     let begun = driver.now();
     let mut operator = Operator {
@@ -384,6 +342,8 @@ pub fn run<L: Line, A: Application>(
     let ran = driver.run(until, stop, &mut operator);
     let now = driver.now();
     let mut report = operator.report(now, driver.main_mut());
+    let times = operator.plan.as_deref().zip(driver.main_mut().bring_up_times());
+    report.bring_up = times.map(|(plan, times)| BringUpReport::of(plan, &times));
     let error = match (operator.failure.take(), ran) {
         (Some(failure), _) => Some(failure),
         (None, Err(error)) => Some(error.into()),

@@ -5,6 +5,7 @@ use linesman_maindevice::{MainDevice, Statistics};
 use linesman_proto::time::{Instant, Span};
 use serde::{Deserialize, Serialize};
 
+use super::bring_up::BringUpReport;
 use super::real_time::Granted;
 use crate::serve::lateness::LatenessReport;
 
@@ -25,6 +26,9 @@ pub struct RunReport {
     pub time_ns: u64,
     /// When all SubDevices had reached their targets, in ns since the start; `null`: they have not.
     pub reached_ns: Option<u64>,
+    /// What bringing up took, step by step; `null`: nothing was brought up, or the
+    /// line still runs.
+    pub bring_up: Option<BringUpReport>,
     /// Whether every SubDevice is in its target state.
     pub settled: bool,
     /// Whether outputs are withheld because the application is late.

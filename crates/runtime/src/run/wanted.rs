@@ -57,9 +57,9 @@ impl Choices {
             if planned.len() > project.devices.len() {
                 let extra = &planned[project.devices.len()].name;
                 return Err(format!(
-                    "found {} SubDevices, the project has {}; the first that it does not have is \
+                    "found {}, the project has {}; the first that it does not have is \
                      {extra}. Do: add it to the project, or take it out",
-                    planned.len(),
+                    so_many(planned.len()),
                     project.devices.len(),
                 ));
             }
@@ -95,9 +95,13 @@ impl Choices {
 
 fn too_few(project: &Project, missing: &str, inventory: &Inventory) -> String {
     format!(
-        "found {} SubDevices, the project has {}; the first that is missing is {missing}. Do: check \
+        "found {}, the project has {}; the first that is missing is {missing}. Do: check \
          cable and supply there, or look with `linesman diagnose --project`",
-        inventory.devices.len(),
+        so_many(inventory.devices.len()),
         project.devices.len(),
     )
+}
+
+fn so_many(count: usize) -> String {
+    if count == 1 { "1 SubDevice".to_owned() } else { format!("{count} SubDevices") }
 }

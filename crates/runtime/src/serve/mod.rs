@@ -141,7 +141,7 @@ impl Server {
                 while let Some(asked) = control.poll() {
                     let answer = obey(now, &asked.request, self);
                     self.tell(&mut beside.journal);
-                    asked.answer(answer);
+                    asked.give(answer);
                 }
             }
             self.wiring.carry(self.segment.signals_mut());

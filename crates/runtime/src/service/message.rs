@@ -10,6 +10,7 @@ use linesman_proto::sii::WordAddress;
 use linesman_proto::state::{AlState, AlStatusCode};
 use serde::{Deserialize, Serialize};
 
+use crate::online::report::OnlineReport;
 use crate::run::report::RunReport;
 
 /// Name and version of the answer.
@@ -21,6 +22,20 @@ pub const SCHEMA: &str = "linesman.service/1";
 pub enum Request {
     /// How the run goes.
     Status,
+    /// How the line is now: states, counters, frames, mailboxes.
+    Online,
+    /// The sum of the errors of each SubDevice, by number: to be asked often, and the line as it is when
+    /// one has risen.
+    Errors,
+    /// Counts begin at 0 again; no register is touched.
+    Clear {
+        /// Those of errors and changes.
+        #[serde(default)]
+        errors: bool,
+        /// Those of frames.
+        #[serde(default)]
+        frames: bool,
+    },
     /// A service for one SubDevice, beside the cycle.
     Serve {
         /// Its number in the plan, from 1.
@@ -78,6 +93,8 @@ pub enum Asked {
     Enter { state: u8 },
     /// Acknowledge an error.
     Acknowledge,
+    /// Read the error counters and clear them in one go.
+    ClearCounters,
     /// Read registers.
     ReadRegister { address: u16, len: u16 },
     /// Write registers.
@@ -109,6 +126,10 @@ pub struct Answer {
     pub words: Option<u32>,
     /// How the run goes; `null` unless that was asked.
     pub run: Option<Box<RunReport>>,
+    /// How the line is now; `null` unless that was asked.
+    pub online: Option<Box<OnlineReport>>,
+    /// The sum of the errors of each SubDevice, by number; `null` unless that was asked.
+    pub errors: Option<Vec<u64>>,
 }
 
 /// By what code a SubDevice has said no.
@@ -134,6 +155,21 @@ impl Answer {
     /// How the run goes.
     pub(crate) fn status(report: RunReport) -> Self {
         Self { run: Some(Box::new(report)), ..Self::empty() }
+    }
+
+    /// How the line is now.
+    pub(crate) fn online(report: OnlineReport) -> Self {
+        Self { online: Some(Box::new(report)), ..Self::empty() }
+    }
+
+    /// The sum of the errors of each SubDevice.
+    pub(crate) fn errors(sums: Vec<u64>) -> Self {
+        Self { errors: Some(sums), ..Self::empty() }
+    }
+
+    /// It is done, and there is nothing to tell.
+    pub(crate) fn done() -> Self {
+        Self::empty()
     }
 
     /// What a service gave.
@@ -188,6 +224,7 @@ impl From<&Service> for Asked {
             Service::State => Self::State,
             Service::Enter(state) => Self::Enter { state: state.bits() },
             Service::Acknowledge => Self::Acknowledge,
+            Service::ClearCounters => Self::ClearCounters,
             Service::ReadRegister { address, len } => {
                 Self::ReadRegister { address: address.0, len: *len }
             }
@@ -265,6 +302,7 @@ impl Asked {
             Self::State => Service::State,
             Self::Enter { state } => Service::Enter(known(state)?),
             Self::Acknowledge => Service::Acknowledge,
+            Self::ClearCounters => Service::ClearCounters,
             Self::ReadRegister { address, len } => {
                 Service::ReadRegister { address: RegisterAddress(address), len }
             }
@@ -322,6 +360,7 @@ mod tests {
             Service::State,
             Service::Enter(AlState::Boot),
             Service::Acknowledge,
+            Service::ClearCounters,
             Service::ReadRegister { address: RegisterAddress(0x130), len: 2 },
             Service::WriteRegister { address: RegisterAddress(0x300), data: data.clone() },
             Service::ReadSii { whole: true },

@@ -14,27 +14,65 @@ use std::path::Path;
 use std::time::Duration;
 
 use linesman_link::socket::Bell;
-use linesman_maindevice::MainDevice;
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
+use linesman_maindevice::{MainDevice, Statistics};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 
 use self::message::{Answer, Asked as AskedService, Request};
 use crate::desk::{Asked, Desk, Protocol, ask_line};
+use crate::online::{Board, Rates, Snapshot};
 use crate::run::report::RunReport;
 
 /// How long a service may take: a file of a slow SubDevice.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// What a MainDevice is asked.
-struct Serving;
+struct Serving {
+    board: Board,
+}
+
+/// What the thread that runs the line gives.
+enum Given {
+    Answer(Box<Answer>),
+    /// The line as it is now.
+    Snapshot(Box<Snapshot>),
+    /// Errors are asked for, which are known without it.
+    Errors,
+    /// Counts begin anew.
+    Clear {
+        errors: bool,
+        /// Where counts of frames begin, if they do.
+        frames: Option<Statistics>,
+    },
+}
 
 impl Protocol for Serving {
     type Request = Request;
+    type Given = Given;
     type Answer = Answer;
     const WHO: &'static str = "MainDevice";
     const EXAMPLE: &'static str = "{\"do\":\"status\"}";
     const PATIENCE: Duration = PATIENCE;
+
+    fn answer(&self, given: Given) -> Answer {
+        match given {
+            Given::Answer(answer) => *answer,
+            Given::Snapshot(snapshot) => {
+                self.board.report(&snapshot).map_or_else(too_early, Answer::online)
+            }
+            Given::Errors => self.board.error_sums().map_or_else(too_early, Answer::errors),
+            Given::Clear { errors, frames } => {
+                if errors {
+                    self.board.clear_errors();
+                }
+                if let Some(statistics) = frames {
+                    self.board.clear_frames(statistics);
+                }
+                Answer::done()
+            }
+        }
+    }
 
     fn refusal(&self, why: String) -> Answer {
         Answer::refusal(why)
@@ -45,21 +83,29 @@ impl Protocol for Serving {
     }
 }
 
+fn too_early() -> Answer {
+    Answer::refusal(NOT_UP.to_owned())
+}
+
+const NOT_UP: &str = "the line is not up yet. Do: ask again";
+
 /// The socket of a MainDevice that runs. It is removed at the end.
 pub struct ServiceDesk {
     desk: Desk<Serving>,
     /// Services that are being done, and who waits for them.
     pending: Vec<(ServiceTicket, Asked<Serving>)>,
+    rates: Rates,
 }
 
 impl ServiceDesk {
     /// Begins to listen at `path`. What an earlier run left there is replaced. `bell` wakes the thread
-    /// that calls [`ServiceDesk::turn`].
+    /// that calls [`ServiceDesk::turn`]; `board` knows what has happened.
     ///
     /// # Errors
     /// When somebody listens there already, something else is there, or the system refuses.
-    pub fn open(path: &Path, bell: Bell) -> io::Result<Self> {
-        Ok(Self { desk: Desk::open(path, bell, Serving)?, pending: Vec::new() })
+    pub fn open(path: &Path, bell: Bell, board: Board) -> io::Result<Self> {
+        let desk = Desk::open(path, bell, Serving { board })?;
+        Ok(Self { desk, pending: Vec::new(), rates: Rates::default() })
     }
 
     /// Takes what is asked for. `report` tells how the run goes.
@@ -69,11 +115,21 @@ impl ServiceDesk {
         main: &mut MainDevice,
         report: impl Fn(&MainDevice) -> RunReport,
     ) {
+        self.rates.turn(now, || main.statistics());
         while let Some(asked) = self.desk.poll() {
             match asked.request.clone() {
-                Request::Status => {
-                    let answer = Answer::status(report(main));
-                    asked.answer(answer);
+                Request::Status => asked.answer(Answer::status(report(main))),
+                Request::Online => {
+                    let snapshot = Snapshot::of(main, now, &self.rates);
+                    asked.give(Given::Snapshot(Box::new(snapshot)));
+                }
+                Request::Errors => asked.give(Given::Errors),
+                Request::Clear { errors, frames } => {
+                    if errors {
+                        main.clear_counts();
+                    }
+                    let frames = frames.then(|| main.statistics());
+                    asked.give(Given::Clear { errors, frames });
                 }
                 Request::Serve { no, service } => match prepared(main, no, service) {
                     Ok((id, service)) => {
@@ -99,13 +155,19 @@ impl ServiceDesk {
     }
 }
 
+impl Asked<Serving> {
+    fn answer(self, answer: Answer) {
+        self.give(Given::Answer(Box::new(answer)));
+    }
+}
+
 /// Whom a request means, and what.
 fn prepared(
     main: &MainDevice,
     no: u32,
     service: AskedService,
 ) -> Result<(DeviceId, Service), String> {
-    let plan = main.plan().ok_or("the line is not up yet. Do: ask again")?;
+    let plan = main.plan().ok_or(NOT_UP)?;
     let count = plan.devices.len();
     let device = plan.devices.iter().find(|device| device.id.no() == no);
     let device = device.ok_or_else(|| format!("there is no SubDevice {no}, there are {count}"))?;
@@ -127,6 +189,23 @@ pub fn ask(path: &Path, no: u32, service: &Service) -> io::Result<Answer> {
 /// As [`ask`].
 pub fn status(path: &Path) -> io::Result<Answer> {
     request(path, &Request::Status)
+}
+
+/// Asks how the line is now.
+///
+/// # Errors
+/// As [`ask`].
+pub fn online(path: &Path) -> io::Result<Answer> {
+    request(path, &Request::Online)
+}
+
+/// Lets counts begin at 0 again: those of errors and changes, those of frames, or both. No register is
+/// touched; that is [`Service::ClearCounters`].
+///
+/// # Errors
+/// As [`ask`].
+pub fn clear(path: &Path, errors: bool, frames: bool) -> io::Result<Answer> {
+    request(path, &Request::Clear { errors, frames })
 }
 
 fn request(path: &Path, request: &Request) -> io::Result<Answer> {

@@ -65,9 +65,9 @@ pub(super) fn run(
     if let Some(failure) = lab.failure() {
         output.warn(&format!("the line was not brought up: {failure}"));
     }
-    let diagnosis = lab.finish();
+    lab.finish();
     follow(&mut lab, &names, &session, output);
-    Ok(session.answer(diagnosis, &names, lab.now(), output))
+    Ok(session.answer(lab.engine(), &names, lab.now(), output))
 }
 
 fn follow(lab: &mut Lab, names: &Names, session: &Session, output: &mut Output) {

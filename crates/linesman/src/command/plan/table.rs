@@ -8,6 +8,7 @@ use linesman_runtime::plan_file::PlanFile;
 
 use super::report::{bits, counter, shares, unit_of};
 use crate::output::{Output, Table, wrapped};
+use crate::text::quantity::count;
 
 pub(super) fn text(file: &PlanFile, doubts: &[Doubt], verbose: bool, output: &Output) -> String {
     let plan = &file.plan;
@@ -15,11 +16,11 @@ pub(super) fn text(file: &PlanFile, doubts: &[Doubt], verbose: bool, output: &Ou
     let mut text = String::new();
     let title = if file.name.is_empty() { "Plan" } else { &file.name };
     text.push_str(&format!(
-        "{}: {} SubDevices, {} bytes of outputs, {} bytes of inputs\n\n",
+        "{}: {}, {} of outputs, {} of inputs\n\n",
         paint.bold(title),
-        plan.devices.len(),
-        plan.outputs_len,
-        plan.inputs_len
+        count(plan.devices.len() as u64, "SubDevice"),
+        count(plan.outputs_len as u64, "byte"),
+        count(plan.inputs_len as u64, "byte")
     ));
     text.push_str(&frames(plan, output));
     text.push_str(&format!(

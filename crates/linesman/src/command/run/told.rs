@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use linesman_diagnosis::report::Severity;
 use linesman_link::unix_time::UnixTime;
-use linesman_maindevice::watch::EntryKind;
-use linesman_maindevice::{Event, Watch};
+use linesman_maindevice::watch::{EntryKind, LogEntry};
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::event_log::{EventLogWriter, WriterReport};
+use linesman_runtime::online::Board;
 use linesman_runtime::run::Note;
+use linesman_runtime::run::bring_up::BringUpReport;
 use linesman_runtime::run::report::{Counts, RunReport};
 
 use crate::command::diagnose::follow::Follower;
-use crate::output::Output;
+use crate::output::{Output, Paint, Table};
 use crate::text::names::Names;
 use crate::text::quantity::{count, grouped, time};
 
@@ -21,16 +22,21 @@ pub(super) struct Teller {
     json: bool,
     names: Names,
     follower: Follower,
-    watch: Option<Watch>,
+    board: Board,
     /// When the run began, by the wall clock.
     began: UnixTime,
     log: Option<EventLogWriter>,
 }
 
 impl Teller {
-    pub(super) fn new(json: bool, began: UnixTime, log: Option<EventLogWriter>) -> Self {
+    pub(super) fn new(
+        json: bool,
+        began: UnixTime,
+        log: Option<EventLogWriter>,
+        board: Board,
+    ) -> Self {
         let follower = Follower::new(false);
-        Self { json, names: Names::default(), follower, watch: None, began, log }
+        Self { json, names: Names::default(), follower, board, began, log }
     }
 
     /// Whether people are not to be told.
@@ -50,7 +56,7 @@ impl Teller {
         match note {
             Note::Scanned(_) => {}
             Note::Planned(plan) => {
-                self.watch = Some(Watch::new(Arc::clone(plan)));
+                self.board.begin(Arc::clone(plan));
                 self.names = Names::new(plan.devices.iter().map(|device| device.name.clone()));
                 for task in &plan.tasks {
                     let frames = count(task.frames.len() as u64, "frame");
@@ -58,7 +64,14 @@ impl Teller {
                     self.line(&format!("Task {}: {frames} every {cycle}.", task.name), output);
                 }
             }
-            Note::Event(at, event) => self.event(*at, event, output),
+            Note::Event(at, event) => {
+                let entries = self.board.event(*at, event);
+                self.entries(entries, output);
+            }
+            Note::Host(observation) => {
+                let entries = self.board.host(observation);
+                self.entries(entries, output);
+            }
             Note::Finding(event) if !self.json => {
                 if event.finding.severity != Severity::Info {
                     self.follower.tell((**event).clone(), &self.names, output);
@@ -69,21 +82,14 @@ impl Teller {
         }
     }
 
-    fn event(&mut self, at: Instant, event: &Event, output: &mut Output) {
-        let Some(watch) = &mut self.watch else { return };
-        watch.handle_event(at, event);
-        self.entries(output);
-    }
-
     /// Nothing has come for a while, or nothing more will: what was waited with is told.
     pub(super) fn flush(&mut self, output: &mut Output) {
-        let Some(watch) = &mut self.watch else { return };
-        watch.flush();
-        self.entries(output);
+        let entries = self.board.flush();
+        self.entries(entries, output);
     }
 
-    fn entries(&mut self, output: &mut Output) {
-        while let Some(entry) = self.watch.as_mut().and_then(Watch::poll_entry) {
+    fn entries(&mut self, entries: Vec<LogEntry>, output: &mut Output) {
+        for entry in entries {
             // That each is there is told once, of all; the log has each.
             let quiet = entry.kind == EntryKind::State && entry.device.is_some();
             if !quiet {
@@ -109,7 +115,7 @@ impl Teller {
 }
 
 /// How it went.
-pub(super) fn summary(report: &RunReport) -> String {
+pub(super) fn summary(report: &RunReport, paint: Paint) -> String {
     let RunReport { counts, lateness, host, .. } = report;
     let mut text = format!("\n{} ran for {}: ", report.on, time(report.time_ns));
     text.push_str(&match report.reached_ns {
@@ -124,6 +130,9 @@ pub(super) fn summary(report: &RunReport) -> String {
         ));
     }
     text.push_str(".\n");
+    if let Some(bring_up) = &report.bring_up {
+        text.push_str(&steps(bring_up, paint));
+    }
     text.push_str(&frames(counts));
     let bad = report.devices.iter().filter(|device| !device.valid).count();
     text.push_str(&match bad {
@@ -148,6 +157,27 @@ pub(super) fn summary(report: &RunReport) -> String {
     for refused in &host.refused {
         text.push_str(&format!("Not granted: {refused}\n"));
     }
+    text
+}
+
+/// What bringing up took, step by step.
+fn steps(bring_up: &BringUpReport, paint: Paint) -> String {
+    let whole = bring_up.took_ns.map_or_else(
+        || "Bringing up was not done".to_owned(),
+        |took| format!("Bringing up took {}", time(took)),
+    );
+    let mut text = format!("{whole}; step by step:\n");
+    let mut table = Table::new(&["  step", "took", ""], paint);
+    for phase in &bring_up.network {
+        table.row([format!("  {}", phase.phase), time(phase.took_ns), String::new()]);
+    }
+    // They are brought up side by side: the slowest counts.
+    let several = bring_up.devices.len() > 1;
+    for (phase, device, took) in bring_up.slowest() {
+        let who = if several { format!("at most, {}", device.name) } else { String::new() };
+        table.row([format!("  {phase}"), time(took), who]);
+    }
+    text.push_str(&table.render());
     text
 }
 

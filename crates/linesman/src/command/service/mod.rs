@@ -23,6 +23,7 @@ use crate::output::Output;
 
 pub(crate) use known::Known;
 pub(crate) use refusal::{Refusal, Report as RefusalReport};
+pub(crate) use socket::{is_one as is_socket, silent};
 
 /// Where the line is, and whom the service is for.
 #[derive(clap::Args, Debug)]

@@ -18,7 +18,7 @@ pub(super) struct Driven {
 }
 
 /// Whether there is a socket of that name.
-pub(super) fn is_one(place: &str) -> bool {
+pub(crate) fn is_one(place: &str) -> bool {
     std::fs::metadata(place).is_ok_and(|found| found.file_type().is_socket())
 }
 
@@ -54,13 +54,9 @@ impl Line for Driven {
     ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
         let answer = service::ask(&self.path, id.no(), &service)
             .map_err(|error| silent(&self.path, &error))?;
-        Ok(answer.given().map_err(|(why, refusal)| {
-            let told = match why.rsplit_once(". Do: ") {
-                Some((reason, next_step)) => Failure::new(reason, next_step),
-                None => Failure::new(why, ""),
-            };
-            NotDone { told, refusal }
-        }))
+        Ok(answer
+            .given()
+            .map_err(|(why, refusal)| NotDone { told: Failure::from_text(&why), refusal }))
     }
 
     fn wait(&mut self, span: Span) -> Result<bool, Failure> {
@@ -74,7 +70,7 @@ impl Line for Driven {
     }
 }
 
-fn silent(path: &Path, error: &std::io::Error) -> Failure {
+pub(crate) fn silent(path: &Path, error: &std::io::Error) -> Failure {
     Failure::new(
         format!("{}: asking the MainDevice behind this socket: {error}", path.display()),
         "is it still running? `linesman run ... --control SOCKET` opens one",

@@ -1,0 +1,475 @@
+//! Where a fault of the catalogue sits and how bad it is: wider than [`crate::choice`] draws, down to
+//! a single hit.
+
+#![expect(clippy::wildcard_enum_match_arm, reason = "menus, not tables of all faults")]
+
+use linesman_config::fault::FaultName::{self, *};
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::time::Span;
+use linesman_proto::topology::End;
+use linesman_sim::device::library;
+use linesman_sim::seed::Stream;
+use linesman_sim::segment_file::{FaultEntry, OneOrMany, SegmentDevice, SegmentFile};
+
+use crate::choice::{Choice, Ground};
+
+/// When a fault is put in.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum When {
+    /// It is so from the start, before the line is brought up.
+    FromStart,
+    /// While the line runs.
+    Running,
+}
+
+/// How it ends.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Ends {
+    /// It stays to the end of the case.
+    Never,
+    /// It is healed when its time is over.
+    Healed,
+}
+
+/// A fault as drawn.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Drawn {
+    /// What and where, and how long it acts.
+    pub choice: Choice,
+    /// How it ends.
+    pub ends: Ends,
+    /// Whose mailbox the application asks meanwhile.
+    pub asks: Option<DeviceId>,
+}
+
+/// What a line offers to faults.
+#[derive(Clone, Copy, Debug)]
+pub struct Offer<'a> {
+    /// Wiring and names.
+    pub ground: &'a Ground<'a>,
+    /// The segment as described.
+    pub file: &'a SegmentFile,
+    /// SubDevices that are in step with SYNC0.
+    pub clocked: &'a [DeviceId],
+    /// The reference clock.
+    pub reference: Option<DeviceId>,
+}
+
+/// When a fault of this name is put in.
+#[must_use]
+pub fn when(name: FaultName) -> When {
+    let built_in = linesman_sim::fault::kind(name).is_some_and(|kind| kind.is_built_in());
+    // What a device refuses on its way up is refused on the way up.
+    if built_in || matches!(name, InitRefused | ConfigMismatch) {
+        When::FromStart
+    } else {
+        When::Running
+    }
+}
+
+/// Draws place and parameters; `None` where the line has no place for it.
+#[must_use]
+pub fn draw(name: FaultName, offer: &Offer<'_>, stream: &mut Stream) -> Option<Drawn> {
+    let mut drawer = Drawer { name, offer, stream };
+    match name {
+        LinkOpen | FalseLink => drawer.opened(),
+        LinkFlapping => drawer.flapping(),
+        RingOpen => drawer.ring(),
+        EarlyLink => drawer.early(),
+        CableDegraded | EmcNoise | TransmitterDamaged | ReceiverDamaged => drawer.noise(),
+        NicDamaged => drawer.card(),
+        DeviceInternal => drawer.inside(),
+        DeviceOff | SupplyOff | BrownOut => drawer.unpowered(),
+        EbusOverload => drawer.overload(),
+        InitRefused | ConfigMismatch => drawer.refused(),
+        FirmwareFault | WatchdogStarved | CycleTooFast | SyncLost => drawer.software(),
+        MailboxError | MailboxSlow | MailboxStuck | Emergency => drawer.mailbox(),
+        ClockDrift | ReferenceClockLost => drawer.clock(),
+        HostDrops | HostJitter | LateFrames => drawer.host(),
+        SecondMainDevice | ForeignFrames => drawer.strangers(),
+        DevicesSwapped | TwinsSwapped | DuplicateAddress => drawer.pair(),
+        DeviceMissing | DeviceWrong | DeviceExtra | PortsSwapped | MainDeviceWrongPort => {
+            drawer.built_in()
+        }
+        _ => None,
+    }
+}
+
+struct Drawer<'a, 's> {
+    name: FaultName,
+    offer: &'a Offer<'a>,
+    stream: &'s mut Stream,
+}
+
+impl Drawer<'_, '_> {
+    fn entry(&self) -> FaultEntry {
+        FaultEntry::new(self.name)
+    }
+
+    /// A fault for some time.
+    fn lasting(&mut self, entry: FaultEntry, low: f64, high: f64) -> Drawn {
+        let lasts = Span::us((self.stream.log_uniform(low, high) * 1e3) as u64);
+        let choice = Choice { name: self.name, entry, link: None, device: None, lasts };
+        Drawn { choice, ends: Ends::Healed, asks: None }
+    }
+
+    /// A fault that stays, or is healed after a while.
+    fn hard(&mut self, entry: FaultEntry) -> Drawn {
+        let ends = if self.stream.chance(0.5) { Ends::Never } else { Ends::Healed };
+        Drawn { ends, ..self.lasting(entry, 200.0, 3_000.0) }
+    }
+
+    fn number(&mut self, low: f64, high: f64) -> f64 {
+        let number = self.stream.log_uniform(low, high);
+        (number * 100.0).round() / 100.0
+    }
+
+    fn word(&mut self, words: &[&'static str]) -> &'static str {
+        self.stream.pick(words).copied().unwrap_or_default()
+    }
+
+    fn at_link(drawn: Drawn, link: usize) -> Drawn {
+        Drawn { choice: Choice { link: Some(link), ..drawn.choice }, ..drawn }
+    }
+
+    fn at_device(drawn: Drawn, device: DeviceId) -> Drawn {
+        Drawn { choice: Choice { device: Some(device), ..drawn.choice }, ..drawn }
+    }
+
+    /// Both directions of a link, as segment files write it.
+    fn both(&self, link: usize) -> String {
+        let ends = self.offer.ground.tree.links()[link];
+        let end = |end: End| self.offer.ground.end(end);
+        format!("{}-{}", end(ends.upstream), end(ends.downstream))
+    }
+
+    /// One direction of a link.
+    fn one(&mut self, link: usize) -> String {
+        let ends = self.offer.ground.tree.links()[link];
+        let (mut from, mut to) = (ends.upstream, ends.downstream);
+        if self.stream.chance(0.5) {
+            std::mem::swap(&mut from, &mut to);
+        }
+        format!("{}>{}", self.offer.ground.end(from), self.offer.ground.end(to))
+    }
+
+    fn opened(&mut self) -> Option<Drawn> {
+        let is_false = self.name == FalseLink;
+        let ground = self.offer.ground;
+        let link =
+            if is_false { ground.any_cable(self.stream) } else { ground.any_link(self.stream) }?;
+        let one_way = self.stream.chance(if is_false { 0.3 } else { 0.1 });
+        let at = if one_way { self.one(link) } else { self.both(link) };
+        let mut entry = self.entry().at(at);
+        if is_false {
+            entry = entry.with("far", self.word(&["with-link", "without-link"]));
+        }
+        let drawn = self.hard(entry);
+        Some(Self::at_link(drawn, link))
+    }
+
+    fn flapping(&mut self) -> Option<Drawn> {
+        let link = self.offer.ground.any_link(self.stream)?;
+        let entry = self
+            .entry()
+            .at(self.both(link))
+            .with("openings_per_s", self.number(0.3, 10.0))
+            .with("open_ms", self.number(0.5, 300.0));
+        let drawn = self.lasting(entry, 1_000.0, 5_000.0);
+        Some(Self::at_link(drawn, link))
+    }
+
+    fn ring(&mut self) -> Option<Drawn> {
+        let tree = self.offer.ground.tree;
+        let on_ring: Vec<usize> =
+            (0..tree.links().len()).filter(|link| tree.is_on_ring(*link)).collect();
+        let link = *self.stream.pick(&on_ring)?;
+        let entry = self.entry().at(self.both(link));
+        let drawn = self.hard(entry);
+        Some(Self::at_link(drawn, link))
+    }
+
+    fn early(&mut self) -> Option<Drawn> {
+        let link = self.offer.ground.any_cable(self.stream)?;
+        let entry = self
+            .entry()
+            .at(self.both(link))
+            .with("blind_ms", self.number(10.0, 2_000.0))
+            .with("down_ms", self.number(5.0, 1_000.0));
+        let drawn = self.lasting(entry, 3_000.0, 5_000.0);
+        Some(Self::at_link(drawn, link))
+    }
+
+    /// Exactly so many frames, from a single one, or symbols at a rate.
+    fn hits(&mut self, entry: FaultEntry, low_ms: f64, high_ms: f64) -> Drawn {
+        if self.stream.chance(0.5) {
+            let hits = self.stream.log_uniform(1.0, 500.0).round() as u32;
+            // There are not many more frames than one a millisecond.
+            let least = low_ms.max(f64::from(hits) * 2.0).min(high_ms);
+            return self.lasting(entry.with("hits", hits), least, high_ms);
+        }
+        let rate = self.stream.log_uniform(1.0, 5_000.0).round();
+        let least = low_ms.max(1_500.0 / rate).min(high_ms);
+        self.lasting(entry.with("hits_per_s", rate), least, high_ms)
+    }
+
+    fn noise(&mut self) -> Option<Drawn> {
+        let ground = self.offer.ground;
+        let is_cable = matches!(self.name, CableDegraded | EmcNoise);
+        let link =
+            if is_cable { ground.any_cable(self.stream) } else { ground.any_link(self.stream) }?;
+        let is_whole = is_cable && self.stream.chance(0.5);
+        let at = if is_whole { self.both(link) } else { self.one(link) };
+        let mut entry = self.entry().at(at.clone());
+        if self.name == EmcNoise {
+            let mut places = vec![at];
+            for _ in 0..self.stream.below(3) {
+                let other = ground.any_cable(self.stream)?;
+                let place = self.both(other);
+                let is_new = |known: &String| !known.contains(&place) && other != link;
+                if places.iter().all(is_new) {
+                    places.push(place);
+                }
+            }
+            entry.at = Some(OneOrMany::Many(places));
+            entry = entry
+                .with("bursts_per_s", self.number(1.0, 50.0))
+                .with("burst_ms", self.number(0.1, 20.0));
+        }
+        if self.name == CableDegraded {
+            entry = entry.with("movement_ms", self.number(50.0, 3_000.0));
+        }
+        let drawn = self.hits(entry, 20.0, 3_000.0);
+        Some(Self::at_link(drawn, link))
+    }
+
+    fn card(&mut self) -> Option<Drawn> {
+        let part = self.word(&["receiver", "transmitter"]);
+        let link = self.offer.ground.tree.link_at(End::MainDevice(Path::A))?;
+        let entry = self.entry().at("maindevice").with("part", part);
+        let drawn = self.hits(entry, 20.0, 3_000.0);
+        Some(Self::at_link(drawn, link))
+    }
+
+    fn inside(&mut self) -> Option<Drawn> {
+        let (device, id) = self.any_device()?;
+        let entry = self.entry().device(&device.name);
+        let drawn = self.hits(entry, 20.0, 3_000.0);
+        Some(Self::at_device(drawn, id))
+    }
+
+    fn unpowered(&mut self) -> Option<Drawn> {
+        let (device, id) = self.any_device()?;
+        let mut names = vec![device.name.clone()];
+        if self.name == SupplyOff {
+            for _ in 0..self.stream.below(3) {
+                let (other, _) = self.any_device()?;
+                if !names.contains(&other.name) {
+                    names.push(other.name.clone());
+                }
+            }
+        }
+        let mut entry = self.entry();
+        match names.as_slice() {
+            [one] => entry.device = Some(one.clone()),
+            _ => entry.devices = Some(names),
+        }
+        let drawn = if self.name == BrownOut {
+            entry = entry.with("dip_ms", self.number(0.5, 3_000.0));
+            self.lasting(entry, 3_000.0, 4_000.0)
+        } else {
+            self.hard(entry)
+        };
+        Some(Self::at_device(drawn, id))
+    }
+
+    fn overload(&mut self) -> Option<Drawn> {
+        let feeds = |device: &&SegmentDevice| {
+            let found = library::find(&device.type_name);
+            found.is_some_and(|found| found.ebus_current_ma() < 0)
+        };
+        let feeding: Vec<_> = self.offer.file.devices.iter().filter(feeds).collect();
+        let device = *self.stream.pick(&feeding)?;
+        let entry = self
+            .entry()
+            .device(&device.name)
+            .with("supply_ma", 1.0)
+            .with("off_ms", self.number(20.0, 500.0))
+            .with("on_ms", self.number(300.0, 3_000.0));
+        let drawn = self.lasting(entry, 2_000.0, 5_000.0);
+        Some(Self::at_device(drawn, self.id(device)?))
+    }
+
+    fn refused(&mut self) -> Option<Drawn> {
+        if self.name == ConfigMismatch {
+            let (device, id) = self.with_mailbox()?;
+            let what = self.word(&["process-data", "mailbox", "modules"]);
+            let entry = self.entry().device(&device.name).with("what", what);
+            return Some(Self::at_device(self.for_ever(entry), id));
+        }
+        let (device, id) = self.any_device()?;
+        let codes = [0x0001, 0x0014, 0x001D, 0x001E, 0x0022, 0x0030, 0x0050, 0x8000];
+        let entry = self
+            .entry()
+            .device(&device.name)
+            .with("to", self.word(&["SAFEOP", "PREOP", "OP"]))
+            .with("code", *self.stream.pick(&codes)?)
+            .with("refusals", self.stream.below(4) as u32);
+        Some(Self::at_device(self.for_ever(entry), id))
+    }
+
+    fn for_ever(&mut self, entry: FaultEntry) -> Drawn {
+        Drawn { ends: Ends::Never, ..self.lasting(entry, 4_000.0, 6_000.0) }
+    }
+
+    fn software(&mut self) -> Option<Drawn> {
+        let entry = self.entry();
+        let (device, id) = match self.name {
+            CycleTooFast | SyncLost => {
+                let id = *self.stream.pick(self.offer.clocked)?;
+                (self.device(id)?, id)
+            }
+            _ => self.with_mailbox()?,
+        };
+        let entry = match self.name {
+            WatchdogStarved if self.stream.chance(0.5) => {
+                let entry = entry.at("maindevice").with("pause_ms", self.number(120.0, 1_000.0));
+                return Some(self.lasting(entry, 2_000.0, 4_000.0));
+            }
+            WatchdogStarved => entry.with("watchdog_ms", self.number(0.1, 3.0)),
+            CycleTooFast => entry.with("needs_us", self.number(5_500.0, 50_000.0)),
+            FirmwareFault => {
+                let how = self.word(&["hangs", "restarts"]);
+                entry.with("how", how)
+            }
+            _ => entry,
+        };
+        let drawn = self.lasting(entry.device(&device.name), 1_000.0, 4_000.0);
+        Some(Self::at_device(drawn, id))
+    }
+
+    fn mailbox(&mut self) -> Option<Drawn> {
+        let (device, id) = self.with_mailbox()?;
+        let entry = self.entry().device(&device.name);
+        let entry = match self.name {
+            MailboxError => entry.with("answer", self.word(&["abort", "error-reply"])),
+            MailboxSlow => entry.with("by_ms", self.number(100.0, 1_500.0)),
+            MailboxStuck => entry.with("side", self.word(&["requests", "answers", "both"])),
+            _ => {
+                let codes = [0x2310, 0x3210, 0x4310, 0x5000, 0x6100, 0x7300, 0x8130, 0xFF01];
+                entry.with("code", *self.stream.pick(&codes)?)
+            }
+        };
+        let is_asked = self.name != Emergency;
+        let drawn = self.lasting(entry, 2_000.0, 4_000.0);
+        let asks = is_asked.then_some(id);
+        Some(Self::at_device(Drawn { asks, ..drawn }, id))
+    }
+
+    fn clock(&mut self) -> Option<Drawn> {
+        let id = match self.name {
+            ReferenceClockLost => self.offer.reference?,
+            _ => *self.stream.pick(self.offer.clocked)?,
+        };
+        let name = self.device(id)?.name.clone();
+        let entry = self.entry().device(name);
+        let entry = if self.name == ReferenceClockLost {
+            entry.with("how", self.word(&["stands", "starts-anew"]))
+        } else {
+            let sign = if self.stream.chance(0.5) { 1.0 } else { -1.0 };
+            entry.with("ppm", sign * self.number(850.0, 2_000.0))
+        };
+        let drawn = self.lasting(entry, 3_000.0, 5_000.0);
+        Some(Self::at_device(drawn, id))
+    }
+
+    fn host(&mut self) -> Option<Drawn> {
+        let entry = self.entry().at("maindevice");
+        let hits = self.stream.log_uniform(1.0, 200.0).round() as u32;
+        let entry = match self.name {
+            HostDrops => entry.with("hits", hits),
+            HostJitter => entry.with("hits", hits).with("delay_us", self.number(100.0, 5_000.0)),
+            _ => entry.with("late_us", self.number(200.0, 3_000.0)),
+        };
+        Some(self.lasting(entry, 500.0, 3_000.0))
+    }
+
+    fn strangers(&mut self) -> Option<Drawn> {
+        let entry = self.entry().with("frames_per_s", self.number(1.0, 500.0));
+        let entry = if self.name == SecondMainDevice {
+            entry.with("does", self.word(&["scan", "init", "preop", "clear-counters"]))
+        } else {
+            entry.with("protocol", self.word(&["mixed", "arp", "ipv4", "lldp"]))
+        };
+        Some(self.lasting(entry, 1_000.0, 4_000.0))
+    }
+
+    fn pair(&mut self) -> Option<Drawn> {
+        let (one, id) = self.any_device()?;
+        let wants_twin = self.name == TwinsSwapped;
+        let fits = |other: &&SegmentDevice| {
+            let is_twin = other.type_name == one.type_name;
+            other.name != one.name && (self.name == DuplicateAddress || is_twin == wants_twin)
+        };
+        let others: Vec<_> = self.offer.file.devices.iter().filter(fits).collect();
+        let other = *self.stream.pick(&others)?;
+        let mut entry = self.entry();
+        entry.devices = Some(vec![one.name.clone(), other.name.clone()]);
+        if self.name == DuplicateAddress {
+            entry = entry.with("which", "station");
+        }
+        let drawn = self.lasting(entry, 2_000.0, 4_000.0);
+        Some(Self::at_device(drawn, id))
+    }
+
+    fn built_in(&mut self) -> Option<Drawn> {
+        let (device, id) = self.any_device()?;
+        let entry = match self.name {
+            MainDeviceWrongPort => self.entry().at("maindevice"),
+            DeviceExtra => self
+                .entry()
+                .device("extra")
+                .with("type", if self.stream.chance(0.5) { "EL1008" } else { "EL2004" })
+                .with("on", device.on.to_string().as_str()),
+            DeviceWrong if self.stream.chance(0.4) => self
+                .entry()
+                .device(&device.name)
+                .with("revision", self.stream.between(1, 0x00FF_0000) as u32),
+            DeviceWrong => {
+                let other = self.any_device()?.0;
+                if other.type_name == device.type_name {
+                    return None;
+                }
+                self.entry().device(&device.name).with("type", other.type_name.as_str())
+            }
+            _ => self.entry().device(&device.name),
+        };
+        Some(Self::at_device(self.for_ever(entry), id))
+    }
+
+    fn any_device(&mut self) -> Option<(SegmentDevice, DeviceId)> {
+        let device = self.stream.pick(&self.offer.file.devices)?.clone();
+        let id = self.id(&device)?;
+        Some((device, id))
+    }
+
+    fn with_mailbox(&mut self) -> Option<(SegmentDevice, DeviceId)> {
+        let fits = |device: &&SegmentDevice| {
+            library::find(&device.type_name).is_some_and(|found| found.has_mailbox())
+        };
+        let fitting: Vec<_> = self.offer.file.devices.iter().filter(fits).collect();
+        let device = (*self.stream.pick(&fitting)?).clone();
+        let id = self.id(&device)?;
+        Some((device, id))
+    }
+
+    fn id(&self, device: &SegmentDevice) -> Option<DeviceId> {
+        let at = self.offer.ground.names.iter().position(|name| *name == device.name)?;
+        Some(DeviceId(at as u32))
+    }
+
+    fn device(&self, id: DeviceId) -> Option<SegmentDevice> {
+        let name = self.offer.ground.names.get(id.index())?;
+        self.offer.file.devices.iter().find(|device| device.name == *name).cloned()
+    }
+}

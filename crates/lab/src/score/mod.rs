@@ -1,0 +1,21 @@
+//! The score: how often the diagnosis is right, on a corpus that anyone can draw again.
+//!
+//! A seed gives a [`case`]: a plant, its features, and faults of the whole catalogue with wide
+//! parameters ([`draw`]). [`play`] runs it, live and as a recording, [`judge`] holds what was said
+//! against the truth log, [`report`] adds up. A case counts when the truth log shows an effect,
+//! whether or not the diagnosis saw it.
+
+pub mod baseline;
+pub mod case;
+pub mod draw;
+pub mod judge;
+pub mod play;
+pub mod rate;
+pub mod report;
+pub mod tally;
+
+pub use case::{CaseKind, ScoreOptions};
+pub use play::{CaseReport, FaultOutcome, run_case};
+pub use rate::Rate;
+pub use report::ScoreReport;
+pub use tally::Tally;

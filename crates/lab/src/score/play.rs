@@ -1,0 +1,443 @@
+//! One case, played: brought up, watched while all is well, broken, judged.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use linesman_config::fault::FaultName;
+use linesman_diagnosis::observe::{Direction, FrameSeen};
+use linesman_diagnosis::report::Diagnosis;
+use linesman_diagnosis::{Engine, Setup};
+use linesman_proto::address::DeviceId;
+use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
+use linesman_sim::seed::Stream;
+use linesman_sim::segment_file::SegmentFile;
+use linesman_sim::truth::{FaultId, FaultRecord};
+
+use super::baseline;
+use super::case::{Case, CaseKind, ScoreOptions};
+use super::draw::{Drawn, Ends, Offer, When, draw, when};
+use super::judge::{Judged, alarms, claim, judge};
+use crate::choice::{Ground, are_apart, text};
+use crate::lab::{Lab, LabError};
+use crate::options::LabOptions;
+use crate::swarm::run::cabled;
+use crate::verdict::{Grade, Scene, Truth, TruthPlace, matches};
+
+/// How long the bring-up may take.
+const BRING_UP: Span = Span::s(30);
+/// How long the line is watched while nothing is wrong.
+const CALM: Span = Span::ms(1_500);
+/// How long a diagnosis may take after a fault is over, or has lasted its time.
+const VERDICT: Span = Span::ms(2_500);
+/// How long a line may take to come back.
+const RECOVERY: Span = Span::s(8);
+/// How often plants are drawn for a fault that needs a place of its own.
+const ATTEMPTS: u32 = 12;
+
+/// What came of one seed.
+#[derive(Clone, Debug)]
+pub struct CaseReport {
+    /// The seed.
+    pub seed: u64,
+    /// Its kind.
+    pub kind: CaseKind,
+    /// SubDevices.
+    pub devices: usize,
+    /// Whether it is a ring.
+    pub is_ring: bool,
+    /// Whether forwarded errors are counted, as far as types do.
+    pub forwarded: bool,
+    /// Whether the card's counters were known.
+    pub host_counters: bool,
+    /// What a healthy line was accused of, live and in its recording; `None` where it never was healthy.
+    pub healthy: Option<(Vec<String>, Vec<String>)>,
+    /// Its faults.
+    pub faults: Vec<FaultOutcome>,
+    /// Why it could not be played.
+    pub unplayable: Option<String>,
+}
+
+/// What came of one fault.
+#[derive(Clone, Debug)]
+pub struct FaultOutcome {
+    /// What it was.
+    pub name: FaultName,
+    /// With place and parameters.
+    pub entry: String,
+    /// How many effects the truth log has; without any the case does not count.
+    pub effects: u64,
+    /// The live diagnosis; `None` when only the recording is judged.
+    pub live: Option<Judged>,
+    /// The diagnosis of the recording.
+    pub capture: Judged,
+    /// Whether the first port with a counter above zero is the place.
+    pub baseline: bool,
+}
+
+impl CaseReport {
+    /// The command that plays it again.
+    #[must_use]
+    pub fn replay(&self) -> String {
+        format!("linesman lab score --seeds {}..{} --list", self.seed, self.seed + 1)
+    }
+}
+
+/// Plays the case of a seed.
+#[must_use]
+pub fn run_case(seed: u64, options: &ScoreOptions) -> CaseReport {
+    let mut why = String::new();
+    for attempt in 0..ATTEMPTS {
+        let case = Case::draw(seed, attempt, options);
+        match Play::new(&case, options).and_then(Play::play) {
+            Ok(report) => return report,
+            Err(Stop::NoPlace) => why = "no place for its faults in any plant".to_owned(),
+            Err(Stop::Failed(error)) => {
+                why = error;
+                break;
+            }
+        }
+    }
+    let case = Case::draw(seed, 0, options);
+    CaseReport { unplayable: Some(why), ..empty(&case, 0) }
+}
+
+fn empty(case: &Case, devices: usize) -> CaseReport {
+    CaseReport {
+        seed: case.seed.0,
+        kind: case.kind,
+        devices,
+        is_ring: case.file.ring.is_some(),
+        forwarded: case.forwarded,
+        host_counters: case.host_counters,
+        healthy: None,
+        faults: Vec::new(),
+        unplayable: None,
+    }
+}
+
+/// Why a case ends early.
+enum Stop {
+    /// This plant has no place for the faults.
+    NoPlace,
+    /// It cannot be played at all.
+    Failed(String),
+}
+
+impl From<LabError> for Stop {
+    fn from(error: LabError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// A fault that was put in.
+struct Active {
+    id: FaultId,
+    drawn: Drawn,
+    until: Instant,
+}
+
+struct Play<'a> {
+    case: &'a Case,
+    options: &'a ScoreOptions,
+    stream: Stream,
+    lab: Lab,
+    /// What reads the recording.
+    recording: Arc<Mutex<Engine>>,
+    /// Faults that are in the line from its making on.
+    built_in: Vec<Drawn>,
+    /// Whether the recording is judged with the project beside it.
+    has_project: bool,
+}
+
+impl<'a> Play<'a> {
+    fn new(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, Stop> {
+        let mut stream = case.seed.stream("score faults");
+        let (file, built_in) = with_built_in(case, &mut stream)?;
+        let lab_options = LabOptions {
+            cycle: case.cycle,
+            host_counters: case.host_counters,
+            clocks: case.clocks,
+            probes: !options.capture_only,
+            ..LabOptions::default()
+        };
+        // What cannot be built so is no case.
+        let mut lab = Lab::new(&file, lab_options).map_err(|_| Stop::NoPlace)?;
+        let has_project = !built_in.is_empty();
+        let setup = Setup {
+            project: has_project.then(|| lab.project().clone()),
+            clock: "virtual".to_owned(),
+            ..Setup::default()
+        };
+        let recording = Arc::new(Mutex::new(Engine::new(setup)));
+        let reader = Arc::clone(&recording);
+        lab.set_tap(Box::new(move |seen| {
+            // As most recordings are: neither cards nor directions are told apart.
+            let frame = FrameSeen { path: None, direction: Direction::Unknown, ..*seen };
+            reader.lock().unwrap_or_else(PoisonError::into_inner).handle_frame(&frame);
+        }));
+        Ok(Self { case, options, stream, lab, recording, built_in, has_project })
+    }
+
+    fn play(mut self) -> Result<CaseReport, Stop> {
+        let mut report = empty(self.case, self.lab.tree().len());
+        let mut active: Vec<Active> = Vec::new();
+        if self.built_in.is_empty() {
+            self.lab.wait_up(BRING_UP)?;
+            self.run(CALM)?;
+            report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
+            if self.case.kind == CaseKind::Healthy {
+                self.run(VERDICT)?;
+                report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
+                return Ok(report);
+            }
+            self.break_line(&mut active)?;
+        } else {
+            for (drawn, id) in std::mem::take(&mut self.built_in).into_iter().zip(0..) {
+                active.push(Active {
+                    id: FaultId(id),
+                    until: self.lab.now() + drawn.choice.lasts,
+                    drawn,
+                });
+            }
+        }
+        self.wait(&mut active)?;
+        let recorded = self.recorded();
+        let diagnosis = self.lab.diagnosis();
+        let cycles = self.cycles(&active);
+        for (active, cycles) in active.iter().zip(cycles) {
+            report.faults.extend(self.outcome(active, &diagnosis, &recorded, cycles));
+        }
+        Ok(report)
+    }
+
+    fn run(&mut self, span: Span) -> Result<(), LabError> {
+        self.lab.run_until(self.lab.now() + span)
+    }
+
+    /// Puts the faults in, one a while after the other.
+    fn break_line(&mut self, active: &mut Vec<Active>) -> Result<(), Stop> {
+        for name in self.case.faults.clone() {
+            let pause = Span::us(self.stream.between(0, 200_000));
+            self.run(pause)?;
+            let drawn = self.draw(name, active)?;
+            let mut entry = drawn.choice.entry.clone();
+            let until = self.lab.now() + drawn.choice.lasts;
+            if entry.parameters.contains_key("hits") {
+                // So many in just this time.
+                let from = self.lab.now() + Span::ms(1);
+                let ms = |at: Instant| at.as_nanos() as f64 / 1e6;
+                entry = entry.from_to(ms(from), Some(ms(until)));
+            }
+            // What chance has put together wrongly is no case.
+            let id = self.lab.inject(&entry).map_err(|_| Stop::NoPlace)?;
+            active.push(Active { id, drawn, until });
+            if self.case.kind == CaseKind::Double && self.stream.chance(0.5) {
+                let pause = Span::us(self.stream.between(0, 1_500_000));
+                self.run(pause)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self, name: FaultName, active: &[Active]) -> Result<Drawn, Stop> {
+        let segment = self.lab.segment();
+        let names: Vec<String> = segment.devices().map(|id| segment.name(id).to_owned()).collect();
+        let cabled = cabled(segment);
+        let ground = Ground { tree: segment.tree(), names: &names, cabled: &cabled };
+        let plan = self.lab.plan();
+        let clocked: Vec<DeviceId> = plan
+            .into_iter()
+            .flat_map(|plan| &plan.devices)
+            .filter(|device| device.settings.clock.is_some())
+            .map(|device| self.lab.of_plan(device.id))
+            .collect();
+        let reference = plan.and_then(|plan| plan.reference_clock()).map(|id| self.lab.of_plan(id));
+        let offer = Offer { ground: &ground, file: &self.case.file, clocked: &clocked, reference };
+        for _ in 0..10 {
+            let drawn = draw(name, &offer, &mut self.stream);
+            // One of two faults must not hide the other.
+            let fits = |drawn: &Drawn| {
+                active.iter().all(|one| are_apart(ground.tree, &one.drawn.choice, &drawn.choice))
+            };
+            if let Some(drawn) = drawn.filter(fits) {
+                return Ok(drawn);
+            }
+        }
+        Err(Stop::NoPlace)
+    }
+
+    /// Lets the faults act, end, and be seen.
+    fn wait(&mut self, active: &mut [Active]) -> Result<(), Stop> {
+        let mut order: Vec<usize> = (0..active.len()).collect();
+        order.sort_by_key(|index| active[*index].until);
+        for index in order {
+            let Active { id, drawn, until } = &active[index];
+            if let Some(asked) = drawn.asks {
+                self.ask(asked, *until)?;
+            }
+            self.lab.run_until(self.lab.now().max(*until))?;
+            if drawn.ends == Ends::Healed {
+                self.lab.heal(*id);
+            }
+        }
+        let is_for_ever = |active: &Active| active.drawn.ends == Ends::Never;
+        if !active.iter().any(is_for_ever) {
+            self.lab.run_while(RECOVERY, Span::ms(20), Lab::is_up)?;
+        }
+        self.run(VERDICT)?;
+        Ok(())
+    }
+
+    /// The application asks a mailbox now and then.
+    fn ask(&mut self, asked: DeviceId, until: Instant) -> Result<(), LabError> {
+        for _ in 0..3 {
+            if self.lab.now() >= until {
+                break;
+            }
+            self.lab.read_object(asked, ObjectAddress::new(0x1018, 1))?;
+            self.run(Span::ms(50))?;
+        }
+        Ok(())
+    }
+
+    /// What is said of the recording, if it ended here.
+    fn recorded(&self) -> Diagnosis {
+        let mut engine = self.recording.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        engine.finish(self.lab.now(), true);
+        engine.diagnosis()
+    }
+
+    /// By fault: when the live diagnosis first named its place.
+    fn cycles(&mut self, active: &[Active]) -> Vec<Option<u64>> {
+        let events: Vec<_> = std::iter::from_fn(|| self.lab.poll_finding_event()).collect();
+        let first = |active: &Active| {
+            let record = self.lab.truth().fault(active.id)?;
+            let began = record.first_effect?;
+            let truth = self.truth(active)?;
+            let names_it = |answered_again: bool, event: &linesman_diagnosis::Event| {
+                let scene = Scene {
+                    tree: self.lab.tree(),
+                    host_counters: self.case.host_counters,
+                    answered_again,
+                };
+                matches(&truth, &scene, claim(&event.finding, &|id| id)).place != Grade::Wrong
+            };
+            let event = events.iter().find(|event| {
+                event.at >= began && (names_it(false, event) || names_it(true, event))
+            })?;
+            let cycle = self.case.cycle.as_nanos().max(1);
+            Some(event.at.since(began).as_nanos().div_ceil(cycle))
+        };
+        active.iter().map(first).collect()
+    }
+
+    fn truth(&self, active: &Active) -> Option<Truth> {
+        let mut truth = self.lab.truth_of(active.id)?;
+        // Who was put in between is also told by whom it has pushed on.
+        let on = active.drawn.choice.entry.parameters.get("on");
+        if truth.name == FaultName::DeviceExtra
+            && let Some(on) = on.map(ToString::to_string)
+        {
+            truth.places.extend(self.pushed_on(&on));
+        }
+        Some(truth)
+    }
+
+    /// The SubDevice that is planned at a port.
+    fn pushed_on(&self, on: &str) -> Option<TruthPlace> {
+        let tree = self.lab.tree();
+        let on = on.trim_matches('"');
+        let end = match on.split_once('.') {
+            None => End::MainDevice(linesman_proto::address::Path::A),
+            Some((name, port)) => {
+                let devices = &self.lab.project().devices;
+                let node = devices.iter().position(|device| device.name == name)?;
+                let port = linesman_proto::port::Port::from_letter(port.chars().next()?)?;
+                End::Controller(node, port)
+            }
+        };
+        let pushed = tree.opposite(end)?.node()?;
+        Some(TruthPlace::Device(DeviceId(pushed as u32)))
+    }
+
+    fn outcome(
+        &self,
+        active: &Active,
+        live: &Diagnosis,
+        recorded: &Diagnosis,
+        cycles: Option<u64>,
+    ) -> Option<FaultOutcome> {
+        let record = self.lab.truth().fault(active.id)?;
+        let truth = self.truth(active)?;
+        let all: Vec<Truth> = self
+            .lab
+            .truth()
+            .faults()
+            .iter()
+            .filter_map(|fault| self.lab.truth_of(fault.id))
+            .chain([truth.clone()])
+            .collect();
+        let tree = self.lab.tree();
+        let answered_again = self.lab.reached().len() >= tree.len();
+        let scene = Scene { tree, host_counters: self.case.host_counters, answered_again };
+        let began = record.began.unwrap_or(Instant::ZERO);
+        let when = (began, self.case.faults.len().max(1));
+        let live = (!self.options.capture_only)
+            .then(|| Judged { cycles, ..judge(live, &truth, &all, &scene, when, &|id| id) });
+        let by_position = |id: DeviceId| self.lab.of_plan(id);
+        let as_planned = |id: DeviceId| id;
+        let naming: &dyn Fn(DeviceId) -> DeviceId =
+            if self.has_project { &as_planned } else { &by_position };
+        let scene = Scene { host_counters: false, ..scene };
+        let capture = judge(recorded, &truth, &all, &scene, when, naming);
+        let baseline = baseline::first_counter(&self.lab);
+        Some(FaultOutcome {
+            name: record.name,
+            entry: text(&active.drawn.choice.entry),
+            effects: effects(record),
+            live,
+            capture,
+            baseline: baseline.is_some_and(|site| baseline::is_right(site, &truth, tree)),
+        })
+    }
+}
+
+/// The segment with those faults in it that are so from the start.
+fn with_built_in(case: &Case, stream: &mut Stream) -> Result<(SegmentFile, Vec<Drawn>), Stop> {
+    let names: Vec<FaultName> =
+        case.faults.iter().copied().filter(|name| when(*name) == When::FromStart).collect();
+    let mut file = case.file.clone();
+    let mut built_in = Vec::new();
+    if names.is_empty() {
+        return Ok((file, built_in));
+    }
+    let project = case.file.project().map_err(|_| Stop::NoPlace)?;
+    let tree = project.tree().map_err(|_| Stop::NoPlace)?;
+    let devices: Vec<String> = project.devices.iter().map(|device| device.name.clone()).collect();
+    let cabled = vec![true; tree.links().len()];
+    let ground = Ground { tree: &tree, names: &devices, cabled: &cabled };
+    for name in names {
+        let offer = Offer { ground: &ground, file: &case.file, clocked: &[], reference: None };
+        let drawn = (0..10).find_map(|_| draw(name, &offer, stream)).ok_or(Stop::NoPlace)?;
+        file.faults.push(drawn.choice.entry.clone());
+        built_in.push(drawn);
+    }
+    Ok((file, built_in))
+}
+
+/// How often a fault has acted.
+fn effects(record: &FaultRecord) -> u64 {
+    if record.first_effect.is_none() {
+        return 0;
+    }
+    // A symbol that was hit inside a frame is one hit, though it spoils the frame, too.
+    let hits = record.symbol_errors.max(record.frames_spoiled);
+    let outages = record.links_lost.div_ceil(2).max(record.supplies_lost);
+    // What is lost behind an open link is no hit of its own.
+    let lost = if hits + outages == 0 { record.frames_lost } else { 0 };
+    [hits, outages, lost, record.frames_sent, record.frames_delayed, 1]
+        .into_iter()
+        .max()
+        .unwrap_or(1)
+}

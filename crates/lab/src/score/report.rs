@@ -1,0 +1,186 @@
+//! The score as programs read it, `linesman.score/1`.
+
+use std::collections::BTreeMap;
+
+use linesman_config::fault::FaultName;
+use serde::Serialize;
+
+use super::rate::Rate;
+
+/// Name and version of the format.
+pub const SCHEMA: &str = "linesman.score/1";
+
+/// A whole score. What is said first of a case with one fault is held against the truth; a case
+/// counts when the truth log shows an effect, whether or not it was seen.
+#[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScoreReport {
+    /// `linesman.score/1`.
+    pub schema: String,
+    /// Name and version of the program.
+    pub tool: String,
+    /// From the first seed up to, not including, the second.
+    pub seeds: (u64, u64),
+    /// The only fault that was put in, if it was chosen.
+    pub fault: Option<FaultName>,
+    /// Whether only recordings were judged.
+    pub capture_only: bool,
+    /// Cases: one for each seed.
+    pub cases: u64,
+    /// Cases in which a fault had an effect.
+    pub effective_cases: u64,
+    /// Single faults: share whose place the first finding names.
+    pub place_at_1: f64,
+    /// Single faults: share whose cause and place the first finding names.
+    pub cause_at_1: f64,
+    /// The same, counting places of causes that no evidence can tell apart.
+    pub place_at_1_set: f64,
+    /// The same, counting causes that no evidence can tell apart.
+    pub cause_at_1_set: f64,
+    /// Runs, or beginnings of runs, in which nothing was wrong.
+    pub healthy_runs: u64,
+    /// Those of them with a warning or an error.
+    pub false_alarms: u64,
+    /// What a course teaches: the first port with a counter above zero.
+    pub baseline: Baseline,
+    /// To say nothing.
+    pub no_diagnosis: Baseline,
+    /// Single faults.
+    pub single: GroupReport,
+    /// Two faults at once: whether the first two findings name both.
+    pub double: DoubleReport,
+    /// Single faults among counters full of old errors.
+    pub masked: GroupReport,
+    /// Single faults where no controller counts forwarded errors.
+    pub without_forwarded: GroupReport,
+    /// Single faults where the card's counters were not known.
+    pub without_card_counters: GroupReport,
+    /// Single faults in rings.
+    pub rings: GroupReport,
+    /// Runs in which nothing was wrong.
+    pub healthy: HealthyReport,
+    /// Single faults by the number of their effects.
+    pub by_effects: Vec<Bucket>,
+    /// How often findings were right that were so sure: cause and place, without admitted sets.
+    pub calibration: Vec<Bin>,
+    /// Single faults by name.
+    pub per_fault: BTreeMap<String, GroupReport>,
+    /// Seeds that could not be played, and why.
+    pub unplayable: Vec<String>,
+    /// Cases that were judged wrongly, or with findings that nothing explains; at most 2,000.
+    pub wrong: Vec<WrongReport>,
+}
+
+/// A way to find faults without this program.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Baseline {
+    /// Single faults: share whose place it names.
+    pub place_at_1: f64,
+}
+
+/// Faults of one kind.
+#[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GroupReport {
+    /// How many, with an effect.
+    pub faults: u64,
+    /// The live diagnosis; `null` when only recordings were judged.
+    pub live: Option<SideReport>,
+    /// The diagnosis of the recordings alone.
+    pub capture: SideReport,
+    /// The first port with a counter above zero.
+    pub baseline: Rate,
+}
+
+/// How the diagnosis did.
+#[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SideReport {
+    /// The place is right.
+    pub place_at_1: Rate,
+    /// Cause and place are right.
+    pub cause_at_1: Rate,
+    /// The place is right or admitted.
+    pub place_at_1_set: Rate,
+    /// Cause and place are right or admitted.
+    pub cause_at_1_set: Rate,
+    /// Warnings and errors that nothing explains.
+    pub other_findings: u64,
+    /// Cycles from the first effect to the first finding at the right place: half of them took no
+    /// longer.
+    pub cycles_median: Option<u64>,
+    /// 95 of 100 took no longer.
+    pub cycles_95: Option<u64>,
+}
+
+/// Two faults in one case.
+#[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DoubleReport {
+    /// Both places are right or admitted, live.
+    pub both_places: Rate,
+    /// Both causes are right or admitted, live.
+    pub both_causes: Rate,
+    /// Both places, by the recordings alone.
+    pub both_places_capture: Rate,
+    /// Both causes, by the recordings alone.
+    pub both_causes_capture: Rate,
+    /// Each fault by itself.
+    pub faults: GroupReport,
+}
+
+/// Runs in which nothing was wrong.
+#[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HealthyReport {
+    /// Without warning or error, live.
+    pub silent: Rate,
+    /// Without warning or error, by the recordings alone.
+    pub silent_capture: Rate,
+    /// What they were accused of.
+    pub alarms: Vec<String>,
+}
+
+/// Faults that acted so often.
+#[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Bucket {
+    /// At least.
+    pub from: u64,
+    /// At most; `null` without bound.
+    pub to: Option<u64>,
+    /// They.
+    #[serde(flatten)]
+    pub group: GroupReport,
+}
+
+/// Findings that were about so sure.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Bin {
+    /// Their mean confidence.
+    pub confidence: f64,
+    /// How often they were right.
+    pub right: Rate,
+}
+
+/// A case that was judged wrongly.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WrongReport {
+    /// Its seed.
+    pub seed: u64,
+    /// SubDevices.
+    pub devices: u64,
+    /// Whether it is a ring.
+    pub ring: bool,
+    /// What was injected.
+    pub fault: String,
+    /// How often it acted.
+    pub effects: u64,
+    /// What was said live.
+    pub live: Option<String>,
+    /// What was said of the recording.
+    pub capture: String,
+}

@@ -1,0 +1,310 @@
+//! Adding up cases, in the order of their seeds.
+
+use std::collections::BTreeMap;
+
+use linesman_config::fault::FaultName;
+
+use super::case::{CaseKind, ScoreOptions};
+use super::judge::Judged;
+use super::play::{CaseReport, FaultOutcome};
+use super::rate::{Count, rounded};
+use super::report::{
+    Baseline, Bin, Bucket, DoubleReport, GroupReport, HealthyReport, SCHEMA, ScoreReport,
+    SideReport, WrongReport,
+};
+use crate::verdict::Grade;
+
+/// Bins of confidence.
+const BINS: usize = 10;
+/// Cases shown in which the first finding was wrong.
+const MOST_WRONG: usize = 2_000;
+
+/// By effects: up to so many.
+const EFFECTS: [(u64, u64); 4] = [(1, 1), (2, 9), (10, 99), (100, u64::MAX)];
+
+/// What a side said of faults, live or of recordings.
+#[derive(Clone, Debug, Default)]
+struct Side {
+    place: Count,
+    cause: Count,
+    place_set: Count,
+    cause_set: Count,
+    others: u64,
+    cycles: Vec<u64>,
+}
+
+impl Side {
+    fn add(&mut self, judged: &Judged) {
+        let fits = judged.fits;
+        self.place.add(fits.place == Grade::Exact);
+        self.cause.add(fits.cause == Grade::Exact);
+        self.place_set.add(fits.place.is_right());
+        self.cause_set.add(fits.cause.is_right());
+        self.others += judged.others;
+        self.cycles.extend(judged.cycles);
+    }
+
+    fn report(&self) -> SideReport {
+        let mut cycles = self.cycles.clone();
+        cycles.sort_unstable();
+        let at = |share: f64| {
+            let last = cycles.len().checked_sub(1)?;
+            cycles.get((last as f64 * share).round() as usize).copied()
+        };
+        SideReport {
+            place_at_1: self.place.rate(),
+            cause_at_1: self.cause.rate(),
+            place_at_1_set: self.place_set.rate(),
+            cause_at_1_set: self.cause_set.rate(),
+            other_findings: self.others,
+            cycles_median: at(0.5),
+            cycles_95: at(0.95),
+        }
+    }
+}
+
+/// Faults of one kind.
+#[derive(Clone, Debug, Default)]
+struct Group {
+    faults: u64,
+    live: Side,
+    capture: Side,
+    baseline: Count,
+}
+
+impl Group {
+    fn add(&mut self, fault: &FaultOutcome) {
+        self.faults += 1;
+        if let Some(live) = &fault.live {
+            self.live.add(live);
+        }
+        self.capture.add(&fault.capture);
+        self.baseline.add(fault.baseline);
+    }
+
+    fn report(&self) -> GroupReport {
+        GroupReport {
+            faults: self.faults,
+            live: (self.live.place.rate().of > 0).then(|| self.live.report()),
+            capture: self.capture.report(),
+            baseline: self.baseline.rate(),
+        }
+    }
+}
+
+/// Both faults of a case.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pairs {
+    places: Count,
+    causes: Count,
+}
+
+impl Pairs {
+    fn add<'a>(&mut self, judged: impl Iterator<Item = &'a Judged> + Clone) {
+        self.places.add(judged.clone().all(|one| one.fits.place.is_right()));
+        self.causes.add(judged.clone().all(|one| one.fits.cause.is_right()));
+    }
+}
+
+/// How sure findings were, and how often they were right.
+#[derive(Clone, Copy, Debug, Default)]
+struct Confidence {
+    count: Count,
+    sum: f64,
+}
+
+/// Cases added up.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    options: ScoreOptions,
+    seeds: Option<(u64, u64)>,
+    cases: u64,
+    effective: u64,
+    unplayable: Vec<String>,
+    healthy: Count,
+    healthy_capture: Count,
+    alarms: Vec<String>,
+    single: Group,
+    masked: Group,
+    without_forwarded: Group,
+    rings: Group,
+    without_card: Group,
+    double: Group,
+    pairs: Pairs,
+    pairs_capture: Pairs,
+    by_effects: [Group; EFFECTS.len()],
+    per_fault: BTreeMap<FaultName, Group>,
+    confidence: [Confidence; BINS],
+    wrong: Vec<WrongReport>,
+}
+
+impl Tally {
+    /// Nothing so far.
+    #[must_use]
+    pub fn new(options: ScoreOptions) -> Self {
+        Self { options, ..Self::default() }
+    }
+
+    /// Adds a case. To be called in the order of seeds.
+    pub fn add(&mut self, case: &CaseReport) {
+        let first = self.seeds.map_or(case.seed, |(first, _)| first);
+        self.seeds = Some((first, case.seed + 1));
+        self.cases += 1;
+        if let Some(why) = &case.unplayable {
+            self.unplayable.push(format!("seed {}: {why}", case.seed));
+        }
+        if let Some((live, capture)) = &case.healthy {
+            let shown = if self.options.capture_only { capture } else { live };
+            self.healthy.add(shown.is_empty());
+            self.healthy_capture.add(capture.is_empty());
+            for alarm in shown {
+                self.alarms.push(format!("seed {}: {alarm}", case.seed));
+            }
+        }
+        let acted: Vec<&FaultOutcome> = case.faults.iter().filter(|one| one.effects > 0).collect();
+        self.effective += u64::from(!acted.is_empty());
+        if case.kind == CaseKind::Double && acted.len() == 2 {
+            self.pairs.add(acted.iter().filter_map(|one| one.live.as_ref()));
+            self.pairs_capture.add(acted.iter().map(|one| &one.capture));
+            for fault in acted {
+                self.double.add(fault);
+                self.note_wrong(case, fault);
+            }
+            return;
+        }
+        // With one of two faults that did nothing, two findings were looked at: it is no single one.
+        if case.kind == CaseKind::Double {
+            return;
+        }
+        for fault in acted {
+            self.add_single(case, fault);
+        }
+    }
+
+    fn add_single(&mut self, case: &CaseReport, fault: &FaultOutcome) {
+        self.single.add(fault);
+        if case.kind == CaseKind::Masked {
+            self.masked.add(fault);
+        }
+        if !case.forwarded {
+            self.without_forwarded.add(fault);
+        }
+        if case.is_ring {
+            self.rings.add(fault);
+        }
+        if !case.host_counters {
+            self.without_card.add(fault);
+        }
+        let of_effects = EFFECTS.iter().position(|(_, most)| fault.effects <= *most);
+        if let Some(group) = of_effects.and_then(|at| self.by_effects.get_mut(at)) {
+            group.add(fault);
+        }
+        self.per_fault.entry(fault.name).or_default().add(fault);
+        let judged = fault.live.as_ref().unwrap_or(&fault.capture);
+        if !judged.said.is_empty() {
+            let bin = ((judged.confidence * BINS as f64) as usize).min(BINS - 1);
+            self.confidence[bin].count.add(judged.fits.cause == Grade::Exact);
+            self.confidence[bin].sum += judged.confidence;
+        }
+        self.note_wrong(case, fault);
+    }
+
+    fn note_wrong(&mut self, case: &CaseReport, fault: &FaultOutcome) {
+        let live = fault.live.as_ref();
+        let is_right =
+            |judged: &Judged| judged.fits.cause.is_right() && judged.fits.place.is_right();
+        let is_all_right = live.is_none_or(is_right) && is_right(&fault.capture);
+        let has_others = live.is_some_and(|judged| judged.others > 0);
+        if (is_all_right && !has_others) || self.wrong.len() >= MOST_WRONG {
+            return;
+        }
+        self.wrong.push(WrongReport {
+            seed: case.seed,
+            devices: case.devices as u64,
+            ring: case.is_ring,
+            fault: fault.entry.clone(),
+            effects: fault.effects,
+            live: live.map(verdict),
+            capture: verdict(&fault.capture),
+        });
+    }
+
+    /// The sum.
+    #[must_use]
+    pub fn report(&self) -> ScoreReport {
+        let single = self.single.report();
+        let first = single.live.clone().unwrap_or_else(|| single.capture.clone());
+        let bins = self.confidence.iter().filter(|bin| bin.count.rate().of > 0).map(|bin| {
+            let right = bin.count.rate();
+            Bin { confidence: rounded(bin.sum / right.of as f64), right }
+        });
+        let (healthy, healthy_capture) = (self.healthy.rate(), self.healthy_capture.rate());
+        ScoreReport {
+            schema: SCHEMA.to_owned(),
+            tool: concat!("linesman ", env!("CARGO_PKG_VERSION")).to_owned(),
+            seeds: self.seeds.unwrap_or_default(),
+            fault: self.options.fault,
+            capture_only: self.options.capture_only,
+            cases: self.cases,
+            effective_cases: self.effective,
+            place_at_1: first.place_at_1.share,
+            cause_at_1: first.cause_at_1.share,
+            place_at_1_set: first.place_at_1_set.share,
+            cause_at_1_set: first.cause_at_1_set.share,
+            healthy_runs: healthy.of,
+            false_alarms: healthy.of - healthy.right,
+            baseline: Baseline { place_at_1: single.baseline.share },
+            no_diagnosis: Baseline { place_at_1: 0.0 },
+            single,
+            double: DoubleReport {
+                both_places: self.pairs.places.rate(),
+                both_causes: self.pairs.causes.rate(),
+                both_places_capture: self.pairs_capture.places.rate(),
+                both_causes_capture: self.pairs_capture.causes.rate(),
+                faults: self.double.report(),
+            },
+            masked: self.masked.report(),
+            without_forwarded: self.without_forwarded.report(),
+            without_card_counters: self.without_card.report(),
+            rings: self.rings.report(),
+            healthy: HealthyReport {
+                silent: healthy,
+                silent_capture: healthy_capture,
+                alarms: self.alarms.clone(),
+            },
+            by_effects: EFFECTS
+                .iter()
+                .zip(&self.by_effects)
+                .map(|((from, to), group)| Bucket {
+                    from: *from,
+                    to: (*to != u64::MAX).then_some(*to),
+                    group: group.report(),
+                })
+                .collect(),
+            calibration: bins.collect(),
+            per_fault: self
+                .per_fault
+                .iter()
+                .map(|(name, group)| (name.name().to_owned(), group.report()))
+                .collect(),
+            unplayable: self.unplayable.clone(),
+            wrong: self.wrong.clone(),
+        }
+    }
+}
+
+/// What was said, and how well it fits.
+fn verdict(judged: &Judged) -> String {
+    let fits = judged.fits;
+    let mark = match (fits.place.is_right(), fits.cause.is_right()) {
+        (true, true) => "right",
+        (true, false) => "wrong cause",
+        (false, _) => "wrong place",
+    };
+    let said = if judged.said.is_empty() { "nothing" } else { &judged.said };
+    let others = match judged.others {
+        0 => String::new(),
+        others => format!(", and {others} more that nothing explains"),
+    };
+    format!("{mark}: {said}{others}")
+}

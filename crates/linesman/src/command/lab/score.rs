@@ -1,0 +1,217 @@
+//! `linesman lab score`: how often the diagnosis is right.
+
+use std::ops::Range;
+
+use linesman_config::fault::FaultName;
+use linesman_lab::score::report::{GroupReport, SideReport};
+use linesman_lab::score::{Rate, ScoreOptions, ScoreReport, Tally, run_case};
+
+use super::{on_all_processors, seeds};
+use crate::exit::Status;
+use crate::output::{Output, Progress, Table};
+use crate::text::quantity::count;
+
+/// What can be asked.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Arguments {
+    /// From the first seed up to, not including, the second
+    #[arg(long, value_name = "A..B", value_parser = seeds)]
+    seeds: Range<u64>,
+    /// Only this fault, one in each case
+    #[arg(long, value_name = "NAME")]
+    fault: Option<FaultName>,
+    /// Judge recordings alone, of lines that nobody asks for registers on account of a finding
+    #[arg(long)]
+    capture_only: bool,
+    /// Also each case that was judged wrongly, with what was said
+    #[arg(long)]
+    list: bool,
+    /// JSON, schema linesman.score/1
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Plays the cases on all processors and adds up in the order of seeds: the sum is the same for any
+/// number of them.
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Status {
+    let options = ScoreOptions { fault: arguments.fault, capture_only: arguments.capture_only };
+    let mut tally = Tally::new(options);
+    let mut progress = Progress::new();
+    let total = arguments.seeds.end - arguments.seeds.start;
+    let mut done = 0;
+    on_all_processors(
+        arguments.seeds.clone(),
+        |seed| run_case(seed, &options),
+        |case| {
+            tally.add(&case);
+            done += 1;
+            progress.show(|| format!("{done} of {}", count(total, "seed")));
+        },
+    );
+    progress.clear();
+    let report = tally.report();
+    if arguments.json {
+        output.json(&report);
+    } else {
+        show(&report, arguments.list, output);
+    }
+    if report.effective_cases + report.healthy_runs > 0 { Status::Good } else { Status::NotJudged }
+}
+
+fn show(report: &ScoreReport, list: bool, output: &mut Output) {
+    let (from, to) = report.seeds;
+    output.line(&format!(
+        "Seeds {from}..{to}: {}, in {} a fault had an effect.",
+        count(report.cases, "case"),
+        report.effective_cases
+    ));
+    output.line("");
+    let mut table = Table::new(
+        &["single faults", "place", "cause", "place, set", "cause, set", "95 %"],
+        output.paint(),
+    );
+    for (name, side) in
+        [("live", report.single.live.as_ref()), ("recording", Some(&report.single.capture))]
+    {
+        let Some(side) = side else { continue };
+        table.row([
+            name.to_owned(),
+            share(side.place_at_1),
+            share(side.cause_at_1),
+            share(side.place_at_1_set),
+            share(side.cause_at_1_set),
+            format!("{} / {}", interval(side.place_at_1_set), interval(side.cause_at_1_set)),
+        ]);
+    }
+    table.row([
+        "first counter above zero".to_owned(),
+        share(report.single.baseline),
+        "-".to_owned(),
+        "-".to_owned(),
+        "-".to_owned(),
+        interval(report.single.baseline),
+    ]);
+    table.row(["no diagnosis", "0.0 %", "-", "-", "-", "-"].map(str::to_owned));
+    output.text(&table.render());
+    output.line("");
+    let (healthy, capture) = (report.healthy.silent, report.healthy.silent_capture);
+    output.line(&format!(
+        "Nothing wrong: {}, {} false alarms ({} in the recordings).",
+        count(healthy.of, "run"),
+        healthy.of - healthy.right,
+        capture.of - capture.right
+    ));
+    let double = &report.double;
+    output.line(&format!(
+        "Two faults: {}; both places {} {}, both causes {}; in the recordings {} and {}.",
+        count(double.both_places.of.max(double.both_places_capture.of), "case"),
+        share(double.both_places),
+        interval(double.both_places),
+        share(double.both_causes),
+        share(double.both_places_capture),
+        share(double.both_causes_capture)
+    ));
+    output.line("");
+    groups(report, output);
+    output.line("");
+    output.line("How sure, and how often cause and place were just that:");
+    for bin in &report.calibration {
+        let right = bin.right;
+        output.line(&format!(
+            "  {:>3.0} %   {} of {}",
+            bin.confidence * 100.0,
+            share(right),
+            count(right.of, "finding")
+        ));
+    }
+    for alarm in &report.healthy.alarms {
+        output.line(&format!("false alarm, {alarm}"));
+    }
+    for why in &report.unplayable {
+        output.line(&format!("not played, {why}"));
+    }
+    if !list {
+        return;
+    }
+    for wrong in &report.wrong {
+        let ring = if wrong.ring { ", ring" } else { "" };
+        output.line(&format!(
+            "seed {}: {} ({}, {}{ring})",
+            wrong.seed,
+            wrong.fault,
+            count(wrong.effects, "effect"),
+            count(wrong.devices, "SubDevice")
+        ));
+        if let Some(live) = &wrong.live {
+            output.line(&format!("    live       {live}"));
+        }
+        output.line(&format!("    recording  {}", wrong.capture));
+    }
+}
+
+fn groups(report: &ScoreReport, output: &mut Output) {
+    let mut table = Table::new(
+        &[
+            "",
+            "faults",
+            "place",
+            "cause",
+            "place, set",
+            "cause, set",
+            "recording",
+            "others",
+            "cycles",
+        ],
+        output.paint(),
+    );
+    let mut add = |name: &str, group: &GroupReport| {
+        if group.faults == 0 {
+            return;
+        }
+        let side = group.live.as_ref().unwrap_or(&group.capture);
+        let recording = &group.capture;
+        table.row([
+            name.to_owned(),
+            group.faults.to_string(),
+            share(side.place_at_1),
+            share(side.cause_at_1),
+            share(side.place_at_1_set),
+            share(side.cause_at_1_set),
+            format!("{} / {}", share(recording.place_at_1_set), share(recording.cause_at_1_set)),
+            side.other_findings.to_string(),
+            cycles(side),
+        ]);
+    };
+    for (name, group) in &report.per_fault {
+        add(name, group);
+    }
+    for bucket in &report.by_effects {
+        let name = match bucket.to {
+            Some(to) if to == bucket.from => format!("{to} effect"),
+            Some(to) => format!("{} to {to} effects", bucket.from),
+            None => format!("from {} effects", bucket.from),
+        };
+        add(&name, &bucket.group);
+    }
+    add("among old counters", &report.masked);
+    add("without forwarded counters", &report.without_forwarded);
+    add("without the card's counters", &report.without_card_counters);
+    add("in rings", &report.rings);
+    add("each of two", &report.double.faults);
+    output.text(&table.render());
+}
+
+fn share(rate: Rate) -> String {
+    if rate.of == 0 { "-".to_owned() } else { format!("{:.1} %", rate.share * 100.0) }
+}
+
+fn interval(rate: Rate) -> String {
+    format!("[{:.1}, {:.1}]", rate.low * 100.0, rate.high * 100.0)
+}
+
+fn cycles(side: &SideReport) -> String {
+    match (side.cycles_median, side.cycles_95) {
+        (Some(median), Some(late)) => format!("{median} ({late})"),
+        (_, _) => "-".to_owned(),
+    }
+}

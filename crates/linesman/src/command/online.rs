@@ -1,0 +1,236 @@
+//! `linesman online`: a network as it is now, once or again and again.
+//!
+//! Of a line that a MainDevice drives its socket is asked; a line that nobody drives is looked at with
+//! nothing but reads; a saved report is shown again.
+
+mod detail;
+mod line;
+mod live;
+mod table;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use linesman_maindevice::service::Service;
+use linesman_proto::address::DeviceId;
+use linesman_runtime::online::report::{OnlineReport, SCHEMA};
+use linesman_runtime::selector::Selector;
+use linesman_runtime::service;
+
+use self::live::{Live, Pace};
+use crate::command::service::{is_socket, silent};
+use crate::exit::Status;
+use crate::failure::Failure;
+use crate::files;
+use crate::output::Output;
+
+/// Most bytes of a saved report.
+const MOST: u64 = 256 * 1024 * 1024;
+
+/// What can be asked.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Arguments {
+    /// Where the line is: the socket of `run --control`; eth0, eth0+eth1 (a ring) or sim:plant.toml for a
+    /// line that nobody drives; or a report that was saved (a path ending in .json)
+    #[arg(value_name = "WHERE", required_unless_present = "control")]
+    place: Option<String>,
+    /// One SubDevice in detail: its number (3), station address (0x1003) or name; all unless said
+    #[arg(value_name = "DEVICE")]
+    device: Option<String>,
+    /// The socket of a running MainDevice, instead of WHERE
+    #[arg(long, value_name = "SOCKET")]
+    control: Option<PathBuf>,
+    /// Again and again: a table on a terminal (q ends it), else a line for each change
+    #[arg(long, short)]
+    live: bool,
+    /// How long to look; live without an end unless said
+    #[arg(long, value_name = "SECONDS")]
+    seconds: Option<f64>,
+    /// Time between two looks of the live view
+    #[arg(long, value_name = "MS", default_value_t = 500, value_parser = clap::value_parser!(u64).range(20..=60_000))]
+    interval_ms: u64,
+    /// Let counts begin at 0 first. Errors: the registers too, which are read and cleared in one go
+    #[arg(long, value_name = "WHAT", value_enum)]
+    clear: Option<What>,
+    /// Keep the report in a file, to be shown again later
+    #[arg(long, value_name = "FILE.json")]
+    save: Option<PathBuf>,
+    /// JSON, schema linesman.online/1; with --live one object a line
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Which counts.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+enum What {
+    /// Error counters and change counters
+    Errors,
+    /// Frames sent and lost
+    Frames,
+    /// Both
+    All,
+}
+
+impl What {
+    const fn errors(self) -> bool {
+        matches!(self, Self::Errors | Self::All)
+    }
+
+    const fn frames(self) -> bool {
+        matches!(self, Self::Frames | Self::All)
+    }
+}
+
+/// Shows what was asked for.
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    if let Some(path) = &arguments.save {
+        files::refuse_to_overwrite(path)?;
+    }
+    let (place, device) = match (&arguments.control, &arguments.place, &arguments.device) {
+        // With an option for the socket the first word is the SubDevice.
+        (Some(_), place, None) => (None, place.as_deref()),
+        (Some(_), Some(_), Some(_)) => return Err(twice()),
+        (_, place, device) => (place.as_deref(), device.as_deref()),
+    };
+    let place = place.unwrap_or_default().to_owned();
+    let socket = match &arguments.control {
+        Some(path) => Some(path.clone()),
+        None => is_socket(&place).then(|| PathBuf::from(&place)),
+    };
+    let report = if let Some(path) = socket {
+        driven(&path, arguments, output)?
+    } else if Path::new(&place).extension().is_some_and(|ending| ending == "json") {
+        saved(Path::new(&place))?
+    } else {
+        match place.parse::<Selector>()? {
+            Selector::Cards(names) => line::cards(&names, &place, arguments, output)?,
+            Selector::Segment(path) => line::segment(&path, &place, arguments, output)?,
+            selector @ (Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_)) => {
+                let reason = format!("`{selector}`: nobody can be asked there");
+                let advice = format!("judge it with `linesman diagnose {place}`");
+                return Err(Failure::new(reason, advice));
+            }
+        }
+    };
+    conclude(&report, device, arguments, output)
+}
+
+fn twice() -> Failure {
+    Failure::new("WHERE and --control both say where the line is", "leave one of them out")
+}
+
+fn conclude(
+    report: &OnlineReport,
+    device: Option<&str>,
+    arguments: &Arguments,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    if let Some(path) = &arguments.save {
+        let text = serde_json::to_string_pretty(report)
+            .map_err(|error| Failure::new(format!("writing JSON: {error}"), ""))?;
+        files::write_new(path, "the report", &text)?;
+    }
+    let chosen = match device {
+        Some(word) => Some(detail::find(report, word)?),
+        None => None,
+    };
+    // A live view has shown all that there was.
+    if !arguments.live {
+        if arguments.json {
+            output.json(report);
+        } else if let Some(device) = chosen {
+            output.text(&detail::text(report, device, output));
+        } else {
+            output.text(&table::text(report, None, output));
+        }
+    }
+    Ok(if report.has_trouble() { Status::Findings } else { Status::Good })
+}
+
+fn interval(arguments: &Arguments) -> Duration {
+    Duration::from_millis(arguments.interval_ms)
+}
+
+/// How long to look; `None`: until somebody ends it.
+fn lasts(arguments: &Arguments) -> Result<Option<Duration>, Failure> {
+    let Some(seconds) = arguments.seconds else { return Ok(None) };
+    Duration::try_from_secs_f64(seconds).map(Some).map_err(|error| {
+        Failure::new(
+            format!("--seconds {seconds}: {error}"),
+            "give a number of seconds, `--seconds 10`",
+        )
+    })
+}
+
+/// A line that a MainDevice drives.
+fn driven(
+    path: &Path,
+    arguments: &Arguments,
+    output: &mut Output,
+) -> Result<OnlineReport, Failure> {
+    if let Some(what) = arguments.clear {
+        clear(path, what, output)?;
+    }
+    let pace = Pace { interval: interval(arguments), lasts: lasts(arguments)? };
+    if !arguments.live {
+        if let Some(lasts) = pace.lasts {
+            std::thread::sleep(lasts);
+        }
+        return ask(path);
+    }
+    let mut live = Live::start(arguments.json, pace, output)?;
+    loop {
+        let report = ask(path)?;
+        live.show(&report, output)?;
+        if !live.wait(output)? {
+            return Ok(report);
+        }
+    }
+}
+
+fn ask(path: &Path) -> Result<OnlineReport, Failure> {
+    let answer = service::online(path).map_err(|error| silent(path, &error))?;
+    match (answer.online, answer.error) {
+        (Some(report), _) => Ok(OnlineReport { on: path.display().to_string(), ..*report }),
+        (None, Some(why)) => {
+            let (reason, advice) = why.split_once(". Do: ").unwrap_or((&why, "ask again"));
+            Err(Failure::new(format!("{}: {reason}", path.display()), advice))
+        }
+        (None, None) => {
+            let reason =
+                format!("{}: whoever listens there does not say how the line is", path.display());
+            Err(Failure::new(reason, "name the socket of `linesman run --control`"))
+        }
+    }
+}
+
+/// The registers first, each read and cleared in one go; then what was summed up.
+fn clear(path: &Path, what: What, output: &Output) -> Result<(), Failure> {
+    if what.errors() {
+        for device in ask(path)?.devices {
+            let Some(id) = DeviceId::from_no(device.no) else { continue };
+            let answer = service::ask(path, id.no(), &Service::ClearCounters)
+                .map_err(|error| silent(path, &error))?;
+            if let Some(why) = answer.error {
+                // The others are cleared all the same.
+                output.warn(&format!("its counters stand: {why}"));
+            }
+        }
+    }
+    let answer = service::clear(path, what.errors(), what.frames());
+    answer.map(drop).map_err(|error| silent(path, &error))
+}
+
+/// A report that was kept.
+fn saved(path: &Path) -> Result<OnlineReport, Failure> {
+    let bytes = files::bytes(path, "a report of `linesman online`", MOST)?;
+    let advice = "name a file that `linesman online --save` has written";
+    let report: OnlineReport = serde_json::from_slice(&bytes)
+        .map_err(|error| Failure::new(format!("{}: {error}", path.display()), advice))?;
+    if report.schema != SCHEMA {
+        let found = &report.schema;
+        let reason = format!("{}: schema `{found}`, expected `{SCHEMA}`", path.display());
+        return Err(Failure::new(reason, advice));
+    }
+    Ok(report)
+}

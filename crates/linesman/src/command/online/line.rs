@@ -1,0 +1,160 @@
+//! A line that nobody drives, looked at with nothing but reads.
+
+use std::path::Path;
+
+use linesman_diagnosis::{FrameSeen, HostObservation};
+use linesman_link::clock::HostClock;
+use linesman_maindevice::procedure::counters::read_and_clear;
+use linesman_maindevice::{Event, MainDevice, Target};
+use linesman_proto::address::Position;
+use linesman_proto::time::{Instant, Span};
+use linesman_runtime::drive::{Audience, Driver};
+use linesman_runtime::line::{Cards, Line, Pace as VirtualPace};
+use linesman_runtime::online::Looker;
+use linesman_runtime::online::report::OnlineReport;
+
+use super::live::{Live, Pace};
+use super::{Arguments, interval, lasts};
+use crate::command::driven;
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// A look takes milliseconds; a line that is silent for so long is.
+const PATIENCE: Span = Span::s(5);
+
+/// Looks at the line on these cards.
+pub(super) fn cards(
+    names: &[String],
+    place: &str,
+    arguments: &Arguments,
+    output: &mut Output,
+) -> Result<OnlineReport, Failure> {
+    driven::refuse(names)?;
+    let line = Cards::open(names, HostClock::start())?;
+    look(line, Looker::new(place, Vec::new()), place, arguments, output)
+}
+
+/// Looks at the segment of a file; nobody brings it up.
+pub(super) fn segment(
+    path: &Path,
+    place: &str,
+    arguments: &Arguments,
+    output: &mut Output,
+) -> Result<OnlineReport, Failure> {
+    let pace = if arguments.live { VirtualPace::Host } else { VirtualPace::Free };
+    let line = driven::virtual_line(path, pace)?;
+    let segment = line.segment();
+    let names = segment.devices().map(|id| segment.name(id).to_owned()).collect();
+    look(line, Looker::new(place, names), place, arguments, output)
+}
+
+fn look<L: Line>(
+    line: L,
+    looker: Looker,
+    place: &str,
+    arguments: &Arguments,
+    output: &mut Output,
+) -> Result<OnlineReport, Failure> {
+    let stop = driven::stop()?;
+    let options = line.options();
+    let mut driver = Driver::new(line, options);
+    let lasts = lasts(arguments)?;
+    let span = lasts.map(|lasts| Span::ns(lasts.as_nanos() as u64));
+    let looker = if arguments.live || lasts.is_some() { looker } else { looker.once() };
+    let until = match (span, arguments.live) {
+        (Some(span), _) => driver.now() + span,
+        (None, true) => Instant::MAX,
+        (None, false) => driver.now() + PATIENCE,
+    };
+    let live = match arguments.live {
+        true => Some(Live::start(
+            arguments.json,
+            Pace { interval: interval(arguments), lasts },
+            output,
+        )?),
+        false => None,
+    };
+    let clears = arguments.clear.is_some_and(super::What::errors);
+    let mut looking =
+        Looking { looker, live, output, clears, show_at: Instant::ZERO, failure: None };
+    let result = driver.run(until, &stop, &mut looking);
+    let Looking { looker, live, failure, .. } = looking;
+    // The terminal is given back before anything else is told.
+    drop(live);
+    result?;
+    if let Some(failure) = failure {
+        return Err(failure);
+    }
+    looker.report(driver.now()).ok_or_else(|| {
+        let why = looker.failure().unwrap_or("nobody has answered yet");
+        let mut failure = Failure::new(format!("{place}: {why}"), "");
+        "check that the first SubDevice is on and wired to this card, and that the card has a link \
+         (`linesman interfaces`)"
+            .clone_into(&mut failure.next_step);
+        failure
+    })
+}
+
+/// Looks, and shows what was seen.
+struct Looking<'a> {
+    looker: Looker,
+    live: Option<Live>,
+    output: &'a mut Output,
+    /// The registers are to be cleared, once it is known who is there.
+    clears: bool,
+    show_at: Instant,
+    failure: Option<Failure>,
+}
+
+impl Looking<'_> {
+    fn show(&mut self, now: Instant) -> Result<bool, Failure> {
+        let Some(live) = &mut self.live else { return Ok(true) };
+        if now < self.show_at {
+            return Ok(true);
+        }
+        let Some(report) = self.looker.report(now) else { return Ok(true) };
+        self.show_at = now + Span::ns(live.interval().as_nanos() as u64);
+        live.show(&report, self.output)?;
+        live.goes_on(self.output)
+    }
+}
+
+impl Audience for Looking<'_> {
+    fn frame(&mut self, frame: &FrameSeen<'_>) {
+        self.looker.frame(frame);
+    }
+
+    fn host(&mut self, observation: &HostObservation) {
+        self.looker.host(observation);
+    }
+
+    fn event(&mut self, now: Instant, event: Event, main: &mut MainDevice) {
+        self.looker.event(now, event, main);
+    }
+
+    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
+        if self.clears
+            && let Some(report) = self.looker.report(now)
+        {
+            self.clears = false;
+            for place in 0..report.planned as u16 {
+                let target = Target::Position(Position(place));
+                // Who does not answer shows in the next look.
+                drop(main.perform(now, |wire| async move { read_and_clear(&wire, target).await }));
+            }
+        }
+        let goes_on = self.looker.turn(now, main);
+        match self.show(now) {
+            Ok(shown) => goes_on && shown && !self.output.is_closed(),
+            Err(failure) => {
+                self.failure = Some(failure);
+                false
+            }
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let show = self.live.is_some().then_some(self.show_at).filter(|at| *at > Instant::ZERO);
+        [self.looker.poll_timeout(), show].into_iter().flatten().min()
+    }
+}

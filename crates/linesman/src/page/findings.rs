@@ -1,0 +1,160 @@
+//! What is wrong, worst first: where, why, how it is known, what to do, what follows from it.
+
+use linesman_diagnosis::report::{EvidenceReport, FindingReport, FindingState, Number, Severity};
+use maud::{Markup, html};
+
+use super::moment;
+use crate::text::finding::{Writer, percent, register_value, when};
+
+/// Most pieces of evidence in a table; a page with thousands of rows helps nobody.
+const MOST_EVIDENCE: usize = 200;
+
+/// What to look at first: place and first action of each finding, to tick off.
+pub(super) fn overview(findings: &[FindingReport], writer: &Writer<'_>) -> Markup {
+    html! {
+        @if !findings.is_empty() {
+            section {
+                h2 { "What to do" }
+                ol class="checklist" {
+                    @for finding in findings {
+                        li {
+                            a href={ "#" (finding.id) } { (finding.id) } " "
+                            b { (writer.names.place(&finding.place)) } ": "
+                            (finding.cause) " (" (percent(finding.confidence)) ")"
+                            ul {
+                                @for action in &finding.actions {
+                                    li { span class="tick" {} (action) }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Each finding in full.
+pub(super) fn section(findings: &[FindingReport], writer: &Writer<'_>) -> Markup {
+    html! {
+        @if !findings.is_empty() {
+            section {
+                h2 { "Findings" }
+                @for finding in findings { (article(finding, writer)) }
+            }
+        }
+    }
+}
+
+fn article(finding: &FindingReport, writer: &Writer<'_>) -> Markup {
+    html! {
+        article id=(finding.id) class=(severity(finding.severity)) {
+            h3 {
+                span class="tag" { (severity(finding.severity)) } " "
+                (finding.id) " " (finding.code) " " (finding.name)
+                span class="faint" { (over(finding.state)) }
+            }
+            dl {
+                dt { "Where" } dd { (writer.names.place(&finding.place)) }
+                dt { "Why" }
+                dd {
+                    b { (finding.cause) } " (" (percent(finding.confidence)) "): " (finding.cause.meaning())
+                }
+                @for other in &finding.alternatives {
+                    dt { "Or" }
+                    dd {
+                        b { (other.cause) } " (" (percent(other.confidence)) "): " (other.cause.meaning())
+                        @if let Some(place) = &other.place { " There: " (writer.names.place(place)) "." }
+                    }
+                }
+                @if writer.timed { dt { "When" } dd { (when(finding)) } }
+            }
+            (evidence(&finding.evidence, writer))
+            (consequences(&finding.consequences, writer))
+        }
+    }
+}
+
+fn evidence(all: &[EvidenceReport], writer: &Writer<'_>) -> Markup {
+    html! {
+        @if !all.is_empty() {
+            details open[all.len() <= 12] {
+                summary { "How it is known (" (all.len()) ")" }
+                table {
+                    thead {
+                        tr {
+                            @if writer.timed { th { "time" } th { "frame" } }
+                            th { "SubDevice" } th { "register" } th { "before" } th { "after" }
+                            th { "what was seen" }
+                        }
+                    }
+                    tbody {
+                        @for one in all.iter().take(MOST_EVIDENCE) { (row(one, writer)) }
+                    }
+                }
+                @if all.len() > MOST_EVIDENCE {
+                    p class="faint" {
+                        "and " (all.len() - MOST_EVIDENCE) " more, in the JSON of the same diagnosis"
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn row(one: &EvidenceReport, writer: &Writer<'_>) -> Markup {
+    let value = |value: Option<Number>| value.map(|Number(value)| register_value(one, value));
+    html! {
+        tr {
+            @if writer.timed {
+                td class="number" { @if let Some(Number(at)) = one.time_ns { (moment(at)) } }
+                td class="number" { @if let Some(Number(frame)) = one.frame { (frame) } }
+            }
+            td {
+                @if let Some(no) = one.no {
+                    (writer.names.device(no)) @if let Some(port) = one.port { " port " (port) }
+                }
+            }
+            td { @if let Some(register) = one.register { (format!("0x{register:04X}")) } }
+            td class="number" { (value(one.before).unwrap_or_default()) }
+            td class="number" { (value(one.after).unwrap_or_default()) }
+            td { (one.text) }
+        }
+    }
+}
+
+fn consequences(all: &[FindingReport], writer: &Writer<'_>) -> Markup {
+    html! {
+        @if !all.is_empty() {
+            details open[all.len() <= 8] {
+                summary { "What follows from it (" (all.len()) ")" }
+                ul {
+                    @for one in all {
+                        li {
+                            (one.id) " " (one.code) " " (one.name) ": " (writer.names.place(&one.place))
+                            @if writer.timed { ", " (when(one)) }
+                            (consequences(&one.consequences, writer))
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// As it is written, and as classes of the style sheet are called.
+pub(super) const fn severity(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+        Severity::Info => "info",
+    }
+}
+
+const fn over(state: FindingState) -> &'static str {
+    match state {
+        FindingState::Opened => " not certain yet",
+        FindingState::Confirmed => "",
+        FindingState::Closed => " over",
+    }
+}

@@ -1,0 +1,229 @@
+//! `linesman online`: a network as it is now, driven or not.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+mod support;
+
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+use support::{PROGRAM, assert_valid, linesman};
+use tempfile::TempDir;
+
+const PLANT: &str = "\
+[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+[[device]]\nname = \"T2\"\ntype = \"EL2008\"\non = \"K1.B\"\n\
+[[device]]\nname = \"T3\"\ntype = \"EL3104\"\non = \"T2.B\"\n";
+
+/// Symbols are destroyed on the way into T3 from 0.5 s on, without end.
+const NOISE: &str = "\
+[[fault]]\nkind = \"emc-noise\"\nat = \"T2.B>T3.A\"\nhits_per_s = 60\nfrom_ms = 500\n";
+
+/// A run in a process of its own, and its socket; ended with the test.
+struct Running {
+    child: Child,
+    folder: TempDir,
+}
+
+impl Running {
+    fn start(plant: &str) -> Self {
+        let folder = TempDir::new().unwrap();
+        let file = folder.path().join("plant.toml");
+        std::fs::write(&file, plant).unwrap();
+        let child = Command::new(PROGRAM)
+            .args(["run", "--on", &format!("sim:{}", file.display()), "--control"])
+            .arg(folder.path().join("socket"))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let running = Self { child, folder };
+        running.until("comes up", |report| {
+            let devices = report["devices"].as_array().unwrap();
+            devices.len() == 3 && devices.iter().all(|one| one["al_state"] == "OP")
+        });
+        running
+    }
+
+    fn socket(&self) -> String {
+        self.folder.path().join("socket").display().to_string()
+    }
+
+    /// The report, once it is as expected; on a busy computer that takes a while.
+    #[track_caller]
+    fn until(&self, what: &str, done: impl Fn(&Value) -> bool) -> Value {
+        let mut last = String::new();
+        for _ in 0..600 {
+            let run = linesman(["online", &self.socket(), "--json"]);
+            if run.status < 2 && done(&run.json()) {
+                return run.json();
+            }
+            last = run.all();
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        panic!("it never {what}: {last}");
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn number(value: &Value) -> u64 {
+    value.as_u64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+// proves: DIA-11, HW-12, HW-32, PLC-01, PLC-03 partial: right, PLC-08, PLC-09, PLC-10, PLC-11, PLC-12, PLC-13, PLC-15
+#[test]
+fn a_running_line_is_shown_with_all_that_is_known() {
+    let running = Running::start(PLANT);
+    let report = running.until("has counted for a second", |report| {
+        !report["cyclic"]["per_second"].is_null() && !report["devices"][2]["dl_status"].is_null()
+    });
+    assert_valid(&report, "online");
+    assert_eq!(
+        (&report["driven"], &report["state"]["word"]),
+        (&Value::from(true), &Value::from(0))
+    );
+    assert_eq!((number(&report["planned"]), number(&report["present"])), (3, 3));
+    assert_eq!(number(&report["responding"]), 3);
+    // The one before: a frame of each, and more of those every cycle.
+    assert!(number(&report["cyclic"]["sent"]) > 100 && number(&report["queued"]["sent"]) > 10);
+    assert!(report["cyclic"]["per_second"].as_f64().unwrap() > 10.0, "{}", report["cyclic"]);
+    let device = &report["devices"][1];
+    assert_eq!(device["state"]["text"], "OP");
+    assert_eq!(device["planned"]["product_code"], device["found"]["product_code"]);
+    assert_eq!((number(&device["station"]), number(&device["auto_increment"])), (0x1002, 0xFFFF));
+    assert_eq!(device["wc_state"], false);
+    assert_eq!(device["ports"][1]["to"]["station"], 0x1003);
+    assert_eq!(device["ports"][0]["to"]["port"], "B", "the coupler's");
+    assert_eq!(
+        (&device["abnormal_changes"], &device["presence_changes"]),
+        (&Value::from(0), &Value::from(1))
+    );
+    let mailbox = &report["devices"][2]["mailbox"];
+    assert!(number(&mailbox["out_size"]) > 0, "{mailbox}");
+    assert!(report["devices"][0]["mailbox"].is_null());
+    // The toggle turns over with each good answer.
+    let toggle = |report: &Value| number(&report["frames"][0]["input_toggle"]);
+    running.until("turns over", |later| toggle(later) != toggle(&report));
+    let table = linesman(["online", &running.socket()]);
+    assert_eq!(table.status, 0, "{}", table.all());
+    for words in ["3 of 3 SubDevices there", "EL3104", "0x1003", "0,1", "Cyclic: ", "sync unit"] {
+        assert!(table.stdout.contains(words), "{words}: {}", table.stdout);
+    }
+    let one = linesman(["online", "--control", &running.socket(), "3"]);
+    assert!(one.stdout.contains("2 port B") && one.stdout.contains("product 0x"), "{}", one.all());
+    assert_eq!(linesman(["online", &running.socket(), "T9"]).status, 2);
+}
+
+// proves: DIA-07 partial: three SubDevices, HW-08, HW-29, PLC-14
+#[test]
+fn errors_are_shown_at_their_port_and_cleared_without_loss() {
+    let running = Running::start(&format!("{PLANT}{NOISE}"));
+    let errors = |report: &Value, no: usize| number(&report["devices"][no - 1]["errors"]);
+    let report = running.until("has errors", |report| errors(report, 3) > 5);
+    let device = &report["devices"][2];
+    let total =
+        |report: &Value, kind: &str| number(&report["devices"][2]["ports"][0][kind]["total"]);
+    assert!(total(&report, "physical_layer") > 0, "{device}");
+    assert_eq!(errors(&report, 2), 0, "only where they happen");
+    // Old terminals do not count what others have found.
+    assert!(
+        report["devices"][1]["ports"][0]["forwarded"].is_null()
+            == report["devices"][1]["ports"][1]["forwarded"].is_null()
+    );
+    let table = linesman(["online", &running.socket()]).stdout;
+    assert!(table.contains("/--") || table.contains("0/0/0/0"), "{table}");
+    let cleared = linesman(["online", &running.socket(), "--clear", "all", "--json"]);
+    assert!(cleared.status < 2, "{}", cleared.all());
+    let after = cleared.json();
+    assert!(
+        errors(&after, 3) < errors(&report, 3),
+        "{} then {}",
+        errors(&report, 3),
+        errors(&after, 3)
+    );
+    assert!(number(&after["cyclic"]["sent"]) < number(&report["cyclic"]["sent"]));
+    assert_eq!(after["devices"][2]["errors_lower_bound"], false, "we cleared it ourselves");
+    running.until("counts on", |report| errors(report, 3) > errors(&after, 3));
+}
+
+// proves: DIA-10
+#[test]
+fn a_report_is_kept_and_shown_again_without_the_line() {
+    let folder = TempDir::new().unwrap();
+    let plant = folder.path().join("plant.toml");
+    std::fs::write(&plant, PLANT).unwrap();
+    let (place, kept) = (format!("sim:{}", plant.display()), folder.path().join("kept.json"));
+    let kept = kept.to_str().unwrap();
+    let run = linesman(["online", &place, "--save", kept]);
+    assert_eq!(run.status, 0, "{}", run.all());
+    assert!(run.stdout.contains("nobody drives it"), "{}", run.stdout);
+    std::fs::remove_file(&plant).unwrap();
+    let again = linesman(["online", kept]);
+    assert_eq!((again.status, &again.stdout), (0, &run.stdout), "{}", again.stderr);
+    let detail = linesman(["online", kept, "2"]);
+    assert!(detail.stdout.contains("2 T2"), "{}", detail.all());
+    assert_eq!(linesman(["online", kept, "--save", kept]).status, 2, "it is not written over");
+    std::fs::write(kept, "{\"schema\": 1}").unwrap();
+    let broken = linesman(["online", kept]);
+    assert_eq!(broken.status, 2);
+    assert!(broken.stderr.contains("--save"), "{}", broken.stderr);
+}
+
+#[test]
+fn a_line_that_nobody_drives_is_looked_at_and_a_cut_is_seen() {
+    let folder = TempDir::new().unwrap();
+    let plant = folder.path().join("plant.toml");
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"T2.B\"\nfrom_ms = 300\n";
+    std::fs::write(&plant, format!("{PLANT}{cut}")).unwrap();
+    let place = format!("sim:{}", plant.display());
+    let report = linesman(["online", &place, "--json"]);
+    assert_eq!(report.status, 0, "{}", report.all());
+    let report = report.json();
+    assert_valid(&report, "online");
+    assert_eq!((&report["driven"], number(&report["present"])), (&Value::from(false), 3));
+    assert_eq!(report["devices"][2]["al_state"], "INIT");
+    assert!(report["devices"][2]["wc_state"].is_null());
+    let later = linesman(["online", &place, "--json", "--seconds", "2"]);
+    assert_eq!(later.status, 1, "{}", later.all());
+    let later = later.json();
+    assert_eq!((number(&later["planned"]), number(&later["present"])), (3, 2));
+    let texts: Vec<&str> =
+        (0..3).map(|place| later["devices"][place]["state"]["text"].as_str().unwrap()).collect();
+    assert_eq!(texts, ["INIT", "INIT LNK_MIS B", "INIT NO_COMM"]);
+    let lost = number(&later["devices"][1]["ports"][1]["lost_links"]["total"]);
+    assert_eq!(lost, 1, "{}", later["devices"][1]["ports"]);
+}
+
+#[test]
+fn the_live_view_tells_what_changes_a_line_each() {
+    let folder = TempDir::new().unwrap();
+    let plant = folder.path().join("plant.toml");
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"T2.B\"\nfrom_ms = 300\n";
+    std::fs::write(&plant, format!("{PLANT}{cut}")).unwrap();
+    let place = format!("sim:{}", plant.display());
+    let live = ["online", &place, "--live", "--seconds", "1", "--interval-ms", "50"];
+    let lines = linesman(live);
+    assert!(lines.stdout.contains("3 (T3): INIT NO_COMM, was INIT"), "{}", lines.all());
+    let json = linesman(live.into_iter().chain(["--json"]));
+    let reports: Vec<Value> =
+        json.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(reports.len() > 3, "{}", reports.len());
+    assert_valid(reports.last().unwrap(), "online");
+    for (arguments, words) in [
+        (vec!["online", "listen:eth0"], "nobody can be asked"),
+        (vec!["online"], "WHERE"),
+        (vec!["online", &place, "--interval-ms", "1"], "interval-ms"),
+        (vec!["online", &place, "--seconds=-1"], "seconds"),
+    ] {
+        let wrong = linesman(arguments.iter().copied());
+        assert_eq!(wrong.status, 2, "{arguments:?}: {}", wrong.all());
+        assert!(wrong.stderr.contains(words), "{arguments:?}: {}", wrong.stderr);
+    }
+}

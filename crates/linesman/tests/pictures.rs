@@ -1,0 +1,241 @@
+//! Drawings and the report page, through the command line.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+mod support;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+use support::linesman;
+use tempfile::TempDir;
+
+/// An element of a drawing, with the text of its title.
+#[derive(Debug, Default)]
+struct Element {
+    name: String,
+    attributes: Vec<(String, String)>,
+    title: String,
+}
+
+impl Element {
+    fn of(start: &BytesStart<'_>) -> Self {
+        let attributes = start.attributes().map(|attribute| {
+            let attribute = attribute.unwrap();
+            (attribute.key.as_ref().to_owned(), attribute.value.to_string())
+        });
+        Self {
+            name: start.name().as_ref().to_owned(),
+            attributes: attributes.collect(),
+            title: String::new(),
+        }
+    }
+
+    fn get(&self, key: &str) -> &str {
+        self.attributes.iter().find(|(name, _)| name == key).map_or("", |(_, value)| value.as_str())
+    }
+
+    fn has_class(&self, class: &str) -> bool {
+        self.get("class").split(' ').any(|one| one == class)
+    }
+}
+
+/// All elements of a well-formed drawing.
+fn elements(svg: &str) -> Vec<Element> {
+    let mut reader = Reader::from_str(svg);
+    let (mut all, mut open): (Vec<Element>, Vec<usize>) = (Vec::new(), Vec::new());
+    loop {
+        match reader.read_event().unwrap() {
+            Event::Start(start) => {
+                open.push(all.len());
+                all.push(Element::of(&start));
+            }
+            Event::Empty(start) => all.push(Element::of(&start)),
+            Event::Text(text) => {
+                if let [.., parent, title] = open[..]
+                    && all[title].name == "title"
+                {
+                    all[parent].title.push_str(&text);
+                }
+            }
+            Event::End(_) => {
+                open.pop().unwrap();
+            }
+            Event::Eof => break,
+            Event::Decl(_) | Event::Comment(_) | Event::GeneralRef(_) => {}
+            other @ (Event::CData(_) | Event::PI(_) | Event::DocType(_)) => {
+                panic!("{other:?} in a drawing")
+            }
+        }
+    }
+    assert!(open.is_empty(), "elements are left open");
+    all
+}
+
+/// A segment of so many SubDevices in a line.
+fn line(len: usize) -> String {
+    let mut text = "name = \"plant\"\n".to_owned();
+    for no in 1..=len {
+        let on = if no == 1 { "maindevice".to_owned() } else { format!("B{}.B", no - 1) };
+        writeln!(text, "[[device]]\nname = \"B{no}\"\ntype = \"EP2308-0001\"\non = \"{on}\"")
+            .unwrap();
+    }
+    text
+}
+
+/// Couplers one behind another, each with terminals.
+fn tree(couplers: usize, terminals: usize) -> String {
+    let mut text = "name = \"plant\"\n".to_owned();
+    for coupler in 1..=couplers {
+        let on = if coupler == 1 { "maindevice".to_owned() } else { format!("K{}.C", coupler - 1) };
+        writeln!(text, "[[device]]\nname = \"K{coupler}\"\ntype = \"EK1100\"\non = \"{on}\"")
+            .unwrap();
+        let mut on = format!("K{coupler}.B");
+        for terminal in 1..=terminals {
+            let name = format!("K{coupler}T{terminal}");
+            writeln!(text, "[[device]]\nname = \"{name}\"\ntype = \"EL1008\"\non = \"{on}\"")
+                .unwrap();
+            on = format!("{name}.B");
+        }
+    }
+    text
+}
+
+/// A junction with a branch at each port.
+fn star() -> String {
+    let mut text =
+        "name = \"plant\"\n[[device]]\nname = \"J\"\ntype = \"CU1124\"\non = \"maindevice\"\n"
+            .to_owned();
+    for port in ["B", "C", "D"] {
+        for no in 1..=4 {
+            let on = if no == 1 { format!("J.{port}") } else { format!("{port}{}.B", no - 1) };
+            let name = format!("{port}{no}");
+            writeln!(text, "[[device]]\nname = \"{name}\"\ntype = \"EP2308-0001\"\non = \"{on}\"")
+                .unwrap();
+        }
+    }
+    text
+}
+
+fn scan_drawing(folder: &Path, name: &str, segment: &str) -> Vec<Element> {
+    let file = folder.join(format!("{name}.toml"));
+    let svg = folder.join(format!("{name}.svg"));
+    fs::write(&file, segment).unwrap();
+    let ran =
+        linesman(["scan", &format!("sim:{}", file.display()), "--svg", svg.to_str().unwrap()]);
+    assert_eq!(ran.status, 0, "{name}: {}", ran.all());
+    elements(&fs::read_to_string(&svg).unwrap())
+}
+
+/// Where the corner of a box is.
+fn corner(element: &Element) -> (i64, i64) {
+    (element.get("x").parse().unwrap(), element.get("y").parse().unwrap())
+}
+
+#[test]
+fn every_shape_is_drawn_with_all_boxes_apart_and_all_links() {
+    let folder = TempDir::new().unwrap();
+    let ring = format!("{}[ring]\ncloses_at = \"B12.B\"\n", line(12));
+    let shapes = [
+        ("one", line(1), 1, 1),
+        ("line", line(30), 30, 30),
+        ("long", line(300), 300, 300),
+        ("tree", tree(6, 7), 48, 48),
+        ("star", star(), 13, 13),
+        ("ring", ring, 12, 13),
+    ];
+    for (name, segment, devices, links) in shapes {
+        let all = scan_drawing(folder.path(), name, &segment);
+        let mut boxes: Vec<(i64, i64)> =
+            all.iter().filter(|one| one.has_class("box")).map(corner).collect();
+        assert_eq!(boxes.len(), devices + 1, "{name}: SubDevices and the MainDevice");
+        boxes.sort_unstable();
+        for (index, a) in boxes.iter().enumerate() {
+            for b in &boxes[index + 1..] {
+                assert!(
+                    (a.0 - b.0).abs() >= 116 || (a.1 - b.1).abs() >= 62,
+                    "{name}: {a:?} on {b:?}"
+                );
+            }
+        }
+        let drawn: Vec<&str> =
+            all.iter().filter(|one| one.has_class("link")).map(|one| one.title.as_str()).collect();
+        assert_eq!(drawn.len(), links, "{name}: {drawn:?}");
+        let (width, height) = (all[0].get("width"), all[0].get("height"));
+        let (width, height): (i64, i64) = (width.parse().unwrap(), height.parse().unwrap());
+        assert!(boxes.iter().all(|(x, y)| x + 116 <= width && y + 62 <= height), "{name}");
+        if name == "star" {
+            assert!(drawn.contains(&"1.C – 6.A") || drawn.contains(&"1.C – 10.A"), "{drawn:?}");
+        }
+        if name == "ring" {
+            assert!(drawn.contains(&"12.B – MainDevice B"), "{drawn:?}");
+        }
+    }
+}
+
+#[test]
+fn the_report_marks_both_faults_of_a_plant_where_they_are() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("plant.toml");
+    let faults = "[[fault]]\nkind = \"emc-noise\"\nat = \"K2.C>K3.A\"\nfrom_ms = 1000\nto_ms = 2500\n\
+                  hits_per_s = 60.0\n[[fault]]\nkind = \"device-off\"\ndevice = \"K5T3\"\nfrom_ms = 3500\n";
+    fs::write(&file, format!("seed = 7\n{}{faults}", tree(5, 7))).unwrap();
+    let place = format!("sim:{}", file.display());
+    let (html, svg) = (folder.path().join("report.html"), folder.path().join("line.svg"));
+    let (html_name, svg_name) = (html.to_str().unwrap(), svg.to_str().unwrap());
+    let ran = linesman(["diagnose", &place, "--html", html_name, "--svg", svg_name, "--json"]);
+    assert_eq!(ran.status, 1, "{}", ran.all());
+    let diagnosis = ran.json();
+    let page = fs::read_to_string(&html).unwrap();
+    // One file, which fetches nothing and runs nothing.
+    for outside in ["<script", "<link", "src=", "@import", "url("] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    for finding in diagnosis["findings"].as_array().unwrap() {
+        let head = format!("<article id=\"{}\"", finding["id"].as_str().unwrap());
+        assert!(page.contains(&head), "{head}");
+        for action in finding["actions"].as_array().unwrap() {
+            let action = action.as_str().unwrap().replace('&', "&amp;");
+            assert!(page.contains(&action), "{action}");
+        }
+    }
+    // The drawing in the page is that of the file, but for its colours.
+    let all = elements(&fs::read_to_string(&svg).unwrap());
+    let link =
+        |title: &str| all.iter().find(|one| one.has_class("link") && one.title.starts_with(title));
+    assert!(link("9.C – 17.A").unwrap().get("class").contains("at-"), "the cable with the noise");
+    assert!(link("35.B – 36.A").unwrap().has_class("at-error"), "the contact to the dead terminal");
+    let marked = all.iter().filter(|one| one.has_class("link") && one.get("class").contains("at-"));
+    assert_eq!(marked.count(), 2, "no other link is marked");
+    let silent = all.iter().filter(|one| one.title.contains("no answer")).count();
+    assert_eq!(silent, 5, "the dead terminal and the four behind it");
+    assert!(page.contains("35.B – 36.A"));
+}
+
+#[test]
+fn files_are_not_overwritten_and_need_a_folder() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("plant.toml");
+    fs::write(&file, line(2)).unwrap();
+    let place = format!("sim:{}", file.display());
+    let there = folder.path().join("there.html");
+    fs::write(&there, "mine").unwrap();
+    let nowhere = folder.path().join("no/such/folder.svg");
+    let rows = [
+        (
+            ["diagnose", place.as_str(), "--html", there.to_str().unwrap()],
+            "the file is there already",
+        ),
+        (["diagnose", place.as_str(), "--svg", nowhere.to_str().unwrap()], "there is no folder"),
+        (["scan", place.as_str(), "--svg", nowhere.to_str().unwrap()], "there is no folder"),
+    ];
+    for (words, why) in rows {
+        let ran = linesman(words);
+        assert_eq!(ran.status, 2, "{}", ran.all());
+        assert!(ran.stderr.contains(why), "{}", ran.stderr);
+    }
+    assert_eq!(fs::read_to_string(&there).unwrap(), "mine");
+}

@@ -1,0 +1,112 @@
+//! What a MainDevice knows of a network that it runs: mailboxes by their mapped bits, error counters
+//! through clears, state words.
+
+use crate::bench::Bench;
+use crate::mailbox::{PLANT, upload};
+use linesman_config::fault::FaultName;
+use linesman_config::plan::{Plan, PlanOptions};
+use linesman_maindevice::service::{Service, ServiceAnswer};
+use linesman_maindevice::{Event, Options};
+use linesman_proto::port::Port;
+use linesman_proto::register::{ErrorCounter, ErrorCounters};
+use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
+use linesman_sim::segment_file::FaultEntry;
+
+/// Runs the plant with or without the bits of mailboxes in the cycle; nothing else is read often.
+fn running(mailbox_states: bool) -> Bench {
+    let quiet = Options { watch_interval: Span::s(60), ..Options::default() };
+    let mut bench = Bench::with_options(PLANT, quiet);
+    let inventory = bench.scan();
+    let options = PlanOptions { mailbox_states, ..PlanOptions::default() };
+    let plan = Plan::build(&inventory.planned(AlState::Op), inventory.tree().clone(), &options);
+    let plan = plan.unwrap();
+    let mapped = plan.devices.iter().filter(|device| device.mailbox_state.is_some()).count();
+    assert_eq!(mapped, if mailbox_states { 2 } else { 0 });
+    bench.device.start(bench.now, plan);
+    assert!(bench.run_until(Span::s(30), |event| matches!(event, Event::AllReached)));
+    bench.run_for(Span::s(1));
+    bench
+}
+
+#[test]
+fn mailboxes_whose_bits_the_cycle_reads_are_not_polled() {
+    let queued_in_ten_seconds = |mailbox_states| {
+        let mut bench = running(mailbox_states);
+        let before = bench.device.statistics().queued_sent();
+        bench.run_for(Span::s(10));
+        bench.device.statistics().queued_sent() - before
+    };
+    let (polled, mapped) = (queued_in_ten_seconds(false), queued_in_ten_seconds(true));
+    assert!(polled > 150, "every 50 ms: {polled}");
+    assert!(mapped < 40, "once a second, in case cyclic frames are lost: {mapped}");
+}
+
+#[test]
+fn what_a_subdevice_says_is_heard_by_its_bit() {
+    let mut bench = running(true);
+    let entry = FaultEntry::new(FaultName::Emergency).device("M1").with("code", 0x8611);
+    bench.segment.inject(bench.now, &entry).unwrap();
+    let began = bench.now;
+    assert!(bench.run_until(Span::s(2), |event| matches!(event, Event::Emergency { .. })));
+    let took = bench.now.since(began);
+    assert!(took < Span::ms(20), "a few cycles, not a poll of one second: {took}");
+    let before = bench.device.statistics().queued_sent();
+    for _ in 0..50 {
+        assert_eq!(upload(&mut bench, "M1", 0x1018, 1).unwrap(), [2, 0, 0, 0]);
+    }
+    let frames = (bench.device.statistics().queued_sent() - before) / 50;
+    assert!(frames <= 4, "written, fetched, seen to be empty: {frames} frames for each object");
+    // A bit that nobody may look at does not keep anybody busy: the mailbox closes while it is full.
+    bench.segment.inject(bench.now, &entry.clone().with("every_ms", 1)).unwrap();
+    let id = bench.id("M1");
+    assert!(bench.device.request_state(bench.now, Some(id), AlState::Init));
+    bench.run_for(Span::s(2));
+    assert_eq!(bench.state("M1"), "INIT");
+    assert!(bench.device.request_state(bench.now, Some(id), AlState::Op));
+    bench.run_for(Span::s(5));
+    assert_eq!(bench.state("M1"), "OP");
+}
+
+// proves: DIA-09, HW-19
+#[test]
+fn no_count_is_lost_when_counters_are_cleared_while_they_rise() {
+    let mut bench = Bench::new(PLANT);
+    bench.start(AlState::Op);
+    // A first reading is history: what happens before it counts for nothing.
+    bench.run_for(Span::ms(200));
+    let entry = FaultEntry::new(FaultName::EmcNoise)
+        .at("A1.B>M1.A")
+        .with("hits_per_s", 400.0)
+        .with("bursts_per_s", 20.0);
+    let fault = bench.segment.inject(bench.now, &entry).unwrap();
+    let id = bench.id("M1");
+    let mut clears = 0;
+    for _ in 0..40 {
+        bench.run_for(Span::ms(50));
+        bench.device.serve(bench.now, id, Service::ClearCounters);
+        let mut stood = None;
+        bench.run_until(Span::s(1), |event| {
+            let Event::Served { result, .. } = event else { return false };
+            stood = result.as_ref().as_ref().ok().cloned();
+            true
+        });
+        if let Some(ServiceAnswer::Data(bytes)) = stood {
+            assert_eq!(bytes.len(), ErrorCounters::LEN);
+            clears += 1;
+        }
+    }
+    assert_eq!(clears, 40, "none of their frames was hit; else what it cleared would be lost");
+    bench.segment.heal(bench.now, fault);
+    bench.run_for(Span::ms(500));
+    let hits = bench.segment.truth().faults()[0].symbol_errors;
+    assert!(hits > 300, "more than a register can hold: {hits}");
+    let standing = bench.device.standing().unwrap();
+    let totals = standing.device(id).unwrap().counters();
+    assert_eq!(totals.count(ErrorCounter::PhysicalLayer(Port::A)), Some(hits));
+    assert!(!totals.is_lower_bound(), "we cleared them ourselves");
+    let registers = totals.registers().unwrap();
+    assert!(registers.value(ErrorCounter::PhysicalLayer(Port::A)) < Some(255));
+    assert_eq!(standing.error_sums().nth(id.index()), Some(totals.sum()));
+    assert!(bench.segment.audit().is_empty());
+}

@@ -1,0 +1,68 @@
+//! Before a run, or by itself: what is there?
+
+use linesman_config::inventory::Inventory;
+use linesman_diagnosis::{FrameSeen, HostObservation};
+use linesman_maindevice::{Event, MainDevice};
+use linesman_proto::time::{Instant, Span};
+
+use super::operator::RunError;
+use crate::drive::{Audience, Driver};
+use crate::line::Line;
+use crate::stop::Stop;
+
+/// How long a scan of a line of usual length may take: one of a thousand SubDevices takes some
+/// seconds.
+pub const PATIENCE: Span = Span::s(60);
+
+/// Finds out what is on a line: it gets station addresses, and keeps its states.
+///
+/// # Errors
+/// When it does not answer, the scan is not done after `patience`, or the interface fails.
+pub fn scan<L: Line>(line: L, patience: Span, stop: &Stop) -> Result<Inventory, RunError> {
+    let settings = line.options();
+    let mut driver = Driver::new(line, settings);
+    let mut scanning = Scanning { begun: false, result: None };
+    let until = driver.now() + patience;
+    driver.run(until, stop, &mut scanning)?;
+    let unfinished = || {
+        let why = if stop.is_set() {
+            "the scan was ended before it was done".to_owned()
+        } else {
+            format!("the scan was not done after {patience}")
+        };
+        Err(RunError::Scan(format!("{why}. Do: scan again")))
+    };
+    scanning.result.unwrap_or_else(unfinished)
+}
+
+/// Waits for the one result.
+struct Scanning {
+    begun: bool,
+    result: Option<Result<Inventory, RunError>>,
+}
+
+impl Audience for Scanning {
+    fn frame(&mut self, _: &FrameSeen<'_>) {}
+
+    fn host(&mut self, _: &HostObservation) {}
+
+    fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
+        if let Event::Scanned(inventory) = event {
+            self.result = Some(Ok(*inventory));
+        } else if let Event::ScanFailed(error) = event {
+            self.result = Some(Err(RunError::Scan(error.to_string())));
+        }
+    }
+
+    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
+        if !std::mem::replace(&mut self.begun, true) {
+            // It looks, with nothing but reads, before it writes.
+            main.scan(now);
+        }
+        self.result.is_none()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
+}
