@@ -69,8 +69,10 @@ fn every_page_has_a_case_that_fires_and_a_look_alike_that_does_not() {
     for story in files(&house().join("scenarios"), "md") {
         shown.story(&story);
     }
-    for test in files(&house().join("crates/diagnosis/tests"), "rs") {
-        shown.test(&test);
+    for folder in ["crates/diagnosis/tests", "crates/linesman/tests"] {
+        for test in files(&house().join(folder), "rs") {
+            shown.test(&test);
+        }
     }
     let codes = || rule::catalogue().into_iter().map(|page| page.code.to_owned());
     let never: Vec<String> = codes().filter(|code| !shown.fires.contains(code)).collect();

@@ -27,6 +27,8 @@ pub struct Device {
     pub planned: Option<Planned>,
     /// What it says of itself.
     pub identity: SeenIdentity,
+    /// When another tool reported that it is not the planned one, without saying what it is instead.
+    pub reported_wrong: Option<Seen<()>>,
     /// Its station address now.
     pub station: Option<StationAddress>,
     /// Its alias.
@@ -136,6 +138,7 @@ impl Device {
             type_name: None,
             planned: None,
             identity: SeenIdentity::default(),
+            reported_wrong: None,
             station: None,
             alias: None,
             position: None,

@@ -16,6 +16,7 @@ pub mod nobody_answers;
 pub mod not_answering;
 pub mod one_direction;
 pub mod paused;
+pub mod reported_wrong;
 pub mod restarted;
 pub mod second_maindevice;
 pub mod state_error;
@@ -86,6 +87,7 @@ pub const RULES: &[Rule] = &[
     frame_errors::RULE,
     identity::RULE,
     wiring::RULE,
+    reported_wrong::RULE,
     //
     // The network as a whole, working counters and states.
     nobody_answers::RULE,
