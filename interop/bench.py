@@ -24,6 +24,8 @@ NEAR_B, FAR_B = "veth2", "veth3"
 
 
 NUMBERS = itertools.count(1)
+# The longest frame. The kernel's buffer has places of equal size: unless told, of 256 KiB each, and few of them.
+LONGEST = 1518
 
 
 class Bench:
@@ -33,6 +35,8 @@ class Bench:
         number = f"{os.getpid()}-{next(NUMBERS)}"
         self.near, self.far = f"linesman-near-{number}", f"linesman-far-{number}"
         self.running = []
+        # What a person should know of a check that is right in the end.
+        self.notes = []
         self.folder = tempfile.TemporaryDirectory(prefix="linesman-interop-")
         self.work = pathlib.Path(self.folder.name)
         self.number = 0
@@ -257,8 +261,8 @@ class Capture:
         for interface in (NEAR, NEAR_B):
             file = self.bench.path(f"{interface}.pcap")
             process = self.bench.start(
-                self.bench.near, "tcpdump", "-i", interface, "-B", 65536, "-U", "--immediate-mode", "-Z", "root", "-w", file,
-                "ether proto 0x88a4",
+                self.bench.near, "tcpdump", "-i", interface, "-B", 65536, "-s", LONGEST, "-U", "--immediate-mode", "-Z", "root",
+                "-w", file, "ether proto 0x88a4",
             )
             # It says so once it listens.
             while (line := process.stderr.readline()) and "listening on" not in line:

@@ -68,7 +68,9 @@ def arrived(number, wanted, image, watch):
     """What was written is at the outputs; inputs and the drive answer as they must."""
     four, eight = wanted[str(O1)][0], wanted[str(O2)][0]
     shown = {f"O1.{bit + 1}": four >> bit & 1 for bit in range(4)} | {f"O2.{bit + 1}": eight >> bit & 1 for bit in range(8)}
-    # The oversampling terminal gives its samples out in step with SYNC, which this client does not switch on.
+    # Two channels, each a count of cycles and a sample. Without SYNC a sample is played when its buffer is served.
+    samples = struct.unpack("<4h", wanted[str(A1)])
+    shown |= {"A1.1": samples[1], "A1.2": samples[3]}
     assert watch.saw(shown), f"round {number + 1}: the outputs never were {shown}; last: {watch.seen[-1]}"
     # The first four inputs are wired to the four outputs, others are held or open.
     read = bytes.fromhex(image[I1])[0]

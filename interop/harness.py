@@ -48,7 +48,10 @@ class Client:
         status, out, err = line.run(line.near, *self.command(script), *arguments, seconds=seconds)
         assert status == 0, f"status {status}: {err[-600:]}"
         # Some stacks print words of their own before.
-        return parse(out.strip().splitlines()[-1] if out.strip() else out, err)
+        result = parse(out.strip().splitlines()[-1] if out.strip() else out, err)
+        if (attempts := result.get("attempts", 1)) > 1:
+            line.notes.append(f"{self.name} needed {attempts} attempts to find the line")
+        return result
 
     def exchange(self, line, plant, rounds, cycles=CYCLES, *options, on=NEAR, cycle_us=CYCLE_US, seconds=240):
         """Takes a plant to OP and writes these rounds of values."""
@@ -60,13 +63,8 @@ CAT = Client("kickcat", tells_identity=False)
 
 
 def linesman(line, *arguments):
-    """Runs Linesman on the near end. It gives a line up that is silent for some 40 ms; on a busy host that may be the
-    host, so there are three attempts."""
-    for _ in range(3):
-        status, out, err = line.run(line.near, LINESMAN, *arguments)
-        if status != 2 or "does not answer" not in out + err:
-            break
-    return status, out, err
+    """Runs Linesman on the near end."""
+    return line.run(line.near, LINESMAN, *arguments)
 
 
 def rounds_file(line, plant, rounds):

@@ -14,7 +14,7 @@ ATTEMPTS = 6
 def main():
     asked = peer.arguments()
     rounds = asked.rounds
-    bus = bring_up(asked.interfaces)
+    bus, attempts = bring_up(asked.interfaces)
     bus.create_mapping(4096)
     slaves = bus.slaves()
     request(bus, kickcat.State.SAFE_OP)
@@ -40,15 +40,15 @@ def main():
         inputs.append([bytes(slave.input_data).hex() for slave in slaves])
     reached = all(bus.get_state(slave) == kickcat.State.OPERATIONAL for slave in slaves)
     peer.report(
-        devices=len(slaves), state="OP" if reached else "other", cycles=asked.cycles, complete=complete,
+        attempts=attempts, devices=len(slaves), state="OP" if reached else "other", cycles=asked.cycles, complete=complete,
         rounds=inputs,
     )
 
 
 def bring_up(interfaces):
-    """All SubDevices in PREOP."""
+    """All SubDevices in PREOP, and how many attempts it took."""
     first, *second = interfaces
-    for attempt in range(ATTEMPTS):
+    for attempt in range(1, ATTEMPTS + 1):
         # A new one each time: what came too late for the last attempt must not be taken for an answer in this one.
         link = kickcat.create_link(first, second[0] if second else "")
         # Without a second card it waits as long after each frame, and each frame that comes later ends everything: so it
@@ -57,9 +57,9 @@ def bring_up(interfaces):
         bus = kickcat.Bus(link)
         try:
             bus.init(timedelta(seconds=3))
-            return bus
+            return bus, attempt
         except RuntimeError as error:
-            print(f"attempt {attempt + 1}: {error}", file=sys.stderr)
+            print(f"attempt {attempt}: {error}", file=sys.stderr)
             time.sleep(0.5)
     peer.refuse(f"not in PREOP after {ATTEMPTS} attempts")
 

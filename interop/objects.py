@@ -55,7 +55,7 @@ def kickcat(interface):
 
     import kickcat_peer
 
-    bus = kickcat_peer.bring_up([interface])
+    bus, _ = kickcat_peer.bring_up([interface])
     store = bus.slaves()[0]
 
     def read(index):

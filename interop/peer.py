@@ -5,6 +5,7 @@ to OP, exchanges process data for CYCLES cycles, an equal part of them for each 
 
     devices   what the scan found: [vendor, product, revision] or what this stack can tell
     state     the state reached by all
+    attempts  how often it was tried to find the line, where that is more than once at times
     cycles    process data exchanges, and `complete`: those with the working counter expected
     wkc       the working counter of the process data, where this stack tells it
     rounds    for each round: the input bytes of each SubDevice at its end, in hexadecimal

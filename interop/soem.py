@@ -13,9 +13,9 @@ def main():
     master = pysoem.Master()
     master.open(*asked.interfaces)
     try:
-        # A busy host may be late at the very first frame.
-        found = next((found for _ in range(3) if (found := master.config_init()) > 0), 0)
-        if not found:
+        # A busy host may be late at the very first frame; how many attempts it took is told.
+        attempts = next((number for number in range(1, 4) if master.config_init() > 0), 0)
+        if not attempts:
             peer.refuse("config_init found no SubDevice")
         devices = [[slave.man, slave.id, slave.rev] for slave in master.slaves]
         names = [slave.name for slave in master.slaves]
@@ -33,7 +33,7 @@ def main():
         shared = shared_addresses(master) if asked.overlap else []
         stop(master)
         peer.report(
-            devices=devices, names=names, state=state, mapped=mapped, shared=shared,
+            attempts=attempts, devices=devices, names=names, state=state, mapped=mapped, shared=shared,
             wkc=wkc, cycles=asked.cycles, complete=complete, rounds=inputs, clocks=clocks,
         )
     finally:

@@ -1,19 +1,18 @@
 //! Files that users write: read as a whole, with messages that say which file and where.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use linesman_config::project::Project;
+use linesman_runtime::named_files::MAX_DESCRIPTION;
+pub(crate) use linesman_runtime::named_files::NamedFiles;
 use linesman_sim::segment::Segment;
-use linesman_sim::segment_file::{DescriptionFiles, SegmentFile};
+use linesman_sim::segment_file::SegmentFile;
 
 use crate::failure::Failure;
 
 /// Longest text file that is read, in bytes; nobody writes more by hand.
 const MAX_TEXT: u64 = 16 * 1024 * 1024;
-
-/// Longest device description that is read, in bytes; the largest of vendors have 50 MB.
-const MAX_DESCRIPTION: u64 = 128 * 1024 * 1024;
 
 /// The text of a file.
 pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
@@ -62,48 +61,7 @@ impl Plant {
 /// A segment file.
 pub(crate) fn segment_file(path: &Path) -> Result<SegmentFile, Failure> {
     let text = text(path, "a segment file")?;
-    SegmentFile::parse_with(&text, &Beside::of(path)).map_err(|error| in_file(path, &error))
-}
-
-/// Files that a segment file or a story names, relative to where that is, or under the directory of
-/// device data: `$LINESMAN_DATA/esi/drive.xml`.
-pub(crate) struct Beside<'a>(&'a Path);
-
-impl<'a> Beside<'a> {
-    /// Those that the file at `path` names.
-    pub(crate) fn of(path: &'a Path) -> Self {
-        Self(path.parent().unwrap_or(Path::new("")))
-    }
-
-    fn path(&self, name: &str) -> Result<PathBuf, String> {
-        let Some(rest) = name.strip_prefix("$LINESMAN_DATA/") else {
-            return Ok(self.0.join(name));
-        };
-        let data = std::env::var_os("LINESMAN_DATA")
-            .ok_or_else(|| format!("{name}: set LINESMAN_DATA to the directory of device data"))?;
-        Ok(PathBuf::from(data).join(rest))
-    }
-}
-
-impl DescriptionFiles for Beside<'_> {
-    fn read(&self, name: &str) -> Result<Vec<u8>, String> {
-        let path = self.path(name)?;
-        let place = path.display();
-        let refuse = |error: std::io::Error| {
-            format!(
-                "reading {place}: {error}; the path is relative to that of the file that names it"
-            )
-        };
-        let about = fs::metadata(&path).map_err(refuse)?;
-        if !about.is_file() {
-            return Err(format!("{place} is no file"));
-        }
-        if about.len() > MAX_DESCRIPTION {
-            let len = about.len();
-            return Err(format!("{place}: {len} bytes, expected at most {MAX_DESCRIPTION}"));
-        }
-        fs::read(&path).map_err(refuse)
-    }
+    SegmentFile::parse_with(&text, &NamedFiles::of(path)).map_err(|error| in_file(path, &error))
 }
 
 /// The bytes of a file that is not for people, of at most `most` bytes.

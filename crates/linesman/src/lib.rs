@@ -41,7 +41,7 @@ mod segment;
 
 pub use error::Error;
 pub use linesman_proto::address::DeviceId;
-pub use linesman_proto::state::AlState;
+pub use linesman_proto::state::{AlState, DeviceState, NetworkState};
 pub use linesman_proto::time::{Instant, Span};
 pub use linesman_runtime::image::{Input, Output, Value, VariableError};
 pub use linesman_runtime::run::report::RunReport;

@@ -11,6 +11,8 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
 use linesman_runtime::listen::is_driven;
+use linesman_runtime::named_files::NamedFiles;
+use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::run::scan::PATIENCE;
 use linesman_runtime::run::{
@@ -48,7 +50,8 @@ pub fn open(place: &str) -> Result<Segment, Error> {
 fn virtual_line(path: &Path) -> Result<Where, Error> {
     let refuse = |why: String| Error::File { path: path.to_owned(), why };
     let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
-    let file = SegmentFile::parse(&text).map_err(|error| refuse(error.to_string()))?;
+    let file = SegmentFile::parse_with(&text, &NamedFiles::of(path))
+        .map_err(|error| refuse(error.to_string()))?;
     let project = file.project().map_err(|error| refuse(error.to_string()))?;
     let segment = VirtualSegment::build(&file).map_err(|error| refuse(error.to_string()))?;
     let ring = file.ring.is_some();
@@ -149,6 +152,11 @@ impl Segment {
         }
         let text = String::from_utf8(bytes).map_err(|_| refuse("no text in UTF-8".to_owned()))?;
         let project = Project::parse(&text).map_err(|error| refuse(error.to_string()))?;
+        // One that chooses more than who is where is planned from what it says.
+        if project.chooses() {
+            let file = PlanFile::open(path).map_err(|error| refuse(error.to_string()))?;
+            return Ok(file.plan.into());
+        }
         let Wanted::Found(make) = Choices::default().project(project) else {
             return Err(refuse("it makes no plan".to_owned()));
         };
@@ -196,7 +204,7 @@ impl Segment {
             diagnose: None,
         };
         // Nobody listens to notes here; they go nowhere.
-        let (notes, _) = mpsc::channel();
+        let (notes, _) = mpsc::sync_channel(1);
         let wanted = Wanted::Plan(Box::new(plan));
         let line = self.line.line();
         let beside = Beside { stop: &self.stop, notes, desk: None };

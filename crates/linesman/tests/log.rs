@@ -9,7 +9,7 @@ use std::path::Path;
 use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::{EntryKind, Severity};
 use linesman_runtime::event_log::{EventLog, StoredEntry};
-use support::{assert_valid, linesman};
+use support::{PROGRAM, assert_valid, linesman};
 use tempfile::TempDir;
 
 /// A log with the message window of the sources (S1 L412-422) and a run before it.
@@ -95,4 +95,56 @@ fn what_is_no_log_or_no_time_is_refused_with_the_next_step() {
         assert_eq!(refused.status, 2, "{}", refused.all());
         assert!(refused.stderr.contains("do:"), "{}", refused.stderr);
     }
+}
+
+/// A line on which error counters rise for a hundred seconds, as a file in the folder.
+fn noisy(folder: &Path) -> String {
+    let plant = folder.join("noisy.toml");
+    let text = "[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+                [[device]]\nname = \"T2\"\ntype = \"EL2008\"\non = \"K1.B\"\n\
+                [[fault]]\nkind = \"emc-noise\"\nat = \"K1.B>T2.A\"\nhits_per_s = 600\n\
+                bursts_per_s = 40\nfrom_ms = 500\n";
+    std::fs::write(&plant, text).unwrap();
+    format!("sim:{}", plant.display())
+}
+
+#[test]
+fn a_full_disk_under_the_log_costs_entries_and_no_cycle() {
+    let folder = TempDir::new().unwrap();
+    let place = noisy(folder.path());
+    let disk = folder.path().join("disk");
+    std::fs::create_dir(&disk).unwrap();
+    // A disk of its own, so small that the log does not fit.
+    let script = "mount -t tmpfs -o size=64k none \"$1\" || exit 77; shift; exec \"$@\"";
+    let run = std::process::Command::new("unshare")
+        .args(["--mount", "--map-root-user", "sh", "-c", script, "sh"])
+        .arg(&disk)
+        .arg(PROGRAM)
+        .args(["run", "--on", &place, "--seconds", "100", "--no-diagnosis", "--json", "--log"])
+        .arg(disk.join("log.sqlite"))
+        .output();
+    let run = match run {
+        Ok(run) if run.status.code() == Some(0) => run,
+        other => {
+            let why = other.map(|run| String::from_utf8_lossy(&run.stderr).into_owned());
+            assert!(!why.as_ref().is_ok_and(|why| why.contains("panicked")), "{why:?}");
+            eprintln!("SKIPPED: no small disk can be had here: {why:?}");
+            return;
+        }
+    };
+    let told = String::from_utf8_lossy(&run.stderr);
+    assert!(told.contains("entries are missing in the event log"), "{told}");
+    assert!(told.contains("the disk is full") && told.contains("make room"), "{told}");
+    let report: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert!(report["counts"]["cycles"].as_u64().unwrap() > 99_000, "{}", report["counts"]);
+    assert_eq!(report["counts"]["cycles_missed"], 0);
+}
+
+#[test]
+fn a_log_on_a_full_disk_is_refused_before_anything_is_driven() {
+    let folder = TempDir::new().unwrap();
+    let run =
+        linesman(["run", "--on", &noisy(folder.path()), "--seconds", "1", "--log", "/dev/full"]);
+    assert_eq!(run.status, 2, "{}", run.all());
+    assert!(run.stderr.contains("/dev/full: the disk is full"), "{}", run.stderr);
 }

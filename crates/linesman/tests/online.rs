@@ -227,3 +227,58 @@ fn the_live_view_tells_what_changes_a_line_each() {
         assert!(wrong.stderr.contains(words), "{arguments:?}: {}", wrong.stderr);
     }
 }
+
+// S0 L2634-2638: the last protocol error stays until the next clean access; states are not touched.
+// proves: SW-09, PLC-17
+#[test]
+fn mailbox_errors_are_shown_apart_and_erased_by_a_clean_access() {
+    let running = Running::start(PLANT);
+    let socket = running.socket();
+    let mailbox = || linesman(["online", &socket, "--json"]).json()["devices"][2].clone();
+    assert_eq!(
+        (&mailbox()["mailbox"]["errors"], &mailbox()["al_state"]),
+        (&Value::from(0), &Value::from("OP"))
+    );
+    let refused = linesman(["sdo", &socket, "3", "read", "0x9999:01", "--type", "udint"]);
+    assert_eq!(refused.status, 1, "{}", refused.all());
+    assert!(!refused.all().contains("start-up list"), "nobody asked for one: {}", refused.all());
+    let after = mailbox();
+    // The dictionary was asked for the entry, too.
+    let errors = number(&after["mailbox"]["errors"]);
+    assert!(errors >= 1, "{after}");
+    assert_eq!(
+        (&after["al_state"], &after["state"]["word"]),
+        (&Value::from("OP"), &Value::from(8))
+    );
+    let standing = &after["mailbox"]["standing"][0];
+    assert_eq!(standing["protocol"], "CoE");
+    assert!(standing["text"].as_str().unwrap().contains("0x06020000"), "{standing}");
+    let table = linesman(["online", &socket]).stdout;
+    assert!(table.contains("CoE failed, "), "{table}");
+    assert_eq!(linesman(["sdo", &socket, "3", "read", "0x1018:01"]).status, 0);
+    let clean = mailbox();
+    assert_eq!(clean["mailbox"]["standing"].as_array().unwrap().len(), 0, "erased");
+    assert_eq!(clean["mailbox"]["errors"], errors, "but counted");
+}
+
+// S0 L2630: how often a SubDevice left OP by itself; here also why.
+// proves: PLC-16
+#[test]
+fn who_leaves_op_by_itself_is_counted_with_the_reason() {
+    let fault = "[[fault]]\nkind = \"watchdog-starved\"\ndevice = \"T3\"\nwatchdog_ms = 0.5\nfrom_ms = 500\nto_ms = 900\n";
+    // A terminal whose own software watches the outputs.
+    let plant = PLANT.replace("EL3104", "EL4102");
+    let running = Running::start(&format!("{plant}{fault}"));
+    let report =
+        running.until("falls", |report| number(&report["devices"][2]["abnormal_changes"]) > 0);
+    let device = &report["devices"][2];
+    let change = &device["history"][0];
+    assert_eq!((&change["from"], &change["to"]), (&Value::from("OP"), &Value::from("SAFEOP")));
+    assert_eq!(change["al_code"], 0x1B, "{change}");
+    for other in [0, 1] {
+        assert_eq!(report["devices"][other]["abnormal_changes"], 0);
+    }
+    let detail = linesman(["online", &running.socket(), "3"]).stdout;
+    assert!(detail.contains("OP to SAFEOP, 0x001B"), "{detail}");
+    running.until("comes back", |report| report["devices"][2]["state"]["word"] == 8);
+}

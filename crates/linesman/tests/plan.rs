@@ -63,7 +63,7 @@ fn the_eleven_frames_of_the_sources() {
 }
 
 // S0 L1520-1527: Drives 80 bytes and 12, inputs 2 bytes and 4, outputs 2 bytes and 2.
-// proves: FRM-22, FRM-23
+// proves: FRM-23
 #[test]
 fn each_sync_unit_has_its_row_and_its_counter() {
     let report = plan("153-and-58-bytes");

@@ -86,6 +86,34 @@ pub enum Event {
         /// What it answered.
         error: Box<StartUpError>,
     },
+    /// A slot of a SubDevice holds another module than planned, so that it is not taken further. It will be
+    /// looked at again later.
+    WrongModule {
+        /// Which SubDevice.
+        id: DeviceId,
+        /// The state it was to enter.
+        to: AlState,
+        /// The state it is in.
+        status: AlStatus,
+        /// The slot, from 1.
+        slot: u8,
+        /// The planned module; 0: none.
+        expected: u32,
+        /// The one that is there; 0: none.
+        found: u32,
+    },
+    /// A SubDevice does not say which modules it has, so that it is not taken further. It will be asked
+    /// again later.
+    ModulesUnread {
+        /// Which SubDevice.
+        id: DeviceId,
+        /// The state it was to enter.
+        to: AlState,
+        /// The state it is in.
+        status: AlStatus,
+        /// What failed.
+        error: Box<StartUpError>,
+    },
     /// Clocks were set, and follow this one.
     ClocksSet {
         /// Station address of the reference clock.

@@ -5,7 +5,7 @@
 //! asks about a card, [`record`] writes what was seen to a file. [`serve`] puts a segment on real
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
 //! outside, [`journal`] writes down what really happened, [`names`] says where. [`plan_file`] reads
-//! the file that a line is planned with. [`stop`] is the wish to stop.
+//! the file that a line is planned with, [`named_files`] the files that a file names. [`stop`] is the wish to stop.
 
 pub mod capture;
 pub mod control;
@@ -17,6 +17,7 @@ pub mod image;
 pub mod journal;
 pub mod line;
 pub mod listen;
+pub mod named_files;
 pub mod names;
 pub mod online;
 pub mod plan_file;

@@ -122,7 +122,9 @@ pub enum Effect {
     ClockRestored,
     /// The SYNC signals of a device do not reach its processor any more.
     SyncCut,
-    /// They reach it again.
+    /// Each SYNC signal of a device reaches its processor twice.
+    SyncBounces,
+    /// They reach it again as they are.
     SyncBack,
     /// The work of a device takes so long in each cycle from now on.
     WorkTakes {
@@ -267,6 +269,7 @@ impl FaultRecord {
             | Effect::ClockRestarted
             | Effect::ClockRestored
             | Effect::SyncCut
+            | Effect::SyncBounces
             | Effect::SyncBack
             | Effect::WorkTakes { .. }
             | Effect::WorkRestored

@@ -103,6 +103,16 @@ fn read(
     }
     if let Some(mailbox) = element.child("Mailbox") {
         device.mailbox = self::mailbox(mailbox, &mut device)?;
+        left_out(mailbox, &device.name, notes);
+    }
+    if let Some(group) = element.child("HotConnect") {
+        let called = clean(group.child_text("GroupName"));
+        let called = if called.is_empty() { String::new() } else { format!(" \"{called}\"") };
+        notes.push(format!(
+            "{}: it begins the hot connect group{called}, which is treated as always there: its \
+             identification is not read, and while it is off its SubDevices count as missing",
+            device.name
+        ));
     }
     let mut meaning = Meaning::default();
     for command in element.at("InitCmds").into_iter().flat_map(|list| list.children("InitCmd")) {
@@ -176,6 +186,25 @@ fn mailbox(element: &Element, device: &mut DevicePlan) -> Result<Option<Mailbox>
     }
     let bootstrap = bootstrap.filter(|pair| pair.is_present());
     Ok(Some(Mailbox { areas, bootstrap, protocols: Protocols(protocols), complete_access }))
+}
+
+/// Commands of protocols that are not spoken are left out, and that is said.
+fn left_out(mailbox: &Element, name: &str, notes: &mut Vec<String>) {
+    for protocol in ["EoE", "SoE", "AoE", "FoE", "VoE"] {
+        let Some(commands) = mailbox.child(protocol).and_then(|one| one.child("InitCmds")) else {
+            continue;
+        };
+        let is_on = |one: &&Element| !matches!(one.child_text("Disabled"), "1" | "true");
+        let what = match commands.children("InitCmd").filter(is_on).count() {
+            0 => continue,
+            1 => "1 start-up command".to_owned(),
+            count => format!("{count} start-up commands"),
+        };
+        notes.push(format!(
+            "{name}: {what} by {protocol} not carried out: that protocol is not spoken at start-up; make \
+             these settings with the maker's tool, or by CoE where the SubDevice has objects for them"
+        ));
+    }
 }
 
 /// What the MainDevice sends, the SubDevice receives.

@@ -386,3 +386,22 @@ fn fmmus_follow_from_the_process_image_where_no_command_sets_them() {
     let error = Eni::parse(beyond.as_bytes()).unwrap_err().to_string();
     assert!(error.contains("bit 880") && error.contains("line 2"), "{error}");
 }
+
+#[test]
+fn what_is_left_out_of_a_file_is_said() {
+    let file = r#"<EtherCATConfig><Config><Slave>
+<Info><Name>Bridge</Name><PhysAddr>1001</PhysAddr><AutoIncAddr>0</AutoIncAddr><Physics>YY</Physics></Info>
+<Mailbox><Send><Start>4096</Start><Length>128</Length></Send><Recv><Start>4224</Start><Length>128</Length></Recv>
+ <Protocol>CoE</Protocol><Protocol>EoE</Protocol>
+ <EoE><InitCmds><InitCmd><Transition>IP</Transition><IP>10.0.0.2</IP></InitCmd>
+  <InitCmd><Transition>IP</Transition><Disabled>1</Disabled></InitCmd></InitCmds></EoE>
+ <SoE><InitCmds><InitCmd><Transition>PS</Transition></InitCmd><InitCmd><Transition>PS</Transition></InitCmd></InitCmds></SoE>
+</Mailbox>
+<HotConnect><GroupName>Tool 1</GroupName><GroupMemberCnt>1</GroupMemberCnt></HotConnect>
+</Slave></Config></EtherCATConfig>"#;
+    let notes = Eni::parse(file.as_bytes()).unwrap().notes;
+    let told = |words: &str| notes.iter().filter(|note| note.contains(words)).count();
+    assert_eq!(told("Bridge: 1 start-up command by EoE not carried out"), 1, "{notes:?}");
+    assert_eq!(told("Bridge: 2 start-up commands by SoE not carried out"), 1, "{notes:?}");
+    assert_eq!(told("hot connect group \"Tool 1\""), 1, "{notes:?}");
+}

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::{SmControl, SmDirection};
 use linesman_proto::sii::Direction;
 
@@ -16,6 +17,8 @@ use crate::xml_writer::{Xml, hex};
 
 /// Where objects are made up for process data that has none: behind those of profiles.
 const MADE_UP: [u16; 2] = [0x3000, 0x3800];
+/// Registers are below, process data from here on.
+const RAM_START: RegisterAddress = RegisterAddress(0x1000);
 /// Bytes of the EEPROM.
 const EEPROM_BYTES: u32 = 4096;
 
@@ -179,9 +182,13 @@ fn write_device(xml: &mut Xml, device: &DevicePlan, plan: &Plan) {
         }
         xml.element("Eeprom", &[], |xml| {
             xml.text("ByteSize", EEPROM_BYTES);
-            // PDI of a processor; of simple digital terminals that AL status mirrors AL control.
-            let emulated = if device.device_emulation { 0x01 } else { 0x00 };
-            xml.text("ConfigData", hex(&[0x05, emulated, 0, 0, 0, 0, 0, 0]));
+            // PDI of a processor, or none but the pins of the controller, whose AL status mirrors AL
+            // control: what stands below the RAM, at 0x0F00, are its digital outputs.
+            let pins = device.mailbox.is_none()
+                && device.sync_managers.iter().any(|(_, manager)| manager.start < RAM_START);
+            let pdi = if pins { 0x04 } else { 0x05 };
+            let emulated = if device.device_emulation || pins { 0x01 } else { 0x00 };
+            xml.text("ConfigData", hex(&[pdi, emulated, 0, 0, 0, 0, 0, 0]));
         });
     });
 }

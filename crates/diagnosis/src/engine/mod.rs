@@ -28,6 +28,9 @@ const JUDGE_AGAIN: Span = Span::ms(100);
 /// For so long after its last rise a counter is watched in this way.
 const WATCHED_AFTER_RISE: Span = Span::s(15);
 
+/// So long after a frame was lost the counters are awaited that tell where, or where not.
+const WATCHED_AFTER_LOSS: Span = Span::s(2);
+
 /// One network.
 #[derive(Clone, Debug)]
 struct Watched {
@@ -65,8 +68,11 @@ impl Watched {
     /// Whether time alone can change what the rules say.
     fn is_watched(&self, now: Instant) -> bool {
         let is_open = self.conditions.iter().any(|condition| condition.ended.is_none());
+        // Counters that are read after a frame was lost tell by standing still.
+        let is_recent = |at: Option<Instant>| at.is_some_and(|at| now < at + WATCHED_AFTER_LOSS);
         is_open
             || self.line.devices.iter().any(|device| device.mailbox.is_open())
+            || is_recent(self.line.traffic.lost.last)
             || self.line.devices.iter().any(|device| {
                 device.counters.last_rise().is_some_and(|at| now < at + WATCHED_AFTER_RISE)
             })

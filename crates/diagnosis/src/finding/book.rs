@@ -34,6 +34,8 @@ pub struct Finding {
     pub confirmed: Option<Instant>,
     /// When it was over.
     pub closed: Option<Instant>,
+    /// When it was over for long enough to be history, whatever the rule says since.
+    pub settled: Option<Instant>,
     /// The finding it follows from, by [`Finding::id`].
     pub parent: Option<u32>,
 }
@@ -67,6 +69,10 @@ impl Book {
         mut tell: impl FnMut(Change, &Finding),
     ) {
         let mut before = std::mem::take(&mut self.findings);
+        for finding in &mut before {
+            let is_settled = |closed: &Instant| *closed + SETTLED <= now;
+            finding.settled = finding.closed.filter(is_settled).or(finding.settled);
+        }
         for condition in conditions {
             let known = before.iter().position(|finding| {
                 is_same(&finding.condition, &condition)
@@ -104,8 +110,10 @@ impl Book {
             }
             self.findings.push(finding);
         }
-        for finding in before {
-            if finding.closed.is_some_and(|closed| closed + SETTLED <= now) {
+        for mut finding in before {
+            if finding.settled.is_some() {
+                // That it came again was an error; that it had been was none.
+                finding.closed = finding.closed.or(finding.settled);
                 self.findings.push(finding);
             } else {
                 tell(Change::Withdrawn, &finding);
@@ -157,7 +165,15 @@ impl Book {
     fn open(&mut self, condition: Condition) -> Finding {
         self.opened += 1;
         let opened = condition.since;
-        Finding { id: self.opened, condition, opened, confirmed: None, closed: None, parent: None }
+        Finding {
+            id: self.opened,
+            condition,
+            opened,
+            confirmed: None,
+            closed: None,
+            settled: None,
+            parent: None,
+        }
     }
 
     /// Hangs each finding beneath the one that explains all of its symptoms.
@@ -176,10 +192,36 @@ impl Book {
                 let severity = one.condition.severity.cmp(&other.condition.severity);
                 severity.then(confidence).then(other.id.cmp(&one.id))
             });
-            if let Some(best) = best {
+            if let Some(best) = best.or_else(|| self.foremost_of_several(index)) {
                 self.findings[index].parent = Some(self.findings[best].id);
             }
         }
+    }
+
+    /// Working counters are sums: what several findings take from one together, none of them explains
+    /// alone. The one that explains most of it.
+    fn foremost_of_several(&self, index: usize) -> Option<usize> {
+        let effect = &self.findings[index];
+        let symptoms = &effect.condition.symptoms;
+        let is_sum = |symptom: &Symptom| matches!(symptom, Symptom::WorkingCounter(_));
+        if symptoms.len() < 2 || !symptoms.iter().all(is_sum) {
+            return None;
+        }
+        let explained = |other: usize, symptom: &Symptom| {
+            let cause = &self.findings[other];
+            other != index
+                && !was_over(cause, effect, AFTER)
+                && cause.condition.explains.contains(symptom)
+                && !self.follows(other, effect.id)
+        };
+        let all = 0..self.findings.len();
+        let is_covered =
+            symptoms.iter().all(|symptom| all.clone().any(|other| explained(other, symptom)));
+        let share = |other: &usize| {
+            let explained = symptoms.iter().filter(|symptom| explained(*other, symptom)).count();
+            (explained, std::cmp::Reverse(*other))
+        };
+        if is_covered { all.max_by_key(share) } else { None }
     }
 
     /// Whether a finding follows, at whatever remove, from the one called `id`.
@@ -217,8 +259,12 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
         )
     };
     let after = if symptoms.iter().all(counted) { AFTER_COUNTED } else { AFTER };
-    let was_over = cause.closed.is_some_and(|closed| closed + after < effect.opened);
     !symptoms.is_empty()
-        && !was_over
+        && !was_over(cause, effect, after)
         && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))
+}
+
+/// Whether a finding was over so long before another one that this does not follow from it.
+fn was_over(cause: &Finding, effect: &Finding, after: Span) -> bool {
+    cause.closed.is_some_and(|closed| closed + after < effect.opened)
 }

@@ -19,6 +19,9 @@ const CALM_AFTER_LONG: Span = Span::ms(500);
 /// A link that stayed up for so long after a short one did not lose it to the same flicker.
 const CALM: Span = Span::s(3);
 
+/// Three spells of losses within this time are one that lasts.
+const OFTEN_WITHIN: Span = Span::s(6);
+
 /// What is known of one link's losses: those since it was last mended.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Drops {
@@ -136,15 +139,22 @@ fn latest_spell(events: &mut [(Instant, Instant)], seen: &[Drop]) -> Instant {
         let mut long = seen.iter().filter(|drop| end.since(drop.at) >= LONG_LOSS);
         if long.any(|drop| drop.back == Some(end)) { CALM_AFTER_LONG } else { CALM }
     };
-    let mut began = Instant::ZERO;
+    let mut spells = vec![Instant::ZERO];
     let mut ended: Option<Instant> = None;
     for &(from, to) in events.iter() {
         if ended.is_some_and(|ended| from > ended + calm_after(ended)) {
-            began = from;
+            spells.push(from);
         }
         ended = ended.max(Some(to));
     }
-    began
+    // What is mended again and again is not mended: it is one trouble.
+    let mut last = spells.len() - 1;
+    if last >= 2 && spells[last].since(spells[last - 2]) <= OFTEN_WITHIN {
+        while last > 0 && spells[last].since(spells[last - 1]) <= OFTEN_WITHIN {
+            last -= 1;
+        }
+    }
+    spells[last]
 }
 
 fn is_same(one: &Drop, other: &Drop) -> bool {

@@ -82,6 +82,8 @@ pub struct Pairing {
     senders_changed: bool,
     returns: u64,
     one_way: OneWay,
+    /// The second card of a ring, where cards are not told apart: it sends what the first one sends.
+    other_card: Option<MacAddress>,
     /// Returns that were taken for requests, since this was asked.
     mistaken: u64,
 }
@@ -106,6 +108,8 @@ struct Pending {
     number: u64,
     path: Option<Path>,
     source: MacAddress,
+    /// Who sent the same at the same time: the other card of a ring, where cards are not told apart.
+    copy_by: Option<MacAddress>,
     is_live: bool,
     sent: [bool; 2],
     /// Copies that are still out.
@@ -140,7 +144,7 @@ impl Pairing {
         };
         if !is_return {
             let other = |found: usize| self.pending[found].source != source;
-            let is_repeated = found.is_some_and(other);
+            let is_repeated = found.is_some_and(other) || self.other_card == Some(source);
             return self.request(frame, source, is_repeated, print, settle);
         }
         let Some(found) = found else {
@@ -238,7 +242,11 @@ impl Pairing {
                 || self.one_way == OneWay::From(source)
                 || self.senders.iter().any(is_own);
         };
-        if print.changing != pending.print.changing {
+        // The copy of the other card comes back as it went, as long as the ring is whole: nobody on its
+        // way processes it.
+        let is_copy = self.other_card == Some(source)
+            && (pending.copy_by == Some(source) || pending.source == source);
+        if print.changing != pending.print.changing || is_copy {
             return true;
         }
         match (pending.source.is_marked(), source.is_marked()) {
@@ -310,6 +318,22 @@ impl Pairing {
             pending.out += 1;
             return Outcome::RequestCopy;
         }
+        let is_other_card = |pending: &&mut Pending| {
+            pending.print == print
+                && pending.copy_by.is_none()
+                && pending.source != source
+                && gap(pending.time, frame.time) <= OTHER_CARD
+        };
+        if frame.path.is_none()
+            && is_repeated
+            && let Some(pending) = self.pending.iter_mut().rev().find(is_other_card)
+        {
+            pending.copy_by = Some(source);
+            pending.out += 1;
+            self.other_card = Some(source);
+            self.note_sender(frame, source, is_repeated);
+            return Outcome::RequestCopy;
+        }
         let was_recorded = |pending: &Pending| {
             pending.print == print
                 && pending.path == frame.path
@@ -340,6 +364,7 @@ impl Pairing {
             number: frame.number,
             path: frame.path,
             source,
+            copy_by: None,
             is_live: frame.direction != Direction::Unknown,
             sent,
             out: 1,

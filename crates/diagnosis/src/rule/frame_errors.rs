@@ -31,12 +31,15 @@
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::register::ErrorCounter;
+use linesman_proto::state::AlStatusCode;
+use linesman_proto::state::status_code::Class as CodeClass;
 use linesman_proto::time::Span;
 use linesman_proto::topology::End;
 use linesman_proto::topology::route::Direction;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
+use crate::line::AlError;
 use crate::locate::cause::Spot;
 use crate::locate::{Damage, LastHop, Located, Survey, Suspicion};
 
@@ -66,6 +69,9 @@ pub const LAST_HOP: RulePage = RulePage {
     class: Class::Hardware,
     source: include_str!("frame_errors.rs"),
 };
+
+/// The watchdog of a SyncManager expired. Reference: ETG.1000.6, AL status codes.
+const OUTPUT_WATCHDOG: AlStatusCode = AlStatusCode(0x001B);
 
 /// Errors that did not come again for this long are over.
 const QUIET: Span = Span::s(2);
@@ -149,6 +155,7 @@ fn add(
     if suspicion.frames() > 0 {
         condition.explains.push(Symptom::FramesLost);
         condition.explains.push(Symptom::CardErrors);
+        condition.explains.extend(starved(view));
     }
     if leader.is_some() {
         // Only the one that leads explains; the others hang beneath it.
@@ -158,6 +165,21 @@ fn add(
     for other in &suspicion.beneath {
         add(view, survey, other, Some(suspicion), conditions);
     }
+}
+
+/// SubDevices that lost nothing but time: frames that are damaged or lost bring neither outputs nor the
+/// time of the reference clock. A hardware cause wins over what software shows of it (SW-06).
+fn starved(view: &View<'_>) -> impl Iterator<Item = Symptom> {
+    let is_of_time = |error: &AlError| {
+        let code = error.code.map(|code| code.value);
+        code.is_some_and(|code| {
+            code == OUTPUT_WATCHDOG || code.explain().class == CodeClass::Timing
+        })
+    };
+    let starved = view.line.devices.iter().filter(move |device| {
+        !device.al.errors.is_empty() && device.al.errors.iter().all(is_of_time)
+    });
+    starved.map(|device| Symptom::StateLost(device.id))
 }
 
 /// What the damage is about: the ports that found it first, and the card.

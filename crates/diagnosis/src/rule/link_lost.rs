@@ -25,11 +25,11 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::{ErrorCounter, table};
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
 use super::{Rule, RulePage, View};
-use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
+use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::line::{Line, Seen};
 use crate::locate::{Drop, Drops};
 
@@ -47,13 +47,72 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// A link that was back so soon was not plugged by a hand.
 const SHORT: Span = Span::s(1);
+/// What was on its way when a link was lost comes back by then.
+const ANSWERS_LATE: Span = Span::ms(100);
+/// A link that was lost again, before it was mended, comes and goes.
+const AGAIN: u64 = 2;
 /// So many losses are no accident.
-const AGAIN: u64 = 3;
+const OFTEN: u64 = 3;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let Some(tree) = &view.line.tree else { return };
-    for drops in Drops::all(view.line) {
-        conditions.push(condition(view.line, tree, &drops));
+    let all = Drops::all(view.line);
+    for drops in &all {
+        let mut condition = condition(view.line, tree, drops);
+        if let Some(node) = dead_on_ring(view.line, tree, &all, drops) {
+            blame(view.line, tree, node, &mut condition);
+        }
+        conditions.push(condition);
+    }
+}
+
+/// The device of a ring that both its neighbours have lost at once, and that nobody reaches: two cuts
+/// beside it at one moment are far less likely.
+fn dead_on_ring(line: &Line, tree: &Tree, all: &[Drops], drops: &Drops) -> Option<usize> {
+    if !drops.is_down || !tree.is_on_ring(drops.link) {
+        return None;
+    }
+    let other = all.iter().find(|other| {
+        other.link != drops.link
+            && other.is_down
+            && tree.is_on_ring(other.link)
+            && other.falls_with(drops)
+    })?;
+    let nodes = |link: usize| {
+        let ends = [tree.links()[link].upstream, tree.links()[link].downstream];
+        ends.into_iter().filter_map(|end| end.node())
+    };
+    nodes(drops.link).find(|node| {
+        let is_between = nodes(other.link).any(|one| one == *node);
+        let device = &line.devices[*node];
+        let has_answered = |at: Instant| at > drops.first.max(other.first) + ANSWERS_LATE;
+        let is_reached = device.answered.is_some_and(|answered| has_answered(answered.at));
+        is_between && (device.silent.is_some() || !is_reached)
+    })
+}
+
+/// Lays a lost link to the device behind it; the other link of the device follows from it.
+fn blame(line: &Line, tree: &Tree, node: usize, condition: &mut Condition) {
+    let id = DeviceId(node as u32);
+    condition.alternatives = vec![Alternative {
+        cause: FaultName::LinkOpen,
+        place: Some(condition.place),
+        confidence: 0.2,
+    }];
+    condition.place = Place::device(line.network, id);
+    (condition.cause, condition.confidence) = (FaultName::DeviceOff, 0.7);
+    for port in Port::ALL {
+        condition.explains.push(Symptom::LinkDown(id, port));
+        condition.explains.push(Symptom::LinkCounted(id, port));
+        let far = tree.opposite(End::Controller(node, port));
+        if let Some(End::Controller(far, port)) = far {
+            let far = DeviceId(far as u32);
+            condition.explains.push(Symptom::LinkDown(far, port));
+            condition.explains.push(Symptom::LinkCounted(far, port));
+        }
+        if let Some(End::MainDevice(_)) = far {
+            condition.explains.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
+        }
     }
 }
 
@@ -110,6 +169,7 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
         BrownOut, CableDegraded, DeviceOff, LinkFlapping, LinkOpen, RingOpen, SupplyOff,
     };
     let is_repeated = drops.count >= AGAIN;
+    let sure = if drops.count >= OFTEN { 0.75 } else { 0.6 };
     match drops.longest() {
         None if tree.is_on_ring(drops.link) => (LinkOpen, 0.6, vec![(RingOpen, None, 0.3)]),
         None => {
@@ -125,7 +185,7 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
             (LinkOpen, off.0, others)
         }
         Some(_) if is_repeated => {
-            (LinkFlapping, 0.75, vec![(BrownOut, behind, 0.1), (CableDegraded, None, 0.05)])
+            (LinkFlapping, sure, vec![(BrownOut, behind, 0.1), (CableDegraded, None, 0.05)])
         }
         Some(longest) if longest < SHORT => {
             (LinkOpen, 0.45, vec![(LinkFlapping, None, 0.35), (BrownOut, behind, 0.1)])

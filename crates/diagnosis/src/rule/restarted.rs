@@ -195,7 +195,8 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
         }
         condition = condition.explaining(follows);
     } else {
-        condition = condition.about([Symptom::StateLost(device.id)]);
+        condition =
+            condition.about([Symptom::StateLost(device.id)]).explaining(consequences(line, fall));
     }
     if is_back(fall)
         && let Some(status) = device.al.status
@@ -245,20 +246,34 @@ fn consequences(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
 fn links_lost_with(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
     let Some(tree) = &line.tree else { return Vec::new() };
     let device = fall.device;
-    let falls = device.al.changes.iter().filter(|change| change.is_own_fall()).count() as u64;
+    let falls: Vec<_> = device.al.changes.iter().filter(|change| change.is_own_fall()).collect();
+    let earliest = match falls.as_slice() {
+        [first, _, ..] => first.at.before(BEFORE),
+        [] | [_] => fall.began(),
+    };
     let mut follows = Vec::new();
     for drops in Drops::all(line) {
         let link = tree.links()[drops.link];
         let ends = [link.upstream, link.downstream];
         let is_its = ends.iter().any(|end| end.node() == Some(device.id.index()));
-        let is_then = drops.first + TOGETHER >= fall.began()
-            && drops.last <= fall.change.at + LINKS_COUNTED
+        // One that starts anew again and again before it is up has no state to fall from.
+        let was_never_up = falls.first().is_some_and(|first| stays_down(device, first, drops.last));
+        let is_then = drops.first + TOGETHER >= earliest
+            && (drops.last <= fall.change.at + LINKS_COUNTED || was_never_up)
             && !drops.is_down;
-        if is_its && is_then && drops.count <= falls {
+        let is_as_often = drops.count <= falls.len() as u64 || was_never_up;
+        if is_its && is_then && is_as_often {
             follows.extend(link_lost::follows(line, tree, drops.link));
         }
     }
     follows
+}
+
+/// Whether a device was not seen in its former state again between a fall and `until`.
+fn stays_down(device: &Device, fall: &AlChange, until: Instant) -> bool {
+    let later = device.al.changes.iter().filter(|change| change.at > fall.at && change.at <= until);
+    let before = fall.from.state().state();
+    later.into_iter().all(|change| change.to.state().state() < before)
 }
 
 fn fell(line: &Line, fall: &Fall<'_>) -> Condition {

@@ -99,6 +99,8 @@ fn page_of(error: &AlError) -> &'static RulePage {
     }
     match error.code.map(|code| code.value) {
         Some(WATCHDOG_CODE) => &WATCHDOG,
+        // Its SYNC signals do not come as they should, whatever class the code is of.
+        Some(AlStatusCode::DC_SYNC_IO_ERROR) => &SYNC,
         Some(code) if code.explain().class == CodeClass::Timing => &SYNC,
         Some(_) | None => &LEFT,
     }

@@ -93,6 +93,12 @@ fn suspects(view: &View<'_>, lost: &[Drops], cyclic: &Cyclic, deficit: &Deficit)
     for least in [Sign::Error, Sign::LinkLost, Sign::Absent] {
         let suspected = shares.iter().zip(&signs).filter(|(_, sign)| **sign >= least);
         let suspected: Vec<_> = suspected.map(|(share, _)| share.clone()).collect();
+        // Who hangs behind a SubDevice that failed goes with it, and comes back at a time of its own: the
+        // lowest working counter may lack any part of them.
+        let whole: u16 = suspected.iter().filter_map(|(_, shares)| shares.first()).sum();
+        if least > Sign::Absent && whole >= missing && is_one_branch(line, &suspected) {
+            return certain(suspected.into_iter().map(|(device, _)| device).collect());
+        }
         if let Some(devices) = fewest(&suspected, missing) {
             return certain(devices);
         }
@@ -116,6 +122,13 @@ fn suspects(view: &View<'_>, lost: &[Drops], cyclic: &Cyclic, deficit: &Deficit)
         1 => certain(alone),
         _ => Suspects { is_certain: false, devices: alone },
     }
+}
+
+/// Whether all hang behind the first of them.
+fn is_one_branch(line: &Line, suspected: &[(DeviceId, Vec<u16>)]) -> bool {
+    let (Some(tree), Some((first, _))) = (&line.tree, suspected.first()) else { return false };
+    let branch = tree.subtree(first.index());
+    suspected.iter().all(|(device, _)| branch.contains(&device.index()))
 }
 
 /// What an owner can miss: its whole share first, then one direction of it.

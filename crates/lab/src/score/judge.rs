@@ -5,6 +5,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
 
+use crate::verdict::judge::{Company, may_be_common};
 use crate::verdict::{Claim, Grade, Match, Scene, Site, Truth, matches};
 
 /// How a diagnosis calls the SubDevices: by the identity of the project, unless it had none.
@@ -21,6 +22,8 @@ pub struct Judged {
     pub confidence: f64,
     /// Findings beside it that no fault explains.
     pub others: u64,
+    /// All that was said, in the order in which it was said.
+    pub findings: Vec<String>,
     /// Cycles from the first effect to the first finding at the right place, where that is known.
     pub cycles: Option<u64>,
 }
@@ -48,35 +51,35 @@ pub fn judge(
     truth: &Truth,
     all: &[Truth],
     scene: &Scene<'_>,
-    (began, among): (Instant, usize),
+    (company, among): (Company, usize),
     naming: Naming<'_>,
 ) -> Judged {
+    let began = company.began.unwrap_or(Instant::ZERO);
     let of_its_time: Vec<&FindingReport> = diagnosis
         .findings
         .iter()
         .filter(|finding| finding.closed_ns.is_none_or(|closed| closed.0 >= began.as_nanos()))
         .collect();
-    let graded = of_its_time.iter().take(among).map(|finding| {
+    let first = || of_its_time.iter().take(among).copied();
+    // Two faults that began together may look like one source: then one of them hangs beneath.
+    let beneath = first()
+        .filter(|finding| company.is_shared && may_be_common(finding.cause))
+        .flat_map(|finding| &finding.consequences);
+    let graded = first().chain(beneath).map(|finding| {
         let fits = matches(truth, scene, claim(finding, naming));
-        (*finding, fits)
+        (finding, fits)
     });
     let best = graded.max_by_key(|(_, fits)| (fits.cause.is_right(), fits.place, fits.cause));
     let others = of_its_time.iter().filter(|finding| {
         finding.severity != Severity::Info && !is_explained(finding, all, scene, naming)
     });
     let others = others.count() as u64;
-    match best {
-        Some((finding, fits)) => Judged {
-            fits,
-            said: text(finding, naming),
-            confidence: finding.confidence,
-            others,
-            cycles: None,
-        },
-        None => {
-            Judged { fits: Match::NONE, said: String::new(), confidence: 0.0, others, cycles: None }
-        }
-    }
+    let findings = of_its_time.iter().map(|finding| text(finding, naming)).collect();
+    let (fits, said, confidence) = match best {
+        Some((finding, fits)) => (fits, text(finding, naming), finding.confidence),
+        None => (Match::NONE, String::new(), 0.0),
+    };
+    Judged { fits, said, confidence, others, findings, cycles: None }
 }
 
 /// Whether any of the faults allows a finding at its place.

@@ -22,6 +22,7 @@ use crate::choice::{Ground, are_apart, text};
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 use crate::swarm::run::cabled;
+use crate::verdict::judge::Company;
 use crate::verdict::{Grade, Scene, Truth, TruthPlace, matches};
 
 /// How long the bring-up may take.
@@ -381,8 +382,8 @@ impl<'a> Play<'a> {
         let tree = self.lab.tree();
         let answered_again = self.lab.reached().len() >= tree.len();
         let scene = Scene { tree, host_counters: self.case.host_counters, answered_again };
-        let began = record.began.unwrap_or(Instant::ZERO);
-        let when = (began, self.case.faults.len().max(1));
+        let company = Company::of(self.lab.truth(), record);
+        let when = (company, self.case.faults.len().max(1));
         let live = (!self.options.capture_only)
             .then(|| Judged { cycles, ..judge(live, &truth, &all, &scene, when, &|id| id) });
         let by_position = |id: DeviceId| self.lab.of_plan(id);

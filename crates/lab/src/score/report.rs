@@ -183,4 +183,6 @@ pub struct WrongReport {
     pub live: Option<String>,
     /// What was said of the recording.
     pub capture: String,
+    /// All that was said, live where the live diagnosis was judged; at most twelve findings.
+    pub findings: Vec<String>,
 }

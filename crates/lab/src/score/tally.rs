@@ -226,6 +226,7 @@ impl Tally {
             effects: fault.effects,
             live: live.map(verdict),
             capture: verdict(&fault.capture),
+            findings: live.unwrap_or(&fault.capture).findings.iter().take(12).cloned().collect(),
         });
     }
 

@@ -275,6 +275,7 @@ impl<'a> Episode<'a> {
                 | Effect::ClockRestarted
                 | Effect::ClockRestored
                 | Effect::SyncCut
+                | Effect::SyncBounces
                 | Effect::SyncBack
                 | Effect::WorkTakes { .. }
                 | Effect::WorkRestored
@@ -325,10 +326,12 @@ impl<'a> Episode<'a> {
                 let faults: Vec<String> =
                     self.lab.truth().faults().iter().map(|fault| fault.name.to_string()).collect();
                 self.violation(format!(
-                    "{} {} {} at {site} has no cause; injected so far: {}",
+                    "{} {} {} at {site} has no cause (opened at {}: {}); injected so far: {}",
                     finding.id,
                     finding.code,
                     finding.cause,
+                    Instant::from_nanos(finding.opened_ns.0),
+                    finding.evidence.first().map_or("", |evidence| evidence.text.as_str()),
                     faults.join(", ")
                 ));
             }

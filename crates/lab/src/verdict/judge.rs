@@ -82,10 +82,7 @@ pub fn best_finding<'a>(
     let began = company.began.unwrap_or(Instant::ZERO).as_nanos();
     let of_its_time =
         |finding: &&FindingReport| finding.closed_ns.is_none_or(|closed| closed.0 >= began);
-    let is_common = |finding: &&FindingReport| {
-        use FaultName::{BrownOut, DeviceOff, EmcNoise, SupplyOff};
-        company.is_shared && matches!(finding.cause, EmcNoise | BrownOut | SupplyOff | DeviceOff)
-    };
+    let is_common = |finding: &&FindingReport| company.is_shared && may_be_common(finding.cause);
     let beneath = diagnosis.findings.iter().filter(is_common).flat_map(|f| &f.consequences);
     let all = diagnosis.findings.iter().chain(beneath);
     let graded = all.filter(of_its_time).map(|finding| {
@@ -95,6 +92,13 @@ pub fn best_finding<'a>(
     graded.filter(|(_, graded)| graded.is_right()).max_by_key(|(finding, graded)| {
         (finding.state != FindingState::Closed, graded.cause, graded.place)
     })
+}
+
+/// Whether a cause may act at several places at once, so that faults which begin together look like it.
+#[must_use]
+pub fn may_be_common(cause: FaultName) -> bool {
+    use FaultName::{BrownOut, DeviceOff, EmcNoise, SupplyOff};
+    matches!(cause, EmcNoise | BrownOut | SupplyOff | DeviceOff)
 }
 
 /// How well a finding fits any of the faults of the run, now or in the past.

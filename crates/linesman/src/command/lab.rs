@@ -97,7 +97,7 @@ fn run_stories(stories: &[PathBuf], output: &mut Output) -> Result<Status, Failu
     for path in stories {
         let text = files::text(path, "a story")?;
         let story = Story::parse(&text).map_err(|error| files::in_file(path, &error))?;
-        let report = play(&story, &files::Beside::of(path));
+        let report = play(&story, &files::NamedFiles::of(path));
         held += usize::from(report.held());
         output.text(&format!("{report}"));
     }

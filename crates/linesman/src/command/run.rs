@@ -20,7 +20,7 @@ use linesman_runtime::line::{Cards, Line, Pace};
 use linesman_runtime::online::Board;
 use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{
-    self as running, Beside, Choices, Ended, Idle, RealTime, RunOptions, Shared, Wanted,
+    self as running, Beside, Choices, Ended, Idle, NOTES, RealTime, RunOptions, Shared, Wanted,
 };
 use linesman_runtime::selector::Selector;
 use linesman_runtime::service::ServiceDesk;
@@ -111,7 +111,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let selector: Selector = arguments.on.parse()?;
     let lasts = lasts(arguments.seconds)?;
     let source = match &arguments.file {
-        Some(path) => Source::read(path)?,
+        Some(path) => Source::read(path, output)?,
         None => Source::AsFound,
     };
     let choices = Choices { target: arguments.to, cycle: arguments.cycle_us.map(Span::us) };
@@ -204,17 +204,21 @@ enum Source {
 }
 
 impl Source {
-    fn read(path: &Path) -> Result<Self, Failure> {
+    fn read(path: &Path, output: &Output) -> Result<Self, Failure> {
         let bytes = files::bytes(path, "a project or an ENI file", MOST)?;
         if !Eni::is_one(&bytes) {
             let project = files::project(path)?;
             // One that chooses more than who is where is planned from what it says.
             if project.chooses() {
-                return Ok(Self::Planned(Box::new(PlanFile::open(path)?.plan)));
+                let PlanFile { plan, notes, .. } = PlanFile::open(path)?;
+                notes.iter().for_each(|note| output.warn(note));
+                return Ok(Self::Planned(Box::new(plan)));
             }
             return Ok(Self::Project(Box::new(project)));
         }
         let eni = Eni::parse(&bytes).map_err(|error| files::in_file(path, &error))?;
+        // What is left out of it is not found out only when it is missed.
+        eni.notes.iter().for_each(|note| output.warn(note));
         Ok(Self::Planned(Box::new(eni.plan)))
     }
 }
@@ -263,7 +267,7 @@ fn drive<L: Line + Send>(
     output: &mut Output,
 ) -> Result<Status, Failure> {
     teller.line(said, output);
-    let (notes, told) = mpsc::channel();
+    let (notes, told) = mpsc::sync_channel(NOTES);
     let ended = std::thread::scope(|scope| {
         let beside = Beside { stop, notes, desk };
         let work = move || match image {

@@ -38,6 +38,26 @@ impl Event {
                 }
                 lines
             }
+            Self::WrongModule { id, to, status, slot, expected, found } => {
+                let name = name(*id);
+                let module = |ident: u32| match ident {
+                    0 => "no module".to_owned(),
+                    ident => format!("module 0x{ident:08X}"),
+                };
+                vec![
+                    format!("{name}: {}", aborted(*to, *status)),
+                    format!(
+                        "{name}: slot {slot}: {} is there, {} is planned (object 0xF050:{slot:02X}); \
+                         check the modules, or change `modules` in the project",
+                        module(*found),
+                        module(*expected)
+                    ),
+                ]
+            }
+            Self::ModulesUnread { id, to, status, error } => vec![
+                format!("{}: {}", name(*id), aborted(*to, *status)),
+                format!("{}: asking for its modules: {error}", name(*id)),
+            ],
             Self::ClocksSet { reference } => {
                 vec![format!("clocks set; station {reference} is the reference clock")]
             }

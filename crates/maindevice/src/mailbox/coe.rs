@@ -214,6 +214,7 @@ impl Transfer<'_, '_> {
             | Why::NotSpoken { .. }
             | Why::TooSmall(_)
             | Why::Exchange(_)
+            | Why::Crowded { .. }
             | Why::Abandoned => return result,
         };
         let abort = Message::Abort(Abort { object: self.object, code: code.value() });

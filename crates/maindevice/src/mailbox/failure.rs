@@ -92,6 +92,11 @@ pub enum Why {
         /// What it says it does; may be empty.
         text: String,
     },
+    /// Too many errands wait for it already.
+    Crowded {
+        /// How many.
+        waiting: usize,
+    },
     /// It has no mailbox.
     NoMailbox,
     /// Its mailbox is not open in the state that it is in.
@@ -143,6 +148,7 @@ impl Why {
                 "its software does not run: switch the SubDevice off and on, else replace it"
             }
             Self::Busy { .. } => "wait until the SubDevice is done, then repeat",
+            Self::Crowded { .. } => "wait for answers before you ask for more",
             Self::NoMailbox => "choose a SubDevice that has a mailbox (`linesman scan -v`)",
             Self::NotOpen => "take it to PREOP first (`linesman state`)",
             Self::NotSpoken { .. } => "choose a SubDevice that speaks it (`linesman scan -v`)",
@@ -192,6 +198,9 @@ impl fmt::Display for Why {
             }
             Self::Busy { patience, text } => {
                 write!(f, "it says it is busy for {patience}: {text}")
+            }
+            Self::Crowded { waiting } => {
+                write!(f, "{waiting} requests wait for its mailbox already")
             }
             Self::NoMailbox => f.write_str("it has no mailbox"),
             Self::NotOpen => f.write_str("its mailbox is not open; that takes PREOP or higher"),

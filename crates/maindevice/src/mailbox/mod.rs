@@ -29,6 +29,7 @@ pub use protocol_errors::{ProtocolError, ProtocolErrors};
 
 pub(crate) use mapped::MailboxBits;
 use multiplexer::Multiplexer;
+pub use queue::MOST_WAITING;
 pub(crate) use queue::{Job, Outcome, Queues};
 
 /// A mailbox whose bit the cycle reads is looked into all the same once in so long.

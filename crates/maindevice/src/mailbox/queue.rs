@@ -15,6 +15,10 @@ use super::protocol_errors::{ProtocolError, ProtocolErrors};
 use crate::executor::lock;
 use crate::executor::wire::Sleep;
 
+/// So many errands may wait for the mailbox of a SubDevice. Whoever asks for more is not served: memory must
+/// not grow with somebody's haste.
+pub const MOST_WAITING: usize = 4_096;
+
 /// What came of an errand.
 pub(crate) type Outcome = Result<Vec<u8>, MailboxFailure>;
 
@@ -116,6 +120,12 @@ impl Queues {
             job.done(Err(none));
             return Pending { slot };
         };
+        if queue.jobs.len() >= MOST_WAITING {
+            drop(queues);
+            let too_many = failure(id, &job.request, Why::Crowded { waiting: MOST_WAITING });
+            job.done(Err(too_many));
+            return Pending { slot };
+        }
         queue.jobs.push_back(job);
         let waker = queue.waker.take();
         drop(queues);

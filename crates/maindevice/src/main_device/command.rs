@@ -277,6 +277,13 @@ impl MainDevice {
         self.running.as_ref().map(|running| running.mailboxes.troubles()).unwrap_or_default()
     }
 
+    /// The states in which the SubDevices of the running plan shall be now: those of the plan unless others
+    /// were asked for.
+    #[must_use]
+    pub fn wanted_states(&self) -> Vec<AlState> {
+        self.running.as_ref().map(|running| lock(&running.line).all_wanted()).unwrap_or_default()
+    }
+
     /// Error and change counters of [`MainDevice::standing`] begin at 0 again. No register is touched.
     pub fn clear_counts(&mut self) {
         if let Some(running) = &mut self.running {

@@ -9,7 +9,7 @@ use linesman_proto::address::{
 };
 use linesman_proto::register::{self, AlStatus, DlStatus, ErrorCounters, EscInformation};
 use linesman_proto::state::{AlStatusCode, OredStates};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use crate::exchange::{ExchangeError, Reply, Request, Target};
 use crate::executor::Wire;
@@ -127,7 +127,7 @@ pub async fn places(wire: &Wire, network: Network) -> Result<(Vec<Target>, OredS
 /// # Errors
 /// [`LookError`] when nobody is there. A single SubDevice that does not answer is no error.
 pub async fn look(wire: Wire, network: Network) -> Result<Look, LookError> {
-    let (places, states) = places(&wire, network).await?;
+    let (places, states) = patient_places(&wire, network).await?;
     let reading: Vec<_> = (places.into_iter().zip(0..))
         .map(|(target, position)| wire.spawn(look_at(wire.clone(), target, Position(position))))
         .collect();
@@ -136,6 +136,23 @@ pub async fn look(wire: Wire, network: Network) -> Result<Look, LookError> {
         devices.push(device.await);
     }
     Ok(Look { network, at: wire.now(), states, devices })
+}
+
+/// [`places`], asked for a few times: a host that is busy with something else may be silent for longer
+/// than a frame is waited for, and nobody else has been heard yet who could tell a dead line from that.
+async fn patient_places(
+    wire: &Wire,
+    network: Network,
+) -> Result<(Vec<Target>, OredStates), LookError> {
+    const LOOKS: u32 = 3;
+    const LOOK_AGAIN_AFTER: Span = Span::ms(100);
+    for _ in 1..LOOKS {
+        match places(wire, network).await {
+            Err(LookError::Silent(_)) => wire.sleep(LOOK_AGAIN_AFTER).await,
+            seen @ (Ok(_) | Err(LookError::Nobody { .. })) => return seen,
+        }
+    }
+    places(wire, network).await
 }
 
 async fn look_at(wire: Wire, target: Target, position: Position) -> LookedDevice {

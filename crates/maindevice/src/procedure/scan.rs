@@ -200,23 +200,34 @@ async fn images(wire: &Wire, stations: &[StationAddress]) -> Vec<Result<Image, S
         let (wire, head) = (wire.clone(), head.clone());
         wire.clone().spawn(async move { sii::read_rest(&wire, target, &head).await })
     };
-    let mut kinds = BTreeMap::new();
+    let (mut kinds, mut alone) = (BTreeMap::new(), Vec::with_capacity(heads.len()));
     for (target, head) in targets().zip(&heads) {
-        let Ok(head) = head else { continue };
-        kinds.entry(head.kind()).or_insert_with(|| read_rest(target, head));
+        let Ok(head) = head else {
+            alone.push(None);
+            continue;
+        };
+        match head.kind() {
+            None => alone.push(Some(read_rest(target, head))),
+            Some(kind) => {
+                kinds.entry(kind).or_insert_with(|| read_rest(target, head));
+                alone.push(None);
+            }
+        }
     }
     let mut read = BTreeMap::new();
     for (kind, reading) in kinds {
         read.insert(kind, reading.await);
     }
     let mut images = Vec::with_capacity(heads.len());
-    for (target, head) in targets().zip(heads) {
-        images.push(match head {
-            Err(error) => Err(error),
-            Ok(head) => match read.get(&head.kind()) {
-                Some(Ok(bytes)) => Ok(bytes.clone()),
+    for ((target, head), alone) in targets().zip(heads).zip(alone) {
+        let equal = |head: &Head| head.kind().and_then(|kind| read.get(&kind));
+        images.push(match (head, alone) {
+            (Err(error), _) => Err(error),
+            (Ok(head), alone) => match (alone, equal(&head)) {
+                (Some(reading), _) => reading.await,
+                (None, Some(Ok(bytes))) => Ok(bytes.clone()),
                 // Its equal could not be read; it may be all right itself.
-                Some(Err(_)) | None => read_rest(target, &head).await,
+                (None, Some(Err(_)) | None) => read_rest(target, &head).await,
             }
             .and_then(|bytes| {
                 head.image_like(&bytes).map_err(|error| SiiAccessError::Image { target, error })

@@ -14,6 +14,9 @@ use linesman_proto::sii::MailboxPair;
 use crate::exchange::{ExchangeError, Request, Target};
 use crate::executor::Wire;
 
+/// Offset of the activate byte of a SyncManager (0x0806).
+const SM_ACTIVATE: u16 = 6;
+
 /// The SyncManagers that serve a mailbox: 0 takes what the MainDevice writes, 1 gives.
 #[must_use]
 pub fn mailbox_sync_managers(areas: MailboxPair) -> [SyncManagerConfig; 2] {
@@ -64,13 +67,12 @@ pub async fn before_mailbox(
 /// # Errors
 /// [`ExchangeError`] when it does not answer.
 pub async fn before_safe_op(wire: &Wire, device: &DevicePlan) -> Result<(), ExchangeError> {
-    const ACTIVATE: u16 = 6;
     let target = Target::Station(device.station);
     let (mut off, mut on) = (Vec::new(), Vec::new());
     for (index, manager) in &device.sync_managers {
         let Some(address) = SYNC_MANAGER.at(u16::from(*index)) else { continue };
         // It may be on, of an earlier try.
-        off.push((RegisterAddress(address.0 + ACTIVATE), vec![0]));
+        off.push((RegisterAddress(address.0 + SM_ACTIVATE), vec![0]));
         on.push((address, manager.to_bytes().to_vec()));
     }
     for (index, fmmu) in &device.fmmus {
@@ -91,6 +93,24 @@ pub async fn before_safe_op(wire: &Wire, device: &DevicePlan) -> Result<(), Exch
     );
     write_all(wire, target, off).await?;
     write_all(wire, target, on).await
+}
+
+/// After the way down from SAFEOP or OP: what served process data is switched off, so that a SubDevice that
+/// does not do so itself adds nothing more to working counters.
+///
+/// # Errors
+/// [`ExchangeError`] when it does not answer.
+pub async fn after_process_data(wire: &Wire, device: &DevicePlan) -> Result<(), ExchangeError> {
+    /// Offset of the activate byte of an FMMU (0x060C).
+    const FMMU_ACTIVATE: u16 = 12;
+    let managers = device.sync_managers.iter().filter_map(|(index, _)| {
+        Some(RegisterAddress(SYNC_MANAGER.at(u16::from(*index))?.0 + SM_ACTIVATE))
+    });
+    let fmmus = device.fmmus.iter().filter_map(|(index, _)| {
+        Some(RegisterAddress(FMMU.at(u16::from(*index))?.0 + FMMU_ACTIVATE))
+    });
+    let off = fmmus.chain(managers).map(|address| (address, vec![0])).collect();
+    write_all(wire, Target::Station(device.station), off).await
 }
 
 /// Writes in order, as many as fit to a frame. When one was not taken, or a frame was lost, all are

@@ -8,7 +8,9 @@
 use linesman_proto::register::{
     SII_ACCESS_ECAT, SII_ADDRESS, SII_CONTROL_STATUS, SII_DATA, SiiCommand, SiiControl,
 };
-use linesman_proto::sii::word::{CHECKSUM, SERIAL_NUMBER, SIZE, STATION_ALIAS, VENDOR_ID};
+use linesman_proto::sii::word::{
+    CHECKSUM, PRODUCT_CODE, SERIAL_NUMBER, SIZE, STATION_ALIAS, VENDOR_ID,
+};
 use linesman_proto::sii::{Identity, Image, Reader, SiiError, Size, WordAddress};
 use linesman_proto::time::Span;
 
@@ -110,9 +112,14 @@ const SIZE_GROUP: WordAddress = WordAddress(SIZE.0 - 2);
 
 impl Head {
     /// What is equal in the EEPROMs of equal SubDevices: all of it but alias, serial number and the
-    /// checksum, which follows from the alias.
+    /// checksum, which follows from the alias. `None` where vendor or product code is 0: whoever has
+    /// no identity is nobody's equal.
     #[must_use]
-    pub fn kind(&self) -> Vec<u8> {
+    pub fn kind(&self) -> Option<Vec<u8>> {
+        let number = |word: WordAddress| self.first.get(word.byte()..word.byte() + 4);
+        if [VENDOR_ID, PRODUCT_CODE].into_iter().any(|word| number(word) == Some(&[0; 4])) {
+            return None;
+        }
         let mut kind = self.first.clone();
         for (word, words) in [(STATION_ALIAS, 1), (CHECKSUM, 1), (SERIAL_NUMBER, 2)] {
             if let Some(own) = kind.get_mut(word.byte()..word.byte() + 2 * words) {
@@ -120,7 +127,7 @@ impl Head {
             }
         }
         kind.extend_from_slice(&self.size);
-        kind
+        Some(kind)
     }
 
     /// The image of a SubDevice whose equal has this one.

@@ -48,6 +48,22 @@ pub enum StepError {
         /// How long it was waited for.
         patience: Span,
     },
+    /// A slot holds another module than planned.
+    #[error(
+        "slot {slot} holds module 0x{found:08X}, expected 0x{expected:08X} (object 0xF050:{slot:02X}; 0 is an \
+         empty slot)"
+    )]
+    Module {
+        /// The slot, from 1.
+        slot: u8,
+        /// The planned module.
+        expected: u32,
+        /// The one that is there.
+        found: u32,
+    },
+    /// It does not say which modules it has.
+    #[error("asking for its modules: {0}")]
+    Unread(Box<StartUpError>),
     /// It does not take a command that belongs to the step.
     #[error("start-up command {command}: {error}")]
     StartUp {
@@ -98,8 +114,7 @@ pub async fn read(wire: &Wire, target: Target) -> Result<(AlStatus, AlStatusCode
 pub async fn request(wire: &Wire, target: Target, step: Step) -> Result<(), StepError> {
     let Step { to, limit, emulated } = step;
     // INIT is heard even when an error stands; the bit does no harm there and clears it.
-    let acknowledge = to == AlState::Init && !emulated;
-    let control = AlControl::request(to).with_error_acknowledge(acknowledge).to_bytes();
+    let mut acknowledge = to == AlState::Init && !emulated;
     let began = wire.now();
     let until = began + limit;
     let mut write_at = began;
@@ -107,14 +122,19 @@ pub async fn request(wire: &Wire, target: Target, step: Step) -> Result<(), Step
         let now = wire.now();
         // A register takes its value when the frame has ended: the status needs a frame of its own.
         if now >= write_at {
+            let control = AlControl::request(to).with_error_acknowledge(acknowledge).to_bytes();
             let sent = wire.write(target, register::AL_CONTROL.address, &control).await?;
             if sent.answered() {
                 write_at = now + WRITE_AGAIN_AFTER;
             }
         }
         let (status, code) = read(wire, target).await?;
-        // We never write the error bit to a controller with device emulation, so it does not mirror
-        // it: there, too, it is the SubDevice that shows it.
+        if acknowledge && is_mirrored(to, status, code) {
+            acknowledge = false;
+            write_at = now;
+            continue;
+        }
+        // Otherwise no error bit was written that could be mirrored: the SubDevice shows it.
         if status.error() {
             return Err(StepError::Refused { to, status, code });
         }
@@ -132,6 +152,12 @@ pub async fn request(wire: &Wire, target: Target, step: Step) -> Result<(), Step
     }
 }
 
+/// Whether what we acknowledged comes back as it was written, with no reason: nobody said so, but AL
+/// status of this controller mirrors AL control (device emulation, register 0x0141 bit 0).
+fn is_mirrored(to: AlState, status: AlStatus, code: AlStatusCode) -> bool {
+    status.error() && status.state() == StateValue::Known(to) && code == AlStatusCode::NO_ERROR
+}
+
 /// Acknowledges an error; the SubDevice stays in its state. Where AL status mirrors AL control the
 /// bit is taken back afterwards.
 ///
@@ -141,7 +167,7 @@ pub async fn acknowledge(
     wire: &Wire,
     target: Target,
     status: AlStatus,
-    emulated: bool,
+    mut emulated: bool,
 ) -> Result<(), StepError> {
     // A value that names no state cannot be asked for: INIT clears all.
     let to = status.state().state().unwrap_or(AlState::Init);
@@ -161,6 +187,7 @@ pub async fn acknowledge(
         if wire.now() >= until {
             return Err(StepError::Refused { to, status, code });
         }
+        emulated |= is_mirrored(to, status, code);
         wire.sleep(SLOWEST_POLL).await;
     }
 }

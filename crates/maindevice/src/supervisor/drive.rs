@@ -7,6 +7,7 @@ use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 
 use super::clocks;
 use super::keeper::Keeper;
+use super::modules;
 use super::start_up::{Moment, execute};
 use super::times::Phase;
 use crate::executor::lock;
@@ -77,6 +78,7 @@ impl Keeper<'_> {
                 self.note(Phase::SetUp(next), began);
             }
             (Some(AlState::PreOp), AlState::SafeOp) => {
+                modules::compare(context, device).await?;
                 self.commands(current, next, Moment::Before).await?;
                 let began = wire.now();
                 clocks::ready(context).await;
@@ -114,6 +116,9 @@ impl Keeper<'_> {
         let step = state::Step { to: next, limit, emulated: device.device_emulation };
         state::request(wire, target, step).await?;
         self.note(Phase::Step(next), began);
+        if current.is_some_and(AlState::has_inputs) && !next.has_inputs() {
+            set_up::after_process_data(wire, device).await?;
+        }
         self.learn_state(AlStatus::new(next), AlStatusCode::NO_ERROR);
         lock(&context.line).set_moving(device.id, Some(next));
         self.commands(current, next, Moment::After).await

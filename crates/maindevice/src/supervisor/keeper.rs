@@ -167,6 +167,16 @@ impl Keeper<'_> {
                 wire.emit(Event::ClockOff { id, to, difference, limit, patience });
                 Some(status)
             }
+            StepError::Module { slot, expected, found } => {
+                let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
+                wire.emit(Event::WrongModule { id, to, status, slot, expected, found });
+                Some(status)
+            }
+            StepError::Unread(error) => {
+                let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
+                wire.emit(Event::ModulesUnread { id, to, status, error });
+                Some(status)
+            }
             StepError::StartUp { command, error } => {
                 let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
                 wire.emit(Event::StartUpFailed { id, to, status, command, error });

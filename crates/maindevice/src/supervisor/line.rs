@@ -284,6 +284,11 @@ impl Line {
         }
     }
 
+    /// The states in which the SubDevices shall be now, by [`DeviceId`].
+    pub(crate) fn all_wanted(&self) -> Vec<AlState> {
+        (0..self.devices.len() as u32).map(|id| self.wanted(DeviceId(id))).collect()
+    }
+
     /// Asks for a state of a SubDevice, whatever the plan says. False when there is no such SubDevice.
     pub(crate) fn ask_for(&mut self, id: DeviceId, state: AlState) -> bool {
         let Some(live) = self.live(id) else { return false };

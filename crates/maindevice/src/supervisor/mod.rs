@@ -10,6 +10,7 @@ mod drive;
 pub(crate) mod keeper;
 pub(crate) mod line;
 mod locate;
+mod modules;
 mod start_up;
 pub(crate) mod times;
 

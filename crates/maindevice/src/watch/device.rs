@@ -204,7 +204,10 @@ impl WatchedDevice {
                 self.status = Some(*status);
                 self.code = *code;
             }
-            Event::StepTimedOut { status, .. } | Event::StartUpFailed { status, .. } => {
+            Event::StepTimedOut { status, .. }
+            | Event::StartUpFailed { status, .. }
+            | Event::WrongModule { status, .. }
+            | Event::ModulesUnread { status, .. } => {
                 self.init_error = true;
                 self.status = Some(*status);
             }
@@ -261,6 +264,8 @@ pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
         | Event::Refused { id, .. }
         | Event::StepTimedOut { id, .. }
         | Event::StartUpFailed { id, .. }
+        | Event::WrongModule { id, .. }
+        | Event::ModulesUnread { id, .. }
         | Event::AbnormalState { id, .. }
         | Event::DeviceLost { id }
         | Event::DeviceBack { id, .. }

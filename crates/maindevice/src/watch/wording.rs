@@ -28,7 +28,9 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
         }
         Event::Refused { id, .. }
         | Event::StepTimedOut { id, .. }
-        | Event::StartUpFailed { id, .. } => {
+        | Event::StartUpFailed { id, .. }
+        | Event::WrongModule { id, .. }
+        | Event::ModulesUnread { id, .. } => {
             states(at, event, plan, Some(*id), Severity::Error, EntryKind::StateAborted)
         }
         Event::TargetReached { id, .. } => {

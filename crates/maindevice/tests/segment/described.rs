@@ -126,6 +126,37 @@ fn pdos_that_exclude_each_other_are_refused() {
     assert!(bench.run_until(Span::s(5), refused), "{}: {:#?}", bench.state("V"), bench.events);
 }
 
+#[test]
+fn another_module_than_planned_is_named_and_not_taken_further() {
+    let mut bench = bench("slots = [\"C16\", \"0x20\"]\n");
+    let inventory = bench.scan();
+    let mut planned = inventory.planned(AlState::Op);
+    planned[0].settings.modules = vec![0x10, 0x10];
+    let build = |planned: &[_]| {
+        Plan::build(planned, inventory.tree().clone(), &PlanOptions::default()).expect("a plan")
+    };
+    bench.device.start(bench.now, build(&planned));
+    let wrong = |event: &Event| matches!(event, Event::WrongModule { slot: 2, .. });
+    assert!(bench.run_until(Span::s(5), wrong), "{:#?}", bench.events);
+    let (_, event) = bench.events.last().unwrap();
+    let lines = event.state_lines(|_| "V".to_owned());
+    assert_eq!(lines[0], "V: state change aborted (requested SAFEOP, back to PREOP)");
+    assert!(
+        lines[1].starts_with("V: slot 2: module 0x00000020 is there, module 0x00000010 is planned"),
+        "{lines:?}"
+    );
+    bench.run_for(Span::s(1));
+    assert_eq!(bench.state("V"), "PREOP");
+    planned[0].settings.modules = vec![0x10, 0x20];
+    bench.device.start(bench.now, build(&planned));
+    assert!(bench.run_until(Span::s(5), |event| matches!(event, Event::AllReached)));
+    // A slot that the SubDevice does not list is empty.
+    planned[0].settings.modules = vec![0x10, 0x20, 0x20];
+    bench.device.start(bench.now, build(&planned));
+    let missing = |event: &Event| matches!(event, Event::WrongModule { slot: 3, found: 0, .. });
+    assert!(bench.run_until(Span::s(5), missing), "{:#?}", bench.events);
+}
+
 /// A drive whose description has neither limits nor windows.
 const DRIVE: &str = r##"<EtherCATInfo><Vendor><Id>#x815</Id></Vendor><Descriptions><Devices>
 <Device Physics="YY"><Type ProductCode="#x402" RevisionNo="1">AXIS</Type><Name>Axis</Name>

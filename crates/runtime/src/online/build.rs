@@ -178,7 +178,8 @@ fn count(totals: &CounterTotals, counter: ErrorCounter) -> Option<Count> {
 
 /// What the cycle and the mailbox say of a SubDevice.
 fn add_data(device: &mut OnlineDevice, planned: &DevicePlan, snapshot: &Snapshot) {
-    device.target = Some(planned.target.to_string());
+    let wanted = snapshot.wanted.get(planned.id.index()).copied();
+    device.target = Some(wanted.unwrap_or(planned.target).to_string());
     let has_data = !planned.outputs.is_empty() || !planned.inputs.is_empty();
     if let Some(quality) = snapshot.qualities.get(planned.id.index()).filter(|_| has_data) {
         device.wc_state = Some(!quality.valid);

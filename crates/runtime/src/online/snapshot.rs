@@ -4,6 +4,7 @@ use linesman_config::plan::Plan;
 use linesman_maindevice::mailbox::ProtocolError;
 use linesman_maindevice::{FrameStatus, MainDevice, Quality, Statistics};
 use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
 /// What is counted over.
@@ -55,6 +56,8 @@ pub struct Snapshot {
     pub rates: Option<[f64; 2]>,
     /// The process data of each SubDevice.
     pub qualities: Vec<Quality>,
+    /// The state in which each SubDevice shall be.
+    pub wanted: Vec<AlState>,
     /// The cyclic frames, task by task.
     pub frames: Vec<FrameStatus>,
     /// How many answered the last cyclic broadcast read.
@@ -72,6 +75,7 @@ impl Snapshot {
             statistics: main.statistics(),
             rates: rates.last(),
             qualities: Vec::new(),
+            wanted: main.wanted_states(),
             frames: Vec::new(),
             responding: main.responding(),
             mailboxes: Vec::new(),

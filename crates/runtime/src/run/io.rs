@@ -1,8 +1,10 @@
 //! What the application sees of a cycle, and does in it.
 
 use linesman_config::plan::Plan;
+use linesman_maindevice::watch::Standing;
 use linesman_maindevice::{FrameStatus, MainDevice, Quality, Statistics};
 use linesman_proto::address::DeviceId;
+use linesman_proto::state::{DeviceState, NetworkState};
 use linesman_proto::time::Instant;
 
 use crate::image::{Input, Output, Value};
@@ -55,6 +57,9 @@ impl<F: FnMut(&mut Io<'_>) -> Next> Application for F {
         self(io)
     }
 }
+
+/// Of a SubDevice that nobody has looked for: INIT, and not there.
+const UNKNOWN: DeviceState = DeviceState(DeviceState::NOT_PRESENT | 1);
 
 /// The process data of a cycle.
 pub struct Io<'a> {
@@ -110,6 +115,33 @@ impl Io<'_> {
     #[must_use]
     pub fn quality(&self, id: DeviceId) -> Quality {
         self.main.quality(id)
+    }
+
+    /// Whether a working counter that a SubDevice has a share in was wrong the last time: set for all that
+    /// share the datagram, whoever is to blame (PLC-03). [`Io::state`] tells who that is.
+    #[must_use]
+    pub fn wc_state(&self, id: DeviceId) -> bool {
+        !self.main.quality(id).valid
+    }
+
+    /// The state word of a SubDevice: its software in the low byte, its wiring in the high byte
+    /// (PLC-04 to PLC-06). 8 is OP and nothing wrong.
+    #[must_use]
+    pub fn state(&self, id: DeviceId) -> DeviceState {
+        let known = self.main.standing().and_then(|standing| standing.device(id));
+        known.map_or(UNKNOWN, |device| device.state())
+    }
+
+    /// The state word of the network (PLC-07); 0 when all is well.
+    #[must_use]
+    pub fn network_state(&self) -> NetworkState {
+        self.main.standing().map_or_else(NetworkState::default, Standing::network_state)
+    }
+
+    /// How many SubDevices are there, of those that are planned (PLC-08).
+    #[must_use]
+    pub fn present(&self) -> usize {
+        self.main.standing().map_or(0, Standing::present)
     }
 
     /// How a frame of a task went the last time.

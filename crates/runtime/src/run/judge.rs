@@ -1,6 +1,6 @@
 //! The thread that judges: the diagnosis of a line while it runs.
 
-use std::sync::mpsc::Sender;
+use std::sync::mpsc::SyncSender;
 use std::thread::{self, JoinHandle};
 
 use linesman_diagnosis::{Diagnosis, Engine, Setup};
@@ -16,7 +16,7 @@ use super::tap::Listener;
 pub fn judge(
     setup: Setup,
     listener: Listener,
-    notes: Sender<Note>,
+    notes: SyncSender<Note>,
 ) -> std::io::Result<JoinHandle<Diagnosis>> {
     thread::Builder::new().name("judge".to_owned()).spawn(move || {
         let mut engine = Engine::new(setup);
@@ -38,13 +38,13 @@ pub fn judge(
             // What it would like to know is known anyway: every SubDevice's keeper reads it.
             while engine.poll_probe().is_some() {}
             while let Some(event) = engine.poll_event() {
-                let _ = notes.send(Note::Finding(Box::new(event)));
+                let _ = notes.try_send(Note::Finding(Box::new(event)));
             }
             done = Some(log);
         }
         engine.finish(last, true);
         while let Some(event) = engine.poll_event() {
-            let _ = notes.send(Note::Finding(Box::new(event)));
+            let _ = notes.try_send(Note::Finding(Box::new(event)));
         }
         engine.diagnosis()
     })

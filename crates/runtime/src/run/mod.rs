@@ -17,7 +17,9 @@ pub mod tap;
 pub mod wanted;
 
 pub use io::{Application, Idle, Io, Next};
-pub use operator::{Beside, Ended, MakePlan, Note, Operator, RunError, RunOptions, Wanted, run};
+pub use operator::{
+    Beside, Ended, MakePlan, NOTES, Note, Operator, RunError, RunOptions, Wanted, run,
+};
 pub use real_time::RealTime;
 pub use scan::scan;
 pub use shared::Shared;

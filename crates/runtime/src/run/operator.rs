@@ -1,7 +1,8 @@
 //! Who runs a machine: finds the line, makes the plan, starts, calls the application, stops.
 
+use std::cell::Cell;
 use std::sync::Arc;
-use std::sync::mpsc::Sender;
+use std::sync::mpsc::{SyncSender, TrySendError};
 
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{IoAt, Plan};
@@ -58,6 +59,9 @@ pub struct RunOptions {
     pub diagnose: Option<Setup>,
 }
 
+/// Room for notes that are on their way to whoever listens.
+pub const NOTES: usize = 65_536;
+
 /// Something to be told while it runs.
 #[derive(Clone, Debug)]
 pub enum Note {
@@ -98,7 +102,7 @@ pub struct Operator<A> {
     wanted: Option<Wanted>,
     application: A,
     io_at: IoAt,
-    notes: Sender<Note>,
+    notes: SyncSender<Note>,
     tap: Option<Tap>,
     plan: Option<Arc<Plan>>,
     begun: bool,
@@ -111,6 +115,8 @@ pub struct Operator<A> {
     withheld: bool,
     scan_until: Instant,
     desk: Option<ServiceDesk>,
+    /// Notes for which there was no room.
+    untold: Cell<u64>,
     begun_at: Instant,
     granted: Granted,
     on: String,
@@ -130,8 +136,10 @@ impl<A: Application> Operator<A> {
     }
 
     fn note(&self, note: Note) {
-        // Whoever listened may have gone: the machine runs on.
-        let _ = self.notes.send(note);
+        // Whoever listened may have gone, or be busy: the machine runs on.
+        if let Err(TrySendError::Full(_)) = self.notes.try_send(note) {
+            self.untold.set(self.untold.get() + 1);
+        }
     }
 
     fn scanned(&mut self, now: Instant, inventory: &Inventory, main: &mut MainDevice) {
@@ -162,7 +170,10 @@ impl<A: Application> Operator<A> {
             devices,
             frames,
             responding: main.responding().map(|count| count.0),
-            counts: Counts::of(&main.statistics(), left_out),
+            counts: Counts {
+                untold: self.untold.get(),
+                ..Counts::of(&main.statistics(), left_out)
+            },
             lateness: self.lateness.report(),
             host: (&self.granted).into(),
         }
@@ -285,7 +296,8 @@ pub struct Beside<'a> {
     /// The wish to stop.
     pub stop: &'a Stop,
     /// What happens.
-    pub notes: Sender<Note>,
+    /// What does not fit there is not told, and counted: nobody waits for a slow listener.
+    pub notes: SyncSender<Note>,
     /// Services for single SubDevices, asked for through a socket.
     pub desk: Option<ServiceDesk>,
 }
@@ -334,6 +346,7 @@ pub fn run<L: Line, A: Application>(
         withheld: false,
         scan_until: Instant::MAX,
         desk,
+        untold: Cell::new(0),
         begun_at: begun,
         granted,
         on: options.on.clone(),

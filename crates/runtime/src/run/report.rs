@@ -106,6 +106,8 @@ pub struct Counts {
     pub repeats: u64,
     /// Frames that the diagnosis did not see because it was busy.
     pub undiagnosed: u64,
+    /// Events that were not told because whoever listens was busy.
+    pub untold: u64,
 }
 
 /// What the host granted.
@@ -155,6 +157,7 @@ impl Counts {
             frames_foreign: statistics.frames_foreign,
             repeats: statistics.repeats,
             undiagnosed,
+            untold: 0,
         }
     }
 }

@@ -262,10 +262,13 @@ impl Controller {
         if self.core.processor_stuck {
             return;
         }
+        let edges = if self.core.sync.bounces { 2 } else { 1 };
         for (signal, _) in SyncSignal::ALL.into_iter().zip(heard).filter(|(_, heard)| *heard) {
-            let mut pdi = Pdi { core: &mut self.core, signals, now: at };
-            if let Some(wake) = self.firmware.sync(signal, at, &mut pdi) {
-                self.core.call_firmware(wake.max(at + SHORTEST_NAP));
+            for _ in 0..edges {
+                let mut pdi = Pdi { core: &mut self.core, signals, now: at };
+                if let Some(wake) = self.firmware.sync(signal, at, &mut pdi) {
+                    self.core.call_firmware(wake.max(at + SHORTEST_NAP));
+                }
             }
         }
     }

@@ -228,6 +228,11 @@ impl Controller {
         }
     }
 
+    /// The line from the SYNC unit to the processor carries each edge twice, or as it is.
+    pub fn bounce_sync(&mut self, bounces: bool) {
+        self.core.sync.bounces = bounces;
+    }
+
     fn replan_sync(&mut self, at: Instant) {
         self.core.plan_sync(at);
         self.reschedule();

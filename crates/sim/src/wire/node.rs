@@ -33,6 +33,7 @@ pub(super) enum Act {
     RestoreDrift,
     RestartClock,
     CutSync(bool),
+    BounceSync(bool),
     SlowDown(Option<Span>),
 }
 
@@ -120,6 +121,7 @@ impl Node {
                 Act::RestoreDrift => self.controller.restore_drift(at),
                 Act::RestartClock => self.controller.restart_clock(at),
                 Act::CutSync(cut) => self.controller.cut_sync(cut),
+                Act::BounceSync(bounces) => self.controller.bounce_sync(bounces),
                 Act::SlowDown(takes) => self.controller.slow_down(takes),
                 Act::Report(emergency) => self.controller.report(at, emergency),
                 Act::Address(address) => self.set_address(address),

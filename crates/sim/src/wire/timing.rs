@@ -25,6 +25,8 @@ pub enum TimingChange {
     RestartClock,
     /// The line from its SYNC unit to its processor breaks.
     CutSync,
+    /// The line from its SYNC unit to its processor carries each edge twice.
+    BounceSync,
     /// Its work in each cycle takes so long.
     SlowDown(Span),
 }
@@ -40,6 +42,7 @@ pub(super) struct HeldTiming {
 enum What {
     Speed,
     Sync,
+    Bounce,
     Work,
 }
 
@@ -62,6 +65,9 @@ impl World {
             }
             TimingChange::RestartClock => (None, Act::RestartClock, Effect::ClockRestarted),
             TimingChange::CutSync => (Some(What::Sync), Act::CutSync(true), Effect::SyncCut),
+            TimingChange::BounceSync => {
+                (Some(What::Bounce), Act::BounceSync(true), Effect::SyncBounces)
+            }
             TimingChange::SlowDown(takes) => {
                 (Some(What::Work), Act::SlowDown(Some(takes)), Effect::WorkTakes { takes })
             }
@@ -90,7 +96,7 @@ impl World {
                 continue;
             }
             let mut given_back = Vec::new();
-            for what in [What::Speed, What::Sync, What::Work] {
+            for what in [What::Speed, What::Sync, What::Bounce, What::Work] {
                 let mine = HeldTiming { by: fault, what };
                 let is_held = node.timing.contains(&mine);
                 let by_others =
@@ -99,6 +105,7 @@ impl World {
                     let (act, effect) = match what {
                         What::Speed => (Act::RestoreDrift, Effect::ClockRestored),
                         What::Sync => (Act::CutSync(false), Effect::SyncBack),
+                        What::Bounce => (Act::BounceSync(false), Effect::SyncBack),
                         What::Work => (Act::SlowDown(None), Effect::WorkRestored),
                     };
                     node.act_at(at, act);

@@ -146,6 +146,9 @@ fn show(report: &ScoreReport, list: bool, output: &mut Output) {
             output.line(&format!("    live       {live}"));
         }
         output.line(&format!("    recording  {}", wrong.capture));
+        if wrong.findings.len() > 1 {
+            output.line(&format!("    in all     {}", wrong.findings.join("; ")));
+        }
     }
 }
 

@@ -195,6 +195,7 @@ fn frames(counts: &Counts) -> String {
         (counts.cyclic_unsent, "not sent"),
         (counts.deadlines_missed, "cycles without new outputs"),
         (counts.undiagnosed, "not seen by the diagnosis"),
+        (counts.untold, "events not told"),
     ];
     for (number, what) in told {
         if number > 0 {

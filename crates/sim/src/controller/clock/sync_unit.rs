@@ -94,12 +94,14 @@ pub(in crate::controller) struct SyncUnit {
     pub(in crate::controller) heard: bool,
     /// The line from the unit to the device is broken: a fault.
     pub(in crate::controller) cut: bool,
+    /// It carries each edge twice: a fault.
+    pub(in crate::controller) bounces: bool,
 }
 
 impl SyncUnit {
-    /// As after power-on; a broken line stays broken.
+    /// As after power-on; a line that is broken or bounces stays so.
     pub(in crate::controller) fn restarted(&self) -> Self {
-        Self { cut: self.cut, ..Self::default() }
+        Self { cut: self.cut, bounces: self.bounces, ..Self::default() }
     }
 
     /// When something is to be done.

@@ -6,6 +6,9 @@
 //! did not come before their SYNC (0B), work that was not done before the next (0C), outputs that
 //! came too shortly before (0D); 20 shows that the last cycle was one of those.
 //!
+//! An edge that follows the last one within a quarter of the cycle is none of the SYNC unit: the line
+//! to the processor is disturbed. Such an edge starts no work; it weighs like a miss.
+//!
 //! A miss weighs three times what a good cycle makes up for; beyond the limit in 0x10F1:02 (4 where
 //! there is no such object) the device leaves OP, as public SubDevice stack code does it.
 
@@ -25,6 +28,8 @@ const DEFAULT_LIMIT: u64 = 4;
 const MISS: u32 = 3;
 /// Pulses in a row, each in its time, that make a device trust its clock.
 const LOCKED: u32 = 5;
+/// So many stray edges are borne.
+const STRAYS: u32 = 4;
 /// Cycles in a row with their outputs that make it go to OP.
 const STEADY: u32 = 3;
 /// So many cycles without a pulse are too many.
@@ -110,6 +115,8 @@ pub(super) struct Synchronisation {
     ever_arrived: bool,
     busy_until: Instant,
     misses: u32,
+    /// Edges that were none of the SYNC unit, weighed like misses.
+    strays: u32,
     /// How long its work takes instead of what it needs: a fault.
     takes: Option<Span>,
     drive_at: Option<Instant>,
@@ -165,6 +172,7 @@ impl Synchronisation {
             ever_arrived: false,
             busy_until: Instant::ZERO,
             misses: 0,
+            strays: 0,
             takes: None,
             drive_at: None,
             sample_at: None,
@@ -277,7 +285,9 @@ impl Synchronisation {
     /// Whether the clock can be trusted; if not, the code to show should that not change.
     pub(super) fn readiness(&self, outputs: bool) -> Result<(), AlStatusCode> {
         let Mode::Clock(_) = self.mode else { return Ok(()) };
-        if self.in_time < LOCKED {
+        if self.strays > MISS * STRAYS {
+            Err(AlStatusCode::DC_SYNC_IO_ERROR)
+        } else if self.in_time < LOCKED {
             Err(AlStatusCode::NO_SYNC_ERROR)
         } else if outputs && !self.ever_arrived {
             Err(AlStatusCode::SYNC_MANAGER_WATCHDOG)
@@ -335,8 +345,18 @@ impl Synchronisation {
         dictionary: &mut Dictionary,
         flow: Flow,
     ) -> Option<AlStatusCode> {
-        let since = self.last_pulse.replace(now).map(|last| now.since(last).as_nanos());
         let cycle = self.cycle.as_nanos();
+        let since = self.last_pulse.map(|last| now.since(last).as_nanos());
+        if since.is_some_and(|since| since < cycle / 4) {
+            self.strays = (self.strays + MISS).min(2 * MISS * STRAYS);
+            let over = self.strays > MISS * STRAYS;
+            return (over && flow.operational).then(|| {
+                self.strays = 0;
+                AlStatusCode::DC_SYNC_IO_ERROR
+            });
+        }
+        self.strays = self.strays.saturating_sub(1);
+        self.last_pulse = Some(now);
         let in_time = since.is_some_and(|since| since.abs_diff(cycle) <= cycle / 4);
         self.in_time = if in_time { self.in_time.saturating_add(1) } else { 0 };
         let leads = leading(flow.outputs);

@@ -246,6 +246,26 @@ fn a_broken_line_to_the_processor_does_the_same() {
     assert_eq!(outputs.request_op(700), (8, 0), "it comes back");
 }
 
+#[test]
+fn a_line_to_the_processor_that_bounces_has_a_code_of_its_own() {
+    let mut outputs = InStep::up("EL4102");
+    outputs.device.bench.controller.bounce_sync(true);
+    outputs.run(3, 700);
+    assert_eq!(outputs.device.status(), (8, 0), "a few are borne");
+    outputs.run(8, 700);
+    assert_eq!(outputs.device.status(), (0x14, 0x0033));
+    assert_eq!((outputs.shown(EVENT_MISSED), outputs.shown(CYCLE_EXCEEDED)), (0, 0));
+    // It does not get to OP while that lasts.
+    assert_eq!(outputs.device.request(0x14), (4, 0));
+    outputs.device.bench.write(0x0120, &[8, 0]);
+    outputs.run(1_200, 700);
+    assert_eq!(outputs.device.status(), (0x14, 0x0033));
+    outputs.device.bench.controller.bounce_sync(false);
+    assert_eq!(outputs.device.request(0x14), (4, 0));
+    outputs.run(20, 700);
+    assert_eq!(outputs.request_op(700), (8, 0), "it comes back");
+}
+
 // proves: SYN-30 partial: the codes a device gives
 #[test]
 fn a_start_time_in_the_past_is_no_sync() {

@@ -1,0 +1,67 @@
+//! What an application sees in its cycle of a line that fails, through the library.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use linesman::prelude::*;
+use linesman::{DeviceId, DeviceState};
+use tempfile::TempDir;
+
+/// Three terminals share one datagram; the last one loses its supply after a second.
+const PLANT: &str = "\
+[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+[[device]]\nname = \"T2\"\ntype = \"EL1008\"\non = \"K1.B\"\n\
+[[device]]\nname = \"T3\"\ntype = \"EL1008\"\non = \"T2.B\"\n\
+[[device]]\nname = \"T4\"\ntype = \"EL1008\"\non = \"T3.B\"\n\
+[[fault]]\nkind = \"device-off\"\ndevice = \"T4\"\nfrom_ms = 1000\n";
+
+/// Whether their working counter was wrong, their states, the frame's bits, the network, who is there.
+type Seen = ([bool; 3], [DeviceState; 3], u16, u16, usize);
+
+// S0 L2518-2532: one who does not answer makes the counter of the datagram wrong, and with it the WcState of
+// all that share it; the state word says who it is.
+// proves: PLC-02, PLC-03, PLC-04, PLC-18 partial: the example does the same
+#[test]
+fn the_counter_accuses_all_and_the_state_the_one() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("plant.toml");
+    std::fs::write(&file, PLANT).unwrap();
+    let mut segment = linesman::open(&format!("sim:{}", file.display())).unwrap();
+    let plan = segment.scan().unwrap().plan().unwrap();
+    let terminals = [1, 2, 3].map(DeviceId);
+    let mut seen: Vec<Seen> = Vec::new();
+    segment
+        .run(plan, Cycle::us(1000), |io| {
+            let settled = io.is_settled();
+            let frame = io.frame_status(0, 0).unwrap();
+            let now = (
+                terminals.map(|id| io.wc_state(id)),
+                terminals.map(|id| io.state(id)),
+                frame.wrong_counter,
+                io.network_state().0,
+                io.present(),
+            );
+            if (settled || !seen.is_empty()) && seen.last() != Some(&now) {
+                seen.push(now);
+            }
+            if io.now() < linesman::Instant::ZERO + linesman::Span::s(3) {
+                Next::Continue
+            } else {
+                Next::Stop
+            }
+        })
+        .unwrap();
+    let (wc, states, wrong, network, present) = seen[0];
+    assert_eq!((wc, wrong, network, present), ([false; 3], 0, 0, 4), "{seen:?}");
+    assert_eq!(states, [DeviceState(8); 3]);
+    // The first that is otherwise: in that cycle nobody knows yet who it is.
+    let (wc, states, wrong, ..) = seen[1];
+    assert_eq!(wc, [true; 3], "{seen:?}");
+    assert_eq!(wrong.count_ones(), 1, "the bit of its datagram");
+    assert_eq!(states, [DeviceState(8); 3]);
+    // The last: the others go on, one is not there, and its neighbour misses a link.
+    let (wc, states, wrong, network, present) = *seen.last().unwrap();
+    assert_eq!((wc, wrong, present), ([false, false, true], 0, 3), "{seen:?}");
+    assert_eq!(states.map(|state| state.to_string()), ["OP", "OP LNK_MIS B", "INIT NO_COMM"]);
+    assert_eq!(states[1].0, 0x2408);
+    assert_eq!(network, 0x0900, "one in INIT, one in error");
+}
