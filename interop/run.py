@@ -35,6 +35,9 @@ def load():
 
 def captured(function, line):
     """Runs a check; gives how many packets went over the cable."""
+    if getattr(function, "spoils_frames", False):
+        function(line)
+        return "not captured: frames are spoiled on purpose"
     if not HAS_TSHARK:
         function(line)
         return "not captured: tcpdump or tshark is missing"

@@ -15,7 +15,8 @@ def main():
     master = pysoem.Master()
     master.open(interface)
     try:
-        found = master.config_init()
+        master.config_init()
+        identities = [[slave.man, slave.id] for slave in master.slaves]
         _, send = soem.configure(master)
         soem.to_op(master, send)
         reached = time.monotonic() - begun
@@ -27,7 +28,7 @@ def main():
             due += cycle
             time.sleep(max(0.0, due - time.monotonic()))
         soem.stop(master)
-        print(json.dumps({"devices": found, "op_ms": reached * 1e3, "cycles": cycles}))
+        print(json.dumps({"identities": identities, "op_ms": reached * 1e3, "cycles": cycles}))
     finally:
         master.close()
 

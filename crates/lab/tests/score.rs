@@ -6,13 +6,13 @@ use linesman_lab::score::{ScoreOptions, Tally, run_case};
 fn a_slice_of_the_score_stays_above_its_floors() {
     let options = ScoreOptions::default();
     let mut tally = Tally::new(options);
-    for seed in 1..61 {
+    for seed in 1..21 {
         tally.add(&run_case(seed, &options));
     }
     let report = tally.report();
-    assert_eq!(report.cases, 60);
-    assert!(report.effective_cases >= 40, "{}", report.effective_cases);
-    assert!(report.healthy_runs >= 40, "{}", report.healthy_runs);
+    assert_eq!(report.cases, 20);
+    assert!(report.effective_cases >= 12, "{}", report.effective_cases);
+    assert!(report.healthy_runs >= 14, "{}", report.healthy_runs);
     let said: Vec<String> = report.wrong.iter().map(|wrong| format!("{wrong:?}")).collect();
     let said = said.join("\n");
     assert_eq!(report.false_alarms, 0, "{:?}", report.healthy.alarms);
@@ -24,7 +24,7 @@ fn a_slice_of_the_score_stays_above_its_floors() {
 #[test]
 fn a_seed_is_judged_the_same_each_time() {
     let options = ScoreOptions::default();
-    for seed in 1..6 {
+    for seed in 1..4 {
         let (one, again) = (run_case(seed, &options), run_case(seed, &options));
         assert_eq!(format!("{one:?}"), format!("{again:?}"));
     }

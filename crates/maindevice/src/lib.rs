@@ -24,7 +24,7 @@ pub mod watch;
 
 pub use cyclic::{FrameStatus, Quality};
 pub use event::Event;
-pub use exchange::{Access, ExchangeError, Reply, Request, Target, Transmit};
+pub use exchange::{Access, DatagramData, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};
 pub use options::Options;
 pub use statistics::Statistics;

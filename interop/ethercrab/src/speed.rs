@@ -18,7 +18,9 @@ pub(crate) async fn run(interface: &str, seconds: Duration, cycle: Duration) -> 
     let (transmit, receive, pdus) =
         STORAGE.try_split().map_err(|()| anyhow!("the storage is split already"))?;
     let timeouts = Timeouts {
+        // The host may be busy: what is measured is the line, not how patient a MainDevice is.
         pdu: Duration::from_millis(200),
+        eeprom: Duration::from_secs(8),
         state_transition: Duration::from_secs(10),
         ..Timeouts::default()
     };
@@ -28,7 +30,9 @@ pub(crate) async fn run(interface: &str, seconds: Duration, cycle: Duration) -> 
         .init_single_group::<SUBDEVICES_MAX, IMAGE_MAX>(ethercat_now)
         .await
         .map_err(|error| anyhow!("scan: {error:?}"))?;
-    let devices = group.len();
+    let identities: Vec<[u32; 2]> = (group.iter(&maindevice))
+        .map(|one| [one.identity().vendor_id, one.identity().product_id])
+        .collect();
     let group = group.into_safe_op(&maindevice).await.map_err(|error| anyhow!("{error:?}"))?;
     let group = group.request_into_op(&maindevice).await.map_err(|error| anyhow!("{error:?}"))?;
     while !group.tx_rx(&maindevice).await.is_ok_and(|answer| answer.all_op()) {
@@ -45,7 +49,7 @@ pub(crate) async fn run(interface: &str, seconds: Duration, cycle: Duration) -> 
         smol::Timer::at(due).await;
     }
     let op_ms = reached.as_secs_f64() * 1e3;
-    println!("{}", serde_json::json!({ "devices": devices, "op_ms": op_ms, "cycles": cycles }));
+    println!("{}", serde_json::json!({ "identities": identities, "op_ms": op_ms, "cycles": cycles }));
     let group = group.into_safe_op(&maindevice).await.map_err(|error| anyhow!("{error:?}"))?;
     let group = group.into_pre_op(&maindevice).await.map_err(|error| anyhow!("{error:?}"))?;
     group.into_init(&maindevice).await.map_err(|error| anyhow!("{error:?}"))?;

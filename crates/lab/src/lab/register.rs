@@ -61,7 +61,7 @@ impl Lab {
         self.run_while(PATIENCE, LOOK, |lab| answer(lab).is_some())
             .map_err(|error| error.to_string())?;
         match answer(self) {
-            Some(Ok(reply)) => Ok(reply.data),
+            Some(Ok(reply)) => Ok(reply.data.into_vec()),
             Some(Err(error)) => Err(format!("{}: {register}: {error}", self.state_of(id))),
             None => Err(format!("{}: {register}: no answer within {PATIENCE}", self.state_of(id))),
         }

@@ -112,7 +112,7 @@ fn access_once(
     lab.run_while(Span::ms(50), Span::us(50), |lab| answer(lab).is_some())
         .map_err(|error| error.to_string())?;
     match answer(lab) {
-        Some(Ok(reply)) if reply.answered() => Ok(reply.data),
+        Some(Ok(reply)) if reply.answered() => Ok(reply.data.into_vec()),
         other => Err(format!("register 0x{register:04X}: {other:?}")),
     }
 }

@@ -5,6 +5,9 @@
 //! with outputs stop carrying them (LRW becomes LRD, LWR becomes NOP), inputs go on, and the
 //! watchdogs expire as they should.
 
+use crate::event::Event;
+use crate::statistics::Statistics;
+
 /// One task's application.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Application {
@@ -28,6 +31,26 @@ pub(super) struct Judged {
     pub(super) changed: bool,
 }
 
+impl Judged {
+    /// Counts it, and tells when outputs begin or end to be withheld.
+    #[cold]
+    pub(super) fn tell(
+        self,
+        task: usize,
+        statistics: &mut Statistics,
+        events: &mut impl FnMut(Event),
+    ) {
+        statistics.deadlines_missed += u64::from(self.missed);
+        statistics.cycles_withheld += u64::from(self.withheld);
+        if self.changed {
+            events(match self.withheld {
+                true => Event::OutputsWithheld { task },
+                false => Event::OutputsResumed { task },
+            });
+        }
+    }
+}
+
 impl Application {
     pub(super) const fn new(allowed: Option<u32>) -> Self {
         Self { allowed, begun: false, fresh: false, missed: 0, withheld: false }
@@ -40,19 +63,26 @@ impl Application {
         self.fresh = true;
     }
 
-    /// A cycle begins.
+    /// A cycle begins. `None`: the application is in time, as before, or is not watched.
     #[inline]
-    pub(super) fn begin_cycle(&mut self) -> Judged {
+    pub(super) fn begin_cycle(&mut self) -> Option<Judged> {
+        if self.fresh && self.missed == 0 {
+            self.fresh = false;
+            return None;
+        }
+        self.judge()
+    }
+
+    fn judge(&mut self) -> Option<Judged> {
         let fresh = std::mem::replace(&mut self.fresh, false);
-        let Some(allowed) = self.allowed.filter(|_| self.begun) else {
-            return Judged { missed: false, withheld: false, changed: false };
-        };
+        let allowed = self.allowed.filter(|_| self.begun)?;
         self.missed = if fresh { 0 } else { self.missed.saturating_add(1) };
         let before = std::mem::replace(&mut self.withheld, self.missed > allowed);
         let changed = before != self.withheld;
-        Judged { missed: !fresh, withheld: self.withheld, changed }
+        Some(Judged { missed: !fresh, withheld: self.withheld, changed })
     }
 
+    #[inline]
     pub(super) const fn is_withheld(&self) -> bool {
         self.withheld
     }
@@ -65,20 +95,22 @@ mod tests {
     #[test]
     fn so_many_misses_are_allowed_and_no_more() {
         let mut application = Application::new(Some(2));
-        let idle = application.begin_cycle();
-        assert_eq!(idle, Judged { missed: false, withheld: false, changed: false });
+        assert_eq!(application.begin_cycle(), None, "it has not begun");
         application.give();
-        let withheld: Vec<bool> = (0..5).map(|_| application.begin_cycle().withheld).collect();
+        let mut withheld = || application.begin_cycle().is_some_and(|judged| judged.withheld);
+        let withheld: Vec<bool> = (0..5).map(|_| withheld()).collect();
         assert_eq!(withheld, [false, false, false, true, true]);
         application.give();
         let back = application.begin_cycle();
-        assert_eq!(back, Judged { missed: false, withheld: false, changed: true });
+        assert_eq!(back, Some(Judged { missed: false, withheld: false, changed: true }));
+        assert!(!application.is_withheld());
     }
 
     #[test]
     fn who_is_not_watched_may_be_late() {
         let mut application = Application::new(None);
         application.give();
-        assert!((0..100).all(|_| !application.begin_cycle().withheld));
+        assert!((0..100).all(|_| application.begin_cycle().is_none()));
+        assert!(!application.is_withheld());
     }
 }

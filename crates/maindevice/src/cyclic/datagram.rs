@@ -7,6 +7,7 @@ use linesman_proto::sii::Direction;
 use linesman_proto::time::Instant;
 
 use super::run::{self, Run};
+use crate::event::Event;
 use crate::exchange::prebuilt;
 
 /// A datagram with what is known of it.
@@ -35,6 +36,16 @@ pub(super) struct Datagram {
     pub(super) receipts: u64,
     /// The wrong counter that was last told of; `None` when all is well.
     pub(super) told: Option<WorkingCounter>,
+}
+
+/// Where a datagram is among those of a plan.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) task: usize,
+    /// Its frame within the task.
+    pub(super) frame: usize,
+    /// Its place within the frame.
+    pub(super) datagram: usize,
 }
 
 /// A working counter that is not known exactly while SubDevices are on their way between states.
@@ -124,7 +135,32 @@ impl Datagram {
         self.receipts += 1;
     }
 
+    /// Tells that it comes back as it should again.
+    #[cold]
+    pub(super) fn tell_good(&mut self, place: Place, events: &mut impl FnMut(Event)) {
+        self.told = None;
+        let Place { task, frame, datagram } = place;
+        events(Event::WorkingCounterGood { task, frame, datagram });
+    }
+
+    /// Tells with which wrong working counter it comes back.
+    #[cold]
+    pub(super) fn tell_wrong(
+        &mut self,
+        place: Place,
+        withheld: bool,
+        received: WorkingCounter,
+        events: &mut impl FnMut(Event),
+    ) {
+        self.told = Some(received);
+        let Place { task, frame, datagram } = place;
+        let expected = self.expected(withheld);
+        let expected = received.clamp(expected.least, expected.most);
+        events(Event::WorkingCounter { task, frame, datagram, expected, received });
+    }
+
     /// It did not: inputs stay as they were, or become zero, as was chosen.
+    #[cold]
     pub(super) fn refuse(&mut self, inputs: &mut [u8]) {
         self.good = false;
         run::clear_image(&self.cleared, inputs);

@@ -11,6 +11,7 @@
 
 mod application;
 mod datagram;
+mod departure;
 mod quality;
 mod run;
 mod steer;
@@ -26,7 +27,8 @@ use linesman_proto::state::{AlState, OredStates};
 use linesman_proto::time::{Instant, Span};
 
 use self::application::Application;
-use self::datagram::{Datagram, clear_lost};
+use self::datagram::{Datagram, Place, clear_lost};
+use self::departure::{Departure, LOST_IS_NEWS, TaskState};
 use self::quality::Share;
 use self::run::Run;
 use self::steer::Steer;
@@ -58,28 +60,6 @@ struct Frame {
     /// It is on its way.
     out: bool,
     status: FrameStatus,
-}
-
-/// Frames of a task that leave together.
-#[derive(Debug)]
-struct Departure {
-    task: usize,
-    next_at: Instant,
-    cycle: Span,
-    /// The cycle of the task begins with it.
-    begins: bool,
-    frames: Vec<usize>,
-}
-
-#[derive(Debug)]
-struct TaskState {
-    /// Frames lost in a row.
-    lost: u64,
-    /// Frames that are on their way.
-    out: u32,
-    /// The last of them has come back, or was given up.
-    exchanged: bool,
-    application: Application,
 }
 
 /// The engine.
@@ -178,11 +158,16 @@ impl Cyclic {
     #[inline]
     pub(crate) fn refresh(&mut self) {
         if self.live.load(Ordering::Relaxed) != self.version {
-            let mut line = lock(&self.line);
-            self.version = line.version();
-            line.take_changes(&mut self.least, &mut self.most);
-            self.steer.set_base(line.clock_base());
+            self.take_over_changes();
         }
+    }
+
+    #[cold]
+    fn take_over_changes(&mut self) {
+        let mut line = lock(&self.line);
+        self.version = line.version();
+        line.take_changes(&mut self.least, &mut self.most);
+        self.steer.set_base(line.clock_base());
     }
 
     /// When the next frames are due; [`Instant::MAX`]: never.
@@ -212,73 +197,73 @@ impl Cyclic {
         self.departures.iter().find(begins).map(|one| one.next_at)
     }
 
-    /// Sends the frames of all tasks whose cycle has begun. Returns whether any had.
+    /// Sends the frames of all tasks whose cycle has begun.
     pub(crate) fn send_due(
         &mut self,
         now: Instant,
         exchange: &mut Exchange,
         statistics: &mut Statistics,
         events: &mut impl FnMut(Event),
-    ) -> bool {
-        if now < self.next_at {
-            return false;
-        }
-        let Self { departures, tasks, frames, outputs, next_at, .. } = self;
+    ) {
         let mut earliest = Instant::MAX;
-        for departure in departures {
-            if departure.next_at > now {
-                earliest = earliest.min(departure.next_at);
-                continue;
-            }
-            departure.next_at += departure.cycle;
-            let mut behind = 0;
+        for at in 0..self.departures.len() {
+            let departure = &mut self.departures[at];
             if departure.next_at <= now {
-                // Cycles that were slept through are left out, not caught up: the grid stays.
-                behind = now.since(departure.next_at).as_nanos() / departure.cycle.as_nanos() + 1;
-                departure.next_at += departure.cycle * behind;
-            }
-            earliest = earliest.min(departure.next_at);
-            let Some(task) = tasks.get_mut(departure.task) else { continue };
-            if departure.begins {
-                statistics.cycles += 1;
-                statistics.cycles_missed += behind;
-                let judged = task.application.begin_cycle();
-                statistics.deadlines_missed += u64::from(judged.missed);
-                statistics.cycles_withheld += u64::from(judged.withheld);
-                if judged.changed {
-                    let task = departure.task;
-                    events(match judged.withheld {
-                        true => Event::OutputsWithheld { task },
-                        false => Event::OutputsResumed { task },
-                    });
-                }
-            }
-            let withheld = task.application.is_withheld();
-            let deadline = now + departure.cycle;
-            for index in &departure.frames {
-                let Some(frame) = frames.get_mut(*index) else { continue };
-                let sent = exchange.send_cyclic(*index, deadline, frame.times, |prebuilt| {
-                    prebuilt.withhold(withheld);
-                    if withheld {
-                        run::clear_frame(&frame.outputs, prebuilt.bytes_mut());
-                    } else {
-                        run::fill(&frame.outputs, outputs, prebuilt.bytes_mut());
-                    }
-                });
-                frame.status.not_sent = match (sent, withheld) {
-                    (false, _) => FrameStatus::WHOLE,
-                    (true, true) => frame.carries,
-                    (true, false) => 0,
-                };
-                statistics.cyclic_unsent += u64::from(!sent);
-                task.out += u32::from(sent && !std::mem::replace(&mut frame.out, sent));
+                departure.next_at += departure.cycle;
+                let behind = if departure.next_at <= now { departure.catch_up(now) } else { 0 };
+                earliest = earliest.min(departure.next_at);
+                self.depart(at, now, behind, exchange, statistics, events);
+            } else {
+                earliest = earliest.min(departure.next_at);
             }
         }
-        *next_at = earliest;
-        true
+        self.next_at = earliest;
+    }
+
+    /// Frames leave that leave together; so many cycles before were slept through.
+    #[inline]
+    fn depart(
+        &mut self,
+        at: usize,
+        now: Instant,
+        behind: u64,
+        exchange: &mut Exchange,
+        statistics: &mut Statistics,
+        events: &mut impl FnMut(Event),
+    ) {
+        let Self { departures, tasks, frames, outputs, .. } = self;
+        let departure = &departures[at];
+        let Some(task) = tasks.get_mut(departure.task) else { return };
+        if departure.begins {
+            statistics.cycles += 1;
+            statistics.cycles_missed += behind;
+            if let Some(judged) = task.application.begin_cycle() {
+                judged.tell(departure.task, statistics, events);
+            }
+        }
+        let withheld = task.application.is_withheld();
+        let deadline = now + departure.cycle;
+        for index in &departure.frames {
+            let Some(frame) = frames.get_mut(*index) else { continue };
+            let sent = exchange.begin_cyclic(*index, deadline, frame.times, withheld);
+            let Some(prebuilt) = sent else {
+                frame.status.not_sent = FrameStatus::WHOLE;
+                statistics.cyclic_unsent += 1;
+                continue;
+            };
+            prebuilt.withhold(withheld);
+            if withheld {
+                run::clear_frame(&frame.outputs, prebuilt.bytes_mut());
+            } else {
+                run::fill(&frame.outputs, outputs, prebuilt.bytes_mut());
+            }
+            frame.status.not_sent = if withheld { frame.carries } else { 0 };
+            task.out += u32::from(!std::mem::replace(&mut frame.out, true));
+        }
     }
 
     /// A frame came back.
+    #[inline]
     pub(crate) fn received(
         &mut self,
         now: Instant,
@@ -289,69 +274,59 @@ impl Cyclic {
         events: &mut impl FnMut(Event),
     ) {
         self.refresh();
-        let Self { plan, line, tasks, frames, inputs, least, most, shares, mailboxes, .. } = self;
+        let Self { plan, line, tasks, frames, inputs, least, most, .. } = self;
+        let Self { shares, mailboxes, version, responding, steer, .. } = self;
         let Some(frame) = frames.get_mut(index) else { return };
-        let (task, number) = (frame.task, frame.number);
-        let Some(state) = tasks.get_mut(task) else { return };
+        let Some(state) = tasks.get_mut(frame.task) else { return };
         state.came(&mut frame.out);
         if state.lost > 0 {
-            let lost = std::mem::take(&mut state.lost);
-            if lost >= LOST_IS_NEWS {
-                events(Event::CyclicFramesBack { task, lost });
-                lock(line).alert();
-            }
+            state.found(frame.task, line, events);
         }
-        if frame.version != self.version {
-            frame.version = self.version;
+        if frame.version != *version {
+            frame.version = *version;
             frame.take_over(plan, index, least, most, shares, inputs);
         }
-        frame.status.wrong_counter = 0;
-        let mut moved = 0;
+        let (mut wrong, mut toggled, mut bit, mut moved) = (0, 0, 1_u16, 0);
         for (at, datagram) in frame.datagrams.iter_mut().enumerate() {
             let Some(wkc) = datagram.counter(reply) else { return };
-            let bit = FrameStatus::bit(at);
             if datagram.role != Role::ProcessData {
-                if datagram.role == Role::Presence {
-                    let states = reply.get(datagram.data_at).copied().unwrap_or(0);
-                    if self.responding != Some((wkc, states)) {
-                        self.responding = Some((wkc, states));
-                        watch_line(line, wkc, states, events);
-                    }
-                }
-                if datagram.role == Role::ReferenceClock && wkc.0 > 0 {
-                    let cycle = plan.tasks.get(task).map_or(Span::ZERO, |task| task.cycle);
-                    let low = reply.get(datagram.data_at..).and_then(<[u8]>::first_chunk);
-                    let low = u32::from_le_bytes(low.copied().unwrap_or_default());
-                    moved += self.steer.correction(now, low, cycle);
-                }
-                if datagram.role == Role::MailboxStates && wkc.0 > 0 {
-                    let bits = reply.get(datagram.data_at..).unwrap_or_default();
-                    mailboxes.take(index, at, bits.get(..datagram.len).unwrap_or_default());
-                }
                 datagram.good = true;
-                frame.status.input_toggle ^= bit;
-                continue;
-            }
-            let expected = datagram.expected(withheld);
-            if expected.fits(wkc) {
-                datagram.take(now, reply, inputs);
-                frame.status.input_toggle ^= bit;
-                if datagram.told.take().is_some() {
-                    events(Event::WorkingCounterGood { task, frame: number, datagram: at });
+                toggled |= bit;
+                let data = reply.get(datagram.data_at..).unwrap_or_default();
+                if datagram.role == Role::Presence {
+                    let seen = Some((wkc, data.first().copied().unwrap_or(0)));
+                    if *responding != seen {
+                        *responding = seen;
+                        watch_line(line, seen, events);
+                    }
+                } else if datagram.role == Role::ReferenceClock && wkc.0 > 0 {
+                    let cycle = plan.tasks.get(frame.task).map_or(Span::ZERO, |task| task.cycle);
+                    moved += steer.correction(now, data, cycle);
+                } else if datagram.role == Role::MailboxStates && wkc.0 > 0 {
+                    mailboxes.take(index, at, data.get(..datagram.len).unwrap_or_default());
                 }
-                continue;
+            } else if datagram.expected(withheld).fits(wkc) {
+                datagram.take(now, reply, inputs);
+                toggled |= bit;
+                if datagram.told.is_some() {
+                    let place = Place { task: frame.task, frame: frame.number, datagram: at };
+                    datagram.tell_good(place, events);
+                }
+            } else {
+                wrong |= bit;
+                datagram.refuse(inputs);
+                statistics.working_counter_errors += 1;
+                if datagram.told != Some(wkc) {
+                    let place = Place { task: frame.task, frame: frame.number, datagram: at };
+                    datagram.tell_wrong(place, withheld, wkc, events);
+                    lock(line).alert();
+                }
             }
-            statistics.working_counter_errors += 1;
-            frame.status.wrong_counter |= bit;
-            datagram.refuse(inputs);
-            if datagram.told != Some(wkc) {
-                datagram.told = Some(wkc);
-                let expected = wkc.clamp(expected.least, expected.most);
-                let (frame, received) = (number, wkc);
-                events(Event::WorkingCounter { task, frame, datagram: at, expected, received });
-                lock(line).alert();
-            }
+            // None for those behind the fifteenth.
+            bit = (bit << 1) & !FrameStatus::WHOLE;
         }
+        frame.status.wrong_counter = wrong;
+        frame.status.input_toggle ^= toggled;
         if moved != 0 {
             self.shift(moved);
         }
@@ -395,17 +370,6 @@ impl Cyclic {
     }
 }
 
-impl TaskState {
-    /// One of its frames is on its way no longer.
-    #[inline]
-    fn came(&mut self, out: &mut bool) {
-        if std::mem::replace(out, false) {
-            self.out = self.out.saturating_sub(1);
-            self.exchanged |= self.out == 0;
-        }
-    }
-}
-
 impl Frame {
     fn new(plan: &Plan, task: usize, number: usize) -> Self {
         let planned = &plan.tasks[task].frames[number];
@@ -432,6 +396,7 @@ impl Frame {
     }
 
     /// Takes over who serves process data.
+    #[cold]
     fn take_over(
         &mut self,
         plan: &Plan,
@@ -460,14 +425,17 @@ impl Frame {
     }
 }
 
-/// So many cyclic frames lost in a row are more than an accident.
-const LOST_IS_NEWS: u64 = 3;
-
 /// The broadcast read of the AL status tells how many are there and whether all is as it shall be.
-fn watch_line(line: &Mutex<Line>, wkc: WorkingCounter, states: u8, events: &mut impl FnMut(Event)) {
+#[cold]
+fn watch_line(
+    line: &Mutex<Line>,
+    seen: Option<(WorkingCounter, u8)>,
+    events: &mut impl FnMut(Event),
+) {
+    let Some((now, states)) = seen else { return };
     let states: OredStates = AlState::from_or(states);
-    if let Some(before) = lock(line).broadcast(wkc, states) {
-        events(Event::Responding { before, now: wkc });
+    if let Some(before) = lock(line).broadcast(now, states) {
+        events(Event::Responding { before, now });
     }
 }
 

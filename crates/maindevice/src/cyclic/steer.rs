@@ -36,9 +36,10 @@ impl Steer {
     }
 
     /// By how many ns the next departures are to be moved, from the low half of the reference's time
-    /// at a frame that came back at `now`.
-    pub(super) fn correction(&mut self, now: Instant, low: u32, cycle: Span) -> i64 {
-        let Some((_, epoch)) = self.base else { return 0 };
+    /// in the data of a datagram that came back at `now`.
+    pub(super) fn correction(&mut self, now: Instant, data: &[u8], cycle: Span) -> i64 {
+        let (Some((_, epoch)), Some(low)) = (self.base, data.first_chunk()) else { return 0 };
+        let low = u32::from_le_bytes(*low);
         // The high half is that of the time it was set to, later that of the time before.
         let near = self.time.unwrap_or(epoch.0.wrapping_add(now.as_nanos()) as i64);
         let time = near.wrapping_add(i64::from(low.wrapping_sub(near as u32) as i32));
@@ -65,7 +66,11 @@ mod tests {
     fn the_cycle_follows_the_reference_clock() {
         let cycle = Span::ms(1);
         let mut steer = Steer::default();
-        assert_eq!(steer.correction(Instant::ZERO, 123_456, cycle), 0, "nothing was set yet");
+        assert_eq!(
+            steer.correction(Instant::ZERO, &[0x40, 0xE2, 0x01, 0x00], cycle),
+            0,
+            "nothing was set yet"
+        );
         let epoch = DcTime(850_000_000_000_000_123);
         steer.set_base(Some((1, epoch)));
         let mut now = 0_i64;
@@ -73,7 +78,7 @@ mod tests {
         for number in 0..20_000 {
             let reference = epoch.0 as i64 + 400_000 + now + now * 80 / 1_000_000;
             let at = Instant::from_nanos(now.unsigned_abs());
-            let moved = steer.correction(at, reference as u32, cycle);
+            let moved = steer.correction(at, &reference.to_le_bytes(), cycle);
             if number > 5_000 {
                 let phase = reference.rem_euclid(1_000_000);
                 worst = worst.max(phase.min(1_000_000 - phase));

@@ -107,7 +107,8 @@ impl Fixture {
         let events = &mut self.events;
         let emit = &mut |event| events.push(event);
         let statistics = &mut self.statistics;
-        assert!(self.cyclic.send_due(self.now, &mut self.exchange, statistics, emit));
+        assert!(self.cyclic.next_at() <= self.now);
+        self.cyclic.send_due(self.now, &mut self.exchange, statistics, emit);
         self.now += Span::ms(1);
         let mut buffer = vec![0; 1514];
         let (transmit, _) = self.exchange.poll_transmit(self.now, &mut buffer).unwrap();

@@ -8,8 +8,10 @@
 //! datagram.
 
 mod merge;
+mod outgoing;
 pub(crate) mod prebuilt;
 mod queue;
+mod receive;
 pub mod request;
 mod slot;
 
@@ -17,14 +19,17 @@ use std::collections::VecDeque;
 
 use linesman_config::plan::FramePlan;
 use linesman_proto::address::Path;
-use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, MAX_LEN, MIN_LEN, MacAddress, SOURCE_MARK};
+use linesman_proto::ethernet::{MAX_LEN, MIN_LEN, MacAddress};
 use linesman_proto::frame::{FrameBuilder, MAX_DATAGRAM_DATA};
 use linesman_proto::time::{Instant, Span};
 
-pub use request::{Access, ExchangeError, Reply, Request, Target};
+pub use request::{Access, DatagramData, ExchangeError, Reply, Request, Target};
 
-use prebuilt::{Prebuilt, Shaped};
+use outgoing::Outgoing;
+use prebuilt::Prebuilt;
 pub(crate) use queue::{Queued, Ticket};
+pub(crate) use receive::Received;
+use receive::{Origin, origin};
 pub(crate) use slot::{Purpose, Slot, SlotState};
 
 /// Most datagrams of procedures in one frame.
@@ -35,15 +40,6 @@ const SLOTS: usize = 256;
 
 /// An answer that comes once more so long after its deadline is none: its index was made up.
 const OLD: Span = Span::ms(50);
-/// Offset of the source address in a frame.
-const SOURCE_AT: usize = 6;
-/// Offset of the byte whose upper half is the type in the EtherCAT header.
-const TYPE_AT: usize = 15;
-/// That type: datagrams.
-const DATAGRAMS: u8 = 1;
-/// Offset of the index byte of the first datagram.
-const FIRST_INDEX: usize = 17;
-
 /// A frame to be sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Transmit {
@@ -55,53 +51,22 @@ pub struct Transmit {
     pub len: usize,
 }
 
-/// What a received frame was.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Received {
-    /// With it, all copies of this slot are back.
-    Complete(usize),
-    /// One of two copies.
-    FirstCopy,
-    /// A frame that was given up.
-    Late,
-    /// A frame that had come back already.
-    Duplicate,
-    /// One more copy of a cyclic frame that is sent more than once, after the first.
-    Spare(usize),
-    /// From our address, but nothing that is out: an unknown number, or other datagrams.
-    Stray,
-    /// A frame of ours without its end.
-    Truncated,
-    /// Our own frame, as it was sent: not from the line.
-    Echo,
-    /// From another address, or no EtherCAT.
-    Foreign,
-}
-
-/// Source address and EtherType of a frame as one number.
-type Origin = u64;
-
-fn origin(source: MacAddress) -> Origin {
-    let [a, b, c, d, e, f] = source.0;
-    let [g, h] = ETHERTYPE_ETHERCAT.to_be_bytes();
-    u64::from_le_bytes([a & !SOURCE_MARK, b, c, d, e, f, g, h])
-}
-
 /// The slots.
 #[derive(Debug)]
 pub(crate) struct Exchange {
     sources: [MacAddress; 2],
     origins: [Origin; 2],
-    paths: [bool; 2],
+    /// Two cards send each frame.
+    ring: bool,
     /// As many as an index byte can name.
     slots: Box<[Slot; SLOTS]>,
     /// The frames of the running plan.
     cyclic: Vec<Prebuilt>,
-    /// Slots that are waiting, oldest first.
-    waiting: Vec<usize>,
-    /// When the first of them is given up.
+    /// How many slots are waiting.
+    waiting: usize,
+    /// When the first of them is given up, or a little before.
     earliest: Instant,
-    outgoing: VecDeque<(usize, Path)>,
+    outgoing: Outgoing,
     queue: VecDeque<Queued>,
     acyclic_out: usize,
     number: u32,
@@ -116,11 +81,11 @@ impl Exchange {
             sources,
             origins: sources.map(origin),
             cyclic: Vec::new(),
-            paths: [true, ring],
+            ring,
             slots: Box::new(std::array::from_fn(|_| Slot::new())),
             earliest: Instant::MAX,
-            waiting: Vec::with_capacity(SLOTS),
-            outgoing: VecDeque::with_capacity(2 * SLOTS),
+            waiting: 0,
+            outgoing: Outgoing::new(),
             queue: VecDeque::new(),
             acyclic_out: 0,
             number: 0,
@@ -139,16 +104,25 @@ impl Exchange {
     }
 
     /// Whether datagrams of procedures wait to be packed.
+    #[inline]
     pub(crate) fn has_queued(&self) -> bool {
         !self.queue.is_empty()
     }
 
     /// How many frames of procedures are out.
+    #[inline]
     pub(crate) fn acyclic_out(&self) -> usize {
         self.acyclic_out
     }
 
+    /// Whether frames wait to be fetched, or datagrams to be packed.
+    #[inline]
+    pub(crate) fn has_any(&self) -> bool {
+        self.has_outgoing() || self.has_queued()
+    }
+
     /// Whether frames wait to be fetched by [`Exchange::poll_transmit`].
+    #[inline]
     pub(crate) fn has_outgoing(&self) -> bool {
         !self.outgoing.is_empty()
     }
@@ -159,7 +133,7 @@ impl Exchange {
             return;
         }
         let Some((at, number)) = self.free_slot() else { return };
-        let slot = &mut self.slots[at];
+        let slot = &mut self.slots[usize::from(at)];
         slot.sent.resize(MAX_LEN, 0);
         slot.requests.clear();
         let room = room.clamp(MIN_LEN, MAX_LEN);
@@ -180,68 +154,69 @@ impl Exchange {
         self.cyclic = frames.map(|frame| Prebuilt::new(&frame, self.sources[0])).collect();
     }
 
-    /// Sends a prebuilt frame by all cards, `times` times each, after `fill` has given it its
-    /// outputs. Whether it went: not when all slots are taken.
+    /// Sends a prebuilt frame by all cards, `times` times each; the caller gives it its outputs before
+    /// the next [`Exchange::poll_transmit`]. `None`: all slots are taken, and it does not go.
     #[inline]
-    pub(crate) fn send_cyclic(
+    pub(crate) fn begin_cyclic(
         &mut self,
         frame: usize,
         deadline: Instant,
         times: u8,
-        fill: impl FnOnce(&mut Prebuilt),
-    ) -> bool {
-        let Some((at, number)) = self.free_slot() else { return false };
-        let Some(prebuilt) = self.cyclic.get_mut(frame) else { return false };
-        if prebuilt.unsent > 0
-            && let Some(before) = prebuilt.slot
-        {
+        withheld: bool,
+    ) -> Option<&mut Prebuilt> {
+        let (at, number) = self.free_slot()?;
+        let before = self.cyclic.get(frame)?.slot;
+        if self.slot(before).is_unsent(frame) {
             // Nobody has fetched the last one: it is overtaken, and was never on the line.
-            self.outgoing.retain(|(outgoing, _)| *outgoing != before);
+            self.outgoing.remove(before);
             self.retire(before, SlotState::Free);
         }
-        let prebuilt = &mut self.cyclic[frame];
-        fill(prebuilt);
-        prebuilt.number(number);
-        prebuilt.slot = Some(at);
-        let copies = if self.paths[Path::B.index()] { 2 } else { 1 };
-        prebuilt.unsent = times * copies;
-        let slot = &mut self.slots[at];
+        let slot = &mut self.slots[usize::from(at)];
         slot.number = number;
-        slot.withheld = prebuilt.is_withheld();
+        slot.withheld = withheld;
         self.go(at, Purpose::Cyclic { frame }, deadline, times);
-        true
+        let prebuilt = &mut self.cyclic[frame];
+        prebuilt.number(number);
+        prebuilt.slot = at;
+        Some(prebuilt)
     }
 
     /// A slot whose frame is ready goes out.
     #[inline]
-    fn go(&mut self, at: usize, purpose: Purpose, deadline: Instant, times: u8) {
-        let slot = &mut self.slots[at];
+    fn go(&mut self, at: u8, purpose: Purpose, deadline: Instant, times: u8) {
+        let slot = &mut self.slots[usize::from(at)];
         slot.state = SlotState::Waiting;
         slot.purpose = purpose;
         slot.deadline = deadline;
-        slot.outstanding = self.paths;
+        slot.outstanding = [true, self.ring];
         slot.arrived = [false; 2];
         slot.truncated = false;
-        slot.spares = [times - 1; 2];
+        slot.spares = [times.saturating_sub(1); 2];
+        slot.unsent = u16::from(times) << u16::from(self.ring);
         slot.reply.clear();
-        self.waiting.push(at);
+        self.waiting += 1;
         self.earliest = self.earliest.min(deadline);
-        for _ in 0..times {
-            self.outgoing.push_back((at, Path::A));
-            if self.paths[Path::B.index()] {
-                self.outgoing.push_back((at, Path::B));
-            }
-        }
+        self.outgoing.push(at);
     }
 
     /// A slot that is free, and the number of the frame in it.
     #[inline]
-    fn free_slot(&mut self) -> Option<(usize, u32)> {
+    fn free_slot(&mut self) -> Option<(u8, u32)> {
+        let number = self.number;
+        let [at, ..] = number.to_le_bytes();
+        if self.slots[usize::from(at)].state == SlotState::Waiting {
+            return self.next_free_slot();
+        }
+        self.number = number.wrapping_add(1);
+        Some((at, number))
+    }
+
+    fn next_free_slot(&mut self) -> Option<(u8, u32)> {
         for _ in 0..SLOTS {
             let number = self.number;
             self.number = number.wrapping_add(1);
-            let at = usize::from(number.to_le_bytes()[0]);
-            if self.slots[at].state != SlotState::Waiting {
+            let [at, ..] = number.to_le_bytes();
+            if self.slots[usize::from(at)].state != SlotState::Waiting {
                 return Some((at, number));
             }
         }
@@ -255,15 +230,18 @@ impl Exchange {
         now: Instant,
         buffer: &mut [u8],
     ) -> Option<(Transmit, Purpose)> {
-        while let Some((at, path)) = self.outgoing.pop_front() {
-            let slot = &self.slots[at];
+        while let Some(at) = self.outgoing.first() {
+            let slot = &mut self.slots[usize::from(at)];
+            // The copies of a ring leave by turns, that of card A first.
+            let path = if self.ring && slot.unsent % 2 == 1 { Path::B } else { Path::A };
+            slot.unsent = slot.unsent.saturating_sub(1);
+            if slot.unsent == 0 {
+                self.outgoing.pop();
+            }
             let purpose = slot.purpose;
             let bytes = match purpose {
-                Purpose::Cyclic { frame } => match self.cyclic.get_mut(frame) {
-                    Some(prebuilt) => {
-                        prebuilt.unsent = prebuilt.unsent.saturating_sub(1);
-                        prebuilt.bytes()
-                    }
+                Purpose::Cyclic { frame } => match self.cyclic.get(frame) {
+                    Some(prebuilt) => prebuilt.bytes(),
                     None => continue,
                 },
                 Purpose::Acyclic => &slot.sent,
@@ -282,159 +260,73 @@ impl Exchange {
         None
     }
 
-    /// Takes a frame that arrived at card `path`.
-    #[inline]
-    pub(crate) fn receive(&mut self, now: Instant, path: Path, frame: &[u8]) -> Received {
-        let Some(sender) = self.sender(frame) else { return Received::Foreign };
-        let Some(first) = frame.get(FIRST_INDEX) else { return Received::Truncated };
-        let at = usize::from(*first);
-        let slot = &mut self.slots[at];
-        if slot.state == SlotState::Free || frame.len() > MAX_LEN {
-            return Received::Stray;
-        }
-        let shaped = match slot.purpose {
-            Purpose::Cyclic { frame: prebuilt } => match self.cyclic.get(prebuilt) {
-                Some(prebuilt) => prebuilt.matches(frame, slot.number, slot.withheld),
-                None => Shaped::Otherwise,
-            },
-            Purpose::Acyclic => slot.matches(frame, sender),
-        };
-        match shaped {
-            Shaped::AsSent => {}
-            Shaped::Otherwise => return Received::Stray,
-            Shaped::CutOff => {
-                slot.truncated = true;
-                return Received::Truncated;
-            }
-        }
-        if frame[SOURCE_AT] & SOURCE_MARK == 0 && sender == path && self.is_echo(at, frame) {
-            return Received::Echo;
-        }
-        let copy = sender.index();
-        let slot = &mut self.slots[at];
-        match slot.state {
-            SlotState::Waiting => {}
-            SlotState::Answered if slot.spares[copy] > 0 => {
-                slot.spares[copy] -= 1;
-                return Received::Spare(at);
-            }
-            SlotState::Free => return Received::Stray,
-            SlotState::GivenUp => return Received::Late,
-            // Numbers come again. No line doubles what was answered so long ago.
-            SlotState::Answered if now > slot.deadline + OLD => return Received::Stray,
-            SlotState::Answered => return Received::Duplicate,
-        }
-        if slot.arrived[copy] || !slot.outstanding[copy] {
-            return Received::Duplicate;
-        }
-        slot.arrived[copy] = true;
-        if !self.paths[Path::B.index()] {
-            if slot.purpose == Purpose::Acyclic {
-                slot.reply.extend_from_slice(frame);
-            }
-            self.retire(at, SlotState::Answered);
-            return Received::Complete(at);
-        }
-        self.ring_intact = Some(path != sender);
-        if slot.reply.is_empty() {
-            slot.reply.extend_from_slice(frame);
-        } else {
-            merge::merge(&mut slot.reply, frame);
-        }
-        if slot.is_complete() {
-            self.retire(at, SlotState::Answered);
-            Received::Complete(at)
-        } else {
-            Received::FirstCopy
-        }
-    }
-
-    /// Whether a frame is just as we have sent it.
-    fn is_echo(&self, at: usize, frame: &[u8]) -> bool {
-        let slot = &self.slots[at];
-        match slot.purpose {
-            Purpose::Acyclic => frame.starts_with(&slot.sent),
-            Purpose::Cyclic { frame: index } => {
-                (self.cyclic.get(index)).is_some_and(|prebuilt| frame.starts_with(prebuilt.bytes()))
-            }
-        }
-    }
-
-    /// Which of our cards has sent a frame, when it is one of datagrams.
-    #[inline]
-    fn sender(&self, frame: &[u8]) -> Option<Path> {
-        let word = frame.get(SOURCE_AT..)?.first_chunk()?;
-        let origin = u64::from_le_bytes(*word);
-        // Controllers set one bit of the source address; those of our cards have it clear.
-        let origin = origin & !u64::from(SOURCE_MARK);
-        if frame.get(TYPE_AT)? >> 4 != DATAGRAMS {
-            return None;
-        }
-        if origin == self.origins[0] {
-            return Some(Path::A);
-        }
-        (self.paths[Path::B.index()] && origin == self.origins[1]).then_some(Path::B)
-    }
-
     /// The whole answer of a slot: what came back last, or both copies merged.
     #[inline]
-    pub(crate) fn answer<'a>(&'a self, at: usize, last: &'a [u8]) -> &'a [u8] {
-        let reply = &self.slots[at].reply;
+    pub(crate) fn answer<'a>(&'a self, at: u8, last: &'a [u8]) -> &'a [u8] {
+        let reply = &self.slot(at).reply;
         if reply.is_empty() { last } else { reply }
     }
 
     #[inline]
-    fn retire(&mut self, at: usize, state: SlotState) {
-        self.slots[at].state = state;
-        if self.waiting.as_slice() == [at] {
-            self.waiting.clear();
-            self.earliest = Instant::MAX;
-        } else {
-            self.retire_of_many(at);
-        }
-        if self.slots[at].purpose == Purpose::Acyclic {
+    fn retire(&mut self, at: u8, state: SlotState) {
+        let slot = &mut self.slots[usize::from(at)];
+        slot.state = state;
+        if slot.purpose == Purpose::Acyclic {
             self.acyclic_out = self.acyclic_out.saturating_sub(1);
+        }
+        self.waiting -= 1;
+        if self.waiting == 0 {
+            self.earliest = Instant::MAX;
         }
     }
 
-    fn retire_of_many(&mut self, at: usize) {
-        // Oldest first, and answers come in order: it is nearly always the first.
-        if let Some(place) = self.waiting.iter().position(|waiting| *waiting == at) {
-            self.waiting.remove(place);
-        }
-        let deadlines = self.waiting.iter().map(|at| self.slots[*at].deadline);
-        self.earliest = deadlines.min().unwrap_or(Instant::MAX);
+    /// Slots that are waiting, oldest first: numbers are given in turn.
+    fn waiting(&self) -> impl Iterator<Item = (u8, &Slot)> {
+        let [first, ..] = self.number.to_le_bytes();
+        let all = (0..=u8::MAX).map(move |offset| first.wrapping_add(offset));
+        let slots = all.map(|at| (at, self.slot(at)));
+        slots.filter(|(_, slot)| slot.state == SlotState::Waiting)
     }
 
     /// The next slot whose time is up at `now`. With one copy back it is answered by that, else it
     /// is given up; the slot's state tells which.
     #[inline]
-    pub(crate) fn expire(&mut self, now: Instant) -> Option<usize> {
+    pub(crate) fn expire(&mut self, now: Instant) -> Option<u8> {
         if now < self.earliest { None } else { self.expire_one(now) }
     }
 
-    fn expire_one(&mut self, now: Instant) -> Option<usize> {
-        let due = |at: &&usize| self.slots[**at].deadline <= now;
-        let at = *self.waiting.iter().find(due)?;
-        let answered = self.slots[at].arrived.contains(&true);
-        self.outgoing.retain(|(outgoing, _)| *outgoing != at);
+    fn expire_one(&mut self, now: Instant) -> Option<u8> {
+        let Some((at, _)) = self.waiting().find(|(_, slot)| slot.deadline <= now) else {
+            let first = self.waiting().map(|(_, slot)| slot.deadline).min();
+            self.earliest = first.unwrap_or(Instant::MAX);
+            return None;
+        };
+        let answered = self.slot(at).arrived.contains(&true);
+        self.outgoing.remove(at);
         self.retire(at, if answered { SlotState::Answered } else { SlotState::GivenUp });
         Some(at)
     }
 
     /// Gives up all frames of a plan that runs no longer: they must not be taken for those of the next.
     pub(crate) fn abandon_cyclic(&mut self) {
-        while let Some(at) = (self.waiting.iter().copied())
-            .find(|at| matches!(self.slots[*at].purpose, Purpose::Cyclic { .. }))
-        {
-            self.outgoing.retain(|(outgoing, _)| *outgoing != at);
+        let is_cyclic = |slot: &Slot| matches!(slot.purpose, Purpose::Cyclic { .. });
+        loop {
+            let next = self.waiting().find(|(_, slot)| is_cyclic(slot)).map(|(at, _)| at);
+            let Some(at) = next else { return };
+            self.outgoing.remove(at);
             self.retire(at, SlotState::GivenUp);
         }
     }
 
     /// The requests of an answered or given-up slot, to be completed by the caller.
-    pub(crate) fn take_requests(&mut self, at: usize) -> Vec<Queued> {
-        std::mem::take(&mut self.slots[at].requests)
+    pub(crate) fn take_requests(&mut self, at: u8) -> Vec<Queued> {
+        std::mem::take(&mut self.slots[usize::from(at)].requests)
+    }
+
+    /// Gives back the room for the requests of a slot.
+    pub(crate) fn give_back(&mut self, at: u8, mut room: Vec<Queued>) {
+        room.clear();
+        self.slots[usize::from(at)].requests = room;
     }
 
     /// A request whose frame was lost: again, if it may be repeated; else it is given back.
@@ -456,15 +348,16 @@ impl Exchange {
         self.ring_intact
     }
 
-    pub(crate) fn slot(&self, at: usize) -> &Slot {
-        &self.slots[at]
+    #[inline]
+    pub(crate) fn slot(&self, at: u8) -> &Slot {
+        &self.slots[usize::from(at)]
     }
 
     pub(crate) fn patience(&self) -> Span {
         self.patience
     }
 
-    /// When the first slot's time is up; [`Instant::MAX`] when nothing is out.
+    /// When the first slot's time is up, or a little before; [`Instant::MAX`] when nothing is out.
     #[inline]
     pub(crate) fn earliest(&self) -> Instant {
         self.earliest

@@ -35,9 +35,7 @@ pub(crate) struct Prebuilt {
     len: usize,
     withheld: bool,
     /// The slot in which it was sent last.
-    pub(super) slot: Option<usize>,
-    /// Copies of that which nobody has fetched yet.
-    pub(super) unsent: u8,
+    pub(super) slot: u8,
 }
 
 /// What a datagram becomes when its outputs must not be taken for fresh: what is read goes on.
@@ -93,19 +91,22 @@ impl Prebuilt {
             Shape { at: header, heads: commands.map(variant), masks: commands.map(mask) }
         };
         let shapes = places.into_iter().map(shape).collect();
-        Self { shapes, bytes, len: at, withheld: false, slot: None, unsent: 0 }
+        Self { shapes, bytes, len: at, withheld: false, slot: 0 }
     }
 
     /// The frame, for filling in outputs.
+    #[inline]
     pub(crate) fn bytes_mut(&mut self) -> &mut [u8] {
         &mut self.bytes
     }
 
+    #[inline]
     pub(super) fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
     /// Turns datagrams that carry outputs into such that do not, or back.
+    #[inline]
     pub(crate) fn withhold(&mut self, withheld: bool) {
         if self.withheld == withheld {
             return;
@@ -116,11 +117,8 @@ impl Prebuilt {
         }
     }
 
-    pub(super) const fn is_withheld(&self) -> bool {
-        self.withheld
-    }
-
     /// Marks the datagrams with the number of the frame.
+    #[inline]
     pub(super) fn number(&mut self, number: u32) {
         let [first, others, ..] = number.to_le_bytes();
         let mut index = first;
@@ -131,6 +129,7 @@ impl Prebuilt {
     }
 
     /// Whether a reply has the datagrams that were sent with this number.
+    #[inline]
     pub(super) fn matches(&self, reply: &[u8], number: u32, withheld: bool) -> Shaped {
         let [first, others, ..] = number.to_le_bytes();
         let mut index = first;

@@ -6,6 +6,7 @@ use linesman_proto::address::{Path, Position, RegisterAddress, StationAddress, W
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::time::Span;
+use smallvec::SmallVec;
 
 /// Whom a register access means.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -85,6 +86,10 @@ impl fmt::Display for Target {
     }
 }
 
+/// Bytes of a datagram. So many as a SubDevice's state and counters take are kept without a place of
+/// their own in memory, so that reading them again and again allocates nothing.
+pub type DatagramData = SmallVec<[u8; 24]>;
+
 /// One datagram to be exchanged.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Request {
@@ -94,7 +99,7 @@ pub struct Request {
     pub address: DatagramAddress,
     /// What is sent; zeros for a read. At most
     /// [`MAX_DATAGRAM_DATA`](linesman_proto::frame::MAX_DATAGRAM_DATA) bytes.
-    pub data: Vec<u8>,
+    pub data: DatagramData,
     /// The card whose copy of the frame carries it; `None`: both.
     pub card: Option<Path>,
     /// How often it is sent again when its frame does not come back.
@@ -110,7 +115,7 @@ impl Request {
         Self {
             command: target.read_command(),
             address: target.register(address),
-            data: vec![0; usize::from(len)],
+            data: SmallVec::from_elem(0, usize::from(len)),
             card: target.card(),
             repeats: 0,
             alone: false,
@@ -123,7 +128,7 @@ impl Request {
         Self {
             command: target.write_command(),
             address: target.register(address),
-            data: data.to_vec(),
+            data: SmallVec::from_slice(data),
             card: target.card(),
             repeats: 0,
             alone: false,
@@ -193,7 +198,7 @@ pub struct Reply {
     /// How many accesses succeeded.
     pub wkc: WorkingCounter,
     /// The data as they came back.
-    pub data: Vec<u8>,
+    pub data: DatagramData,
 }
 
 impl Reply {

@@ -6,9 +6,9 @@ use linesman_proto::ethernet::{HEADER_LEN, MAX_LEN};
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, FrameView, WKC_LEN};
 use linesman_proto::time::Instant;
 
-use super::MAX_ACYCLIC_DATAGRAMS;
 use super::prebuilt::Shaped;
 use super::queue::Queued;
+use super::{MAX_ACYCLIC_DATAGRAMS, OLD, Received};
 
 /// Whose frame it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,6 +55,8 @@ pub(crate) struct Slot {
     pub(crate) truncated: bool,
     /// Further copies of the same frame that each card has sent and that have not come back.
     pub(crate) spares: [u8; 2],
+    /// Copies that nobody has fetched yet.
+    pub(crate) unsent: u16,
     pub(crate) deadline: Instant,
     /// Copies by the card that sent them: on their way, or come back.
     pub(crate) outstanding: [bool; 2],
@@ -76,10 +78,11 @@ impl Slot {
             withheld: false,
             truncated: false,
             spares: [0; 2],
+            unsent: 0,
             deadline: Instant::MAX,
             outstanding: [false; 2],
             arrived: [false; 2],
-            requests: Vec::new(),
+            requests: Vec::with_capacity(MAX_ACYCLIC_DATAGRAMS),
         }
     }
 
@@ -106,6 +109,30 @@ impl Slot {
             }
         }
         if came.next().is_none() { Shaped::AsSent } else { Shaped::Otherwise }
+    }
+
+    /// Whether it is on its way with a prebuilt frame of which nobody has fetched every copy.
+    #[inline]
+    pub(super) fn is_unsent(&self, frame: usize) -> bool {
+        self.unsent > 0
+            && self.state == SlotState::Waiting
+            && self.purpose == Purpose::Cyclic { frame }
+    }
+
+    /// What a copy is that came at `now` although the slot, number `at`, waits for none.
+    pub(super) fn answered_again(&mut self, at: u8, now: Instant, sender: Path) -> Received {
+        let spares = &mut self.spares[sender.index()];
+        match self.state {
+            SlotState::Answered if *spares > 0 => {
+                *spares -= 1;
+                Received::Spare(at)
+            }
+            SlotState::Free => Received::Stray,
+            SlotState::GivenUp => Received::Late,
+            // Numbers come again. No line doubles what was answered so long ago.
+            SlotState::Answered if now > self.deadline + OLD => Received::Stray,
+            SlotState::Answered | SlotState::Waiting => Received::Duplicate,
+        }
     }
 
     /// The card that alone carries a datagram.

@@ -42,7 +42,7 @@ fn answered(frame: &[u8], data: [u8; 2], wkc: u8) -> Vec<u8> {
     back
 }
 
-fn reply_of(exchange: &Exchange, slot: usize) -> ([u8; 2], u8) {
+fn reply_of(exchange: &Exchange, slot: u8) -> ([u8; 2], u8) {
     let reply = &exchange.slot(slot).reply;
     ([reply[26], reply[27]], reply[28])
 }

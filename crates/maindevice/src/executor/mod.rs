@@ -5,6 +5,8 @@
 //! came, so that the same frames at the same times always do the same.
 
 mod task;
+mod timers;
+pub(crate) mod waitlist;
 pub mod wire;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -17,6 +19,8 @@ use linesman_proto::time::Instant;
 use crate::event::Event;
 use crate::exchange::{ExchangeError, Reply, Request, Ticket};
 use task::Spawned;
+use timers::Timers;
+use waitlist::Waitlist;
 
 pub use task::Handle;
 pub use wire::Wire;
@@ -57,6 +61,7 @@ impl Board {
         lock(&self.shared)
     }
 
+    #[inline]
     pub(crate) fn now(&self) -> Instant {
         Instant::from_nanos(self.now.load(Ordering::Relaxed))
     }
@@ -68,7 +73,7 @@ impl Board {
 
     /// Timers have changed.
     pub(crate) fn note_timers(&self, shared: &Shared) {
-        let first = shared.timers.first_key_value().map_or(u64::MAX, |((at, _), _)| at.as_nanos());
+        let first = shared.timers.first().map_or(u64::MAX, Instant::as_nanos);
         self.first_timer.store(first, Ordering::Relaxed);
     }
 }
@@ -77,12 +82,10 @@ impl Board {
 pub(crate) struct Shared {
     /// Whether what card A sends arrives at card B.
     pub(crate) ring_intact: Option<bool>,
-    pub(crate) next_ticket: u64,
     pub(crate) submitted: VecDeque<(Ticket, Request)>,
     pub(crate) cancelled: Vec<Ticket>,
-    pub(crate) answers: BTreeMap<Ticket, Answer>,
-    pub(crate) next_timer: u64,
-    pub(crate) timers: BTreeMap<(Instant, u64), Waker>,
+    pub(crate) answers: Waitlist<Answer>,
+    pub(crate) timers: Timers,
     pub(crate) spawned: VecDeque<Spawned>,
     pub(crate) events: VecDeque<Event>,
 }
@@ -143,12 +146,10 @@ impl Executor {
     pub(crate) fn new() -> Self {
         let shared = Shared {
             ring_intact: None,
-            next_ticket: 0,
             submitted: VecDeque::new(),
             cancelled: Vec::new(),
-            answers: BTreeMap::new(),
-            next_timer: 0,
-            timers: BTreeMap::new(),
+            answers: Waitlist::default(),
+            timers: Timers::default(),
             spawned: VecDeque::new(),
             events: VecDeque::new(),
         };
@@ -183,7 +184,14 @@ impl Executor {
         self.board.news.load(Ordering::Relaxed) && self.board.news.swap(false, Ordering::Relaxed)
     }
 
+    /// The same, for a look.
+    #[inline]
+    pub(crate) fn has_news(&self) -> bool {
+        self.board.news.load(Ordering::Relaxed)
+    }
+
     /// Tells the user of the MainDevice.
+    #[cold]
     pub(crate) fn emit(&self, event: Event) {
         self.shared().events.push_back(event);
         self.note_event();
@@ -197,9 +205,10 @@ impl Executor {
     /// The next thing to tell.
     #[inline]
     pub(crate) fn poll_event(&mut self) -> Option<Event> {
-        if !self.board.events.load(Ordering::Relaxed) {
-            return None;
-        }
+        if self.board.events.load(Ordering::Relaxed) { self.take_event() } else { None }
+    }
+
+    fn take_event(&mut self) -> Option<Event> {
         let event = self.shared().events.pop_front();
         if event.is_none() {
             self.board.events.store(false, Ordering::Relaxed);
@@ -240,11 +249,9 @@ impl Executor {
 
     fn wake_sleepers(&mut self, now: Instant) {
         let mut shared = lock(&self.board.shared);
-        while let Some(first) = shared.timers.first_entry()
-            && first.key().0 <= now
-        {
+        while let Some(sleeper) = shared.timers.pop_due(now) {
             // Waking touches only the queue of those that are ready.
-            first.remove().wake();
+            sleeper.wake();
         }
         self.board.note_timers(&shared);
     }
@@ -252,7 +259,7 @@ impl Executor {
     /// The answer to a request.
     pub(crate) fn answer(&mut self, ticket: Ticket, result: Result<Reply, ExchangeError>) {
         let mut shared = lock(&self.board.shared);
-        let Some(answer) = shared.answers.get_mut(&ticket) else { return };
+        let Some(answer) = shared.answers.get_mut(ticket.0) else { return };
         answer.result = Some(result);
         let waker = answer.waker.take();
         drop(shared);
@@ -261,11 +268,16 @@ impl Executor {
         }
     }
 
+    /// Whether there is something to run, or tasks have changed something.
+    #[inline]
+    pub(crate) fn is_stirred(&self) -> bool {
+        self.board.news.load(Ordering::Relaxed) || self.ready.any.load(Ordering::Relaxed)
+    }
+
     /// Polls whoever is ready until nobody is.
     #[inline]
     pub(crate) fn run(&mut self) {
-        let news = self.board.news.load(Ordering::Relaxed);
-        if news || self.ready.any.load(Ordering::Relaxed) {
+        if self.is_stirred() {
             self.run_all();
         }
     }

@@ -10,7 +10,7 @@ const TARGET: Target = Target::Station(StationAddress(0x1001));
 const REGISTER: RegisterAddress = RegisterAddress(0x0130);
 
 fn reply(wkc: u16) -> Result<Reply, ExchangeError> {
-    Ok(Reply { wkc: WorkingCounter(wkc), data: vec![8, 0] })
+    Ok(Reply { wkc: WorkingCounter(wkc), data: smallvec::smallvec![8, 0] })
 }
 
 fn submitted(executor: &Executor) -> Vec<Ticket> {

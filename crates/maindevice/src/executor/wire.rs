@@ -45,10 +45,8 @@ impl Wire {
     /// Queues a datagram at once; await the result for its answer. Dropping it gives the answer up.
     pub fn submit(&self, request: Request) -> Exchanging {
         let mut shared = self.shared.lock();
-        let ticket = Ticket(shared.next_ticket);
-        shared.next_ticket += 1;
+        let ticket = Ticket(shared.answers.insert(Answer::default()));
         shared.submitted.push_back((ticket, request));
-        shared.answers.insert(ticket, Answer::default());
         Exchanging { shared: Arc::clone(&self.shared), ticket }
     }
 
@@ -157,10 +155,10 @@ impl Future for Exchanging {
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
         let mut shared = self.shared.lock();
-        let Some(answer) = shared.answers.get_mut(&self.ticket) else { return Poll::Pending };
+        let Some(answer) = shared.answers.get_mut(self.ticket.0) else { return Poll::Pending };
         match answer.result.take() {
             Some(result) => {
-                shared.answers.remove(&self.ticket);
+                shared.answers.remove(self.ticket.0);
                 Poll::Ready(result)
             }
             None => {
@@ -174,7 +172,7 @@ impl Future for Exchanging {
 impl Drop for Exchanging {
     fn drop(&mut self) {
         let mut shared = self.shared.lock();
-        if shared.answers.remove(&self.ticket).is_some() {
+        if shared.answers.remove(self.ticket.0).is_some() {
             shared.cancelled.push(self.ticket);
         }
     }
@@ -197,17 +195,11 @@ impl Future for Sleep {
             return Poll::Ready(());
         }
         let mut shared = board.lock();
-        let timer = match self.timer {
-            Some(timer) => timer,
-            None => {
-                let timer = shared.next_timer;
-                shared.next_timer += 1;
-                self.timer = Some(timer);
-                timer
-            }
-        };
-        shared.timers.insert((until, timer), context.waker().clone());
-        board.note_timers(&shared);
+        let sleeps = self.timer.is_some_and(|timer| shared.timers.renew(timer, context.waker()));
+        if !sleeps {
+            self.timer = Some(shared.timers.insert(until, context.waker().clone()));
+            board.note_timers(&shared);
+        }
         Poll::Pending
     }
 }
@@ -216,7 +208,7 @@ impl Drop for Sleep {
     fn drop(&mut self) {
         if let Some(timer) = self.timer {
             let mut shared = self.shared.lock();
-            if shared.timers.remove(&(self.until, timer)).is_some() {
+            if shared.timers.remove(timer) {
                 self.shared.note_timers(&shared);
             }
         }

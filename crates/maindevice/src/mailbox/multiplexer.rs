@@ -268,7 +268,7 @@ impl Multiplexer {
                         return Ok(None);
                     }
                     self.received = counter;
-                    return Ok(Some(reply.data));
+                    return Ok(Some(reply.data.into_vec()));
                 }
                 Ok(_) => return Ok(None),
                 Err(error @ ExchangeError::WorkingCounter { .. }) => return Err(error),

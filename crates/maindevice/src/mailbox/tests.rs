@@ -110,7 +110,7 @@ impl Scripted {
         assert_eq!(station, 0x1005);
         let (wkc, data) = match (request.command, at) {
             (Command::Fprd, OUT_STATUS) => (1, vec![if self.deaf { FULL } else { 0 }]),
-            (Command::Fpwr, OUT) if self.deaf => (0, request.data.clone()),
+            (Command::Fpwr, OUT) if self.deaf => (0, request.data.to_vec()),
             (Command::Fprd, IN_STATUS) => (1, vec![if self.waiting.is_some() { FULL } else { 0 }]),
             (Command::Fpwr, OUT) => {
                 assert_eq!(request.data.len(), 32, "the whole mailbox is written");
@@ -119,7 +119,7 @@ impl Scripted {
                 if !self.says.is_empty() {
                     self.speak();
                 }
-                (1, request.data.clone())
+                (1, request.data.to_vec())
             }
             (Command::Fprd, IN) => match self.waiting.take() {
                 Some(message) => {
@@ -132,7 +132,7 @@ impl Scripted {
             },
             other => panic!("{other:?}"),
         };
-        Reply { wkc: WorkingCounter(wkc), data }
+        Reply { wkc: WorkingCounter(wkc), data: data.into() }
     }
 
     fn speak(&mut self) {

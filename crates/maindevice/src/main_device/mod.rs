@@ -2,18 +2,21 @@
 
 mod command;
 
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::Plan;
 use linesman_proto::address::{DeviceId, Network, Path, WorkingCounter};
 use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
+use linesman_proto::frame::FrameView;
 use linesman_proto::frame::size::{BYTE_NS, WIRE_OVERHEAD};
 use linesman_proto::time::Instant;
 
 use crate::cyclic::{Cyclic, FrameStatus, Quality};
 use crate::event::Event;
 use crate::exchange::{
-    Exchange, ExchangeError, Purpose, Queued, Received, Reply, SlotState, Ticket, Transmit,
+    DatagramData, Exchange, ExchangeError, Purpose, Queued, Received, Reply, Request, SlotState,
+    Ticket, Transmit,
 };
 use crate::executor::{Executor, Wire, lock};
 use crate::mailbox::Queues;
@@ -45,6 +48,8 @@ pub struct MainDevice {
     /// SubDevices that are served without being driven.
     attended: Option<Attended>,
     next_service: u64,
+    /// Requests on their way from procedures to the exchange.
+    submitted: VecDeque<(Ticket, Request)>,
     /// How many frames of procedures may still go out in this cycle.
     acyclic_left: usize,
 }
@@ -75,6 +80,7 @@ impl MainDevice {
             running: None,
             attended: None,
             next_service: 0,
+            submitted: VecDeque::new(),
             acyclic_left: 0,
         }
     }
@@ -91,18 +97,26 @@ impl MainDevice {
     #[inline]
     pub fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
         self.executor.advance(now);
-        if let Some(running) = &mut self.running
-            && running.cyclic.next_at() <= now
-        {
+        let due = self.running.as_ref().is_some_and(|running| running.cyclic.next_at() <= now);
+        if due || self.executor.has_news() || self.exchange.has_any() {
+            return self.transmit(now, due, buffer);
+        }
+        None
+    }
+
+    /// The next frame, where there may be one; the cycle begins if it is `due`.
+    fn transmit(&mut self, now: Instant, due: bool, buffer: &mut [u8]) -> Option<Transmit> {
+        if due && let Some(running) = &mut self.running {
             let (exchange, statistics) = (&mut self.exchange, &mut self.statistics);
             let shared = &self.executor;
-            let emit = &mut |event| shared.emit(event);
-            if running.cyclic.send_due(now, exchange, statistics, emit) {
-                self.acyclic_left = self.options.frames_at_once;
-            }
+            running.cyclic.send_due(now, exchange, statistics, &mut |event| shared.emit(event));
+            self.acyclic_left = self.options.frames_at_once;
         }
         self.submit();
         if !self.exchange.has_outgoing() {
+            if !self.exchange.has_queued() {
+                return None;
+            }
             self.send_acyclic(now);
         }
         let (transmit, purpose) = self.exchange.poll_transmit(now, buffer)?;
@@ -113,10 +127,8 @@ impl MainDevice {
 
     /// Packs requests of procedures: beside a cycle so many frames each cycle, and none so long that
     /// it would still hold the wire when the next cycle begins.
-    #[inline]
     fn send_acyclic(&mut self, now: Instant) {
-        if !self.exchange.has_queued() || self.exchange.acyclic_out() >= self.options.frames_at_once
-        {
+        if self.exchange.acyclic_out() >= self.options.frames_at_once {
             return;
         }
         let mut room = MAX_LEN;
@@ -145,10 +157,10 @@ impl MainDevice {
 
     fn submit_news(&mut self) {
         let mut shared = self.executor.shared();
-        let submitted = std::mem::take(&mut shared.submitted);
+        std::mem::swap(&mut shared.submitted, &mut self.submitted);
         let cancelled = std::mem::take(&mut shared.cancelled);
         drop(shared);
-        for (ticket, request) in submitted {
+        while let Some((ticket, request)) = self.submitted.pop_front() {
             if let Err(queued) = self.exchange.submit(Queued { ticket, request, frames: 0 }) {
                 self.fail(queued);
             }
@@ -163,11 +175,22 @@ impl MainDevice {
     #[inline]
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.executor.advance(now);
-        match self.exchange.receive(now, path, frame) {
-            Received::Complete(slot) => {
-                self.statistics.frames_received += 1;
-                self.complete(now, slot, frame);
-            }
+        let received = self.exchange.receive(now, path, frame);
+        if let Received::Complete(slot) = received {
+            self.statistics.frames_received += 1;
+            self.complete(now, slot, frame);
+        } else {
+            self.receive_other(now, received, frame);
+        }
+        if self.options.ring {
+            self.watch_ring();
+        }
+        self.work();
+    }
+
+    /// A frame with which no slot is complete.
+    fn receive_other(&mut self, now: Instant, received: Received, frame: &[u8]) {
+        match received {
             Received::Spare(slot) => {
                 self.statistics.frames_spare += 1;
                 self.complete_spare(now, slot, frame);
@@ -178,12 +201,8 @@ impl MainDevice {
             Received::Late => self.statistics.frames_late += 1,
             Received::Duplicate => self.statistics.frames_duplicate += 1,
             Received::Foreign => self.statistics.frames_foreign += 1,
-            Received::Echo => {}
+            Received::Echo | Received::Complete(_) => {}
         }
-        if self.options.ring {
-            self.watch_ring();
-        }
-        self.work();
     }
 
     fn watch_ring(&mut self) {
@@ -204,6 +223,14 @@ impl MainDevice {
     #[inline]
     pub fn handle_timeout(&mut self, now: Instant) {
         self.executor.advance(now);
+        if self.exchange.earliest() <= now {
+            self.expire(now);
+        }
+        self.work();
+    }
+
+    #[cold]
+    fn expire(&mut self, now: Instant) {
         while let Some(slot) = self.exchange.expire(now) {
             if self.exchange.slot(slot).state == SlotState::Answered {
                 self.complete(now, slot, &[]);
@@ -211,12 +238,18 @@ impl MainDevice {
                 self.give_up(slot);
             }
         }
-        self.work();
     }
 
     /// Runs whoever is ready.
     #[inline]
     fn work(&mut self) {
+        if self.executor.is_stirred() {
+            self.work_on();
+        }
+    }
+
+    #[inline(never)]
+    fn work_on(&mut self) {
         self.executor.run();
         self.submit();
         if let Some(running) = &mut self.running {
@@ -226,7 +259,7 @@ impl MainDevice {
 
     /// All that comes back of a frame is back; `last` is what came back last.
     #[inline]
-    fn complete(&mut self, now: Instant, slot: usize, last: &[u8]) {
+    fn complete(&mut self, now: Instant, slot: u8, last: &[u8]) {
         match self.exchange.slot(slot).purpose {
             Purpose::Cyclic { frame } => {
                 let Some(running) = &mut self.running else { return };
@@ -241,23 +274,27 @@ impl MainDevice {
     }
 
     #[inline(never)]
-    fn complete_acyclic(&mut self, slot: usize, last: &[u8]) {
-        let requests = self.exchange.take_requests(slot);
-        let replies = replies(self.exchange.answer(slot, last));
-        for (queued, reply) in requests.into_iter().zip(replies) {
-            self.executor.answer(queued.ticket, Ok(reply));
+    fn complete_acyclic(&mut self, slot: u8, last: &[u8]) {
+        let mut requests = self.exchange.take_requests(slot);
+        if let Ok(view) = FrameView::parse(self.exchange.answer(slot, last)) {
+            let datagrams = view.datagrams().map_while(Result::ok);
+            for (queued, datagram) in requests.drain(..).zip(datagrams) {
+                let data = DatagramData::from_slice(datagram.data());
+                self.executor.answer(queued.ticket, Ok(Reply { wkc: datagram.wkc(), data }));
+            }
         }
+        self.exchange.give_back(slot, requests);
     }
 
     /// One more copy of a cyclic frame: taken only when the first was not good.
-    fn complete_spare(&mut self, now: Instant, slot: usize, last: &[u8]) {
+    fn complete_spare(&mut self, now: Instant, slot: u8, last: &[u8]) {
         let Purpose::Cyclic { frame } = self.exchange.slot(slot).purpose else { return };
         if !self.options.ring && self.running.as_ref().is_some_and(|one| one.cyclic.is_bad(frame)) {
             self.complete(now, slot, last);
         }
     }
 
-    fn give_up(&mut self, slot: usize) {
+    fn give_up(&mut self, slot: u8) {
         // One that came back without its end has been counted as that.
         self.statistics.frames_lost += u64::from(!self.exchange.slot(slot).truncated);
         match self.exchange.slot(slot).purpose {
@@ -269,12 +306,14 @@ impl MainDevice {
             }
             Purpose::Acyclic => {
                 self.statistics.queued_lost += u64::from(!self.exchange.slot(slot).truncated);
-                for queued in self.exchange.take_requests(slot) {
+                let mut requests = self.exchange.take_requests(slot);
+                for queued in requests.drain(..) {
                     match self.exchange.again(queued) {
                         None => self.statistics.repeats += 1,
                         Some(queued) => self.fail(queued),
                     }
                 }
+                self.exchange.give_back(slot, requests);
             }
         }
     }
@@ -418,14 +457,4 @@ impl MainDevice {
     pub fn statistics(&self) -> Statistics {
         self.statistics
     }
-}
-
-/// The answers in a frame that came back, in order.
-fn replies(frame: &[u8]) -> Vec<Reply> {
-    let Ok(view) = linesman_proto::frame::FrameView::parse(frame) else { return Vec::new() };
-    let reply = |datagram: linesman_proto::frame::Datagram<'_>| Reply {
-        wkc: datagram.wkc(),
-        data: datagram.data().to_vec(),
-    };
-    view.datagrams().map_while(Result::ok).map(reply).collect()
 }

@@ -16,7 +16,7 @@ use linesman_proto::topology::{DelayError, Delays, Reconstruction, SeenControlle
 
 use super::look::{self, LookError};
 use super::set_up::write_all;
-use crate::exchange::{ExchangeError, Reply, Request, Target};
+use crate::exchange::{DatagramData, ExchangeError, Reply, Request, Target};
 use crate::executor::Wire;
 
 /// How much longer a frame takes through a controller whose processing unit it passes (S1 9.1.2).
@@ -164,7 +164,7 @@ pub(crate) async fn compensate(wire: &Wire, reference: StationAddress, frames: u
         let request = Request {
             command: Command::Frmw,
             address,
-            data: vec![0; 8],
+            data: DatagramData::from_elem(0, 8),
             card: None,
             repeats: 0,
             alone: true,

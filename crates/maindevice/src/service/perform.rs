@@ -48,7 +48,9 @@ pub(crate) async fn perform(
         Service::ClearCounters => clear_counters(servant, id, target).await,
         Service::ReadRegister { address, len } => {
             let reply = wire.read_one(target, address, len).await;
-            reply.map(|reply| ServiceAnswer::Data(reply.data)).map_err(|error| register(id, error))
+            reply
+                .map(|reply| ServiceAnswer::Data(reply.data.into_vec()))
+                .map_err(|error| register(id, error))
         }
         Service::WriteRegister { address, data } => {
             let reply = wire.write_one(target, address, &data).await;

@@ -1,7 +1,7 @@
 //! What is known of each SubDevice right now: shared by the cyclic exchange, which judges by it, and
 //! by the keepers, which find it out.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -17,6 +17,7 @@ use linesman_proto::time::{DcTime, Instant, Span};
 
 use super::times::{BringUpTimes, Phase};
 use crate::executor::lock;
+use crate::executor::waitlist::Waitlist;
 use crate::executor::wire::Sleep;
 
 /// Whether and how a SubDevice can be reached.
@@ -68,8 +69,7 @@ pub(crate) struct Line {
     version: Arc<AtomicU64>,
     alerts: u64,
     /// Naps that an alert ends, in the order in which they began.
-    waiting: BTreeMap<u64, Waker>,
-    naps: u64,
+    waiting: Waitlist<Waker>,
     /// Devices whose presence has changed since [`Line::take_changes`].
     changed: Vec<DeviceId>,
     /// How many are at their targets.
@@ -391,7 +391,7 @@ impl Line {
     /// Something is not as it was: all keepers shall look at once.
     pub(crate) fn alert(&mut self) {
         self.alerts += 1;
-        for waker in std::mem::take(&mut self.waiting).into_values() {
+        for waker in self.waiting.take_all() {
             waker.wake();
         }
     }
@@ -420,9 +420,7 @@ impl Future for Nap {
             return Poll::Ready(());
         }
         if self.place.is_none() {
-            let place = line.naps;
-            line.naps += 1;
-            line.waiting.insert(place, context.waker().clone());
+            let place = line.waiting.insert(context.waker().clone());
             drop(line);
             self.place = Some(place);
         } else {
@@ -435,7 +433,7 @@ impl Future for Nap {
 impl Drop for Nap {
     fn drop(&mut self) {
         if let Some(place) = self.place {
-            lock(&self.line).waiting.remove(&place);
+            lock(&self.line).waiting.remove(place);
         }
     }
 }

@@ -17,5 +17,6 @@ mod scan;
 mod soak;
 mod software;
 mod start_up;
+mod tasks;
 mod watch;
 mod wire_faults;

@@ -17,7 +17,10 @@ const FRAMES: usize = 2_048;
 /// Logs on their way: so far may the judging thread fall behind.
 const LOGS: usize = 8;
 /// A log that is older than this is handed over although it is not full.
-const OLD: Span = Span::ms(20);
+const OLD: Span = Span::ms(50);
+
+/// After no empty log was there, none is asked for this long.
+const PAUSE: Span = Span::ms(5);
 
 /// One frame of a log.
 #[derive(Clone, Copy)]
@@ -30,32 +33,69 @@ struct Record {
     truncated: bool,
 }
 
+impl Record {
+    const NONE: Self = Self {
+        time: Instant::ZERO,
+        number: 0,
+        end: 0,
+        path: None,
+        direction: Direction::Unknown,
+        truncated: false,
+    };
+}
+
 /// Frames and what the host noticed, in order of time.
 pub struct Log {
-    bytes: Vec<u8>,
-    records: Vec<Record>,
+    /// The frames one behind the other, and how many bytes they take.
+    bytes: Box<[u8]>,
+    len: usize,
+    records: Box<[Record]>,
+    count: usize,
     host: Vec<HostObservation>,
 }
 
 impl Log {
-    fn new() -> Self {
+    fn new(bytes: usize, frames: usize) -> Self {
         Self {
-            bytes: Vec::with_capacity(ROOM),
-            records: Vec::with_capacity(FRAMES),
+            bytes: vec![0; bytes].into(),
+            len: 0,
+            records: vec![Record::NONE; frames].into(),
+            count: 0,
             host: Vec::new(),
         }
     }
 
     fn clear(&mut self) {
-        self.bytes.clear();
-        self.records.clear();
+        (self.len, self.count) = (0, 0);
         self.host.clear();
+    }
+
+    /// Copies a frame; false: there is no room for it.
+    #[inline]
+    fn push(&mut self, frame: &FrameSeen<'_>) -> bool {
+        let end = self.len + frame.bytes.len();
+        let room = self.bytes.get_mut(self.len..end);
+        let (Some(room), Some(record)) = (room, self.records.get_mut(self.count)) else {
+            return false;
+        };
+        room.copy_from_slice(frame.bytes);
+        *record = Record {
+            time: frame.time,
+            number: frame.number,
+            end,
+            path: frame.path,
+            direction: frame.direction,
+            truncated: frame.truncated,
+        };
+        self.len = end;
+        self.count += 1;
+        true
     }
 
     /// The frames, oldest first.
     pub fn frames(&self) -> impl Iterator<Item = FrameSeen<'_>> {
         let mut begin = 0;
-        self.records.iter().map(move |record| {
+        self.records[..self.count].iter().map(move |record| {
             let bytes = &self.bytes[begin..record.end];
             begin = record.end;
             FrameSeen {
@@ -81,9 +121,12 @@ impl Log {
 /// The end in the cycle.
 pub struct Tap {
     log: Log,
-    began: Option<Instant>,
+    /// When the log is handed over although it is not full.
+    due: Instant,
     full: SyncSender<Log>,
     empty: Receiver<Log>,
+    /// There was no empty log; none is asked for before.
+    full_until: Instant,
     /// Frames that were left out.
     left_out: u64,
     /// Wait for the other side rather than leave anything out.
@@ -104,9 +147,17 @@ pub fn tap(waits: bool) -> (Tap, Listener) {
     let (to_cycle, empty) = mpsc::sync_channel(LOGS + 1);
     for _ in 0..LOGS {
         // There is room for all of them.
-        let _ = to_cycle.try_send(Log::new());
+        let _ = to_cycle.try_send(Log::new(ROOM, FRAMES));
     }
-    let tap = Tap { log: Log::new(), began: None, full, empty, left_out: 0, waits };
+    let tap = Tap {
+        log: Log::new(ROOM, FRAMES),
+        due: Instant::MAX,
+        full_until: Instant::ZERO,
+        full,
+        empty,
+        left_out: 0,
+        waits,
+    };
     (tap, Listener { full: from_cycle, empty: to_cycle })
 }
 
@@ -114,25 +165,27 @@ impl Tap {
     /// A frame left a card or came back.
     #[inline]
     pub fn frame(&mut self, frame: &FrameSeen<'_>) {
-        let log = &mut self.log;
-        let fits = log.bytes.len() + frame.bytes.len() <= ROOM && log.records.len() < FRAMES;
-        if !fits && !self.hand_over() {
+        if self.log.count == 0 {
+            self.due = frame.time + OLD;
+        }
+        if !self.log.push(frame) {
+            self.push_into_next(frame);
+        }
+    }
+
+    /// The log is full: the next one takes the frame, if there is one.
+    #[cold]
+    fn push_into_next(&mut self, frame: &FrameSeen<'_>) {
+        // Asking again and again costs more than the frames are worth.
+        if frame.time < self.full_until || !self.hand_over() {
+            if frame.time >= self.full_until {
+                self.full_until = frame.time + PAUSE;
+            }
             self.left_out += 1;
             return;
         }
-        let log = &mut self.log;
-        log.bytes.extend_from_slice(frame.bytes);
-        log.records.push(Record {
-            time: frame.time,
-            number: frame.number,
-            end: log.bytes.len(),
-            path: frame.path,
-            direction: frame.direction,
-            truncated: frame.truncated,
-        });
-        if self.began.is_none() {
-            self.began = Some(frame.time);
-        }
+        self.due = frame.time + OLD;
+        self.left_out += u64::from(!self.log.push(frame));
     }
 
     /// The host noticed something.
@@ -143,9 +196,9 @@ impl Tap {
     /// Hands over what is old.
     #[inline]
     pub fn turn(&mut self, now: Instant) {
-        if self.began.is_some_and(|began| now.since(began) >= OLD) && !self.hand_over() {
+        if now >= self.due && !self.hand_over() {
             // Nobody takes it now: there is room left, and asking costs something.
-            self.began = Some(now);
+            self.due = now + OLD;
         }
     }
 
@@ -164,7 +217,7 @@ impl Tap {
         let Some(mut next) = next else { return false };
         next.clear();
         let log = std::mem::replace(&mut self.log, next);
-        self.began = None;
+        self.due = Instant::MAX;
         match self.full.try_send(log) {
             Ok(()) => true,
             // As many logs as there is room for: it cannot be full.
@@ -180,10 +233,7 @@ impl Tap {
 impl Drop for Tap {
     fn drop(&mut self) {
         // Nobody may listen any more.
-        let _ = self.full.try_send(std::mem::replace(
-            &mut self.log,
-            Log { bytes: Vec::new(), records: Vec::new(), host: Vec::new() },
-        ));
+        let _ = self.full.try_send(std::mem::replace(&mut self.log, Log::new(0, 0)));
     }
 }
 

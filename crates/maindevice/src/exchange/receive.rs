@@ -1,0 +1,153 @@
+//! Frames that come back: whose they are, and what they are to the slot whose number they carry.
+
+use linesman_proto::address::Path;
+use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, MAX_LEN, MacAddress, SOURCE_MARK};
+use linesman_proto::time::Instant;
+
+use super::prebuilt::Shaped;
+use super::{Exchange, Purpose, SlotState, merge};
+
+/// Offset of the source address in a frame.
+const SOURCE_AT: usize = 6;
+/// Offset of the byte whose upper half is the type in the EtherCAT header.
+const TYPE_AT: usize = 15;
+/// That type: datagrams.
+const DATAGRAMS: u8 = 1;
+/// Offset of the index byte of the first datagram.
+const FIRST_INDEX: usize = 17;
+
+/// What a received frame was.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Received {
+    /// With it, all copies of this slot are back.
+    Complete(u8),
+    /// One of two copies.
+    FirstCopy,
+    /// A frame that was given up.
+    Late,
+    /// A frame that had come back already.
+    Duplicate,
+    /// One more copy of a cyclic frame that is sent more than once, after the first.
+    Spare(u8),
+    /// From our address, but nothing that is out: an unknown number, or other datagrams.
+    Stray,
+    /// A frame of ours without its end.
+    Truncated,
+    /// Our own frame, as it was sent: not from the line.
+    Echo,
+    /// From another address, or no EtherCAT.
+    Foreign,
+}
+
+/// Source address and EtherType of a frame as one number.
+pub(super) type Origin = u64;
+
+pub(super) fn origin(source: MacAddress) -> Origin {
+    let [a, b, c, d, e, f] = source.0;
+    let [g, h] = ETHERTYPE_ETHERCAT.to_be_bytes();
+    u64::from_le_bytes([a & !SOURCE_MARK, b, c, d, e, f, g, h])
+}
+
+impl Exchange {
+    /// Takes a frame that arrived at card `path`.
+    #[inline]
+    pub(crate) fn receive(&mut self, now: Instant, path: Path, frame: &[u8]) -> Received {
+        let Some(head) = frame.first_chunk() else { return self.receive_stub(frame) };
+        let Some(sender) = self.sender(head) else { return Received::Foreign };
+        let at = head[FIRST_INDEX];
+        let slot = &mut self.slots[usize::from(at)];
+        if slot.state == SlotState::Free || frame.len() > MAX_LEN {
+            return Received::Stray;
+        }
+        let shaped = match slot.purpose {
+            Purpose::Cyclic { frame: prebuilt } => match self.cyclic.get(prebuilt) {
+                Some(prebuilt) => prebuilt.matches(frame, slot.number, slot.withheld),
+                None => Shaped::Otherwise,
+            },
+            Purpose::Acyclic => slot.matches(frame, sender),
+        };
+        match shaped {
+            Shaped::AsSent => {}
+            Shaped::Otherwise => return Received::Stray,
+            Shaped::CutOff => {
+                slot.truncated = true;
+                return Received::Truncated;
+            }
+        }
+        if head[SOURCE_AT] & SOURCE_MARK == 0 && sender == path && self.is_echo(at, frame) {
+            return Received::Echo;
+        }
+        let slot = &mut self.slots[usize::from(at)];
+        if slot.state != SlotState::Waiting {
+            return slot.answered_again(at, now, sender);
+        }
+        if self.ring {
+            return self.receive_copy(at, path, sender, frame);
+        }
+        slot.arrived[0] = true;
+        if slot.purpose == Purpose::Acyclic {
+            slot.reply.extend_from_slice(frame);
+        }
+        self.retire(at, SlotState::Answered);
+        Received::Complete(at)
+    }
+
+    /// A frame that ends before its first index byte.
+    fn receive_stub(&self, frame: &[u8]) -> Received {
+        let mut head = [0; FIRST_INDEX + 1];
+        head[..frame.len()].copy_from_slice(frame);
+        match self.sender(&head) {
+            Some(_) => Received::Truncated,
+            None => Received::Foreign,
+        }
+    }
+
+    /// One of the two copies of a ring.
+    fn receive_copy(&mut self, at: u8, path: Path, sender: Path, frame: &[u8]) -> Received {
+        let slot = &mut self.slots[usize::from(at)];
+        let copy = sender.index();
+        if slot.arrived[copy] || !slot.outstanding[copy] {
+            return Received::Duplicate;
+        }
+        slot.arrived[copy] = true;
+        self.ring_intact = Some(path != sender);
+        if slot.reply.is_empty() {
+            slot.reply.extend_from_slice(frame);
+        } else {
+            merge::merge(&mut slot.reply, frame);
+        }
+        if slot.is_complete() {
+            self.retire(at, SlotState::Answered);
+            Received::Complete(at)
+        } else {
+            Received::FirstCopy
+        }
+    }
+
+    /// Whether a frame is just as we have sent it.
+    fn is_echo(&self, at: u8, frame: &[u8]) -> bool {
+        let slot = self.slot(at);
+        match slot.purpose {
+            Purpose::Acyclic => frame.starts_with(&slot.sent),
+            Purpose::Cyclic { frame: index } => {
+                (self.cyclic.get(index)).is_some_and(|prebuilt| frame.starts_with(prebuilt.bytes()))
+            }
+        }
+    }
+
+    /// Which of our cards has sent a frame, when it is one of datagrams.
+    #[inline]
+    fn sender(&self, head: &[u8; FIRST_INDEX + 1]) -> Option<Path> {
+        let word = head[SOURCE_AT..].first_chunk()?;
+        let origin = u64::from_le_bytes(*word);
+        // Controllers set one bit of the source address; those of our cards have it clear.
+        let origin = origin & !u64::from(SOURCE_MARK);
+        if head[TYPE_AT] >> 4 != DATAGRAMS {
+            return None;
+        }
+        if origin == self.origins[0] {
+            return Some(Path::A);
+        }
+        (self.ring && origin == self.origins[1]).then_some(Path::B)
+    }
+}

@@ -1,0 +1,40 @@
+"""A cycle of 50 µs, 20,000 frames a second, on a host that may be late: whatever does not come back in time is counted,
+and each count says what became of it."""
+
+import os
+
+from bench import NEAR, Segment, parse
+from harness import LINE, LINESMAN, check
+
+CYCLE_US = 50
+SECONDS = float(os.environ.get("LINESMAN_FAST_SECONDS", "3"))
+# Frames that are still on their way when the report is made.
+UNDER_WAY = 256
+
+
+@check
+def every_frame_of_a_50_us_cycle_is_accounted_for(line):
+    with Segment(line, LINESMAN, LINE.file):
+        status, out, err = line.run(
+            line.near, LINESMAN, "run", "--on", NEAR, "--seconds", SECONDS, "--cycle-us", CYCLE_US, "--json",
+            seconds=SECONDS + 60,
+        )
+    assert status in (0, 1), f"status {status}: {(out + err)[-600:]}"
+    report = parse(out, err)
+    counts = report["counts"]
+    told = {name: count for name, count in counts.items() if count}
+    assert report["error"] is None and report["reached_ns"], report["error"]
+    # Each cycle since OP began with a frame, or is counted as one that the host slept through.
+    due = (report["time_ns"] - report["reached_ns"]) / (CYCLE_US * 1000)
+    assert counts["cycles"] + counts["cycles_missed"] >= 0.99 * due, f"{due:.0f} cycles were due: {told}"
+    assert counts["cyclic_sent"] + counts["cyclic_unsent"] == counts["cycles"], told
+    # Each frame has come back in time, or is lost; of the lost, those that came after all are late, or strays when their
+    # number had been given anew.
+    under_way = counts["frames_sent"] - counts["frames_received"] - counts["frames_lost"]
+    assert 0 <= under_way <= UNDER_WAY, f"{under_way} frames are neither back nor lost: {told}"
+    assert counts["frames_late"] + counts["frames_stray"] <= counts["frames_lost"], told
+    never = counts["frames_lost"] - counts["frames_late"] - counts["frames_stray"]
+    assert never <= UNDER_WAY, f"{never} frames never came, on a cable that loses none: {told}"
+    for name in ("frames_duplicate", "frames_truncated", "frames_foreign", "working_counter_errors"):
+        assert counts[name] == 0, told
+    print(f"    {CYCLE_US} µs for {SECONDS:g} s: {told}; late by {report['lateness']}", flush=True)

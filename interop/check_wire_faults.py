@@ -1,0 +1,90 @@
+"""Linesman's own MainDevice, and a cable that spoils what comes back.
+
+2,000 cycles with each fault: exactly the faulty cycles are bad, what is doubled or stray costs none, each kind is counted
+under its own name, and the run goes on.
+"""
+
+import sys
+
+from bench import FAR, HERE, NEAR, Segment, inside, parse
+from harness import LINE, LINESMAN, Skip, check
+
+CYCLE_US, SETTLED, COUNTED = 8000, 200, 2000
+# A host that holds a frame for longer than most of a cycle has lost it by itself.
+LIMIT_MS = 5.0
+ATTEMPTS = 4
+# Both ends of a further cable, between what spoils and the segment.
+BEFORE, BEHIND = "veth8", "veth9"
+NAMES = ("frames_lost", "frames_late", "frames_duplicate", "frames_stray", "frames_truncated")
+
+
+def spoiled(line, fault, every):
+    """What Linesman counted, and what the cable says it did."""
+    inside(line.far, "ip", "link", "add", BEFORE, "type", "veth", "peer", "name", BEHIND)
+    for name in (BEFORE, BEHIND):
+        inside(line.far, "sysctl", "-q", "-w", f"net.ipv6.conf.{name}.disable_ipv6=1")
+        inside(line.far, "ip", "link", "set", name, "up")
+    seconds = (SETTLED + COUNTED) * CYCLE_US / 1e6 + 4
+    for _ in range(ATTEMPTS):
+        cable = line.start(
+            line.far, sys.executable, HERE / "wire_faults.py", FAR, BEFORE, fault, every, SETTLED, COUNTED, LIMIT_MS,
+        )
+        assert cable.stdout.readline().strip() == "ready"
+        segment = Segment(line, LINESMAN, LINE.file, on=BEHIND)
+        segment.near = NEAR
+        with segment:
+            status, out, err = line.run(
+                line.near, LINESMAN, "run", "--on", NEAR, "--seconds", seconds, "--cycle-us", CYCLE_US, "--json",
+                seconds=seconds + 60,
+            )
+            _, told, words = line.stop(cable)
+        assert status in (0, 1), f"status {status}: {(out + err)[-600:]}"
+        told, report = parse(told, words), parse(out, err)
+        latest_ms = report["lateness"]["max_ns"] / 1e6
+        if told["held"] == 0 and report["counts"]["cycles_missed"] == 0 and latest_ms < LIMIT_MS:
+            return report, told
+    raise Skip(f"the host is too busy: {told}, a cycle began {latest_ms:.1f} ms late")
+
+
+def judge(line, fault, every, cycles_lost, **counted):
+    """`cycles_lost`: whether a spoiled frame costs its cycle; `counted`: the names under which it is counted."""
+    report, told = spoiled(line, fault, every)
+    counts, expected = report["counts"], COUNTED // every
+    assert told["cyclic"] > SETTLED + COUNTED, told
+    assert told["spoiled"] == expected, told
+    assert report["error"] is None and report["settled"], report
+    seen = {name: counts[name] for name in NAMES}
+    wanted = {name: expected if name in counted else 0 for name in NAMES}
+    assert seen == wanted, f"{seen}, expected {wanted}; {told}"
+    assert counts["cyclic_lost"] == (expected if cycles_lost else 0), counts
+    assert counts["working_counter_errors"] == 0, counts
+    assert all(device["valid"] for device in report["devices"]), report["devices"]
+
+
+@check
+def doubled_frames_cost_no_cycle(line):
+    judge(line, "doubled", 50, False, frames_duplicate=True)
+
+
+@check
+def frames_with_an_unknown_index_cost_no_cycle(line):
+    judge(line, "stray", 50, False, frames_stray=True)
+
+
+@check
+def truncated_frames_cost_their_cycle(line):
+    judge(line, "truncated", 50, True, frames_truncated=True)
+
+
+# What is cut off is malformed, and meant to be.
+truncated_frames_cost_their_cycle.spoils_frames = True
+
+
+@check
+def lost_frames_cost_their_cycle(line):
+    judge(line, "lost", 50, True, frames_lost=True)
+
+
+@check
+def late_frames_cost_their_cycle(line):
+    judge(line, "late_by_10_ms", 500, True, frames_lost=True, frames_late=True)
