@@ -77,7 +77,7 @@ fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
-// proves: DIA-11, HW-12, HW-32, PLC-01, PLC-03 partial: right, PLC-08, PLC-09, PLC-10, PLC-11, PLC-12, PLC-13, PLC-15
+// proves: DIA-11, HW-12, HW-32, PLC-01, PLC-03 partial: while all is right, PLC-08, PLC-09, PLC-10 partial: no groups that come and go, PLC-11, PLC-12, PLC-13, PLC-15
 #[test]
 fn a_running_line_is_shown_with_all_that_is_known() {
     let running = Running::start(PLANT);

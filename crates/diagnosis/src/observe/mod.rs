@@ -5,8 +5,10 @@ pub mod exchange;
 pub mod fingerprint;
 pub mod pairing;
 pub mod seen;
+pub mod sender;
 
 pub use exchange::{Exchange, FrameCopy};
 pub use fingerprint::Fingerprint;
-pub use pairing::{Outcome, Pairing, Sender};
+pub use pairing::{Outcome, Pairing};
 pub use seen::{Direction, FrameSeen, HostEvent, HostObservation};
+pub use sender::Sender;

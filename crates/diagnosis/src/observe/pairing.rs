@@ -17,7 +17,8 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
-use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen};
+use super::sender::OWN;
+use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen, Sender};
 use crate::line::Seen;
 
 /// Most requests waiting for their return; beyond, the oldest is lost.
@@ -39,8 +40,6 @@ const OTHER_CARD: Span = Span::ms(1);
 const REMEMBERED: usize = 8;
 /// Senders kept.
 const MOST_SENDERS: usize = 4;
-/// So many requests of its own make a sender one for sure.
-pub const OWN: u64 = 16;
 
 /// What a frame turned out to be, besides the exchange it may complete.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,19 +54,6 @@ pub enum Outcome {
     ReturnAlone,
     /// A frame that was recorded twice.
     Duplicate,
-}
-
-/// Somebody who sends requests.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Sender {
-    /// Its address.
-    pub mac: MacAddress,
-    /// Its first request.
-    pub first: Seen<()>,
-    /// Requests of its own: the second card of a ring only repeats those of the first.
-    pub own: u64,
-    /// Whether it is a card of this host, so that several of them are one MainDevice.
-    pub is_host: bool,
 }
 
 /// Requests that wait for their return.

@@ -15,7 +15,7 @@ use linesman_config::fault::{Class, FaultName};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
-use crate::observe::pairing::OWN;
+use crate::observe::sender::OWN;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
