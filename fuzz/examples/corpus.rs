@@ -34,6 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("esi", descriptions()),
         ("sii", images()?),
         ("mailbox", messages().into_iter().chain(conversations()).collect()),
+        ("mailbox_client", hostile()),
         ("capture", captures),
     ];
     for (target, inputs) in targets {
@@ -152,6 +153,44 @@ fn images() -> Result<Made, Box<dyn Error>> {
         ("cut-off", unfinished),
         ("blank", vec![0xFF; 256]),
     ])
+}
+
+/// What is asked, and answers to it: empty, cut off, of another service, endless segments.
+fn hostile() -> Made {
+    let answers = |choice: u8, flags: u8, bodies: &[&[u8]]| {
+        let mut input = vec![choice];
+        for body in bodies {
+            input.extend((body.len() as u16).to_le_bytes());
+            input.extend([flags, 0]);
+            input.extend_from_slice(body);
+        }
+        input
+    };
+    // SDO response; 0x41 is an upload of that many bytes in segments, 0x00 a segment that is not the last.
+    let long = [0x41, 0x18, 0x10, 1, 0xFF, 0xFF, 0xFF, 0x7F];
+    let segment = [0x00, 1, 2, 3, 4, 5, 6, 7];
+    vec![
+        ("nothing", answers(0x00, 0, &[&[0; 16], &[0; 16]])),
+        ("all-ones", answers(0x41, 0, &[&[0xFF; 32], &[0xFF; 32]])),
+        ("endless-upload", answers(0x00, 2, &[&long, &segment, &segment, &segment])),
+        ("abort-of-another", answers(0x02, 2, &[&[0x80, 0, 0x20, 5, 0, 0, 2, 6]])),
+        (
+            "list-without-end",
+            answers(0x04, 2, &[&[0x82, 0, 0xFF, 0xFF, 1, 0, 0, 16], &[0x82, 0, 0xFF, 0xFF]]),
+        ),
+        (
+            "file",
+            answers(
+                0x87,
+                1,
+                &[&[3, 0, 1, 0, 0, 0, 9, 9], &[3, 0, 9, 0, 0, 0], &[6, 0, 0, 0, 0, 0]],
+            ),
+        ),
+        (
+            "no-mailbox-message",
+            answers(0x55, 0, &[&[2, 0, 0, 0, 0, 0x10, 1, 0], &[2, 0, 0, 0, 0, 0x20, 9, 0]]),
+        ),
+    ]
 }
 
 /// Messages by hand: header of six bytes, CoE header of two, then the service.

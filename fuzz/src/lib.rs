@@ -11,6 +11,7 @@ mod eni;
 mod esi;
 mod frame;
 mod mailbox;
+mod mailbox_client;
 mod observation_file;
 mod project;
 mod segment;
@@ -25,6 +26,7 @@ pub use eni::eni;
 pub use esi::esi;
 pub use frame::frame;
 pub use mailbox::mailbox;
+pub use mailbox_client::mailbox_client;
 pub use observation_file::observation_file;
 pub use project::project;
 pub use segment::segment;
@@ -43,6 +45,7 @@ pub const TARGETS: &[Target] = &[
     ("esi", esi),
     ("frame", frame),
     ("mailbox", mailbox),
+    ("mailbox_client", mailbox_client),
     ("observation_file", observation_file),
     ("project", project),
     ("segment", segment),

@@ -6,6 +6,7 @@ use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::topology::{Reconstruction, Tree};
 
+use crate::compare::There;
 use crate::identity::RevisionRule;
 use crate::plan::{DeviceSettings, PlannedDevice};
 use crate::profile::DeviceProfile;
@@ -67,6 +68,16 @@ impl Inventory {
     #[must_use]
     pub fn tree(&self) -> &Tree {
         &self.wiring.tree
+    }
+
+    /// What was found, for a comparison with what was planned.
+    #[must_use]
+    pub fn there(&self) -> Vec<There> {
+        let there = |found: &FoundDevice| There {
+            identity: found.identity,
+            alias: Some(found.alias.value()),
+        };
+        self.devices.iter().map(there).collect()
     }
 
     /// A plan's devices made of what is there: everything as found, driven to `target`.

@@ -5,6 +5,7 @@
 //! [`esi`] reads device descriptions of makers. [`fault`] holds the names that segment, diagnosis and score share.
 
 pub mod attachment;
+pub mod compare;
 pub mod eni;
 pub mod esi;
 pub mod fault;

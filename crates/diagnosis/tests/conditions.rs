@@ -67,6 +67,8 @@ fn all_well() {
     assert!(script.engine.poll_event().is_none());
 }
 
+// fires: S200
+// silent: S201, S202
 // proves: SW-01 partial, DIA-02 partial
 #[test]
 fn a_refused_state_names_device_transition_and_code() {
@@ -109,6 +111,7 @@ fn a_refusal_is_over_when_the_state_is_reached_and_not_when_it_is_acknowledged()
     assert_eq!(reached.verdict, Verdict::Faulty, "it was there");
 }
 
+// silent: S200
 #[test]
 fn a_copied_acknowledge_bit_is_no_error() {
     let mut script = Script::scanned(2);
@@ -119,6 +122,7 @@ fn a_copied_acknowledge_bit_is_no_error() {
     assert_eq!(report.verdict, Verdict::Healthy, "{}", text(&report));
 }
 
+// fires: S202
 // proves: SW-03 partial
 #[test]
 fn a_watchdog_explains_the_missing_outputs() {
@@ -137,6 +141,8 @@ fn a_watchdog_explains_the_missing_outputs() {
     assert!(below.opened_ns < finding.opened_ns);
 }
 
+// fires: S210
+// silent: H102
 #[test]
 fn a_missing_share_names_the_only_device_that_fits() {
     let mut script = running();
@@ -166,6 +172,7 @@ fn devices_that_do_not_answer_either_are_the_ones() {
     assert_eq!(below.cause, FaultName::DeviceOff, "{}", text(&report));
 }
 
+// silent: S210
 #[test]
 fn process_data_that_the_maindevice_stops_are_not_missing() {
     let mut script = running();
@@ -183,6 +190,8 @@ fn process_data_that_the_maindevice_stops_are_not_missing() {
     assert_eq!(report.verdict, Verdict::Healthy, "{}", text(&report));
 }
 
+// fires: H150
+// silent: S205
 #[test]
 fn a_fall_to_init_that_nobody_asked_for_is_a_restart() {
     let mut script = running();
@@ -233,6 +242,8 @@ fn host(script: &mut Script, what: HostEvent) {
     script.engine.handle_host(&observation);
 }
 
+// fires: X510
+// silent: X511, X512
 #[test]
 fn a_host_that_drops_frames_is_blamed_itself() {
     let mut script = running();
@@ -244,6 +255,8 @@ fn a_host_that_drops_frames_is_blamed_itself() {
     assert_eq!(finding.place, PlaceReport::Host);
 }
 
+// fires: X511
+// silent: X510
 #[test]
 fn late_cycles_are_a_warning_once_they_are_many() {
     let mut script = running();
@@ -256,6 +269,8 @@ fn late_cycles_are_a_warning_once_they_are_many() {
     assert_eq!(only(&report).cause, FaultName::HostJitter);
 }
 
+// fires: C330
+// silent: C330
 #[test]
 fn two_senders_are_two_maindevices_but_two_cards_are_not() {
     let other = |script: &mut Script, datagram: &support::script::Datagram| {
@@ -319,6 +334,7 @@ fn emergency(station: u16, code: u16) -> support::script::Datagram {
     fprd(station, 0x1080, &message)
 }
 
+// fires: S240
 #[test]
 fn an_emergency_is_read_and_withdrawn_by_its_device() {
     let mut script = running();
@@ -333,6 +349,7 @@ fn an_emergency_is_read_and_withdrawn_by_its_device() {
     assert_eq!(only(&report(&mut script)).state, FindingState::Closed);
 }
 
+// silent: S240
 #[test]
 fn a_device_that_says_all_is_well_has_no_emergency() {
     let mut script = running();

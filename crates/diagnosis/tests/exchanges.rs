@@ -28,6 +28,8 @@ fn a_healthy_line_is_healthy() {
     assert_eq!(report.network.al_state_highest.as_deref(), Some("OP"));
 }
 
+// fires: X500
+// silent: H100
 #[test]
 fn requests_alone_are_no_dead_line() {
     let mut script = Script::new();
@@ -58,6 +60,8 @@ fn returns_alone_still_teach() {
     assert_eq!((report.network.datagrams.0, report.network.unanswered.0), (200, 0));
 }
 
+// fires: H100
+// silent: X500
 #[test]
 fn thousands_of_unanswered_requests_are_one_finding() {
     let mut script = Script::scanned(2);

@@ -59,6 +59,7 @@ fn forward_and_return_damage_are_told_apart_by_counts() {
     assert_eq!(of("13 of its own"), 1, "{texts:#?}");
 }
 
+// silent: C306
 // proves: HW-10
 #[test]
 fn a_permanent_break_is_one_finding_with_its_consequences() {

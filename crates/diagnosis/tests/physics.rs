@@ -123,6 +123,7 @@ fn every_link_and_direction_is_named_with_1_10_and_1000_hits() {
     }
 }
 
+// fires: H112
 #[test]
 fn without_the_cards_counters_the_last_hop_is_in_the_set() {
     let file = bench();

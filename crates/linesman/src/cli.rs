@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, demo, diagnose, explain, fault, foe, history, interfaces, lab, log, online, plan,
-    reg, run, scan, schema, sdo, sii, sim, state,
+    completion, counters, demo, diagnose, explain, fault, foe, history, host, interfaces, lab, log,
+    online, plan, probe, reg, run, scan, schema, sdo, sii, sim, state,
 };
 use crate::version::VERSION;
 
@@ -55,6 +55,8 @@ pub(crate) enum Command {
     Plan(plan::Arguments),
     /// Network cards: link, driver, suitability, EtherCAT seen
     Interfaces(interfaces::Arguments),
+    /// This computer as a suspect: what makes frames late or loses them, and the commands that mend it
+    Host(host::Arguments),
     /// What a finding, AL status code, abort code, register, state or fault name means
     Explain(explain::Arguments),
     /// States of SubDevices: look, ask for another, acknowledge an error
@@ -69,6 +71,10 @@ pub(crate) enum Command {
     Sii(sii::Arguments),
     /// Registers of a SubDevice's controller: read, write
     Reg(reg::Arguments),
+    /// Error counters of all SubDevices: read, clear, watch and export them, judge what rises
+    Counters(counters::Arguments),
+    /// Try out each link with many long frames, while nobody drives the line
+    Probe(probe::Arguments),
     /// Drive a line: bring it up, exchange process data, watch it, stop it cleanly
     Run(run::Arguments),
     /// A line as it is now: states, error counters, frames, mailboxes; once or live
@@ -97,6 +103,7 @@ impl Command {
             Self::Online(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
             Self::Fault(arguments) => arguments.json,
+            Self::Host(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,
             Self::Lab(arguments) => arguments.wants_json(),
             Self::Log(arguments) => arguments.json,
@@ -107,6 +114,8 @@ impl Command {
             Self::Foe(arguments) => arguments.json,
             Self::Sii(arguments) => arguments.json,
             Self::Reg(arguments) => arguments.json,
+            Self::Counters(arguments) => arguments.json,
+            Self::Probe(arguments) => arguments.json,
             Self::Demo(_) | Self::Explain(_) | Self::Schema(_) | Self::Completion(_) => false,
         }
     }

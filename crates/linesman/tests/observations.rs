@@ -56,6 +56,23 @@ fn a_table_of_states_leads_to_the_break_and_what_follows_hangs_beneath() {
     assert_eq!(silent, [15, 16, 17, 18, 19, 20, 21]);
 }
 
+// fires: C306
+// proves: HW-01, HW-02 partial: from the words of another tool's list
+#[test]
+fn a_list_of_wrong_devices_leads_to_the_cable_and_what_follows_hangs_beneath() {
+    let finding = finding("wrong-order.toml");
+    assert_eq!(finding["code"], "C306", "{finding:#}");
+    assert_eq!(finding["place"]["a"], json!({ "no": 14, "port": "B" }));
+    let evidence = finding["evidence"].as_array().unwrap();
+    let texts: Vec<&str> = evidence.iter().map(|one| one["text"].as_str().unwrap()).collect();
+    assert!(
+        texts[0].contains("15 (Term 64 (EK1100))") && texts[0].contains("6 others"),
+        "{texts:?}"
+    );
+    assert!(texts[1].contains("port C of SubDevice 1"), "{texts:?}");
+    assert!(finding["actions"][0].as_str().unwrap().contains("port C of 1"), "{finding:#}");
+}
+
 // proves: JCT-11 partial: read from a table, not seen on a line
 #[test]
 fn a_cable_pulled_at_a_junction_is_told_by_its_port() {

@@ -299,3 +299,21 @@ fn an_eeprom_is_read_compared_written_and_its_alias_set() {
     assert_eq!(alias["image"]["alias"], 7);
     assert_eq!(alias["image"]["checksum"], "valid");
 }
+
+// proves: ESC-15
+#[test]
+fn registers_are_dumped_word_by_word() {
+    let plant = Plant::new();
+    let run = plant.run("reg", &["A1", "dump", "--from", "0x0100", "--len", "64"]);
+    assert_eq!(run.status, 0, "{}", run.all());
+    let row = run.stdout.lines().find(|line| line.starts_with("0110")).unwrap();
+    // Ports A and B with link, open, communicating.
+    for cell in ["0x5A3", "23", "DL status"] {
+        assert!(row.contains(cell), "`{cell}` is missing in `{row}`");
+    }
+    let json =
+        plant.run("reg", &["A1", "dump", "--from", "0x0100", "--len", "64", "--json"]).json();
+    assert_valid(&json, "registers");
+    let words = json["words"].as_array().unwrap();
+    assert_eq!((words.len(), words[0]["address"].as_u64()), (32, Some(0x0100)));
+}

@@ -12,6 +12,7 @@ use super::{
     ClockChoice, Description, Mapping, ProjectError, StartUpEntry, WatchdogChoice, inline, quoted,
 };
 use crate::attachment::Attachment;
+use crate::compare::Wanted;
 use crate::esi::value;
 use crate::identity::RevisionRule;
 use crate::plan::{AddressingChoice, OnWrongCounter, ProcessAccess};
@@ -41,6 +42,9 @@ pub struct ProjectDevice {
     /// Serial number; not compared when absent.
     #[serde(default)]
     pub serial: Option<u32>,
+    /// Station alias, as its EEPROM holds it: tells twins apart. Not compared when absent.
+    #[serde(default)]
+    pub alias: Option<u16>,
     /// Whose port it hangs on: `maindevice` or a device's name and port.
     pub on: Attachment,
     /// The port by which it is entered, `A` unless said.
@@ -111,6 +115,7 @@ impl ProjectDevice {
             revision: None,
             revision_rule: RevisionRule::Equal,
             serial: None,
+            alias: None,
             on,
             entry: port_a(),
             station: None,
@@ -149,6 +154,12 @@ impl ProjectDevice {
             Some(_) => self.revision_rule,
             None => RevisionRule::Any,
         }
+    }
+
+    /// What is compared with what is found.
+    #[must_use]
+    pub fn wanted(&self) -> Wanted {
+        Wanted { identity: self.identity(), rule: self.rule(), alias: self.alias }
     }
 
     /// The station address it is to have.
@@ -192,6 +203,9 @@ impl ProjectDevice {
         }
         if let Some(serial) = self.serial {
             line("serial", serial.to_string());
+        }
+        if let Some(alias) = self.alias {
+            line("alias", alias.to_string());
         }
         line("on", quoted(&self.on.to_string()));
         if self.entry != "A" {
@@ -275,6 +289,7 @@ impl ProjectDevice {
             revision: self.revision,
             revision_rule: self.revision_rule,
             serial: self.serial,
+            alias: self.alias,
             entry: self.entry.clone(),
             station: self.station,
             description: self.description.clone(),

@@ -158,6 +158,7 @@ impl Project {
                 revision: identity.map(|identity| identity.revision),
                 entry: tree.entry(node).to_string(),
                 station: (found.station.0 != 0).then_some(found.station.0),
+                alias: (found.alias.0 != 0).then_some(found.alias.0),
                 description: (described != Description::default()).then_some(described),
                 ..ProjectDevice::at(
                     "",

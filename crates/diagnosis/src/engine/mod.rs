@@ -71,6 +71,7 @@ impl Watched {
         // Counters that are read after a frame was lost tell by standing still.
         let is_recent = |at: Option<Instant>| at.is_some_and(|at| now < at + WATCHED_AFTER_LOSS);
         is_open
+            || self.line.devices.iter().any(|device| device.mailbox.is_open())
             || is_recent(self.line.traffic.lost.last)
             || self.line.devices.iter().any(|device| {
                 device.counters.last_rise().is_some_and(|at| now < at + WATCHED_AFTER_RISE)

@@ -20,6 +20,8 @@ pub struct CounterHistory {
     last: ErrorCounters,
     /// Falls without a write that was seen: the line has another reader, or the supply was gone.
     clears: u32,
+    /// When that was last read, and before which fall.
+    cleared: Option<Seen<(ErrorCounter, u8)>>,
     /// When a rise was last read.
     last_rise: Option<Instant>,
 }
@@ -80,8 +82,9 @@ impl CounterHistory {
         let mut fell = [false; ClearGroup::ALL.len()];
         for (counter, value) in reading.iter() {
             let group = counter.clear_group() as usize;
-            if self.last.value(counter).is_some_and(|last| value < last) {
+            if let Some(last) = self.last.value(counter).filter(|last| value < *last) {
                 fell[group] = true;
+                self.cleared = Some(Seen::new((counter, last), at, frame));
             }
         }
         self.clears += fell.iter().filter(|fell| **fell).count() as u32;
@@ -188,6 +191,12 @@ impl CounterHistory {
     #[must_use]
     pub const fn foreign_clears(&self) -> u32 {
         self.clears
+    }
+
+    /// The latest fall without a write that was seen: which counter, and what it had counted.
+    #[must_use]
+    pub const fn cleared(&self) -> Option<Seen<(ErrorCounter, u8)>> {
+        self.cleared
     }
 
     /// The latest value of each counter.

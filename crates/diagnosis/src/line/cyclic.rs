@@ -6,7 +6,7 @@ use linesman_proto::address::{DeviceId, LogicalAddress};
 use linesman_proto::command::Command;
 use linesman_proto::time::Instant;
 
-use super::Seen;
+use super::{Beat, Seen};
 
 /// Deficits kept of one datagram.
 pub const DEFICITS_KEPT: usize = 16;
@@ -29,6 +29,10 @@ pub struct Cyclic {
     pub highest: Seen<u16>,
     /// When the working counter was too low, oldest first, at most [`DEFICITS_KEPT`].
     pub deficits: VecDeque<Deficit>,
+    /// When it was sent.
+    pub sent: Beat,
+    /// When it came back.
+    pub returned: Beat,
 }
 
 /// A stretch of time in which a working counter was too low.
@@ -61,8 +65,17 @@ impl Cyclic {
     /// A datagram that came back for the first time.
     #[must_use]
     pub fn new(command: Command, start: LogicalAddress, len: u16, wkc: Seen<u16>) -> Self {
-        let deficits = VecDeque::new();
-        Self { command, start, len, count: 1, wkc, highest: wkc, deficits }
+        Self {
+            command,
+            start,
+            len,
+            count: 1,
+            wkc,
+            highest: wkc,
+            deficits: VecDeque::new(),
+            sent: Beat::default(),
+            returned: Beat::default(),
+        }
     }
 
     /// Whether a working counter is too low now.

@@ -6,11 +6,12 @@ use linesman_config::identity::RevisionRule;
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias};
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::PortMap;
-use linesman_proto::register::FmmuConfig;
+use linesman_proto::register::{FmmuConfig, WatchdogDivider, WatchdogTime};
 use linesman_proto::sii::Identity;
-use linesman_proto::time::{DcTime32, Instant};
+use linesman_proto::time::{DcTime32, Instant, Span};
 use linesman_proto::topology::SeenController;
 
+use super::mailbox::MailboxHistory;
 use super::{AlChange, AlError, AlHistory, CounterHistory, DlHistory, Seen, SiiImage, push_kept};
 
 /// A controller.
@@ -26,6 +27,8 @@ pub struct Device {
     pub planned: Option<Planned>,
     /// What it says of itself.
     pub identity: SeenIdentity,
+    /// When another tool reported that it is not the planned one, without saying what it is instead.
+    pub reported_wrong: Option<Seen<()>>,
     /// Its station address now.
     pub station: Option<StationAddress>,
     /// Its alias.
@@ -46,13 +49,37 @@ pub struct Device {
     pub counters: CounterHistory,
     /// Emergencies it sent, oldest first, at most [`CHANGES_KEPT`](super::CHANGES_KEPT).
     pub emergencies: VecDeque<Seen<Emergency>>,
+    /// What its mailbox tells of trouble.
+    pub mailbox: MailboxHistory,
+    /// Its process data watchdog, as last read or written.
+    pub watchdog: Watchdog,
     /// When a frame was received at each port, by its own clock: registers 0x0900 to 0x090F as last
     /// read. Those of closed ports mean nothing.
     pub received: Option<PortMap<DcTime32>>,
+    /// Whether its SYNC signals are switched on: register 0x0981 as last written.
+    pub sync_on: Option<Seen<bool>>,
     /// Its FMMUs, as they were set up.
     pub fmmus: BTreeMap<u8, FmmuConfig>,
     /// What was seen of its SII.
     pub sii: SiiImage,
+}
+
+/// The process data watchdog of a controller: registers 0x0400 and 0x0420; what was not seen is as after
+/// a reset.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct Watchdog {
+    /// Length of a tick.
+    pub divider: WatchdogDivider,
+    /// Ticks until it expires.
+    pub time: WatchdogTime,
+}
+
+impl Watchdog {
+    /// How long it holds without outputs; `None` when it is switched off.
+    #[must_use]
+    pub fn span(&self) -> Option<Span> {
+        self.time.span(self.divider)
+    }
 }
 
 /// What the project says of a controller.
@@ -64,6 +91,8 @@ pub struct Planned {
     pub rule: RevisionRule,
     /// The station address it is to have.
     pub station: StationAddress,
+    /// Its station alias, where the project gives one.
+    pub alias: Option<u16>,
 }
 
 /// What was read of a controller's identity, part by part.
@@ -109,6 +138,7 @@ impl Device {
             type_name: None,
             planned: None,
             identity: SeenIdentity::default(),
+            reported_wrong: None,
             station: None,
             alias: None,
             position: None,
@@ -119,7 +149,10 @@ impl Device {
             dl: DlHistory::default(),
             counters: CounterHistory::default(),
             emergencies: VecDeque::new(),
+            mailbox: MailboxHistory::default(),
+            watchdog: Watchdog::default(),
             received: None,
+            sync_on: None,
             fmmus: BTreeMap::new(),
             sii: SiiImage::default(),
         }

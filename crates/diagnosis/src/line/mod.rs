@@ -4,12 +4,14 @@
 //! keeps when and by which frame it was learnt, so that a finding can point there.
 
 pub mod al_history;
+pub mod beat;
 pub mod counters;
 pub mod cyclic;
 pub mod device;
 pub mod dl_history;
 pub mod host;
 pub mod learn;
+pub mod mailbox;
 pub mod sii_image;
 pub mod traffic;
 
@@ -23,6 +25,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 
 pub use al_history::{AlChange, AlError, AlHistory};
+pub use beat::{Beat, Off, Pause};
 pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cyclic::{Cyclic, Deficit, Owner};
 pub use device::{Absence, Device, Planned, SeenIdentity, Trouble};
@@ -104,6 +107,7 @@ impl Line {
                 identity: planned.identity(),
                 rule: planned.rule(),
                 station: planned.station(id),
+                alias: planned.alias,
             });
             device
         });

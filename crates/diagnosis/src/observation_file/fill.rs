@@ -77,6 +77,9 @@ impl ObservedDevice {
         device.station =
             device.station.or(self.station.map(linesman_proto::address::StationAddress));
         self.teach_identity(device, at);
+        if state.is_some_and(|state| state.contains(DeviceState::WRONG_IDENTITY)) {
+            device.reported_wrong = Some(Seen::new((), at, None));
+        }
         if let Some(state) = state {
             let bits = u16::from(state.device_byte() & 0x1F);
             device.al.record_status(AlStatus(bits), at, None);

@@ -85,6 +85,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     {
         return;
     }
+    if super::wiring::judges(line) {
+        return;
+    }
     let slots = slots(line);
     if slots.iter().all(|slot| slot.mismatch().is_none()) {
         return;

@@ -3,17 +3,24 @@
 //! A rule is a pure function of the line. It is asked whenever something was learnt, and says all
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
+pub mod counters;
+pub mod device_message;
 pub mod emergency;
 pub mod frame_errors;
 pub mod host_trouble;
 pub mod identity;
+pub mod jitter;
 pub mod link_lost;
+pub mod mailbox;
 pub mod nobody_answers;
 pub mod not_answering;
 pub mod one_direction;
+pub mod paused;
+pub mod reported_wrong;
 pub mod restarted;
 pub mod second_maindevice;
 pub mod state_error;
+pub mod wiring;
 pub mod working_counter;
 
 use linesman_config::fault::Class;
@@ -79,6 +86,8 @@ pub const RULES: &[Rule] = &[
     not_answering::RULE,
     frame_errors::RULE,
     identity::RULE,
+    wiring::RULE,
+    reported_wrong::RULE,
     //
     // The network as a whole, working counters and states.
     nobody_answers::RULE,
@@ -88,6 +97,11 @@ pub const RULES: &[Rule] = &[
     one_direction::RULE,
     emergency::RULE,
     host_trouble::RULE,
+    jitter::RULE,
+    paused::RULE,
+    mailbox::RULE,
+    device_message::RULE,
+    counters::RULE,
     second_maindevice::RULE,
 ];
 

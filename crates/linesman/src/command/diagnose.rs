@@ -34,7 +34,7 @@ use crate::version;
 use super::sim;
 
 /// The clock of an observation file.
-const NO_CLOCK: &str = "none";
+pub(super) const NO_CLOCK: &str = "none";
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -262,7 +262,7 @@ impl Session {
 }
 
 /// The diagnosis as text.
-fn print(diagnosis: &Diagnosis, names: &Names, output: &mut Output) {
+pub(super) fn print(diagnosis: &Diagnosis, names: &Names, output: &mut Output) {
     // An observation file says what was read, not when.
     let timed = diagnosis.clock != NO_CLOCK;
     let writer = Writer { names, paint: output.paint(), width: output.width(), timed };
@@ -275,7 +275,7 @@ fn names(engine: &Engine) -> Names {
     Names::new(devices.iter().map(|device| device.best_name().unwrap_or_default().to_owned()))
 }
 
-fn status(diagnosis: &Diagnosis) -> Status {
+pub(super) fn status(diagnosis: &Diagnosis) -> Status {
     match diagnosis.verdict {
         Verdict::Healthy => Status::Good,
         Verdict::Faulty => Status::Findings,

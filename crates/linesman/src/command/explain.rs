@@ -4,6 +4,7 @@
 //! is all shown. `al:`, `abort:` and `register:` in front say which is meant.
 
 mod page;
+mod topic;
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::rule::{self, RulePage};
@@ -25,7 +26,8 @@ const MOST_SUGGESTIONS: usize = 8;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     /// A finding (H101), AL status code (0x001D), abort code (0x06090011), register (0x0130 or its
-    /// name), state (SAFEOP) or fault name (link-open); several words are one name
+    /// name), state (SAFEOP), fault name (link-open) or topic (counter-guide, lamps, line-codes, located,
+    /// lost-links, running-errors, start-up-errors, two-counters); several words are one name
     #[arg(required = true, value_name = "CODE")]
     code: Vec<String>,
 }
@@ -71,6 +73,7 @@ fn pages(word: &str) -> Vec<Page> {
     pages.extend(state.map(page::state));
     pages.extend(fault.map(page::fault));
     pages.extend(named_register(word));
+    pages.extend(topic::find(word).map(|topic| page::topic(topic.text)));
     pages
 }
 

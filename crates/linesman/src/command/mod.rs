@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 pub(crate) mod completion;
+pub(crate) mod counters;
 pub(crate) mod demo;
 pub(crate) mod diagnose;
 pub(crate) mod driven;
@@ -8,11 +9,13 @@ pub(crate) mod explain;
 pub(crate) mod fault;
 pub(crate) mod foe;
 pub(crate) mod history;
+pub(crate) mod host;
 pub(crate) mod interfaces;
 pub(crate) mod lab;
 pub(crate) mod log;
 pub(crate) mod online;
 pub(crate) mod plan;
+pub(crate) mod probe;
 pub(crate) mod reg;
 pub(crate) mod run;
 pub(crate) mod scan;
@@ -39,6 +42,7 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::Plan(arguments) => plan::run(&arguments, output),
         Command::Scan(arguments) => scan::run(&arguments, output),
         Command::Diagnose(arguments) => diagnose::run(&arguments, output),
+        Command::Host(arguments) => host::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
         Command::Explain(arguments) => explain::run(&arguments, output),
         Command::Sim(arguments) => sim::run(&arguments, output),
@@ -48,6 +52,8 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::History(arguments) => history::run(&arguments, output),
         Command::Foe(arguments) => foe::run(&arguments, output),
         Command::Sii(arguments) => sii::run(&arguments, output),
+        Command::Counters(arguments) => counters::run(&arguments, output),
+        Command::Probe(arguments) => probe::run(&arguments, output),
         Command::Reg(arguments) => reg::run(&arguments, output),
         Command::Schema(arguments) => schema::run(&arguments, output),
         Command::Completion(arguments) => completion::run(&arguments, output),

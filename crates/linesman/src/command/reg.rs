@@ -1,5 +1,7 @@
 //! `linesman reg`: registers of a SubDevice's controller, and the memory behind them.
 
+mod dump;
+
 use linesman_maindevice::service::Service;
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::register::{by_name, describe, pieces};
@@ -38,6 +40,15 @@ enum Action {
         #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..=i64::from(MOST)))]
         len: Option<u16>,
     },
+    /// Read many, word by word: address, hexadecimal, decimal, text, name
+    Dump {
+        /// From where; a name will do, too
+        #[arg(long, default_value = "0x0000", value_parser = register)]
+        from: RegisterAddress,
+        /// How many bytes
+        #[arg(long, value_name = "BYTES", default_value_t = 0x0500, value_parser = clap::value_parser!(u16).range(2..=0x1000))]
+        len: u16,
+    },
     /// Write a register: at once, whatever it does
     Write {
         /// Its address (0x0010) or name (configured-station-alias)
@@ -71,7 +82,7 @@ pub(crate) struct Report {
     tool: String,
     /// Whose.
     device: DeviceReport,
-    /// `read` or `write`.
+    /// `read`, `dump` or `write`.
     action: String,
     /// Where the bytes begin.
     address: u16,
@@ -79,6 +90,8 @@ pub(crate) struct Report {
     bytes: String,
     /// What they say, register by register.
     registers: Vec<PieceReport>,
+    /// Of a dump: the same word by word.
+    words: Vec<dump::Word>,
 }
 
 /// Bytes of one register.
@@ -100,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     // A value that cannot be written is refused before anything is sent.
     let data = match &arguments.action {
         Action::Write { address, value, len } => Some(value_bytes(*address, value, *len)?),
-        Action::Read { .. } => None,
+        Action::Read { .. } | Action::Dump { .. } => None,
     };
     let mut session = Session::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
@@ -120,6 +133,24 @@ fn act(
             let len = len.unwrap_or_else(|| rest_of_register(*address));
             let address = *address;
             ("read", address, session.bytes(id, Service::ReadRegister { address, len })?)
+        }
+        (Action::Dump { from, len }, _) => {
+            let mut data = Vec::new();
+            while data.len() < usize::from(*len) {
+                let address = RegisterAddress(from.0.saturating_add(data.len() as u16));
+                let len = (*len - data.len() as u16).min(MOST / 2 * 2);
+                let part = session.bytes(id, Service::ReadRegister { address, len })?;
+                if part.is_empty() {
+                    break;
+                }
+                data.extend(part);
+            }
+            if !arguments.json {
+                output.line(&format!("{}:", session.label(id)));
+                output.text(&dump::text(&dump::words(*from, &data), output));
+                return Ok(());
+            }
+            ("dump", *from, data)
         }
         (Action::Write { address, .. }, data) => {
             let (address, data) = (*address, data.unwrap_or_default());
@@ -146,6 +177,7 @@ fn act(
         address: address.0,
         bytes: hex(&data),
         registers,
+        words: if action == "dump" { dump::words(address, &data) } else { Vec::new() },
     };
     if arguments.json {
         output.json(&report);

@@ -1,5 +1,6 @@
 //! `linesman scan`: which SubDevices there are and how they are wired.
 
+mod against;
 pub(crate) mod report;
 mod table;
 
@@ -34,6 +35,9 @@ pub(crate) struct Arguments {
     /// Write what was found as a project, to hold the line against later
     #[arg(long, value_name = "machine.toml")]
     save: Option<PathBuf>,
+    /// Hold what was found against this project: exit status 1 when it differs
+    #[arg(long, value_name = "machine.toml", conflicts_with = "save")]
+    against: Option<PathBuf>,
     /// Write a drawing of the line
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
@@ -54,6 +58,14 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     for path in [&arguments.save, &arguments.svg].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
     }
+    let planned = match &arguments.against {
+        Some(path) => {
+            let project = files::project(path)?;
+            let tree = project.tree().map_err(|error| files::in_file(path, &error))?;
+            Some((project, tree))
+        }
+        None => None,
+    };
     let scan = match &selector {
         Selector::Cards(names) => on_cards(names)?,
         Selector::Segment(path) => on_segment(path)?,
@@ -64,10 +76,15 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
     };
     let Scan { inventory, start } = &scan;
+    let against = planned.map(|(project, tree)| against::against(&project, &tree, inventory));
+    let is_as_planned = against.as_ref().is_none_or(against::Against::is_as_planned);
     if arguments.json {
-        output.json(&report::report(inventory, start.clone()));
+        output.json(&report::report(inventory, start.clone(), against));
     } else {
         output.text(&table::text(inventory, arguments.verbose, output));
+        if let Some(against) = &against {
+            output.text(&against.text(output));
+        }
     }
     if let Some(path) = &arguments.save {
         save(path, inventory)?;
@@ -79,7 +96,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         let drawing = drawing::file(&page::scene::of_scan(inventory));
         files::write_new(path, "the drawing", &drawing)?;
     }
-    Ok(Status::Good)
+    Ok(if is_as_planned { Status::Good } else { Status::Findings })
 }
 
 /// Scans the line on these cards: listens first, looks, then addresses and reads.

@@ -19,7 +19,7 @@ use super::log::LogReport;
 use super::plan::report::PlanReport;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
-use super::{foe, history, reg, service, sii, state};
+use super::{counters, foe, history, host, probe, reg, service, sii, state};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::output::Output;
@@ -75,6 +75,8 @@ pub(crate) enum Name {
     Service,
     /// `interfaces --json`
     Interfaces,
+    /// `host --json`
+    Host,
     /// `state --json`
     States,
     /// `sdo … read|write --json`
@@ -87,6 +89,10 @@ pub(crate) enum Name {
     File,
     /// `sii --json`
     Sii,
+    /// `counters --json`
+    Counters,
+    /// `probe --json`
+    Probe,
     /// `reg --json`
     Registers,
     /// What services print with --json when the SubDevice refuses
@@ -123,12 +129,15 @@ fn schema(name: Name) -> Schema {
         Name::ServiceRequest => schema_for!(linesman_runtime::service::message::Request),
         Name::Service => schema_for!(linesman_runtime::service::message::Answer),
         Name::Interfaces => schema_for!(interfaces::Report),
+        Name::Host => schema_for!(host::Report),
         Name::States => schema_for!(state::Report),
         Name::Sdo => schema_for!(ReadReport),
         Name::Objects => schema_for!(ListReport),
         Name::History => schema_for!(history::Report),
         Name::File => schema_for!(foe::Report),
         Name::Sii => schema_for!(sii::Report),
+        Name::Counters => schema_for!(counters::Report),
+        Name::Probe => schema_for!(probe::Report),
         Name::Registers => schema_for!(reg::Report),
         Name::Refusal => schema_for!(service::RefusalReport),
         Name::Error => schema_for!(ErrorReport),

@@ -9,6 +9,7 @@ use linesman_proto::ethernet::MacAddress;
 
 use super::ethtool::Ethtool;
 use super::netlink::{LinkRecord, Netlink};
+use crate::computer::DriverSettings;
 use crate::error::LinkError;
 
 /// A network interface as it is now.
@@ -232,6 +233,15 @@ pub fn find(name: &str) -> Result<Interface, LinkError> {
             Err(LinkError::Missing { interface: name.to_owned(), present })
         }
     }
+}
+
+/// What the driver of a card says of how it handles frames; nothing for a card that is not there.
+///
+/// # Errors
+/// When no socket can be had.
+pub fn driver_settings(name: &str) -> Result<DriverSettings, LinkError> {
+    let failed = |error| LinkError::all("asking drivers for their settings", error);
+    Ok(Ethtool::open().map_err(failed)?.settings(name))
 }
 
 fn describe(record: &LinkRecord<'_>) -> Interface {

@@ -10,9 +10,16 @@ use std::os::fd::{AsRawFd as _, OwnedFd};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, socket_with};
 
 use super::card::Duplex;
+use crate::computer::DriverSettings;
 
 const GET_DRIVER_INFO: u32 = 0x03;
 const GET_COALESCE: u32 = 0x0E;
+const GET_RING: u32 = 0x10;
+const GET_FLAGS: u32 = 0x25;
+const GET_GENERIC_RECEIVE_OFFLOAD: u32 = 0x2B;
+const GET_ENERGY_EFFICIENT: u32 = 0x44;
+/// Large receive offload in the word of flags.
+const FLAG_LARGE_RECEIVE_OFFLOAD: u32 = 1 << 15;
 const GET_LINK_SETTINGS: u32 = 0x4C;
 /// Words in front of the bit masks of link settings.
 const LINK_SETTINGS_WORDS: usize = 12;
@@ -77,10 +84,33 @@ impl Ethtool {
 
     /// How long the card waits before it reports a received frame, in µs.
     pub(super) fn receive_delay_us(&self, interface: &str) -> Option<u32> {
-        let mut coalesce = [0; 23];
-        coalesce[0] = GET_COALESCE;
-        self.query(interface, &mut coalesce).ok()?;
-        Some(coalesce[1])
+        Some(self.ask::<23>(interface, GET_COALESCE)?[1])
+    }
+
+    /// All that matters to frames in time.
+    pub(super) fn settings(&self, interface: &str) -> DriverSettings {
+        let coalesce = self.ask::<23>(interface, GET_COALESCE);
+        let ring = self.ask::<9>(interface, GET_RING);
+        let offload = self.ask::<2>(interface, GET_GENERIC_RECEIVE_OFFLOAD);
+        let flags = self.ask::<2>(interface, GET_FLAGS);
+        let energy = self.ask::<10>(interface, GET_ENERGY_EFFICIENT);
+        DriverSettings {
+            receive_delay_us: coalesce.map(|words| words[1]),
+            adaptive_receive_delay: coalesce.map(|words| words[10] != 0),
+            send_delay_us: coalesce.map(|words| words[5]),
+            generic_receive_offload: offload.map(|words| words[1] != 0),
+            large_receive_offload: flags.map(|words| words[1] & FLAG_LARGE_RECEIVE_OFFLOAD != 0),
+            energy_efficient: energy.map(|words| words[5] != 0),
+            receive_ring: ring.map(|words| (words[5], words[1])).filter(|(_, most)| *most > 0),
+        }
+    }
+
+    /// The words of the structure of a command; `None` where the driver does not know it.
+    fn ask<const N: usize>(&self, interface: &str, command: u32) -> Option<[u32; N]> {
+        let mut words = [0; N];
+        words[0] = command;
+        self.query(interface, &mut words).ok()?;
+        Some(words)
     }
 
     /// Has the driver fill `words`, whose first one is the command.

@@ -9,5 +9,5 @@ pub(crate) mod netlink;
 mod suitability;
 
 pub use card::{Duplex, Interface, InterfaceAddress, InterfaceKind, OperationalState};
-pub use card::{find, list};
+pub use card::{driver_settings, find, list};
 pub use suitability::{Assessment, Note, NoteWeight, Suitability};

@@ -441,6 +441,8 @@ pub(super) fn project(
             wanted.product_code = Some(image.identity.product_code);
             wanted.revision = Some(image.identity.revision);
         }
+        let written = file.devices.iter().find(|device| device.name == controller.name);
+        wanted.alias = written.and_then(|device| device.alias);
     }
     Ok(project)
 }

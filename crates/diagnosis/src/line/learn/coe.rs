@@ -1,63 +1,137 @@
-//! What mailboxes tell: the identity as the object dictionary has it (SDO uploads of 0x1018), and
-//! emergencies.
+//! What mailboxes tell: the identity as the object dictionary has it (SDO uploads of 0x1018), messages of
+//! the diagnosis history (0x10F3), emergencies, and how requests fare.
 
 use linesman_proto::address::DeviceId;
-use linesman_proto::mailbox::coe::sdo::Response;
+use linesman_proto::mailbox::coe::diagnosis::DiagnosisMessage;
+use linesman_proto::mailbox::coe::sdo::{Request, Response};
 use linesman_proto::mailbox::coe::{Emergency, Message, ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::error_reply::ErrorReply;
 use linesman_proto::mailbox::{Header, MailboxType};
 
 use super::Answer;
+use crate::line::mailbox::{HistoryMessage, Refusal};
 use crate::line::{Line, Seen};
+
+/// The diagnosis history.
+const HISTORY: ObjectIndex = ObjectIndex(0x10F3);
+/// Its first message.
+const FIRST_MESSAGE: u8 = 6;
 
 /// A mailbox was read, or another part of the process RAM.
 pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     let data = answer.reply.data();
     // Cheap checks first: this is asked of every read of process RAM.
-    let Ok(header) = Header::parse(data) else { return };
-    if header.kind != MailboxType::Coe {
-        return;
-    }
-    let end = HEADER_LEN + usize::from(header.length);
-    let Some(body) = data.get(HEADER_LEN..end) else { return };
-    match Message::parse(body) {
-        Ok(Message::SdoResponse(Response::Upload { object, complete: false, initial })) => {
-            identity(line, id, answer, object, initial.data());
-        }
-        // Other process data may begin like a message by chance; an emergency has one length only.
-        Ok(Message::Emergency(emergency)) if body.len() == EMERGENCY_LEN => {
-            let Some(device) = line.devices.get_mut(id.index()) else { return };
-            device.record_emergency(Seen::new(emergency, answer.at, Some(answer.frame)));
-            line.touch();
-        }
-        Ok(_) | Err(_) => {}
+    let Some((kind, body)) = message(data) else { return };
+    let (at, frame) = (answer.at, answer.frame);
+    let Some(device) = line.devices.get_mut(id.index()) else { return };
+    let news = match kind {
+        MailboxType::Error => match ErrorReply::parse(body) {
+            Ok(reply) if body.len() == ErrorReply::LEN => {
+                device.mailbox.answered(at, frame);
+                device.mailbox.refused(Refusal::Error(reply.code), at, frame);
+                true
+            }
+            Ok(_) | Err(_) => false,
+        },
+        MailboxType::Coe => match Message::parse(body) {
+            Ok(Message::SdoResponse(response)) => {
+                let mut news = device.mailbox.answered(at, frame);
+                if let Response::Upload { object, complete: false, initial } = response {
+                    news |= uploaded(line, id, answer, object, initial.data());
+                }
+                news
+            }
+            Ok(Message::Abort(abort)) => {
+                device.mailbox.answered(at, frame);
+                let refusal = Refusal::Abort { object: abort.object, code: abort.code };
+                device.mailbox.refused(refusal, at, frame);
+                true
+            }
+            // Other process data may begin like a message by chance; an emergency has one length only.
+            Ok(Message::Emergency(emergency)) if body.len() == EMERGENCY_LEN => {
+                device.record_emergency(Seen::new(emergency, at, Some(frame)));
+                true
+            }
+            Ok(_) | Err(_) => false,
+        },
+        MailboxType::Eoe
+        | MailboxType::Foe
+        | MailboxType::Soe
+        | MailboxType::Aoe
+        | MailboxType::Voe
+        | MailboxType::Reserved(_) => false,
+    };
+    if news {
+        line.touch();
     }
 }
 
-/// An object was read: the identity, perhaps.
-fn identity(
+/// A mailbox was written to, or another part of the process RAM; or was not, if `taken` is false.
+pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>, taken: bool) {
+    let Some((MailboxType::Coe, body)) = message(answer.written()) else { return };
+    let object = match Message::parse(body) {
+        Ok(Message::SdoRequest(
+            Request::Upload { object, .. } | Request::Download { object, .. },
+        )) => Some(object),
+        Ok(Message::SdoRequest(Request::UploadSegment { .. } | Request::DownloadSegment(_))) => {
+            None
+        }
+        Ok(_) | Err(_) => return,
+    };
+    let Some(device) = line.devices.get_mut(id.index()) else { return };
+    if taken {
+        device.mailbox.asked(object, answer.at, answer.frame);
+    } else {
+        device.mailbox.not_taken(answer.at, answer.frame);
+    }
+    // Whether it stays unanswered is told by time alone.
+    line.touch();
+}
+
+/// Kind and body of a mailbox message, if the bytes can be one.
+fn message(data: &[u8]) -> Option<(MailboxType, &[u8])> {
+    let header = Header::parse(data).ok()?;
+    let end = HEADER_LEN + usize::from(header.length);
+    Some((header.kind, data.get(HEADER_LEN..end)?))
+}
+
+/// An object was read: the identity, perhaps, or a message of the history. Says whether it is news.
+fn uploaded(
     line: &mut Line,
     id: DeviceId,
     answer: &Answer<'_>,
     object: ObjectAddress,
     data: &[u8],
-) {
-    let Some(bytes) = data.first_chunk() else { return };
-    if object.index != ObjectIndex::IDENTITY {
-        return;
+) -> bool {
+    let Some(device) = line.devices.get_mut(id.index()) else { return false };
+    if object.index == HISTORY && object.subindex >= FIRST_MESSAGE {
+        let Some(message) = DiagnosisMessage::parse(data) else { return false };
+        let message = HistoryMessage {
+            code: message.code,
+            severity: message.severity,
+            text: message.text,
+            time_ns: message.time_ns,
+            parameters: message.parameters.to_vec(),
+        };
+        return device.mailbox.note(message, answer.at, answer.frame);
     }
-    let Some(device) = line.devices.get_mut(id.index()) else { return };
+    let Some(bytes) = data.first_chunk() else { return false };
+    if object.index != ObjectIndex::IDENTITY {
+        return false;
+    }
     let seen = Some(Seen::new(u32::from_le_bytes(*bytes), answer.at, Some(answer.frame)));
     let field = match object.subindex {
         1 => &mut device.identity.vendor_id,
         2 => &mut device.identity.product_code,
         3 => &mut device.identity.revision,
         4 => &mut device.identity.serial,
-        _ => return,
+        _ => return false,
     };
-    if field.is_none() {
+    let is_new = field.is_none();
+    if is_new {
         *field = seen;
-        line.touch();
     }
+    is_new
 }
 
 const HEADER_LEN: usize = 6;

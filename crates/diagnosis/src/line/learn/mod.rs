@@ -47,6 +47,8 @@ struct Answer<'a> {
     is_last: bool,
     /// Whether positions can be counted: there is but one copy.
     is_single: bool,
+    /// When the request went out, where it was seen.
+    sent_at: Option<Instant>,
     at: Instant,
     frame: u64,
 }
@@ -132,6 +134,7 @@ impl Learner {
                 sum,
                 is_last: exchange.is_last,
                 is_single: exchange.is_last && exchange.earlier.is_empty(),
+                sent_at: exchange.request.map(|request| request.time),
                 at: reply.time,
                 frame: reply.number,
             };
@@ -202,7 +205,8 @@ impl Learner {
         };
         let news = cyclic.record(seen, is_wanted);
         let is_expected = cyclic.highest.value > 0;
-        if news {
+        let sent_off = answer.sent_at.is_some_and(|at| cyclic.sent.tick(at));
+        if news | sent_off | cyclic.returned.tick(answer.at) {
             line.touch();
         }
         is_expected
@@ -271,6 +275,14 @@ impl Learner {
             return;
         }
         if answer.sum == 0 {
+            if answer.is_last && answer.ado >= FIRST_RAM && answer.effect.writes {
+                coe::written(line, id, answer, false);
+                return;
+            }
+            if answer.ado >= FIRST_RAM && answer.effect.reads {
+                device.mailbox.polled = Some(answer.at);
+                return;
+            }
             if answer.is_last && answer.ado < FIRST_OPTIONAL && device.answered.is_some() {
                 let is_news = device.silent.is_none();
                 device.is_silent(answer.at, Some(answer.frame));
@@ -292,6 +304,8 @@ impl Learner {
         if answer.ado >= FIRST_RAM {
             if answer.effect.reads {
                 coe::read(line, id, answer);
+            } else if answer.effect.writes {
+                coe::written(line, id, answer, true);
             }
             return;
         }
@@ -325,6 +339,19 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
             traffic.first_unanswered.get_or_insert(seen);
         }
         let addressing = datagram.command().map(Command::addressing);
+        if addressing == Some(Addressing::Logical) {
+            let (start, len) = (datagram.logical(), datagram.data_len() as u16);
+            let same = |cyclic: &&mut Cyclic| {
+                cyclic.start == start
+                    && cyclic.len == len
+                    && Some(cyclic.command) == datagram.command()
+            };
+            if let Some(cyclic) = line.cyclic.iter_mut().find(same) {
+                cyclic.sent.tick(request.time);
+                cyclic.returned.skip();
+            }
+        }
+        let traffic = &mut line.traffic;
         if matches!(addressing, Some(Addressing::Station | Addressing::Logical)) {
             traffic.lost_addressed += 1;
         }

@@ -4,6 +4,7 @@ use linesman_proto::address::{DeviceId, RegisterAddress, StationAlias};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
     AlControl, AlStatus, ClearGroup, DlStatus, ErrorCounters, FmmuConfig, PortState,
+    WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::DcTime32;
@@ -19,6 +20,12 @@ const AL_STATUS_CODE: u16 = 0x0134;
 const COUNTERS: std::ops::Range<u16> = 0x0300..0x0314;
 const FMMUS: std::ops::Range<u16> = 0x0600..0x0700;
 const RECEIVE_TIMES: u16 = 0x0900;
+/// Activation of cyclic operation and SYNC signals; bit 0 switches them on, bits 1 and 2 choose them.
+const SYNC_ACTIVATION: u16 = 0x0981;
+/// Status of SyncManager 1, which holds the answers of the mailbox.
+const MAILBOX_IN_STATUS: u16 = 0x080D;
+const WATCHDOG_DIVIDER: u16 = 0x0400;
+const WATCHDOG_TIME: u16 = 0x0420;
 
 /// One controller's registers were read.
 pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
@@ -45,6 +52,10 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         }
         let Some(device) = line.device_mut(id) else { return };
         news |= device.counters.record(start, data, at, frame);
+    } else if start.0 <= WATCHDOG_TIME {
+        watchdog(device, data, start);
+    } else if part(data, start, MAILBOX_IN_STATUS, 1).is_some() {
+        device.mailbox.polled = Some(at);
     } else if start.0 == RECEIVE_TIMES
         && let Some(times) = part(data, start, RECEIVE_TIMES, 16)
     {
@@ -117,6 +128,12 @@ fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
             .record_request(control, Seen::new(control.requested(), answer.at, Some(answer.frame)));
         return true;
     }
+    if let Some(activation) = part(data, start, SYNC_ACTIVATION, 1) {
+        let is_on = activation[0] & 1 != 0 && activation[0] & 0b110 != 0;
+        device.sync_on = Some(Seen::new(is_on, answer.at, Some(answer.frame)));
+        return true;
+    }
+    watchdog(device, data, start);
     if touches(start, data, COUNTERS) {
         for group in ClearGroup::ALL {
             let is_hit = (0..data.len() as u16).any(|offset| {
@@ -129,6 +146,16 @@ fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
         }
     }
     false
+}
+
+/// The watchdog's registers were read or written.
+fn watchdog(device: &mut Device, data: &[u8], start: RegisterAddress) {
+    if let Some(divider) = word_at(data, start, WATCHDOG_DIVIDER) {
+        device.watchdog.divider = WatchdogDivider(divider);
+    }
+    if let Some(time) = word_at(data, start, WATCHDOG_TIME) {
+        device.watchdog.time = WatchdogTime(time);
+    }
 }
 
 fn write_fmmus(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {

@@ -105,6 +105,16 @@ pub(super) fn finding(page: &RulePage) -> Page {
     result
 }
 
+/// A page about a topic of the guide.
+pub(super) fn topic(text: &str) -> Page {
+    let (title, rest) = text.split_once('\n').unwrap_or((text, ""));
+    let mut page = Page::new(title.trim_start_matches("# ").to_owned());
+    for line in rest.trim().lines() {
+        page.parts.push(Part::Line(line.to_owned()));
+    }
+    page
+}
+
 /// A page about an AL status code.
 pub(super) fn status(code: AlStatusCode) -> Page {
     let entry = code.explain();

@@ -7,6 +7,7 @@ use linesman_proto::port::Port;
 use linesman_proto::topology::End;
 use serde::Serialize;
 
+use super::against::Against;
 use crate::version;
 
 /// A scan.
@@ -23,6 +24,8 @@ pub(crate) struct Scan {
     networks: u32,
     /// The SubDevices, by number.
     devices: Vec<Device>,
+    /// How that compares with what was planned; `null` without `--against`.
+    against: Option<Against>,
 }
 
 /// A SubDevice.
@@ -78,13 +81,18 @@ struct PortReport {
 }
 
 /// The report of an inventory.
-pub(super) fn report(inventory: &Inventory, start: Option<String>) -> Scan {
+pub(super) fn report(
+    inventory: &Inventory,
+    start: Option<String>,
+    against: Option<Against>,
+) -> Scan {
     Scan {
         schema: "linesman.scan/1".to_owned(),
         tool: version::tool(),
         start,
         networks: 1,
         devices: inventory.devices.iter().map(|found| device(inventory, found)).collect(),
+        against,
     }
 }
 

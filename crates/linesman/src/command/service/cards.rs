@@ -12,7 +12,6 @@ use linesman_proto::time::{Instant, Span};
 use linesman_runtime::drive::{Audience, Driver};
 use linesman_runtime::stop::Stop;
 
-use super::known::{self, Known};
 use super::{Line, NotDone};
 use crate::command::driven;
 use crate::failure::Failure;
@@ -31,7 +30,7 @@ pub(super) struct Cards {
 }
 
 /// Opens and scans the line.
-pub(super) fn open(names: &[String]) -> Result<(Cards, Vec<Known>), Failure> {
+pub(super) fn open(names: &[String]) -> Result<(Cards, Inventory), Failure> {
     driven::refuse(names)?;
     let stop = driven::stop()?;
     let driver = Driver::open(names, HostClock::start())?;
@@ -47,7 +46,7 @@ pub(super) fn open(names: &[String]) -> Result<(Cards, Vec<Known>), Failure> {
         None => return Err(cards.interrupted()),
     };
     cards.asking.order = Some(Order::Attend(Box::new(super::plan(&inventory))));
-    Ok((cards, known::all(&inventory, &[])))
+    Ok((cards, inventory))
 }
 
 impl Cards {
@@ -74,6 +73,11 @@ impl Line for Cards {
         self.run(SERVICE_PATIENCE)?;
         let served = self.asking.served.take().ok_or_else(|| self.interrupted())?;
         Ok(served.map_err(|failure| NotDone::from(&failure)))
+    }
+
+    fn wait(&mut self, span: Span) -> Result<bool, Failure> {
+        self.run(span)?;
+        Ok(!self.stop.is_set())
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {

@@ -11,8 +11,9 @@ mod socket;
 use linesman_config::inventory::{FoundDevice, Inventory};
 use linesman_config::plan::{DevicePlan, Plan, PlanOptions};
 use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer, ServiceFailure};
-use linesman_proto::address::DeviceId;
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
 use linesman_runtime::selector::Selector;
 use serde::Serialize;
 
@@ -43,6 +44,8 @@ pub(crate) trait Line {
         id: DeviceId,
         service: Service,
     ) -> Result<Result<ServiceAnswer, NotDone>, Failure>;
+    /// Lets time pass. `false` when the user ended it.
+    fn wait(&mut self, span: Span) -> Result<bool, Failure>;
     /// Emergencies that SubDevices sent meanwhile, in words.
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)>;
 }
@@ -68,6 +71,7 @@ pub(crate) struct Session {
     devices: Vec<Known>,
     place: String,
     kind: Kind,
+    inventory: Option<Inventory>,
 }
 
 /// What becomes of a line when the command ends.
@@ -126,17 +130,18 @@ impl Session {
         if socket::is_one(place) {
             let (line, devices) = socket::open(place)?;
             let line = Box::new(line);
-            return Ok(Self { line, devices, place: place.to_owned(), kind: Kind::Driven });
+            let (place, kind) = (place.to_owned(), Kind::Driven);
+            return Ok(Self { line, devices, place, kind, inventory: None });
         }
         let selector: Selector = place.parse()?;
-        let (line, devices, kind): (Box<dyn Line>, _, _) = match &selector {
+        let (line, devices, kind, inventory): (Box<dyn Line>, _, _, _) = match &selector {
             Selector::Cards(names) => {
-                let (line, devices) = cards::open(names)?;
-                (Box::new(line), devices, Kind::Cards)
+                let (line, inventory) = cards::open(names)?;
+                (Box::new(line), known::all(&inventory, &[]), Kind::Cards, inventory)
             }
             Selector::Segment(path) => {
-                let (line, devices) = segment::open(path)?;
-                (Box::new(line), devices, Kind::Passing)
+                let (line, inventory, names) = segment::open(path)?;
+                (Box::new(line), known::all(&inventory, &names), Kind::Passing, inventory)
             }
             Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
                 let reason =
@@ -144,12 +149,40 @@ impl Session {
                 return Err(Failure::new(reason, "name a network card, or sim:plant.toml"));
             }
         };
-        Ok(Self { line, devices, place: place.to_owned(), kind })
+        Ok(Self { line, devices, place: place.to_owned(), kind, inventory: Some(inventory) })
     }
 
     /// Whether what is written is gone when the command ends.
     pub(crate) fn is_passing(&self) -> bool {
         self.kind == Kind::Passing
+    }
+
+    /// What the scan found; `None` of a line that another process drives.
+    pub(crate) const fn inventory(&self) -> Option<&Inventory> {
+        self.inventory.as_ref()
+    }
+
+    /// What the line was called.
+    pub(crate) fn place(&self) -> &str {
+        &self.place
+    }
+
+    /// Lets time pass. `false` when the user ended it.
+    pub(crate) fn wait(&mut self, span: Span) -> Result<bool, Failure> {
+        self.line.wait(span)
+    }
+
+    /// Reads registers; `None` when nothing came back.
+    pub(crate) fn try_read(
+        &mut self,
+        id: DeviceId,
+        address: RegisterAddress,
+        len: u16,
+    ) -> Result<Option<Vec<u8>>, Failure> {
+        match self.line.ask(id, Service::ReadRegister { address, len })? {
+            Ok(ServiceAnswer::Data(data)) => Ok(Some(data)),
+            Ok(_) | Err(_) => Ok(None),
+        }
     }
 
     /// All SubDevices.

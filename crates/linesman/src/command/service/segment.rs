@@ -10,7 +10,6 @@ use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
 
-use super::known::{self, Known};
 use super::{Line, NotDone};
 use crate::command::driven;
 use crate::failure::Failure;
@@ -33,7 +32,7 @@ pub(super) struct Virtual {
 }
 
 /// Builds and scans the segment.
-pub(super) fn open(path: &Path) -> Result<(Virtual, Vec<Known>), Failure> {
+pub(super) fn open(path: &Path) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
     let file = files::segment_file(path)?;
     let options = LabOptions { begin: Begin::Idle, ..LabOptions::default() };
     let lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
@@ -53,7 +52,7 @@ pub(super) fn open(path: &Path) -> Result<(Virtual, Vec<Known>), Failure> {
     let now = segment.lab.now();
     segment.lab.main_mut().attend(now, super::plan(&inventory));
     let names = names(&segment.lab, &inventory);
-    Ok((segment, known::all(&inventory, &names)))
+    Ok((segment, inventory, names))
 }
 
 /// The names of the file, if the line is as the file says: else they would be those of others.
@@ -112,6 +111,12 @@ impl Line for Virtual {
                 None
             }
         })
+    }
+
+    fn wait(&mut self, span: Span) -> Result<bool, Failure> {
+        let run = self.lab.run_while(span, STEP, |_| false);
+        run.map_err(|error| files::in_file(&self.path, &error))?;
+        Ok(true)
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {

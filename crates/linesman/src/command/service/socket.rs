@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
+use linesman_proto::time::Span;
 use linesman_runtime::service;
 
 use super::known::Known;
@@ -56,6 +57,11 @@ impl Line for Driven {
         Ok(answer
             .given()
             .map_err(|(why, refusal)| NotDone { told: Failure::from_text(&why), refusal }))
+    }
+
+    fn wait(&mut self, span: Span) -> Result<bool, Failure> {
+        std::thread::sleep(std::time::Duration::from_nanos(span.as_nanos()));
+        Ok(true)
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {

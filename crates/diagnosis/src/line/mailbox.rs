@@ -1,0 +1,130 @@
+//! What went through the mailbox of one controller, as far as it tells of trouble.
+
+use std::collections::VecDeque;
+
+use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::mailbox::coe::diagnosis::Severity;
+use linesman_proto::mailbox::error_reply::ErrorReplyCode;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Seen, push_kept};
+
+/// From so long on an answer is slow. SubDevices answer within some ms; MainDevices wait some seconds.
+pub const SLOW: Span = Span::ms(300);
+
+/// A mailbox over time.
+#[derive(Clone, Default, Debug)]
+pub struct MailboxHistory {
+    /// The request that was taken and is not answered yet, by its object, where it names one.
+    pub waiting: Option<Seen<Option<ObjectAddress>>>,
+    /// When somebody last looked for an answer.
+    pub polled: Option<Instant>,
+    /// Since when, and until when, requests are not taken; `None` when the latest one was.
+    pub full: Option<(Seen<()>, Instant)>,
+    /// Stretches of time without an answer, or without a request being taken, that are over: from, to.
+    pub stuck: VecDeque<(Instant, Instant)>,
+    /// Requests that were refused, oldest first.
+    pub refusals: VecDeque<Seen<Refusal>>,
+    /// Answers that came late, oldest first.
+    pub slow: VecDeque<Seen<SlowAnswer>>,
+    /// Messages of the diagnosis history (object 0x10F3) in the order in which they were read.
+    pub messages: VecDeque<Seen<HistoryMessage>>,
+}
+
+/// A request that a SubDevice refused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Refusal {
+    /// An SDO was aborted.
+    Abort {
+        /// Of this object.
+        object: ObjectAddress,
+        /// With this code.
+        code: u32,
+    },
+    /// The mailbox itself answered with an error.
+    Error(ErrorReplyCode),
+}
+
+/// An answer that came late.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SlowAnswer {
+    /// What was asked for, where the request names an object.
+    pub object: Option<ObjectAddress>,
+    /// When it was asked.
+    pub asked: Instant,
+}
+
+/// A message of a diagnosis history.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct HistoryMessage {
+    /// The code.
+    pub code: u32,
+    /// How serious the SubDevice takes it.
+    pub severity: Severity,
+    /// Number of the text in its description.
+    pub text: u16,
+    /// When it happened by the SubDevice's clock, in ns; 0 when it has none.
+    pub time_ns: u64,
+    /// The parameters as they were sent.
+    pub parameters: Vec<u8>,
+}
+
+impl MailboxHistory {
+    /// A request was taken.
+    pub fn asked(&mut self, object: Option<ObjectAddress>, at: Instant, frame: u64) {
+        if let Some((since, until)) = self.full.take() {
+            self.note_stuck(since.at, until.max(at));
+        }
+        if let Some(waiting) = self.waiting.replace(Seen::new(object, at, Some(frame))) {
+            self.note_stuck(waiting.at, at);
+        }
+    }
+
+    /// A request was not taken: the one before is still in the mailbox.
+    pub fn not_taken(&mut self, at: Instant, frame: u64) {
+        match &mut self.full {
+            Some((_, until)) => *until = at,
+            None => self.full = Some((Seen::new((), at, Some(frame)), at)),
+        }
+    }
+
+    /// An answer came. Says whether it was slow.
+    pub fn answered(&mut self, at: Instant, frame: u64) -> bool {
+        let Some(waiting) = self.waiting.take() else { return false };
+        if at.since(waiting.at) < SLOW {
+            return false;
+        }
+        let slow = SlowAnswer { object: waiting.value, asked: waiting.at };
+        push_kept(&mut self.slow, Seen::new(slow, at, Some(frame)));
+        true
+    }
+
+    /// Whether time alone may show that it is stuck.
+    #[must_use]
+    pub const fn is_open(&self) -> bool {
+        self.waiting.is_some() || self.full.is_some()
+    }
+
+    /// A request was refused.
+    pub fn refused(&mut self, refusal: Refusal, at: Instant, frame: u64) {
+        push_kept(&mut self.refusals, Seen::new(refusal, at, Some(frame)));
+    }
+
+    /// A message of the diagnosis history was read. Says whether it is new.
+    pub fn note(&mut self, message: HistoryMessage, at: Instant, frame: u64) -> bool {
+        if self.messages.iter().any(|known| known.value == message) {
+            return false;
+        }
+        push_kept(&mut self.messages, Seen::new(message, at, Some(frame)));
+        true
+    }
+
+    fn note_stuck(&mut self, from: Instant, to: Instant) {
+        if to.since(from) >= STUCK {
+            push_kept(&mut self.stuck, (from, to));
+        }
+    }
+}
+
+/// A request that is not taken, or not answered, for so long: the mailbox is stuck.
+pub const STUCK: Span = Span::ms(900);

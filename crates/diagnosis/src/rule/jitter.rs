@@ -1,0 +1,189 @@
+//! # Jitter against the cycle
+//!
+//! Process data are sent, or come back, unevenly.
+//!
+//! **How it is found.** The usual interval between two frames with the same process data is the cycle. An
+//! interval that is 20 % of the cycle too long or too short is doubtful, 30 % are bad (S0, runtime
+//! errors). Several within ten seconds are the finding. Where all frames leave evenly and come back
+//! unevenly, they were late behind the point of observation: in a queue, in the card.
+//!
+//! **What it means.** A SubDevice that works in step with its SYNC signal needs its outputs before the
+//! signal, in every cycle. Frames that come later than the shift allows are missed: the SubDevice counts
+//! them (0x1C32:0B) and, after some, leaves OP with a synchronisation error. As long as no SYNC signal was
+//! seen being switched on (0x0981), jitter makes outputs uneven and does no other harm: no finding.
+//!
+//! **What to do.** `linesman host --measure 10` tells how late this computer begins its cycles, and what to
+//! change. Then lengthen the cycle, or move the shift of the SYNC signal away from the frame.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::time::{Instant, Span};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::{Beat, Cyclic, Device, Off};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "T410",
+    name: "jitter",
+    severity: Severity::Warning,
+    class: Class::Timing,
+    source: include_str!("jitter.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// How much jitter is too much.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub enum Verdict {
+    /// 20 % of the cycle and more: synchronisation may be lost.
+    Doubtful,
+    /// 30 % of the cycle and more: synchronisation errors are likely.
+    Bad,
+}
+
+impl Verdict {
+    const DOUBTFUL_PERCENT: u64 = 20;
+    const BAD_PERCENT: u64 = 30;
+
+    /// The verdict on a deviation; `None` where it does no harm.
+    #[must_use]
+    pub const fn of(deviation: Span, cycle: Span) -> Option<Self> {
+        let (by, of) = (deviation.as_nanos() as u128 * 100, cycle.as_nanos() as u128);
+        if by >= of * Self::BAD_PERCENT as u128 {
+            Some(Self::Bad)
+        } else if by >= of * Self::DOUBTFUL_PERCENT as u128 {
+            Some(Self::Doubtful)
+        } else {
+            None
+        }
+    }
+
+    /// From where on it is bad.
+    #[must_use]
+    pub const fn bad_from(cycle: Span) -> Span {
+        Span::ns(cycle.as_nanos() / 100 * Self::BAD_PERCENT)
+    }
+}
+
+/// One late frame makes two uneven intervals; a single one is no matter.
+const OFTEN: usize = 3;
+/// What lies closer together belongs together.
+const TOGETHER: Span = Span::s(10);
+/// What did not come again for this long is over.
+const QUIET: Span = Span::s(2);
+
+/// The latest stretch of uneven intervals.
+struct Spell<'a> {
+    cyclic: &'a Cyclic,
+    cycle: Span,
+    /// Whether the frames left unevenly already.
+    at_sending: bool,
+    off: Vec<Off>,
+}
+
+impl Spell<'_> {
+    fn worst(&self) -> Span {
+        self.off.iter().map(|off| off.by).max().unwrap_or(Span::ZERO)
+    }
+
+    fn verdict(&self) -> Option<Verdict> {
+        let bad =
+            self.off.iter().filter(|off| Verdict::of(off.by, self.cycle) == Some(Verdict::Bad));
+        if bad.count() >= OFTEN {
+            Some(Verdict::Bad)
+        } else {
+            Verdict::of(self.worst(), self.cycle)
+        }
+    }
+}
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let spells = view.line.cyclic.iter().filter_map(spell);
+    let worst = spells.max_by_key(|spell| spell.worst());
+    let Some(spell) = worst else { return };
+    let (Some(first), Some(last)) = (spell.off.first(), spell.off.last()) else { return };
+    let has_sync = |device: &&Device| device.sync_on.is_some_and(|on| on.value);
+    let in_step: Vec<&Device> = view.line.devices.iter().filter(has_sync).collect();
+    if in_step.is_empty() {
+        // Whoever runs free takes outputs when they come.
+        return;
+    }
+    let severity = match spell.verdict() {
+        Some(Verdict::Doubtful) => Severity::Warning,
+        Some(Verdict::Bad) => Severity::Error,
+        None => return,
+    };
+    let (cause, other) = if spell.at_sending {
+        (FaultName::HostJitter, FaultName::LateFrames)
+    } else {
+        (FaultName::LateFrames, FaultName::HostJitter)
+    };
+    let mut condition = Condition::new(&PAGE, Place::Host, cause, first.at)
+        .confidence(if spell.at_sending { 0.7 } else { 0.6 })
+        .or(other, 0.25)
+        .confirmed(spell.off[OFTEN - 1].at)
+        .shown_by(evidence(&spell, last.at, in_step.len()))
+        .explaining(in_step.iter().map(|device| Symptom::StateLost(device.id)))
+        .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
+        .advise("Lengthen the cycle, or move the shift of the SYNC signal away from the frame.");
+    condition.severity = severity;
+    if last.at + QUIET < view.line.now {
+        condition = condition.ended(last.at);
+    }
+    conditions.push(condition);
+}
+
+/// The latest spell of a datagram: of its sending, else of its return.
+fn spell(cyclic: &Cyclic) -> Option<Spell<'_>> {
+    let of = |beat: &Beat, at_sending| {
+        let cycle = beat.cycle()?;
+        let mut off: Vec<Off> = Vec::new();
+        for one in beat.off.iter().rev() {
+            if off.last().is_some_and(|later| later.at.since(one.at) > TOGETHER) {
+                break;
+            }
+            off.push(*one);
+        }
+        off.reverse();
+        (off.len() >= OFTEN).then_some(Spell { cyclic, cycle, at_sending, off })
+    };
+    of(&cyclic.sent, true).or_else(|| of(&cyclic.returned, false))
+}
+
+fn evidence(spell: &Spell<'_>, at: Instant, in_step: usize) -> Evidence {
+    let ms = |span: Span| span.as_nanos() as f64 / 1e6;
+    let worst = spell.worst();
+    let percent = worst.as_nanos() as f64 * 100.0 / spell.cycle.as_nanos() as f64;
+    let what = if spell.at_sending { "were sent" } else { "came back" };
+    let whom = match in_step {
+        1 => "one SubDevice works in step with a SYNC signal".to_owned(),
+        count => format!("{count} SubDevices work in step with SYNC signals"),
+    };
+    let text = format!(
+        "process data at {} {what} unevenly {} times: by {:.3} ms of a cycle of {:.3} ms at most, that is \
+         {percent:.0} %; {whom}",
+        spell.cyclic.start,
+        spell.off.len(),
+        ms(worst),
+        ms(spell.cycle)
+    );
+    Evidence::host(Some(at), text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // proves: SYN-31 partial: the limits themselves
+    #[test]
+    fn limits_are_20_and_30_percent_of_the_cycle() {
+        let of = |us| Verdict::of(Span::us(us), Span::ms(2));
+        assert_eq!(of(399), None);
+        assert_eq!(of(400), Some(Verdict::Doubtful));
+        assert_eq!(of(599), Some(Verdict::Doubtful));
+        assert_eq!(of(600), Some(Verdict::Bad));
+        assert_eq!(Verdict::bad_from(Span::ms(2)), Span::us(600));
+    }
+}

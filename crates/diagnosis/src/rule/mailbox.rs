@@ -1,0 +1,179 @@
+//! # Mailbox errors
+//!
+//! A SubDevice refuses requests to its mailbox, answers them late, or not at all.
+//!
+//! **How it is found.** Requests and answers are seen in the mailbox areas behind 0x1000. `S250`: an SDO is
+//! aborted, or the mailbox answers with an error of its own. `S251`: an answer came 300 ms or longer after
+//! its request. `S252`: for nearly a second a request is not taken (working counter 0: the one before is
+//! still in the mailbox), or it is taken and the MainDevice looks for the answer in vain, while the controller answers as always.
+//!
+//! **What it means.** The mailbox is served by another part of the firmware than process data and states:
+//! errors in it leave the state machine alone (S0 L2399), and a SubDevice with a stuck mailbox may run on in
+//! OP. An abort says that a request does not suit an object: another index than the device has, a
+//! value out of range, a write in the wrong state. That an object is not there is asked for by many
+//! tools on purpose and is no finding.
+//!
+//! **What to do.** Look the code up with `linesman explain`. Of a slow or stuck mailbox: ask less often, and
+//! one at a time; look for a second tool that uses the same mailbox; read the diagnosis history; then new
+//! firmware. Power off and on frees a stuck mailbox.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::mailbox::abort_code::SdoAbortCode;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::mailbox::{Refusal, STUCK};
+use crate::line::{Device, Line, Seen};
+
+/// Requests are refused.
+pub const REFUSED: RulePage = RulePage {
+    code: "S250",
+    name: "mailbox-refusal",
+    severity: Severity::Warning,
+    class: Class::Software,
+    source: include_str!("mailbox.rs"),
+};
+
+/// Answers are late.
+pub const SLOW: RulePage = RulePage {
+    code: "S251",
+    name: "mailbox-slow",
+    severity: Severity::Warning,
+    class: Class::Software,
+    source: include_str!("mailbox.rs"),
+};
+
+/// Nothing is taken, or nothing comes back.
+pub const STUCK_PAGE: RulePage = RulePage {
+    code: "S252",
+    name: "mailbox-stuck",
+    severity: Severity::Warning,
+    class: Class::Software,
+    source: include_str!("mailbox.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[REFUSED, SLOW, STUCK_PAGE], judge };
+
+/// What did not come again for this long is over.
+const QUIET: Span = Span::s(2);
+/// Shown of many.
+const SHOWN: usize = 3;
+/// Aborts by which a tool finds out what a SubDevice has: no such object, no such entry, complete access not
+/// supported.
+const ASKING: [u32; 3] = [0x0602_0000, 0x0609_0011, 0x0601_0004];
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    for device in &view.line.devices {
+        conditions.extend(refused(view.line, device));
+        conditions.extend(slow(view.line, device));
+        conditions.extend(stuck(view, device));
+    }
+}
+
+fn refused(line: &Line, device: &Device) -> Option<Condition> {
+    let counts = |seen: &&Seen<Refusal>| !matches!(seen.value, Refusal::Abort { code, .. } if ASKING.contains(&code));
+    let all: Vec<_> = device.mailbox.refusals.iter().filter(counts).collect();
+    let (first, last) = (all.first()?, all.last()?);
+    let mut condition = begin(line, device, &REFUSED, FaultName::MailboxError, first.at, last.at)
+        .confidence(0.8)
+        .or(FaultName::ConfigMismatch, 0.15);
+    if all.iter().all(|seen| matches!(seen.value, Refusal::Abort { .. })) {
+        // The mailbox works; what was asked for did not suit.
+        condition.severity = Severity::Info;
+    }
+    let label = line.label(device.id);
+    for seen in all.iter().rev().take(SHOWN) {
+        let text = match seen.value {
+            Refusal::Abort { object, code } => {
+                format!("SubDevice {label} aborts {object}: {}", SdoAbortCode(code))
+            }
+            Refusal::Error(code) => {
+                format!("the mailbox of SubDevice {label} answers with error {code}")
+            }
+        };
+        condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
+    }
+    if let Some(Refusal::Abort { code, .. }) = all.last().map(|seen| seen.value) {
+        condition = condition.advise(SdoAbortCode(code).explain().action);
+    }
+    Some(
+        condition
+            .advise("Its state and its process data are not concerned; look at the request first."),
+    )
+}
+
+fn slow(line: &Line, device: &Device) -> Option<Condition> {
+    let all = &device.mailbox.slow;
+    let (first, last) = (all.front()?, all.back()?);
+    let since = first.value.asked;
+    let mut condition = begin(line, device, &SLOW, FaultName::MailboxSlow, since, last.at)
+        .confidence(0.7)
+        .or(FaultName::FirmwareFault, 0.2);
+    for seen in all.iter().rev().take(SHOWN) {
+        let ms = seen.at.since(seen.value.asked).as_nanos() / 1_000_000;
+        let what = seen.value.object.map_or_else(String::new, |object| format!(" to {object}"));
+        let text =
+            format!("SubDevice {} answers a request{what} after {ms} ms", line.label(device.id));
+        condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
+    }
+    Some(
+        condition
+            .advise("Ask this SubDevice less often, and one request at a time.")
+            .advise("Allow a longer time for its answers."),
+    )
+}
+
+fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
+    let mailbox = &device.mailbox;
+    // Who does not answer at all is the matter of other rules.
+    if device.silent.is_some() {
+        return None;
+    }
+    let waiting = mailbox
+        .waiting
+        .zip(mailbox.polled)
+        .map(|(waiting, polled)| (waiting.at, polled, waiting.frame))
+        .filter(|(from, to, _)| to.since(*from) >= STUCK);
+    let full = mailbox
+        .full
+        .map(|(since, until)| (since.at, until, since.frame))
+        .filter(|(from, to, _)| to.since(*from) >= STUCK);
+    let over = mailbox.stuck.back().map(|(from, to)| (*from, *to, None));
+    let (since, until, frame) = full.or(waiting).or(over)?;
+    let label = view.line.label(device.id);
+    let ms = until.since(since).as_nanos() / 1_000_000;
+    let text = if full.is_some() {
+        format!("SubDevice {label} takes no request out of its mailbox for {ms} ms")
+    } else {
+        format!("SubDevice {label} has not answered a request for {ms} ms; its controller answers")
+    };
+    let place = Place::device(view.line.network, device.id);
+    let mut condition = Condition::new(&STUCK_PAGE, place, FaultName::MailboxStuck, since)
+        .confidence(0.7)
+        .or(FaultName::FirmwareFault, 0.2)
+        .confirmed(since + STUCK)
+        .about([Symptom::Silent(device.id)])
+        .shown_by(Evidence::frame(since, frame.unwrap_or(0), text))
+        .advise("Look for another tool that uses the mailbox of this SubDevice.")
+        .advise("Power it off and on; its process data ran on meanwhile.")
+        .advise("Ask its maker for newer firmware.");
+    if full.or(waiting).is_none() {
+        condition = condition.ended(until);
+    }
+    Some(condition)
+}
+
+fn begin(
+    line: &Line,
+    device: &Device,
+    page: &'static RulePage,
+    cause: FaultName,
+    first: Instant,
+    last: Instant,
+) -> Condition {
+    let place = Place::device(line.network, device.id);
+    let condition = Condition::new(page, place, cause, first).confirmed(first);
+    if last + QUIET < line.now { condition.ended(last) } else { condition }
+}

@@ -1,0 +1,142 @@
+//! # No outputs for longer than a watchdog holds
+//!
+//! The MainDevice's side stopped sending process data, and watchdogs expired.
+//!
+//! **How it is found.** A SubDevice left OP with AL status code 0x001B. Right before, the datagrams with its
+//! outputs paused for as long as its watchdog (0x0400, 0x0420; 100 ms after a reset) or longer. Either none
+//! was sent in that time, or the card did not take them. If they were sent and did not come back, the line
+//! is to blame: then this rule says nothing, and findings about links and damage do.
+//!
+//! **What it means.** The application, or the program that sends, stood still: a long call within the cycle
+//! (an SDO, a file, a print), a garbage collector, a debugger, a process without real-time priority, a
+//! virtual machine whose host was busy. The SubDevices are well, and did what they should.
+//!
+//! **What to do.** Keep mailbox and files out of the cyclic thread; give it real-time priority
+//! (`linesman host` tells what is missing). Only then think of a longer watchdog: it is what keeps a
+//! machine safe while nobody controls it.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::state::AlStatusCode;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::{AlError, Beat, Device, Line, Pause};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "X513",
+    name: "outputs-paused",
+    severity: Severity::Error,
+    class: Class::Host,
+    source: include_str!("paused.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// SyncManager watchdog.
+const WATCHDOG: AlStatusCode = AlStatusCode(0x001B);
+/// States are polled after the pause: an expiry is read so long after it at most.
+const READ_WITHIN: Span = Span::ms(1500);
+
+/// A pause and whom it hit.
+struct Found<'a> {
+    pause: Pause,
+    /// Whether frames were made and the card did not take them.
+    at_card: Option<Path>,
+    devices: Vec<&'a Device>,
+}
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    let mut all: Vec<Found<'_>> = Vec::new();
+    for device in &line.devices {
+        let expired = |error: &&AlError| error.code.is_some_and(|code| code.value == WATCHDOG);
+        let Some(error) = device.al.errors.iter().rfind(expired) else { continue };
+        let Some((pause, at_card)) = pause_before(line, device, error) else { continue };
+        match all.iter_mut().find(|found| found.pause.to == pause.to) {
+            Some(found) => found.devices.push(device),
+            None => all.push(Found { pause, at_card, devices: vec![device] }),
+        }
+    }
+    // One finding, however often it came: the latest pause is shown.
+    let Some(latest) = all.iter().max_by_key(|found| found.pause.to) else { return };
+    let devices: Vec<DeviceId> =
+        all.iter().flat_map(|found| found.devices.iter().map(|device| device.id)).collect();
+    conditions.push(condition(line, latest, &devices));
+}
+
+/// The pause that let a watchdog expire.
+fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause, Option<Path>)> {
+    let watchdog = device.watchdog.span()?;
+    let mine = line.cyclic.iter().filter(|cyclic| {
+        line.owners(cyclic).any(|owner| owner.device == device.id && owner.writes)
+    });
+    for cyclic in mine {
+        let of = |beat: &Beat| {
+            let fits = |pause: &&Pause| {
+                pause.span() >= watchdog
+                    && pause.from < error.status.at
+                    && error.status.at.since(pause.to.min(error.status.at)) <= READ_WITHIN
+            };
+            beat.pauses.iter().rev().find(fits).copied()
+        };
+        if let Some(pause) = of(&cyclic.sent) {
+            return Some((pause, None));
+        }
+        // Made, and not taken by the card: then nothing came back either.
+        let refused = Path::ALL.into_iter().find(|path| {
+            let failures = &line.host.card(*path).send_failures;
+            let since = error.status.at.before(watchdog + READ_WITHIN);
+            failures.last.is_some_and(|last| last >= since)
+                && failures.first.is_some_and(|first| first <= error.status.at + READ_WITHIN)
+        });
+        if let (Some(card), Some(last)) = (refused, line.traffic.latest_returned) {
+            let silences = line.traffic.silences.iter().rev();
+            let mut silences = silences.filter(|silence| silence.since.at < error.status.at);
+            let silence = silences.next()?;
+            let to = silence.ended.unwrap_or(last.at.max(silence.last.at));
+            let pause = Pause { from: silence.since.at, to };
+            return (pause.span() + cyclic.sent.cycle().unwrap_or(Span::ZERO) >= watchdog)
+                .then_some((pause, Some(card)));
+        }
+    }
+    None
+}
+
+fn condition(line: &Line, found: &Found<'_>, all: &[DeviceId]) -> Condition {
+    let ms = |span: Span| span.as_nanos() as f64 / 1e6;
+    let Pause { from, to } = found.pause;
+    let shortest = found.devices.iter().filter_map(|device| device.watchdog.span()).min();
+    let what = match found.at_card {
+        None => "nothing was sent to the outputs".to_owned(),
+        Some(card) => format!("card {card} took no frames"),
+    };
+    let text = format!(
+        "{what} for {:.1} ms; the watchdog of SubDevice {} holds for {:.1} ms",
+        ms(found.pause.span()),
+        found.devices.first().map(|device| line.label(device.id)).unwrap_or_default(),
+        ms(shortest.unwrap_or(Span::ZERO))
+    );
+    let symptoms =
+        all.iter().flat_map(|id| [Symptom::StateLost(*id), Symptom::WorkingCounter(*id)]);
+    Condition::new(&PAGE, Place::Host, FaultName::WatchdogStarved, from)
+        .confidence(0.7)
+        .or(FaultName::HostJitter, 0.25)
+        .confirmed(watchdog_expired(found, to))
+        .ended(to)
+        .shown_by(Evidence::host(Some(from), text))
+        .explaining(symptoms)
+        .explaining([Symptom::FramesLost, Symptom::NobodyAnswers].into_iter().filter(|_| found.at_card.is_some()))
+        .advise("Find what stood still: mailbox or files within the cyclic thread, a debugger, a busy host.")
+        .advise("Run `linesman host`: it tells what lets this computer stop a program.")
+        .advise("Lengthen the watchdog only if the machine stays safe for that long without control.")
+}
+
+/// When the first of the watchdogs had expired.
+fn watchdog_expired(found: &Found<'_>, to: Instant) -> Instant {
+    let first = found.devices.iter().filter_map(|device| device.watchdog.span()).min();
+    first.map_or(to, |span| (found.pause.from + span).min(to))
+}

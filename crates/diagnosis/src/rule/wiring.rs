@@ -1,0 +1,433 @@
+//! # Wired otherwise than planned
+//!
+//! All SubDevices answer, but the tree that they form is not the planned one.
+//!
+//! **How it is found.** The tree that was found follows from the open ports (0x0110) in the order of
+//! processing, and from the receive times of the ports (0x0900): the port with the earliest time is the one
+//! by which frames come in. It is laid upon the planned tree with the identities (SII words 0x08 to 0x0F,
+//! object 0x1018) and aliases (0x0012) of all SubDevices, at the least cost: one cable, or one device, at a
+//! time. Whole branches that are missing and nothing else are no matter of this rule: they may be without
+//! power, or cut off.
+//!
+//! **What it means.**
+//!
+//! * `C304` a SubDevice is plugged in the wrong way round: frames come in at another port than planned. Of
+//!   the first one: the MainDevice is plugged into the wrong port. Or a cable leads to another port or
+//!   SubDevice than planned, with all behind it.
+//! * `C305` two SubDevices of the same kind sit in each other's place; only alias or serial number tell.
+//!
+//! Everything may run all the same. A reversed SubDevice works on what hangs on its port A before itself,
+//! which breaks clocks and positions; a cable elsewhere lets outputs go to another machine part.
+//!
+//! **What to do.** Compare the cables at the named ports with the drawing, in the named order. IN is port A,
+//! the upper socket (X1) of most couplers. Where the wiring is what is wanted, scan anew and save the project.
+
+use linesman_config::compare::{
+    Comparison, Difference, Side, There, Unlike, Wanted, compare, unlike,
+};
+use linesman_config::fault::{Class, FaultName};
+use linesman_config::identity;
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::port::Port;
+use linesman_proto::register::table;
+use linesman_proto::time::Instant;
+use linesman_proto::topology::derive::EntryBasis;
+use linesman_proto::topology::{End, Reconstruction, Tree};
+
+use super::identity::{EXTRA, MISSING, WRONG};
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::{Device, Line, Seen};
+
+/// Plugged otherwise.
+pub const PLUGGED: RulePage = RulePage {
+    code: "C304",
+    name: "plugged-otherwise",
+    severity: Severity::Error,
+    class: Class::Configuration,
+    source: include_str!("wiring.rs"),
+};
+
+/// Twins in each other's place.
+pub const TWINS: RulePage = RulePage {
+    code: "C305",
+    name: "twins-swapped",
+    severity: Severity::Error,
+    class: Class::Configuration,
+    source: include_str!("wiring.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PLUGGED, TWINS], judge };
+
+/// What was found, as far as it is enough to be laid upon the plan.
+struct Found<'a> {
+    line: &'a Line,
+    planned: &'a Tree,
+    wanted: Vec<Wanted>,
+    tree: Tree,
+    basis: Vec<EntryBasis>,
+    /// Whose answers those of a found node are taken for: positions move with what is missing.
+    ids: Vec<DeviceId>,
+    there: Vec<There>,
+    /// When the last of it was learnt.
+    at: Instant,
+    frame: Option<u64>,
+}
+
+/// Whether the trees can be compared, so that this rule speaks of devices missing, extra and wrong, too.
+pub(super) fn judges(line: &Line) -> bool {
+    Found::of(line).is_some_and(|found| found.tells(&found.compare()))
+}
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let Some(found) = Found::of(view.line) else { return };
+    let comparison = found.compare();
+    if !found.tells(&comparison) {
+        return;
+    }
+    for difference in &comparison.differences {
+        let mut condition = found.condition(difference);
+        if !matches!(difference, Difference::Swapped { .. } | Difference::Wrong { .. }) {
+            condition = condition.explaining(found.shifted(&comparison));
+        }
+        conditions.push(condition.confirmed(found.at));
+        if let Difference::Swapped { one, other, twins } = difference {
+            conditions.push(found.swapped(*other, *one, *twins).confirmed(found.at));
+        }
+    }
+}
+
+impl<'a> Found<'a> {
+    fn of(line: &'a Line) -> Option<Self> {
+        let planned = line.tree.as_ref().filter(|_| line.tree_is_planned)?;
+        if planned.closes_at().is_some() || !line.devices.iter().any(is_known_to_plan) {
+            // In a ring receive times and open ports say something else.
+            return None;
+        }
+        let mut ids: Vec<DeviceId> =
+            planned.order().iter().map(|node| DeviceId(*node as u32)).collect();
+        ids.extend(
+            line.devices.iter().map(|device| device.id).filter(|id| id.index() >= planned.len()),
+        );
+        let count = usize::from(line.traffic.positions_seen);
+        if count == 0 || count > ids.len() {
+            return None;
+        }
+        ids.truncate(count);
+        let devices: Vec<&Device> = ids.iter().filter_map(|id| line.device(*id)).collect();
+        let is_whole = devices.len() == count
+            && devices
+                .iter()
+                .all(|device| device.dl.first.is_some() && device.identity.identity().is_some());
+        if !is_whole {
+            return None;
+        }
+        let seen: Vec<_> = devices.iter().map(|device| device.as_first_seen()).collect();
+        let Reconstruction { tree, entry_basis, errors, .. } = Reconstruction::of(Path::A, &seen);
+        if !errors.is_empty() || tree.detached().next().is_some() {
+            return None;
+        }
+        let wanted = (0..planned.len()).map(|node| wanted(line.devices.get(node))).collect();
+        let there = devices.iter().map(|device| There {
+            identity: device.identity.identity(),
+            alias: device.alias.map(|alias| alias.value()),
+        });
+        let latest = devices.iter().filter_map(|device| device.identity.product_code);
+        let latest = latest.max_by_key(|seen| seen.at);
+        Some(Self {
+            line,
+            planned,
+            wanted,
+            there: there.collect(),
+            tree,
+            basis: entry_basis,
+            ids,
+            at: latest.map_or(Instant::ZERO, |seen| seen.at),
+            frame: latest.and_then(|seen| seen.frame),
+        })
+    }
+
+    fn compare(&self) -> Comparison {
+        if self.is_as_planned() {
+            return Comparison::default();
+        }
+        compare(
+            Side { tree: self.planned, nodes: &self.wanted },
+            Side { tree: &self.tree, nodes: &self.there },
+        )
+    }
+
+    /// The cheap answer for a line that is well.
+    fn is_as_planned(&self) -> bool {
+        self.tree.len() == self.planned.len()
+            && self.ids.iter().enumerate().all(|(node, id)| {
+                let wanted = id.index();
+                self.tree.entry(node) == self.planned.entry(wanted)
+                    && Port::ALL.into_iter().all(|port| {
+                        self.tree.is_open(node, port) == self.planned.is_open(wanted, port)
+                    })
+                    && unlike(&self.wanted[wanted], &self.there[node]).is_none()
+            })
+    }
+
+    /// Whether a comparison says anything that can be relied on.
+    fn tells(&self, comparison: &Comparison) -> bool {
+        let is_gone = |difference: &Difference| {
+            matches!(difference, Difference::Missing { planned, all }
+                if all.len() == self.planned.subtree(*planned).len())
+        };
+        let is_seen = |found: &usize| {
+            matches!(
+                self.basis.get(*found),
+                Some(EntryBasis::ReceiveTimes | EntryBasis::OnlyPlace | EntryBasis::OnlyPort)
+            )
+        };
+        let is_guessed = |difference: &Difference| matches!(difference, Difference::Reversed { found, .. } if !is_seen(found));
+        // Too much that differs is another line, and not this one with a fault.
+        let most = 2 + self.planned.len() / 4;
+        let differences = &comparison.differences;
+        !differences.is_empty()
+            && differences.len() <= most
+            && !differences.iter().all(is_gone)
+            && !differences.iter().any(is_guessed)
+    }
+
+    fn condition(&self, difference: &Difference) -> Condition {
+        match difference {
+            Difference::Missing { planned, all } => self.missing(*planned, all.len()),
+            Difference::Extra { found, all, on } => self.extra(*found, all.len(), *on),
+            Difference::Wrong { planned, found, what } => self.wrong(*planned, *found, *what),
+            Difference::Swapped { one, other, twins } => self.swapped(*one, *other, *twins),
+            Difference::Reversed { planned, found, entry, wanted } => {
+                self.reversed(*planned, *found, *entry, *wanted)
+            }
+            Difference::Moved { planned, found, wanted, on } => {
+                self.moved(*planned, *found, *wanted, *on)
+            }
+        }
+    }
+
+    fn missing(&self, planned: usize, count: usize) -> Condition {
+        let label = self.label(planned);
+        let text = if count == 1 {
+            format!("{label} is not in the line; its neighbours are wired to each other")
+        } else {
+            format!("{label} and {} behind it are not in the line", count - 1)
+        };
+        self.begin(&MISSING, self.place(planned), FaultName::DeviceMissing, 0.85, text)
+            .or(FaultName::DeviceWrong, 0.1)
+            .advise(format!("Put {label} into its place, or take it out of the project."))
+            .advise("Compare the line around it with the project, label by label.")
+    }
+
+    fn extra(&self, found: usize, count: usize, on: Option<End>) -> Condition {
+        let (what, at) = (self.kind(found), self.found_end(on));
+        let more = if count == 1 { String::new() } else { format!(" and {} behind it", count - 1) };
+        let text =
+            format!("{what}{more} at {at} is in no plan; all behind are further on than planned");
+        let id = self.ids.get(found).copied().unwrap_or_default();
+        let place = Place::device(self.line.network, id);
+        self.begin(&EXTRA, place, FaultName::DeviceExtra, 0.85, text)
+            .or(FaultName::DeviceWrong, 0.1)
+            .advise(format!(
+                "Take {what} at {at} out of the line, or scan anew and save the project."
+            ))
+    }
+
+    fn wrong(&self, planned: usize, found: usize, what: Unlike) -> Condition {
+        let label = self.label(planned);
+        let text = match what {
+            Unlike::Identity(what) => {
+                let there = self.there[found].identity.map(|there| identity::text(&there));
+                let wanted = self.wanted[planned].identity.map(|wanted| identity::text(&wanted));
+                format!(
+                    "SubDevice {label} has another {what} than planned: found {}; planned {}",
+                    there.unwrap_or_default(),
+                    wanted.unwrap_or_default()
+                )
+            }
+            Unlike::Alias { planned, found } => {
+                format!("SubDevice {label} has alias {found}, planned was {planned}")
+            }
+        };
+        let cause = match what {
+            Unlike::Identity(_) => FaultName::DeviceWrong,
+            Unlike::Alias { .. } => FaultName::TwinsSwapped,
+        };
+        self.begin(&WRONG, self.place(planned), cause, 0.85, text)
+            .or(FaultName::DevicesSwapped, 0.05)
+            .advise("Compare the device's label with the project, and change one of them.")
+            .advise("Check whether cables are plugged in the planned order.")
+    }
+
+    fn swapped(&self, one: usize, other: usize, twins: bool) -> Condition {
+        let (label, other_label) = (self.label(one), self.label(other));
+        let text = format!("{label} and {other_label} sit in each other's place");
+        let (page, cause) = if twins {
+            (&TWINS, FaultName::TwinsSwapped)
+        } else {
+            (&WRONG, FaultName::DevicesSwapped)
+        };
+        self.begin(page, self.place(one), cause, 0.85, text)
+            .or_at(cause, self.place(other), 0.05)
+            .or(FaultName::DeviceWrong, 0.05)
+            .advise(format!("Exchange {label} and {other_label}, with what is wired to them."))
+    }
+
+    fn reversed(&self, planned: usize, found: usize, entry: Port, wanted: Port) -> Condition {
+        let label = self.label(planned);
+        let first = matches!(self.planned.upstream(planned), Some(End::MainDevice(_)));
+        let (cause, what) = if first {
+            (FaultName::MainDeviceWrongPort, "the MainDevice is plugged into")
+        } else {
+            (FaultName::PortsSwapped, "the cable from the MainDevice's side is plugged into")
+        };
+        let other = if first { FaultName::PortsSwapped } else { FaultName::DevicesSwapped };
+        let text =
+            format!("{label}: {what} port {entry} instead of port {wanted}{}", self.times(found));
+        self.begin(&PLUGGED, self.place(planned), cause, 0.9, text)
+            .or(other, 0.05)
+            .advise(format!("Exchange the cables at ports {wanted} and {entry} of {label}."))
+    }
+
+    fn moved(
+        &self,
+        planned: usize,
+        found: usize,
+        wanted: Option<End>,
+        on: Option<End>,
+    ) -> Condition {
+        let label = self.label(planned);
+        let count = self.planned.subtree(planned).len();
+        let more = if count == 1 { String::new() } else { format!(" and {} behind it", count - 1) };
+        let (at, right) = (self.found_end(on), self.planned_end(wanted));
+        let text = format!("{label}{more} hang on {at}; planned was {right}");
+        let mut condition = self
+            .begin(&PLUGGED, self.place(planned), FaultName::PortsSwapped, 0.5, text)
+            .or(FaultName::DevicesSwapped, 0.3)
+            .advise(format!("Plug the cable to {label} into {right}; it is in {at} now."))
+            .advise("If the wiring is as it is wanted, scan anew and save the project.");
+        if let Some(id) = self.ids.get(found) {
+            let dl = self.line.device(*id).and_then(|device| device.dl.first);
+            condition.evidence.extend(dl.map(|seen| {
+                let text = format!("open ports as found, at {at}: {}", ports(&self.tree, found));
+                Evidence::register(*id, table::DL_STATUS.address, &seen, text)
+            }));
+        }
+        condition
+    }
+
+    fn begin(
+        &self,
+        page: &'static RulePage,
+        place: Place,
+        cause: FaultName,
+        confidence: f64,
+        text: String,
+    ) -> Condition {
+        let seen = Seen::new((), self.at, self.frame);
+        let device = match place {
+            Place::Device { device, .. } => device,
+            Place::Link { .. } | Place::Network { .. } | Place::Host => DeviceId::default(),
+        };
+        let shown = Evidence::register(device, table::SII_DATA.address, &seen, text);
+        Condition::new(page, place, cause, self.at).confidence(confidence).shown_by(shown)
+    }
+
+    /// Who answers from another place than planned: ports that should lead on end the line there, and the
+    /// last planned ones never answer.
+    fn shifted(&self, comparison: &Comparison) -> Vec<Symptom> {
+        let is_same =
+            |(node, id): (usize, &DeviceId)| comparison.pairs.get(id.index()) == Some(&Some(node));
+        let first = self.ids.iter().enumerate().position(|pair| !is_same(pair));
+        let first = first.unwrap_or(self.ids.len()).saturating_sub(1);
+        let order = self.planned.order();
+        let behind = order.iter().skip(first).map(|node| DeviceId(*node as u32));
+        let swapped = comparison.differences.iter().flat_map(|difference| match difference {
+            Difference::Reversed { planned, .. } => Some(DeviceId(*planned as u32)),
+            Difference::Moved { planned, .. } => {
+                self.planned.parent(*planned).map(|node| DeviceId(node as u32))
+            }
+            Difference::Missing { .. }
+            | Difference::Extra { .. }
+            | Difference::Wrong { .. }
+            | Difference::Swapped { .. } => None,
+        });
+        let concerned = behind.chain(swapped);
+        concerned
+            .flat_map(|id| {
+                let ports = Port::ALL.into_iter().flat_map(move |port| {
+                    [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
+                });
+                ports.chain([
+                    Symptom::Silent(id),
+                    Symptom::WorkingCounter(id),
+                    Symptom::StateLost(id),
+                ])
+            })
+            .collect()
+    }
+
+    fn place(&self, planned: usize) -> Place {
+        Place::device(self.line.network, DeviceId(planned as u32))
+    }
+
+    fn label(&self, planned: usize) -> String {
+        self.line.label(DeviceId(planned as u32))
+    }
+
+    /// What a found node is, as no name in the plan says.
+    fn kind(&self, found: usize) -> String {
+        let id = self.ids.get(found).copied().unwrap_or_default();
+        let sii = self.line.device(id).and_then(|device| device.sii.type_name());
+        sii.unwrap_or_else(|| format!("the SubDevice at position {found}"))
+    }
+
+    fn planned_end(&self, end: Option<End>) -> String {
+        match end {
+            Some(End::Controller(node, port)) => format!("port {port} of {}", self.label(node)),
+            Some(End::MainDevice(path)) => format!("card {path} of the MainDevice"),
+            None => "nothing".to_owned(),
+        }
+    }
+
+    /// An end of the found tree, named by the plan where the position fits.
+    fn found_end(&self, end: Option<End>) -> String {
+        let named = end.map(|end| end.map(|node| self.ids.get(node).map_or(node, |id| id.index())));
+        self.planned_end(named)
+    }
+
+    /// What the receive times say of a node.
+    fn times(&self, found: usize) -> String {
+        let device = self.ids.get(found).and_then(|id| self.line.device(*id));
+        match (self.basis.get(found), device.and_then(|device| device.received)) {
+            (Some(EntryBasis::ReceiveTimes), Some(times)) => {
+                let entry = self.tree.entry(found);
+                let open = self.tree.open_ports(found).filter(|port| *port != entry);
+                let later: Vec<String> = open
+                    .map(|port| format!("{port} {} ns later", times[port].delta(times[entry])))
+                    .collect();
+                format!("; receive times: {entry} first, {}", later.join(", "))
+            }
+            _ => String::new(),
+        }
+    }
+}
+
+fn is_known_to_plan(device: &Device) -> bool {
+    device.planned.is_some_and(|planned| planned.identity.is_some())
+}
+
+fn wanted(device: Option<&Device>) -> Wanted {
+    let planned = device.and_then(|device| device.planned);
+    planned.map_or_else(Wanted::default, |planned| Wanted {
+        identity: planned.identity,
+        rule: planned.rule,
+        alias: planned.alias,
+    })
+}
+
+fn ports(tree: &Tree, node: usize) -> String {
+    tree.open_ports(node).map(|port| port.to_string()).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,222 @@
+//! Counters of all SubDevices, read again and again, and what they say together.
+
+use linesman_config::inventory::Inventory;
+use linesman_config::project::Project;
+use linesman_diagnosis::line::{Line, Seen};
+use linesman_diagnosis::{Diagnosis, Engine, engine::Setup};
+use linesman_maindevice::service::Service;
+use linesman_proto::address::{DeviceId, Network, RegisterAddress};
+use linesman_proto::port::Port;
+use linesman_proto::register::{ClearGroup, DlStatus, ErrorCounter, ErrorCounters, table};
+use linesman_proto::time::{Instant, Span};
+
+use crate::command::diagnose::NO_CLOCK;
+use crate::command::service::{Session, Trouble};
+use crate::failure::Failure;
+use crate::version;
+
+/// What one SubDevice's counters read at one time.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    /// When, since the beginning.
+    pub(crate) at: Span,
+    /// Whose.
+    pub(crate) id: DeviceId,
+    /// What they read; `None` when it did not answer.
+    pub(crate) counters: Option<ErrorCounters>,
+    /// Its ports at that time; `None` when it did not answer.
+    pub(crate) ports: Option<DlStatus>,
+}
+
+/// All readings, oldest first.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Samples {
+    pub(crate) all: Vec<Sample>,
+    /// Frames that were sent to try the line out.
+    pub(crate) sent: u64,
+    /// Frames of those that nobody answered.
+    pub(crate) lost: u64,
+    /// Whether the counters were cleared at the beginning.
+    pub(crate) cleared: bool,
+}
+
+impl Samples {
+    /// Clears all error counters of all SubDevices.
+    pub(crate) fn clear(&mut self, session: &mut Session) -> Result<(), Trouble> {
+        let ids: Vec<DeviceId> = session.devices().iter().map(|known| known.id).collect();
+        for id in ids {
+            for group in ClearGroup::ALL {
+                let (address, data) = (group.address(), vec![0]);
+                match session.ask(id, Service::WriteRegister { address, data }) {
+                    // Not every controller has every counter.
+                    Ok(_) | Err(Trouble::Refused(_)) => {}
+                    Err(Trouble::Failed(failure)) if group == ClearGroup::Rx => {
+                        return Err(Trouble::Failed(failure));
+                    }
+                    Err(Trouble::Failed(_)) => {}
+                }
+            }
+        }
+        self.cleared = true;
+        Ok(())
+    }
+
+    /// Reads the counters of all SubDevices.
+    pub(crate) fn read(&mut self, session: &mut Session, at: Span) -> Result<(), Failure> {
+        let ids: Vec<DeviceId> = session.devices().iter().map(|known| known.id).collect();
+        for id in ids {
+            let len = ErrorCounters::LEN as u16;
+            let data = session.try_read(id, ErrorCounters::START, len)?;
+            let counters = data.map(|data| ErrorCounters::from_bytes(&data, ErrorCounters::START));
+            let status = session.try_read(id, table::DL_STATUS.address, 2)?;
+            let ports =
+                status.and_then(|data| data.first_chunk().copied()).map(DlStatus::from_bytes);
+            self.all.push(Sample { at, id, counters, ports });
+        }
+        Ok(())
+    }
+
+    /// The latest reading of a SubDevice that answered.
+    pub(crate) fn latest(&self, id: DeviceId) -> Option<&ErrorCounters> {
+        self.of(id).last()
+    }
+
+    /// By how much a counter rose from the first reading to the last, through its overflow-free way.
+    pub(crate) fn rise(&self, id: DeviceId, counter: ErrorCounter) -> u64 {
+        let values: Vec<u8> = self.of(id).filter_map(|counters| counters.value(counter)).collect();
+        let steps = values.windows(2).map(|pair| match pair {
+            [before, after] if after >= before => u64::from(after - before),
+            // Somebody cleared it in between.
+            [_, after] => u64::from(*after),
+            _ => 0,
+        });
+        steps.sum()
+    }
+
+    fn of(&self, id: DeviceId) -> impl Iterator<Item = &ErrorCounters> {
+        let of = self.all.iter().filter(move |sample| sample.id == id);
+        of.filter_map(|sample| sample.counters.as_ref())
+    }
+
+    /// What all of it says: only what rose counts.
+    pub(crate) fn diagnosis(&self, inventory: &Inventory, place: &str) -> Diagnosis {
+        let project = Project::from_inventory("", inventory);
+        let mut line = Line::planned(Network(0), &project);
+        for sample in &self.all {
+            let at = Instant::ZERO + sample.at;
+            line.now = line.now.max(at);
+            let Some(device) = line.device_mut(sample.id) else { continue };
+            if sample.counters.is_none() && sample.ports.is_none() {
+                device.is_silent(at, None);
+                continue;
+            }
+            device.answers(at, None);
+            if let Some(ports) = sample.ports {
+                device.dl.record(ports, at, None);
+            }
+            if let Some(counters) = &sample.counters {
+                device.counters.record_counters(counters, at, None);
+            }
+        }
+        for found in &inventory.devices {
+            if let (Some(device), Some(identity)) = (line.device_mut(found.id), found.identity) {
+                let seen = |value| Some(Seen::new(value, Instant::ZERO, None));
+                device.identity.vendor_id = seen(identity.vendor_id);
+                device.identity.product_code = seen(identity.product_code);
+                device.identity.revision = seen(identity.revision);
+            }
+        }
+        line.traffic.positions_seen = u16::try_from(inventory.devices.len()).unwrap_or(u16::MAX);
+        line.traffic.lost.add(self.lost, line.now);
+        line.touch();
+        let setup =
+            Setup { source: place.to_owned(), clock: NO_CLOCK.to_owned(), ..Setup::default() };
+        let mut engine = Engine::with_line(setup, line);
+        let end = self.all.last().map_or(Instant::ZERO, |sample| Instant::ZERO + sample.at);
+        engine.finish(end, true);
+        Diagnosis { tool: version::tool(), ..engine.diagnosis() }
+    }
+
+    /// All readings as a table for other programs: one row for each counter of each reading.
+    pub(crate) fn csv(&self, session: &Session) -> String {
+        let mut text = "time_s,no,name,register,port,counter,value\n".to_owned();
+        for sample in &self.all {
+            let Some(counters) = &sample.counters else { continue };
+            let known = session.known(sample.id);
+            let name = known.map_or("", |known| known.name.as_deref().unwrap_or(&known.type_name));
+            for (counter, value) in counters.iter() {
+                let port = counter.port().map_or_else(String::new, |port| port.to_string());
+                let seconds = sample.at.as_nanos() as f64 / 1e9;
+                let RegisterAddress(address) = counter.address();
+                text.push_str(&format!(
+                    "{seconds:.3},{},\"{}\",0x{address:04X},{port},{},{value}\n",
+                    sample.id.no(),
+                    name.replace('"', "\"\""),
+                    counter.name()
+                ));
+            }
+        }
+        text
+    }
+}
+
+/// What one port has counted, for reports.
+#[derive(Clone, PartialEq, Eq, Debug, serde::Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PortReport {
+    /// A to D.
+    port: char,
+    /// Frames with a wrong check sequence, 0x0300 and on; `null` when the SubDevice did not answer.
+    frames: Option<u8>,
+    /// Symbols that are none, 0x0301 and on.
+    symbols: Option<u8>,
+    /// Frames that were marked as bad before, 0x0308 and on; 0 where they are not counted.
+    forwarded: Option<u8>,
+    /// Lost links, 0x0310 and on.
+    lost_links: Option<u8>,
+    /// By how much these four rose while they were watched.
+    rises: [u64; 4],
+}
+
+impl PortReport {
+    /// A port's counters.
+    pub(crate) fn of(samples: &Samples, id: DeviceId, port: Port) -> Self {
+        let kinds = [
+            ErrorCounter::InvalidFrame(port),
+            ErrorCounter::PhysicalLayer(port),
+            ErrorCounter::Forwarded(port),
+            ErrorCounter::LostLink(port),
+        ];
+        let latest = samples.latest(id);
+        let [frames, symbols, forwarded, lost_links] =
+            kinds.map(|kind| latest.and_then(|counters| counters.value(kind)));
+        let rises = kinds.map(|kind| samples.rise(id, kind));
+        Self { port: port.letter(), frames, symbols, forwarded, lost_links, rises }
+    }
+
+    /// A cell of a table: `4/18 fwd 2 lnk 1 (+5)`; `.` for nothing.
+    pub(crate) fn cell(&self) -> String {
+        let number =
+            |value: Option<u8>| value.map_or_else(|| "--".to_owned(), |one| one.to_string());
+        let all = [self.frames, self.symbols, self.forwarded, self.lost_links];
+        if all.iter().all(|value| *value == Some(0)) && self.rises.iter().all(|rise| *rise == 0) {
+            return ".".to_owned();
+        }
+        let mut text = format!("{}/{}", number(self.frames), number(self.symbols));
+        for (name, value) in [("fwd", self.forwarded), ("lnk", self.lost_links)] {
+            if value != Some(0) {
+                text.push_str(&format!(" {name} {}", number(value)));
+            }
+        }
+        let rise: u64 = self.rises.iter().sum();
+        if rise > 0 {
+            text.push_str(&format!(" (+{rise})"));
+        }
+        text
+    }
+
+    /// Whether anything rose.
+    pub(crate) fn rose(&self) -> bool {
+        self.rises.iter().any(|rise| *rise > 0)
+    }
+}
