@@ -56,7 +56,7 @@ impl Desk {
     }
 }
 
-// proves: HW-20: counters are cleared, watched, exported and judged in one command
+// proves: HW-20
 #[test]
 fn one_command_clears_watches_exports_and_judges() {
     let desk = Desk::new(&format!("{NOISE}hits_per_s = 200.0\n"));
