@@ -4,8 +4,9 @@
 //!
 //! **How it is found.** A SubDevice left OP with AL status code 0x001B. Right before, the datagrams with its
 //! outputs paused for as long as its watchdog (0x0400, 0x0420; 100 ms after a reset) or longer. Either none
-//! was sent in that time, or the card did not take them. If they were sent and did not come back, the line
-//! is to blame: then this rule says nothing, and findings about links and damage do.
+//! was sent in that time, or the card did not take them though it had a link. If they were sent and did not
+//! come back, or nobody was there any more to send them to, the line is to blame: then this rule says nothing,
+//! and findings about links and damage do.
 //!
 //! **What it means.** The application, or the program that sends, stood still: a long call within the cycle
 //! (an SDO, a file, a print), a garbage collector, a debugger, a process without real-time priority, a
@@ -83,9 +84,6 @@ fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause,
             };
             beat.pauses.iter().rev().find(fits).copied()
         };
-        if let Some(pause) = of(&cyclic.sent) {
-            return Some((pause, None));
-        }
         // Made, and not taken by the card: then nothing came back either.
         let refused = Path::ALL.into_iter().find(|path| {
             let failures = &line.host.card(*path).send_failures;
@@ -93,17 +91,45 @@ fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause,
             failures.last.is_some_and(|last| last >= since)
                 && failures.first.is_some_and(|first| first <= error.status.at + READ_WITHIN)
         });
+        if let Some(pause) = of(&cyclic.sent) {
+            // With nobody there to answer, nothing is sent for them either: the line paused first.
+            let is_ours = match refused {
+                Some(card) => !lost_its_link(line, card, pause),
+                None => !was_silent(line, pause),
+            };
+            return is_ours.then_some((pause, None));
+        }
         if let (Some(card), Some(last)) = (refused, line.traffic.latest_returned) {
             let silences = line.traffic.silences.iter().rev();
             let mut silences = silences.filter(|silence| silence.since.at < error.status.at);
             let silence = silences.next()?;
             let to = silence.ended.unwrap_or(last.at.max(silence.last.at));
             let pause = Pause { from: silence.since.at, to };
+            // A card without a link takes no frames, and is not to blame.
+            if lost_its_link(line, card, pause) {
+                return None;
+            }
             return (pause.span() + cyclic.sent.cycle().unwrap_or(Span::ZERO) >= watchdog)
                 .then_some((pause, Some(card)));
         }
     }
     None
+}
+
+/// Whether the line had stopped to answer when a pause began, or while it lasted.
+fn was_silent(line: &Line, pause: Pause) -> bool {
+    line.traffic.silences.iter().any(|silence| {
+        let ended = silence.ended.unwrap_or(Instant::MAX);
+        silence.since.at <= pause.to && ended >= pause.from
+    })
+}
+
+/// Whether a card had no link for some of a pause.
+fn lost_its_link(line: &Line, card: Path, pause: Pause) -> bool {
+    let card = line.host.card(card);
+    card.carrier.is_some_and(|carrier| {
+        !carrier.value || card.carrier_changes > 0 && carrier.at >= pause.from
+    })
 }
 
 fn condition(line: &Line, found: &Found<'_>, all: &[DeviceId]) -> Condition {
