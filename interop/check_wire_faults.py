@@ -1,7 +1,8 @@
 """Linesman's own MainDevice, and a cable that spoils what comes back.
 
 2,000 cycles with each fault: exactly the faulty cycles are bad, what is doubled or stray costs none, each kind is counted
-under its own name, and the run goes on.
+under its own name, and the run goes on. A host that runs other programs beside brings frames late by itself: these, too, have
+to be counted as late, each of them once, and are the only ones that may come on top.
 """
 
 import sys
@@ -55,8 +56,15 @@ def judge(line, fault, every, cycles_lost, **counted):
     assert report["error"] is None and report["settled"], report
     seen = {name: counts[name] for name in NAMES}
     wanted = {name: expected if name in counted else 0 for name in NAMES}
-    assert seen == wanted, f"{seen}, expected {wanted}; {told}"
-    assert counts["cyclic_lost"] == (expected if cycles_lost else 0), counts
+    # What the host brought late is lost for its cycle and comes after all.
+    late = seen["frames_late"] - wanted["frames_late"]
+    if late > COUNTED // 10:
+        raise Skip(f"the host is too busy: it brought {late} frames late")
+    wanted["frames_late"] += late
+    wanted["frames_lost"] += late
+    assert late >= 0 and seen == wanted, f"{seen}, expected {wanted}; {told}"
+    bad = expected if cycles_lost else 0
+    assert bad <= counts["cyclic_lost"] <= bad + late, counts
     assert counts["working_counter_errors"] == 0, counts
     assert all(device["valid"] for device in report["devices"]), report["devices"]
 
