@@ -75,6 +75,10 @@ impl Beat {
 
     /// It came at `at`. Says whether it was off the beat, or paused.
     pub fn tick(&mut self, at: Instant) -> bool {
+        // One that is known to be lost is heard of when later ones are back already.
+        if self.last.is_some_and(|last| at <= last) {
+            return false;
+        }
         let Some(last) = self.last.replace(at) else { return false };
         let interval = at.since(last);
         let Some(cycle) = self.cycle else {
@@ -86,8 +90,8 @@ impl Beat {
         if paused {
             keep(&mut self.pauses, Pause { from: last, to: at }, PAUSES_KEPT);
         }
-        let by = interval_ns.abs_diff(cycle_ns);
-        if by * 100 < cycle_ns * OFF_PERCENT {
+        let is_off = |by: u64| by * 100 >= cycle_ns * OFF_PERCENT;
+        if !is_off(interval_ns.abs_diff(cycle_ns)) {
             self.off_in_a_row = 0;
             return paused;
         }
@@ -99,6 +103,12 @@ impl Beat {
                 pauses: std::mem::take(&mut self.pauses),
                 ..Self::default()
             };
+            return paused;
+        }
+        // Whatever is missing between them is missing, not late.
+        let cycles = ((interval_ns + cycle_ns / 2) / cycle_ns).max(1);
+        let by = interval_ns.abs_diff(cycles * cycle_ns);
+        if !is_off(by) {
             return paused;
         }
         keep(&mut self.off, Off { at, by: Span::ns(by) }, KEPT);
@@ -157,6 +167,19 @@ mod tests {
         let steady = || std::iter::repeat_n(1_000, 40);
         assert!(ticked(steady().chain([1_199, 801])).off.is_empty());
         assert_eq!(ticked(steady().chain([1_200, 800])).off.len(), 2);
+    }
+
+    #[test]
+    fn what_is_missing_is_not_late_and_comes_in_any_order() {
+        let steady = || std::iter::repeat_n(1_000, 40);
+        let mut beat = ticked(steady().chain([2_000, 3_000, 1_000]));
+        assert!(beat.off.is_empty(), "{:?}", beat.off);
+        // A lost one is heard of afterwards.
+        let last = beat.last().unwrap();
+        beat.tick(Instant::from_nanos(last.as_nanos() - 1_500_000));
+        assert_eq!((beat.last(), beat.off.len()), (Some(last), 0));
+        // Late by most of a cycle: the next interval tells.
+        assert_eq!(ticked(steady().chain([1_900, 100])).off.len(), 1);
     }
 
     #[test]
