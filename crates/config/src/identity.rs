@@ -32,6 +32,22 @@ pub enum RevisionRule {
 }
 
 impl RevisionRule {
+    /// The rule that a word of the ESI attribute `CheckRevisionNo` names (ETG.2000); `None` for any other
+    /// word.
+    #[must_use]
+    pub fn from_esi(word: &str) -> Option<Self> {
+        Some(match word {
+            "NONE" => Self::Any,
+            "EQ" => Self::Equal,
+            "EQ_OR_G" => Self::EqualOrGreater,
+            "LW_EQ" => Self::LowWordEqual,
+            "LW_EQ_HW_EQ_OR_G" => Self::LowWordEqualHighWordEqualOrGreater,
+            "HW_EQ" => Self::HighWordEqual,
+            "HW_EQ_OR_G" => Self::HighWordEqualOrGreater,
+            _ => return None,
+        })
+    }
+
     /// Whether a device of revision `found` may stand where `planned` was planned.
     #[must_use]
     pub const fn accepts(self, planned: u32, found: u32) -> bool {
@@ -131,6 +147,16 @@ mod tests {
         for (rule, found, expected) in table {
             assert_eq!(rule.accepts(planned, found), expected, "{rule:?} 0x{found:08X}");
         }
+    }
+
+    #[test]
+    fn words_of_descriptions_name_rules() {
+        assert_eq!(RevisionRule::from_esi("EQ_OR_G"), Some(EqualOrGreater));
+        assert_eq!(
+            RevisionRule::from_esi("LW_EQ_HW_EQ_OR_G"),
+            Some(LowWordEqualHighWordEqualOrGreater)
+        );
+        assert_eq!(RevisionRule::from_esi("SIMILAR"), None);
     }
 
     #[test]

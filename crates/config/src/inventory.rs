@@ -70,6 +70,12 @@ impl Inventory {
         &self.wiring.tree
     }
 
+    /// The name people know a SubDevice by, or its number.
+    #[must_use]
+    pub fn label(&self, id: DeviceId) -> String {
+        self.devices.get(id.index()).map_or_else(|| id.no().to_string(), FoundDevice::label)
+    }
+
     /// What was found, for a comparison with what was planned.
     #[must_use]
     pub fn there(&self) -> Vec<There> {

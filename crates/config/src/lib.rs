@@ -6,6 +6,7 @@
 
 pub mod attachment;
 pub mod compare;
+pub mod ebus;
 pub mod eni;
 pub mod esi;
 pub mod fault;

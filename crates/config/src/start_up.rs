@@ -8,6 +8,8 @@ use std::fmt;
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::mailbox::eoe::IpParameters;
+use linesman_proto::mailbox::soe::Idn;
 use linesman_proto::state::AlState;
 
 /// One command.
@@ -34,6 +36,24 @@ pub enum StartUpAction {
         /// The value as it is transferred, little-endian.
         data: Vec<u8>,
     },
+    /// Sets the addresses of an Ethernet port by EoE; when, as for CoE.
+    SetAddresses {
+        /// Which port of the device.
+        port: u8,
+        /// The addresses as the message carries them: which there are, and those.
+        parameters: Vec<u8>,
+    },
+    /// Writes an identification number of a drive by SoE; when, as for CoE.
+    WriteIdn {
+        /// Which drive of the device.
+        drive: u8,
+        /// Which number.
+        idn: Idn,
+        /// Which of its elements; 0x40 is its value.
+        elements: u8,
+        /// What is written.
+        data: Vec<u8>,
+    },
     /// Writes registers of the controller, before the new state is asked for.
     RegisterWrite {
         /// The first one.
@@ -41,6 +61,22 @@ pub enum StartUpAction {
         /// What is written.
         data: Vec<u8>,
     },
+}
+
+/// What is told of start-up commands that are not carried out: whose, how many, which (where they have
+/// names), and what follows.
+#[must_use]
+pub fn left_out(device: &str, protocol: &str, count: usize, names: &[String]) -> String {
+    let what = match count {
+        1 => "1 start-up command".to_owned(),
+        count => format!("{count} start-up commands"),
+    };
+    let which = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
+    format!(
+        "{device}: {what} by {protocol}{which} not carried out: that is not spoken at start-up, and the \
+         SubDevice keeps the settings it has; make them with the maker's tool, or by CoE where it has objects \
+         for them"
+    )
 }
 
 /// A step between states, as ENI and ESI name it by two letters.
@@ -110,6 +146,18 @@ impl fmt::Display for StartUpCommand {
             StartUpAction::CoeDownload { object, complete_access, data } => {
                 write!(f, "{object} =")?;
                 (data, *complete_access)
+            }
+            StartUpAction::SetAddresses { port, parameters } => {
+                write!(f, "addresses of Ethernet port {port} by EoE")?;
+                if let Some([a, b, c, d]) = IpParameters::parse(parameters).and_then(|all| all.ip) {
+                    write!(f, ", IP {a}.{b}.{c}.{d}")?;
+                }
+                f.write_str(":")?;
+                (parameters, false)
+            }
+            StartUpAction::WriteIdn { drive, idn, data, .. } => {
+                write!(f, "{idn} of drive {drive} by SoE =")?;
+                (data, false)
             }
             StartUpAction::RegisterWrite { address, data } => {
                 write!(f, "register {address} =")?;

@@ -13,6 +13,6 @@ pub mod observe;
 pub mod report;
 pub mod rule;
 
-pub use engine::{Engine, Event, EventKind, Probe, ProbeEffect, Setup};
+pub use engine::{Asked, Engine, Event, EventKind, Probe, ProbeEffect, Setup};
 pub use observe::{Direction, FrameSeen, HostEvent, HostObservation};
 pub use report::Diagnosis;

@@ -6,7 +6,7 @@ mod support;
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, PlaceReport, Verdict};
-use linesman_diagnosis::{EventKind, HostEvent, HostObservation};
+use linesman_diagnosis::{Asked, EventKind, HostEvent, HostObservation};
 use linesman_proto::address::{LogicalAddress, Network, Path, RegisterAddress};
 use linesman_proto::register::FmmuConfig;
 use linesman_proto::time::{Instant, Span};
@@ -82,7 +82,7 @@ fn a_refused_state_names_device_transition_and_code() {
     let report = report(&mut script);
     let finding = only(&report);
     assert_eq!(finding.name, "state-refused");
-    assert_eq!(finding.cause, FaultName::InitRefused);
+    assert_eq!(finding.cause, FaultName::ConfigMismatch);
     assert_eq!(no(finding), Some(2));
     assert_eq!(finding.state, FindingState::Confirmed);
     let [status, code, control] = &finding.evidence[..] else { panic!("{}", text(&report)) };
@@ -228,7 +228,8 @@ fn probes_are_asked_for_once_something_is_wrong() {
     cycles(&mut script, 200, 1);
     let probes: Vec<_> = std::iter::from_fn(|| script.engine.poll_probe()).collect();
     assert_eq!(probes.len(), 2 * 3);
-    assert!(probes.iter().any(|probe| probe.register == RegisterAddress(0x0300)));
+    let counters = Asked::Register { address: RegisterAddress(0x0300), len: 20 };
+    assert!(probes.iter().any(|probe| probe.what == counters));
 }
 
 fn host(script: &mut Script, what: HostEvent) {
@@ -419,4 +420,61 @@ fn a_run_joined_in_the_middle_is_put_in_the_order_of_stations() {
     assert_eq!(stations, [0x1001, 0x1002, 0x1003]);
     let tree = line.tree.as_ref().unwrap();
     assert_eq!([tree.parent(0), tree.parent(1), tree.parent(2)], [None, Some(0), Some(1)]);
+}
+
+// fires: S206
+#[test]
+fn a_processor_that_stops_shows_in_dl_status() {
+    let mut script = running();
+    script.exchange(&[fprd(0x1002, 0x0110, &[0x37, 0x5A])]);
+    script.exchange(&[fprd(0x1002, 0x0110, &[0x35, 0x5A])]);
+    // What it says of synchronisation follows.
+    script.exchange(&[fprd(0x1002, 0x0130, &[0x14, 0, 0, 0, 0x1A, 0])]);
+    let lasting = report(&mut script);
+    let finding = only(&lasting);
+    assert_eq!((finding.name.as_str(), no(finding)), ("processor-stopped", Some(2)));
+    assert_eq!(finding.cause, FaultName::FirmwareFault);
+    assert_eq!(finding.consequences.len(), 1, "{}", text(&lasting));
+    script.exchange(&[fprd(0x1002, 0x0110, &[0x37, 0x5A])]);
+    let again = report(&mut script);
+    assert_eq!(only(&again).state, FindingState::Closed);
+}
+
+// silent: S206
+#[test]
+fn a_device_that_was_without_supply_has_no_stopped_processor() {
+    let mut script = running();
+    script.exchange(&[fprd(0x1002, 0x0110, &[0x37, 0x5A]).wkc(0)]);
+    // Its firmware is not up yet.
+    script.exchange(&[fprd(0x1002, 0x0110, &[0x35, 0x5A])]);
+    let report = report(&mut script);
+    assert!(report.findings.iter().all(|one| one.code != "S206"), "{}", text(&report));
+}
+
+// fires: C332
+#[test]
+fn two_answers_to_one_address_are_found_and_nothing_is_learnt_of_them() {
+    let mut script = running();
+    // The third one has taken the second one's address: it does not answer to its own any more.
+    script.exchange(&[fprd(0x1003, 0x0130, &[8, 0, 0, 0, 0, 0]).wkc(0)]);
+    script.exchange(&[fprd(0x1002, 0x0300, &[0x5A; 20]).wkc(2)]);
+    script.exchange(&[fprd(0x1002, 0x0110, &[0x11, 0x11]).wkc(2)]);
+    let report = report(&mut script);
+    let finding = only(&report);
+    assert_eq!((finding.code.as_str(), no(finding)), ("C332", Some(3)), "{}", text(&report));
+    assert_eq!(finding.cause, FaultName::DuplicateAddress);
+    assert!(finding.evidence[0].text.contains("working counter 2"), "{}", text(&report));
+}
+
+// silent: C332
+#[test]
+fn one_answer_each_is_no_shared_address() {
+    let mut script = running();
+    // One silent SubDevice, and one that reads and writes at once: 3 is what one of them adds.
+    script.exchange(&[fprd(0x1003, 0x0130, &[8, 0, 0, 0, 0, 0]).wkc(0)]);
+    let mut both = fprd(0x1002, 0x0120, &[8, 0]);
+    both.command = linesman_proto::command::Command::Fprw;
+    script.exchange(&[both.wkc(3)]);
+    let report = report(&mut script);
+    assert!(report.findings.iter().all(|one| one.code != "C332"), "{}", text(&report));
 }

@@ -29,6 +29,8 @@ pub struct LabOptions {
     pub project: bool,
     /// Whether the diagnosis may ask for registers by itself.
     pub probes: bool,
+    /// Whether it may write what restores itself, to find where frames vanish.
+    pub active: bool,
     /// Whether SubDevices with distributed clocks are brought into step with SYNC0, one event a cycle.
     pub clocks: bool,
     /// What is done with the line from the start.
@@ -45,6 +47,7 @@ impl Default for LabOptions {
             host_counters: true,
             project: true,
             probes: true,
+            active: false,
             clocks: false,
             begin: Begin::Run,
             source: String::new(),

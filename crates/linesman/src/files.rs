@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use linesman_config::project::Project;
-use linesman_runtime::named_files::MAX_DESCRIPTION;
 pub(crate) use linesman_runtime::named_files::NamedFiles;
+use linesman_runtime::named_files::{MAX_DESCRIPTION, read_at_most};
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::SegmentFile;
 
@@ -30,7 +30,7 @@ pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
         let reason = format!("{name}: {len} bytes, expected {what}, a text of at most {MAX_TEXT}");
         return Err(Failure::new(reason, "check the path"));
     }
-    let bytes = fs::read(path).map_err(refuse)?;
+    let bytes = read_at_most(path, MAX_TEXT).map_err(refuse)?;
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let reason = format!("{name}: at byte {at}: no text in UTF-8, expected {what} in TOML");
@@ -74,7 +74,7 @@ pub(crate) fn bytes(path: &Path, what: &str, most: u64) -> Result<Vec<u8>, Failu
         let reason = format!("{}: {len} bytes, expected {what} of at most {most}", path.display());
         return Err(Failure::new(reason, "check the path"));
     }
-    fs::read(path).map_err(refuse)
+    read_at_most(path, most).map_err(refuse)
 }
 
 /// A device description.
@@ -118,7 +118,15 @@ pub(crate) fn write_new_bytes(path: &Path, what: &str, bytes: &[u8]) -> Result<(
 
 /// An error inside a file.
 pub(crate) fn in_file(path: &Path, error: &dyn std::error::Error) -> Failure {
+    in_file_of(path, error, "correct the file there")
+}
+
+/// An error inside a file of a kind, with advice where the error has none.
+pub(crate) fn in_file_of(path: &Path, error: &dyn std::error::Error, advice: &str) -> Failure {
     let mut failure = Failure::from_error(error);
     failure.reason = format!("{}: {}", path.display(), failure.reason.trim_end());
+    if failure.next_step.is_empty() {
+        advice.clone_into(&mut failure.next_step);
+    }
     failure
 }

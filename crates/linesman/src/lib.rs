@@ -27,8 +27,14 @@
 //! # std::fs::remove_dir_all(&folder).unwrap();
 //! ```
 //!
+//! For axes, [`Cycle::dc`] puts the cycle in step with the distributed clocks; `examples/axis.rs` drives one:
+//!
+//! ```
+#![doc = include_str!("../examples/axis.rs")]
+//! ```
+//!
 //! The closure is called once a cycle, with inputs that have just come back; outputs leave with the
-//! next frames. When it is late more often than [`Cycle::allow_misses`] says, outputs are withheld, so
+//! next frames ([`Cycle::exchange_at_end`] turns that round). When it is late more often than [`Cycle::allow_misses`] says, outputs are withheld, so
 //! that the watchdogs of SubDevices do their work. At the end outputs go to zero and every SubDevice
 //! back to INIT.
 //!

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use linesman_config::eni::Eni;
 use linesman_config::inventory::Inventory;
+use linesman_proto::time::Span;
 use linesman_runtime::image::{Input, Output, Value};
 use linesman_runtime::run::Choices;
 
@@ -22,7 +23,7 @@ impl Scan {
     /// When its process data do not fit.
     pub fn plan(&self) -> Result<Plan, Error> {
         let plan = Choices::default().plan_of(&self.inventory).map_err(Error::Plan)?;
-        Ok(Plan { plan })
+        Ok(Plan { plan, found: Some(Box::new(self.inventory.clone())) })
     }
 
     /// What is there.
@@ -36,6 +37,8 @@ impl Scan {
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(crate) plan: linesman_config::plan::Plan,
+    /// What it was made of, if that was a scan.
+    found: Option<Box<Inventory>>,
 }
 
 impl Plan {
@@ -49,7 +52,7 @@ impl Plan {
         let refuse = |why: String| Error::File { path: path.to_owned(), why };
         let bytes = std::fs::read(path).map_err(|error| refuse(error.to_string()))?;
         let eni = Eni::parse(&bytes).map_err(|error| refuse(error.to_string()))?;
-        Ok(Self { plan: eni.plan })
+        Ok(eni.plan.into())
     }
 
     /// An input by its name: `EL1008/1`, `Drive/Status word`, `EL3204/1/Value`.
@@ -68,6 +71,24 @@ impl Plan {
         Ok(Output::find(&self.plan, name)?)
     }
 
+    /// The plan with distributed clocks, for a cycle of this time. One that has clocks stays as it is.
+    ///
+    /// # Errors
+    /// When it was not made of a scan, and chooses none.
+    pub(crate) fn clocked(self, cycle: Span) -> Result<linesman_config::plan::Plan, Error> {
+        if self.plan.reference_clock().is_some() {
+            return Ok(self.plan);
+        }
+        let Some(found) = self.found else {
+            let why = "distributed clocks are asked for, and the file chooses none. Do: write `clock = {}` for \
+                       the SubDevices of the project that are to have one";
+            return Err(Error::Plan(why.to_owned()));
+        };
+        // Clocks have datagrams of their own: where process data lie does not change.
+        let choices = Choices { cycle: Some(cycle), clocks: true, ..Choices::default() };
+        choices.plan_of(&found).map_err(Error::Plan)
+    }
+
     /// The plan itself.
     #[must_use]
     pub const fn as_plan(&self) -> &linesman_config::plan::Plan {
@@ -77,6 +98,6 @@ impl Plan {
 
 impl From<linesman_config::plan::Plan> for Plan {
     fn from(plan: linesman_config::plan::Plan) -> Self {
-        Self { plan }
+        Self { plan, found: None }
     }
 }

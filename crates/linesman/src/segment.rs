@@ -5,6 +5,7 @@ use std::sync::mpsc;
 
 use linesman_config::eni::Eni;
 use linesman_config::inventory::Inventory;
+use linesman_config::plan::IoAt;
 use linesman_config::project::Project;
 use linesman_link::clock::HostClock;
 use linesman_proto::state::AlState;
@@ -89,6 +90,8 @@ pub struct Cycle {
     misses: u32,
     real_time: RealTime,
     leave: AlState,
+    io_at: Option<IoAt>,
+    clocks: bool,
 }
 
 impl Cycle {
@@ -96,13 +99,41 @@ impl Cycle {
     #[must_use]
     pub fn us(micros: u64) -> Self {
         let time = Span::us(micros.max(1));
-        Self { time, misses: 2, real_time: RealTime::default(), leave: AlState::Init }
+        let (real_time, leave) = (RealTime::default(), AlState::Init);
+        Self { time, misses: 2, real_time, leave, io_at: None, clocks: false }
     }
 
     /// How many cycles in a row the application may be late before its outputs are withheld.
     #[must_use]
     pub const fn allow_misses(mut self, misses: u32) -> Self {
         self.misses = misses;
+        self
+    }
+
+    /// Distributed clocks: every SubDevice that has one and says in its EEPROM how it is to be used gets
+    /// SYNC0 in the beat of this cycle, and the cycle follows the reference clock. A plan of a project that
+    /// chooses clocks keeps its choices.
+    #[must_use]
+    pub const fn dc(mut self) -> Self {
+        self.clocks = true;
+        self
+    }
+
+    /// Frames leave when the cycle begins, with the outputs of the cycle before, and the application runs
+    /// after them, on inputs that have just come back: steady, for motion. It is so unless a project says
+    /// otherwise.
+    #[must_use]
+    pub const fn exchange_at_begin(mut self) -> Self {
+        self.io_at = Some(IoAt::TaskBegin);
+        self
+    }
+
+    /// The application runs when the cycle begins, and frames leave as soon as it has returned: outputs are
+    /// as fresh as they can be, and jitter with the application. What need not go before them runs in
+    /// [`Application::after_outputs`].
+    #[must_use]
+    pub const fn exchange_at_end(mut self) -> Self {
+        self.io_at = Some(IoAt::TaskEnd);
         self
     }
 
@@ -190,10 +221,11 @@ impl Segment {
         cycle: Cycle,
         application: impl Application,
     ) -> Result<RunReport, Error> {
-        let mut plan = plan.plan;
+        let mut plan = if cycle.clocks { plan.clocked(cycle.time)? } else { plan.plan };
         // The first task is the application's; an imported one keeps the times of its others.
         if let Some(task) = plan.tasks.first_mut() {
             task.cycle = cycle.time;
+            task.io_at = cycle.io_at.unwrap_or(task.io_at);
         }
         let options = RunOptions {
             on: self.place.clone(),

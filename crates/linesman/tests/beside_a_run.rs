@@ -4,69 +4,14 @@
 
 mod support;
 
-use std::process::{Child, Command, Stdio};
-use std::time::Duration;
-
-use support::{PROGRAM, assert_valid, linesman};
+use support::running::{PLANT, Running};
+use support::{assert_valid, linesman};
 use tempfile::TempDir;
-
-const PLANT: &str = "\
-[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
-[[device]]\nname = \"T2\"\ntype = \"EL2008\"\non = \"K1.B\"\n\
-[[device]]\nname = \"T3\"\ntype = \"EL3104\"\non = \"T2.B\"\n";
-
-/// A run in a process of its own, and its socket; ended with the test.
-struct Running {
-    child: Child,
-    folder: TempDir,
-}
-
-impl Running {
-    fn start() -> Self {
-        let folder = TempDir::new().unwrap();
-        let plant = folder.path().join("plant.toml");
-        std::fs::write(&plant, PLANT).unwrap();
-        let child = Command::new(PROGRAM)
-            .args(["run", "--on", &format!("sim:{}", plant.display()), "--control"])
-            .arg(folder.path().join("socket"))
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let running = Self { child, folder };
-        // The socket is there once the line is being driven, on a busy computer a little later.
-        for _ in 0..600 {
-            let states = linesman(["state", &running.socket(), "--json"]);
-            if states.status == 0
-                && states.json()["devices"]
-                    .as_array()
-                    .unwrap()
-                    .iter()
-                    .all(|one| one["al_state"] == "OP")
-            {
-                return running;
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        panic!("the line does not come up");
-    }
-
-    fn socket(&self) -> String {
-        self.folder.path().join("socket").display().to_string()
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
 
 // proves: DIA-08 partial: requests beside a run
 #[test]
 fn subdevices_are_asked_while_the_line_runs() {
-    let running = Running::start();
+    let running = Running::start(PLANT);
     let socket = running.socket();
     let states = linesman(["state", &socket, "--json"]).json();
     assert_valid(&states, "states");
@@ -93,6 +38,37 @@ fn subdevices_are_asked_while_the_line_runs() {
     assert_eq!(up.status, 0, "{}", up.all());
 }
 
+// S0 L1568, L2431-2440: "clear error".
+// proves: DIA-08
+#[test]
+fn an_error_is_cleared_while_the_line_runs() {
+    let running = Running::start(&format!(
+        "{PLANT}\n[[fault]]\nkind = \"config-mismatch\"\ndevice = \"T3\"\nfrom_ms = 2000\n"
+    ));
+    let socket = running.socket();
+    // From then on it refuses SAFEOP, which nobody notices until it is asked for that.
+    let refused = (0..100).any(|_| {
+        let down = linesman(["state", &socket, "3", "--to", "preop"]);
+        assert_eq!(down.status, 0, "{}", down.all());
+        linesman(["state", &socket, "3", "--to", "safeop", "--json"]).status == 1
+    });
+    assert!(refused, "it never refuses");
+    let state = || linesman(["state", &socket, "3", "--json"]).json()["devices"][0].clone();
+    let erroneous = (0..100).any(|_| state()["al_error"] == true);
+    assert!(erroneous, "{}", state());
+    let cleared = linesman(["state", &socket, "3", "--acknowledge", "--json"]);
+    assert_eq!(cleared.status, 0, "{}", cleared.all());
+    let device = &cleared.json()["devices"][0];
+    assert_eq!(
+        (&device["al_state"], &device["al_error"]),
+        (&"PREOP".into(), &false.into()),
+        "{device}"
+    );
+    // The others have run on meanwhile.
+    let states = linesman(["state", &socket, "--json"]).json();
+    assert_eq!(states["devices"][1]["al_state"], "OP");
+}
+
 #[test]
 fn a_socket_without_a_run_is_told() {
     let folder = TempDir::new().unwrap();
@@ -101,7 +77,7 @@ fn a_socket_without_a_run_is_told() {
     let run = linesman(["state", path.to_str().unwrap()]);
     assert_eq!(run.status, 2, "{}", run.all());
     assert!(run.stderr.contains("is it still running?"), "{}", run.stderr);
-    let running = Running::start();
+    let running = Running::start(PLANT);
     let nobody = linesman(["state", &running.socket(), "9"]);
     assert_eq!(nobody.status, 2, "{}", nobody.all());
 }

@@ -4,74 +4,14 @@
 
 mod support;
 
-use std::process::{Child, Command, Stdio};
-use std::time::Duration;
-
 use serde_json::Value;
-use support::{PROGRAM, assert_valid, linesman};
+use support::running::{PLANT, Running};
+use support::{assert_valid, linesman};
 use tempfile::TempDir;
-
-const PLANT: &str = "\
-[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
-[[device]]\nname = \"T2\"\ntype = \"EL2008\"\non = \"K1.B\"\n\
-[[device]]\nname = \"T3\"\ntype = \"EL3104\"\non = \"T2.B\"\n";
 
 /// Symbols are destroyed on the way into T3 from 0.5 s on, without end.
 const NOISE: &str = "\
 [[fault]]\nkind = \"emc-noise\"\nat = \"T2.B>T3.A\"\nhits_per_s = 60\nfrom_ms = 500\n";
-
-/// A run in a process of its own, and its socket; ended with the test.
-struct Running {
-    child: Child,
-    folder: TempDir,
-}
-
-impl Running {
-    fn start(plant: &str) -> Self {
-        let folder = TempDir::new().unwrap();
-        let file = folder.path().join("plant.toml");
-        std::fs::write(&file, plant).unwrap();
-        let child = Command::new(PROGRAM)
-            .args(["run", "--on", &format!("sim:{}", file.display()), "--control"])
-            .arg(folder.path().join("socket"))
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let running = Self { child, folder };
-        running.until("comes up", |report| {
-            let devices = report["devices"].as_array().unwrap();
-            devices.len() == 3 && devices.iter().all(|one| one["al_state"] == "OP")
-        });
-        running
-    }
-
-    fn socket(&self) -> String {
-        self.folder.path().join("socket").display().to_string()
-    }
-
-    /// The report, once it is as expected; on a busy computer that takes a while.
-    #[track_caller]
-    fn until(&self, what: &str, done: impl Fn(&Value) -> bool) -> Value {
-        let mut last = String::new();
-        for _ in 0..600 {
-            let run = linesman(["online", &self.socket(), "--json"]);
-            if run.status < 2 && done(&run.json()) {
-                return run.json();
-            }
-            last = run.all();
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        panic!("it never {what}: {last}");
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
 
 fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_else(|| panic!("no number: {value}"))
@@ -226,6 +166,62 @@ fn the_live_view_tells_what_changes_a_line_each() {
         assert_eq!(wrong.status, 2, "{arguments:?}: {}", wrong.all());
         assert!(wrong.stderr.contains(words), "{arguments:?}: {}", wrong.stderr);
     }
+}
+
+// S0 L1302-1348: state, CRC, lost frames, errors of the card and the log side by side, "ERR SAFEOP" with
+// its code.
+// proves: DIA-01
+#[test]
+fn state_errors_lost_frames_and_log_stand_in_one_view() {
+    let plant = format!(
+        "{}[[fault]]\nkind = \"watchdog-starved\"\ndevice = \"T3\"\nwatchdog_ms = 0.2\nfrom_ms = 6000\n\
+         [[fault]]\nkind = \"nic-damaged\"\nat = \"maindevice\"\npart = \"receiver\"\nhits_per_s = 400\n\
+         from_ms = 5000\n[[fault]]\nkind = \"emc-noise\"\nat = \"K1.B>T2.A\"\nhits_per_s = 60\n\
+         from_ms = 5000\n",
+        PLANT.replace("EL3104", "EL4102")
+    );
+    let running = Running::start(&plant);
+    let report = running.until("fails", |report| {
+        let text = report["devices"][2]["state"]["text"].as_str().unwrap_or_default();
+        let lost = number(&report["cyclic"]["lost"]) + number(&report["queued"]["lost"]);
+        text.starts_with("ERR SAFEOP")
+            && lost > 0
+            && number(&report["devices"][1]["errors"]) > 0
+            && report["cards"][0]["rx_errors"].as_u64().is_some_and(|errors| errors > 0)
+    });
+    let folder = TempDir::new().unwrap();
+    let kept = folder.path().join("kept.json");
+    std::fs::write(&kept, report.to_string()).unwrap();
+    let view = linesman(["online", kept.to_str().unwrap()]).stdout;
+    let cyclic = format!("{} lost. Queued", report["cyclic"]["lost"]);
+    let receive = format!("receive errors {}, send errors 0", report["cards"][0]["rx_errors"]);
+    for part in [
+        "ERR SAFEOP",
+        "(0x001B sync manager watchdog)",
+        "Latest:",
+        "OP to SAFEOP, 0x001B",
+        &cyclic,
+        &receive,
+    ] {
+        assert!(view.contains(part), "{part} in {view}");
+    }
+}
+
+// S4 L47-48: a line in trouble shows it by its acyclic frames, from 2 a second to 77.
+// proves: JCT-13
+#[test]
+fn a_line_in_trouble_asks_around_and_that_shows() {
+    let dips = "[[fault]]\nkind = \"brown-out\"\ndevices = [\"T3\"]\ndip_ms = 60\nevery_ms = 700\n\
+                from_ms = 6000\n";
+    let running = Running::start(&format!("{PLANT}{dips}"));
+    let rate = |report: &Value| report["queued"]["per_second"].as_f64();
+    let quiet = running.until("is quiet", |report| {
+        number(&report["time_ns"]) > 2_000_000_000 && rate(report).is_some()
+    });
+    let before = rate(&quiet).unwrap();
+    running.until("asks around", |report| rate(report).is_some_and(|rate| rate > before * 3.0));
+    let view = linesman(["online", &running.socket()]).stdout;
+    assert!(view.contains("Queued: ") && view.contains(" a second), "), "{view}");
 }
 
 // S0 L2634-2638: the last protocol error stays until the next clean access; states are not touched.

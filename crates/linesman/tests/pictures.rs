@@ -176,6 +176,7 @@ fn every_shape_is_drawn_with_all_boxes_apart_and_all_links() {
     }
 }
 
+// proves: JCT-14
 #[test]
 fn the_report_marks_both_faults_of_a_plant_where_they_are() {
     let folder = TempDir::new().unwrap();
@@ -212,6 +213,8 @@ fn the_report_marks_both_faults_of_a_plant_where_they_are() {
     assert_eq!(marked.count(), 2, "no other link is marked");
     let silent = all.iter().filter(|one| one.title.contains("no answer")).count();
     assert_eq!(silent, 5, "the dead terminal and the four behind it");
+    let gone: Vec<&Element> = all.iter().filter(|one| one.has_class("gone")).collect();
+    assert_eq!(gone.len(), 5 + 1, "they have the red border, and the legend its key");
     assert!(page.contains("35.B – 36.A"));
 }
 

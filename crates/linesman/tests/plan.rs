@@ -153,6 +153,33 @@ fn the_branched_configuration_runs_on_a_segment_that_is_made_of_it() {
     assert!(devices.iter().all(|device| device["valid"] == true), "{report}");
 }
 
+// S0 L1505-1507, S1 L169: what works closely together into one sync unit, what is independent apart.
+// proves: FRM-25
+#[test]
+fn many_devices_in_one_sync_unit_are_advised_to_part() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("wide.toml");
+    let advised = |terminals: usize, parted: bool| {
+        let mut text = "name = \"wide\"\n".to_owned();
+        for no in 1..=terminals {
+            let on = if no == 1 { "maindevice".to_owned() } else { format!("B{}.B", no - 1) };
+            let unit = if parted { no % 2 } else { 0 };
+            text += &format!(
+                "[[device]]\nname = \"B{no}\"\non = \"{on}\"\nsync_unit = \"unit {unit}\"\n\
+                 [device.description]\noutputs_bits = 8\n"
+            );
+        }
+        std::fs::write(&file, text).unwrap();
+        let run = linesman(["plan", file.to_str().unwrap()]);
+        assert!(run.status <= 1, "{}", run.all());
+        let words = run.all().split_whitespace().collect::<Vec<_>>().join(" ");
+        words.contains("put what works closely together into one sync unit")
+    };
+    assert!(advised(100, false), "a hundred in one");
+    assert!(!advised(100, true), "fifty in each of two");
+    assert!(!advised(30, false), "thirty in one");
+}
+
 #[test]
 fn what_cannot_be_planned_is_refused_with_its_place() {
     let folder = TempDir::new().unwrap();

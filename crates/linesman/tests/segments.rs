@@ -56,6 +56,36 @@ fn a_scan_draws_the_branch() {
     assert_eq!(scan["start"], Value::Null, "virtual time has no date");
 }
 
+// proves: HW-05 partial: told by `scan`, from what each SII says
+#[test]
+fn a_scan_names_the_terminal_that_needs_a_feed_before_it() {
+    let scan = |terminals: usize| {
+        let mut text =
+            "name = \"press\"\n[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n"
+                .to_owned();
+        for no in 1..=terminals {
+            let before = if no == 1 { "K1".to_owned() } else { format!("T{}", no - 1) };
+            text +=
+                &format!("[[device]]\nname = \"T{no}\"\ntype = \"EL2008\"\non = \"{before}.B\"\n");
+        }
+        let directory = TempDir::new().expect("a temporary directory");
+        let path = directory.path().join("press.toml");
+        fs::write(&path, text).expect("a file can be written");
+        let place = format!("sim:{}", path.display());
+        (linesman(["scan", &place]), linesman(["scan", &place, "--json"]).json())
+    };
+    // 2,000 mA are supplied, each terminal takes 110 mA.
+    let (text, json) = scan(19);
+    let said = text.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(said.contains("overloaded from 20 (EL2008) on: 90 mA are missing"), "{}", text.all());
+    assert!(said.contains("power feed terminal (EL94xx) before 20 (EL2008)"), "{}", text.all());
+    assert_valid(&json, "scan");
+    assert_eq!(json["ebus"][0]["first_negative"], 20);
+    let (text, json) = scan(18);
+    assert!(!text.stdout.contains("overloaded"), "{}", text.all());
+    assert_eq!(json["ebus"][0]["members"][17]["remaining_ma"], 20);
+}
+
 #[test]
 fn a_sound_plant_is_healthy_in_op() {
     let found = diagnosis(&with_segment("diagnose", "", &["--json"]), 0);

@@ -3,7 +3,7 @@
 use linesman_config::identity::Mismatch;
 use linesman_config::inventory::Inventory;
 use linesman_config::start_up::StartUpCommand;
-use linesman_proto::address::{DeviceId, Position, StationAddress, WorkingCounter};
+use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias, WorkingCounter};
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
 use linesman_proto::register::{AlStatus, DlStatus, ErrorCounters};
@@ -178,6 +178,15 @@ pub enum Event {
         expected: Identity,
         /// Who is there.
         found: Identity,
+    },
+    /// Several answer to the alias by which one of the plan is to be found: none of them is taken. Told once.
+    AliasShared {
+        /// Which one is planned.
+        id: DeviceId,
+        /// The alias.
+        alias: StationAlias,
+        /// How many answer to it.
+        count: u16,
     },
     /// A SubDevice that the plan does not have. It is left alone.
     UnplannedDevice {

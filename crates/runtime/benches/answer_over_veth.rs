@@ -7,7 +7,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot go on may panic")]
 
-use std::process::{Command, ExitCode};
+mod own_namespace;
+
+use std::process::ExitCode;
 use std::thread;
 
 use linesman_link::clock::{HostClock, tighten_timers};
@@ -21,10 +23,8 @@ use linesman_runtime::wiring::Wiring;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::SegmentFile;
 
-const NEAR: &str = "near0";
-const FAR: &str = "far0";
-/// Set for the process inside the namespace.
-const INSIDE: &str = "LINESMAN_BENCH_INSIDE";
+use own_namespace::{FAR, NEAR};
+
 /// What the segment may need, of what the reflector needs.
 const BAR: f64 = 1.5;
 const ROUNDS: usize = 10;
@@ -34,34 +34,10 @@ const LINES: [usize; 3] = [1, 8, 30];
 const PRIORITY: u8 = 10;
 
 fn main() -> ExitCode {
-    if std::env::var_os(INSIDE).is_some() {
-        return inside();
-    }
-    let program = std::env::current_exe().unwrap();
-    let status = Command::new("unshare").arg("--net").arg(program).env(INSIDE, "1").status();
-    match status {
-        Ok(status) => ExitCode::from(status.code().unwrap_or(1) as u8),
-        Err(error) => {
-            println!("skipped: a network namespace cannot be made here: {error}");
-            ExitCode::SUCCESS
-        }
-    }
+    own_namespace::run(inside)
 }
 
 fn inside() -> ExitCode {
-    let lay = format!("ip link add {NEAR} type veth peer name {FAR}");
-    let mut commands = vec![lay];
-    for card in [NEAR, FAR] {
-        commands.push(format!("sysctl -q -w net.ipv6.conf.{card}.disable_ipv6=1"));
-        commands.push(format!("ip link set {card} up"));
-    }
-    for command in commands {
-        let done = Command::new("sh").args(["-c", &command]).status();
-        if !done.is_ok_and(|status| status.success()) {
-            println!("skipped: `{command}` failed; it needs root and iproute2");
-            return ExitCode::SUCCESS;
-        }
-    }
     tighten_timers();
     if sched_fifo(PRIORITY).is_err() {
         println!("without real-time priority: other programs are measured too");

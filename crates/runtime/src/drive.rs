@@ -3,12 +3,13 @@
 use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
-use linesman_maindevice::{Event, MainDevice, Options};
+use linesman_maindevice::{Event, MainDevice, Options, Transmit};
 use linesman_proto::address::{Network, Path};
 use linesman_proto::ethernet::MAX_LEN;
 use linesman_proto::time::{Instant, Span};
 
 use crate::line::{Cards, Line};
+use crate::run::tap::Passed;
 use crate::stop::Stop;
 
 /// Most frames handed out in one go; a MainDevice has far fewer out at once.
@@ -20,6 +21,14 @@ const NAP: Span = Span::ms(50);
 pub trait Audience {
     /// A frame left a card or came back.
     fn frame(&mut self, frame: &FrameSeen<'_>);
+    /// Room for a frame of at most 1,514 bytes that may be sent at `now`, where the audience keeps
+    /// frames: it is built there. After it was sent [`keep`](Self::keep) follows in place of
+    /// [`frame`](Self::frame).
+    fn room(&mut self, _now: Instant) -> Option<&mut [u8]> {
+        None
+    }
+    /// The frame in [`room`](Self::room), so many bytes, has been sent.
+    fn keep(&mut self, _sent: &Passed, _len: usize) {}
     /// The host noticed something.
     fn host(&mut self, observation: &HostObservation);
     /// The MainDevice tells something.
@@ -136,13 +145,25 @@ impl<L: Line> Driver<L> {
 
     /// Sends what the MainDevice has to send.
     fn send(&mut self, audience: &mut impl Audience) -> Result<(), LinkError> {
+        let Self { main, line, buffer, frames } = self;
         for _ in 0..MOST_FRAMES {
-            let now = self.line.now();
-            let Some(transmit) = self.main.poll_transmit(now, &mut self.buffer) else { break };
-            let bytes = &self.buffer[..transmit.len];
-            self.line.send(transmit.path, bytes)?;
-            self.frames += 1;
-            audience.frame(&seen(self.frames, transmit.path, Direction::Sent, now, bytes));
+            let now = line.now();
+            if let Some(room) = audience.room(now) {
+                let Some(Transmit { path, len, .. }) = main.poll_transmit(now, room) else { break };
+                line.send(path, room.get(..len).unwrap_or_default())?;
+                *frames += 1;
+                let (path, direction) = (Some(path), Direction::Sent);
+                let sent = Passed { time: now, number: *frames, path, direction, truncated: false };
+                audience.keep(&sent, len);
+            } else {
+                let Some(Transmit { path, len, .. }) = main.poll_transmit(now, buffer) else {
+                    break;
+                };
+                let bytes = &buffer[..len];
+                line.send(path, bytes)?;
+                *frames += 1;
+                audience.frame(&seen(*frames, path, Direction::Sent, now, bytes));
+            }
         }
         Ok(())
     }

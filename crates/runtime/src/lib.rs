@@ -27,4 +27,5 @@ pub mod selector;
 pub mod serve;
 pub mod service;
 pub mod stop;
+pub mod system_log;
 pub mod wiring;

@@ -1,12 +1,28 @@
 //! Files that another file names.
 
 use std::fs;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use linesman_sim::segment_file::DescriptionFiles;
 
 /// Longest device description that is read, in bytes; the largest of vendors have 50 MB.
 pub const MAX_DESCRIPTION: u64 = 128 * 1024 * 1024;
+
+/// The bytes of a file, of which there must be no more than `most`: what has no end, such as a device, is not
+/// read for ever.
+///
+/// # Errors
+/// When it cannot be read, or is longer.
+pub fn read_at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let len = fs::File::open(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+    if len as u64 > most {
+        let what = format!("it has more than {most} bytes");
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, what));
+    }
+    Ok(bytes)
+}
 
 /// Files that a segment file or a story names, relative to where that is, or under the directory of
 /// device data: `$LINESMAN_DATA/esi/drive.xml`.

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 
+use super::cargo::cargo;
 use super::{Context, Outcome, interop, product, tools};
 
 pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
@@ -27,6 +28,15 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
         .run()?;
     for line in ran.output.lines() {
         println!("    {line}");
+    }
+    // What a cycle costs on a card, as a share of bare sending and receiving on the same CPU.
+    let floor = ["bench", "-p", "linesman-runtime", "--bench", "round_trips"];
+    let trips = context.command("round-trips", cargo(), &floor).limit(900).run()?;
+    for line in trips.output.lines().filter(|line| line.contains("µs")) {
+        println!("    {line}");
+    }
+    if !trips.success() {
+        return Ok(Outcome::Failed { count: 0, why: trips.status_line() });
     }
     let measured = ran.output.lines().filter(|line| line.contains(" ms ")).count() as u64;
     Ok(match ran.success() {

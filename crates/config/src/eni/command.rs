@@ -16,6 +16,8 @@ pub(super) struct RegisterCommand {
     pub(super) line: u32,
     pub(super) transitions: Vec<Transition>,
     pub(super) command: Command,
+    /// Whom it means: position, station address or alias, as its command has it.
+    pub(super) adp: u16,
     pub(super) address: RegisterAddress,
     pub(super) data: Vec<u8>,
     /// What must come back, and which bits of it count; empty: all.
@@ -73,6 +75,7 @@ pub(super) fn register(element: &Element) -> Result<Option<RegisterCommand>, Esi
         line: element.line,
         transitions: transitions(element)?,
         command,
+        adp: element.child_number("Adp")?.unwrap_or(0),
         address: RegisterAddress(address),
         data,
         validate,

@@ -3,13 +3,15 @@
 
 use std::ops::Range;
 
+use linesman_proto::address::StationAlias;
+use linesman_proto::command::Command;
 use linesman_proto::register::{FmmuConfig, SyncManagerConfig};
 use linesman_proto::time::Span;
 
 use super::command::RegisterCommand;
 use crate::esi::EsiError;
 use crate::identity::RevisionRule;
-use crate::plan::{ClockSettings, DevicePlan};
+use crate::plan::{AddressingChoice, ClockSettings, DevicePlan};
 use crate::start_up::{StartUpAction, StartUpCommand, Transition};
 
 const STATION: Range<u16> = 0x0010..0x0012;
@@ -40,6 +42,10 @@ pub(super) struct Meaning {
     emulated: Option<bool>,
     clock: (Option<u16>, Option<[u32; 2]>),
     sii_word: u32,
+    /// It is given a station address.
+    named: bool,
+    /// It is asked for SAFEOP by its position.
+    by_position: bool,
 }
 
 impl Meaning {
@@ -73,6 +79,8 @@ impl Meaning {
                         command.data.first().is_some_and(|low| low & ACKNOWLEDGE != 0);
                     self.emulated = Some(!acknowledges);
                 }
+                self.by_position |=
+                    command.command == Command::Apwr && command.at(Transition::PRE_OP_TO_SAFE_OP);
             }
             _ if STATION.contains(&address) => {
                 if let Some(station) = word(0).filter(|station| *station != device.station.0) {
@@ -81,6 +89,12 @@ impl Meaning {
                         device.station.0
                     );
                     return Err(wrong(command, reason));
+                }
+                self.named = true;
+                // Who is given its address by another one is found by that: its second address.
+                if command.command == Command::Fpwr && command.adp != device.station.0 {
+                    device.settings.addressing = AddressingChoice::Alias;
+                    device.settings.alias = Some(StationAlias(command.adp));
                 }
             }
             _ if SII.contains(&address) => {}
@@ -174,6 +188,9 @@ impl Meaning {
     /// What is known once all commands have been read.
     pub(super) fn finish(&self, device: &mut DevicePlan, clock: Option<ClockSettings>) {
         device.device_emulation = self.emulated.unwrap_or(false);
+        if self.by_position && !self.named {
+            device.settings.addressing = AddressingChoice::Position;
+        }
         let (activation, cycles) = self.clock;
         let mut clock = clock.unwrap_or_default();
         clock.assign_activate = activation.unwrap_or(0);

@@ -1,6 +1,6 @@
 //! A SubDevice: element `Slave` (ETG.2100).
 
-use linesman_proto::address::{DeviceId, RegisterAddress, StationAddress};
+use linesman_proto::address::{DeviceId, RegisterAddress, StationAddress, StationAlias};
 use linesman_proto::port::Port;
 use linesman_proto::register::{FmmuConfig, SmMode};
 use linesman_proto::sii::{Direction, Identity, MailboxArea, MailboxPair, Protocols};
@@ -11,10 +11,12 @@ use super::state::Meaning;
 use super::{OWN, clean, command};
 use crate::esi::EsiError;
 use crate::esi::device::physics;
+use crate::esi::setting;
 use crate::esi::xml::Element;
 use crate::identity::RevisionRule;
 use crate::plan::{AddressingChoice, ClockSettings, DevicePlan, OnWrongCounter, ProcessAccess};
 use crate::profile::Mailbox;
+use crate::start_up::{StartUpCommand, left_out};
 
 /// Status byte of the SyncManager that serves the mailbox in.
 const MAILBOX_IN_STATUS: RegisterAddress = RegisterAddress(0x080D);
@@ -103,7 +105,7 @@ fn read(
     }
     if let Some(mailbox) = element.child("Mailbox") {
         device.mailbox = self::mailbox(mailbox, &mut device)?;
-        left_out(mailbox, &device.name, notes);
+        settings(mailbox, &mut device, notes)?;
     }
     if let Some(group) = element.child("HotConnect") {
         let called = clean(group.child_text("GroupName"));
@@ -188,23 +190,41 @@ fn mailbox(element: &Element, device: &mut DevicePlan) -> Result<Option<Mailbox>
     Ok(Some(Mailbox { areas, bootstrap, protocols: Protocols(protocols), complete_access }))
 }
 
-/// Commands of protocols that are not spoken are left out, and that is said.
-fn left_out(mailbox: &Element, name: &str, notes: &mut Vec<String>) {
-    for protocol in ["EoE", "SoE", "AoE", "FoE", "VoE"] {
+/// Commands by EoE and SoE; those that cannot be carried out are left out, and that is said.
+fn settings(
+    mailbox: &Element,
+    device: &mut DevicePlan,
+    notes: &mut Vec<String>,
+) -> Result<(), EsiError> {
+    type Read = fn(&Element) -> Result<Option<Vec<StartUpCommand>>, EsiError>;
+    let protocols: [(&str, Read); 5] = [
+        ("EoE", setting::ethernet),
+        ("SoE", setting::drive),
+        ("AoE", |_| Ok(None)),
+        ("FoE", |_| Ok(None)),
+        ("VoE", |_| Ok(None)),
+    ];
+    for (protocol, read) in protocols {
         let Some(commands) = mailbox.child(protocol).and_then(|one| one.child("InitCmds")) else {
             continue;
         };
-        let is_on = |one: &&Element| !matches!(one.child_text("Disabled"), "1" | "true");
-        let what = match commands.children("InitCmd").filter(is_on).count() {
-            0 => continue,
-            1 => "1 start-up command".to_owned(),
-            count => format!("{count} start-up commands"),
-        };
-        notes.push(format!(
-            "{name}: {what} by {protocol} not carried out: that protocol is not spoken at start-up; make \
-             these settings with the maker's tool, or by CoE where the SubDevice has objects for them"
-        ));
+        let mut names = Vec::new();
+        let mut count = 0;
+        for command in commands.children("InitCmd").filter(|one| setting::is_on(one)) {
+            match read(command).map_err(|error| error.within(&format!("{protocol}/InitCmds")))? {
+                Some(read) => device.start_up.extend(read),
+                None => {
+                    count += 1;
+                    let comment = clean(command.child_text("Comment"));
+                    names.extend(Some(comment).filter(|comment| !comment.is_empty()));
+                }
+            }
+        }
+        if count > 0 {
+            notes.push(left_out(&device.name, protocol, count, &names));
+        }
     }
+    Ok(())
 }
 
 /// What the MainDevice sends, the SubDevice receives.
@@ -310,7 +330,9 @@ fn ours(own: &Element, file: &mut FileDevice) -> Result<(), EsiError> {
         known::<RevisionRule>(choice("revision-rule")).unwrap_or(device.revision_rule);
     device.settings.access = known::<ProcessAccess>(choice("access")).unwrap_or_default();
     device.settings.addressing =
-        known::<AddressingChoice>(choice("addressing")).unwrap_or_default();
+        known::<AddressingChoice>(choice("addressing")).unwrap_or(device.settings.addressing);
+    let alias: Option<u16> = own.attribute_number("alias")?;
+    device.settings.alias = alias.map(StationAlias).or(device.settings.alias);
     device.settings.on_wrong_counter =
         known::<OnWrongCounter>(choice("on-wrong-counter")).unwrap_or_default();
     device.settings.task = own.attribute("task").map(str::to_owned);

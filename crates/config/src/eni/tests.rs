@@ -1,6 +1,6 @@
 //! Files of the tools, made in miniature, and all that there are.
 
-use linesman_proto::address::{LogicalAddress, RegisterAddress, StationAddress};
+use linesman_proto::address::{LogicalAddress, RegisterAddress, StationAddress, StationAlias};
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::frame::size::frame_size;
@@ -115,7 +115,9 @@ fn plans_agree_with_the_numbers_of_their_files() {
                 StartUpAction::CoeDownload { object, data, .. } => {
                     Some((object.index.0, object.subindex, data.clone()))
                 }
-                StartUpAction::RegisterWrite { .. } => None,
+                StartUpAction::SetAddresses { .. }
+                | StartUpAction::WriteIdn { .. }
+                | StartUpAction::RegisterWrite { .. } => None,
             });
             objects.collect()
         };
@@ -217,7 +219,9 @@ fn everything() -> Plan {
             type_name: "DRV".to_owned(),
             mailbox: Some(Mailbox {
                 areas: MailboxPair::from_words([0x1000, 128, 0x1080, 128]),
-                protocols: Protocols(Protocols::COE | Protocols::FOE),
+                protocols: Protocols(
+                    Protocols::COE | Protocols::FOE | Protocols::EOE | Protocols::SOE,
+                ),
                 bootstrap: Some(MailboxPair::from_words([0x1000, 256, 0x1200, 256])),
                 complete_access: true,
             }),
@@ -262,6 +266,24 @@ fn everything() -> Plan {
         },
         StartUpCommand {
             transition: Transition::INIT_TO_PRE_OP,
+            action: StartUpAction::SetAddresses {
+                port: 0,
+                parameters: vec![2, 0, 0, 0, 11, 1, 168, 192],
+            },
+            comment: "addresses".to_owned(),
+        },
+        StartUpCommand {
+            transition: Transition::PRE_OP_TO_SAFE_OP,
+            action: StartUpAction::WriteIdn {
+                drive: 1,
+                idn: linesman_proto::mailbox::soe::Idn(32),
+                elements: 0x40,
+                data: vec![11, 0],
+            },
+            comment: "mode".to_owned(),
+        },
+        StartUpCommand {
+            transition: Transition::INIT_TO_PRE_OP,
             action: StartUpAction::RegisterWrite {
                 address: RegisterAddress(0x0200),
                 data: vec![4, 0],
@@ -281,6 +303,8 @@ fn everything() -> Plan {
         device.settings.task = Some("slow".to_owned());
         device.settings.sync_unit = Some("lamps".to_owned());
         device.settings.frame_repeat = true;
+        device.settings.alias = Some(StationAlias(0x2000 + device.station.0));
+        device.settings.addressing = AddressingChoice::Alias;
     }
     let mut seen = vec![SeenController::open_at(&[Port::A, Port::B]); 6];
     seen.push(SeenController::open_at(&[Port::A]));
@@ -404,4 +428,17 @@ fn what_is_left_out_of_a_file_is_said() {
     assert_eq!(told("Bridge: 1 start-up command by EoE not carried out"), 1, "{notes:?}");
     assert_eq!(told("Bridge: 2 start-up commands by SoE not carried out"), 1, "{notes:?}");
     assert_eq!(told("hot connect group \"Tool 1\""), 1, "{notes:?}");
+}
+
+// S0 L2481-2483.
+// proves: SW-12 partial: of a network configuration
+#[test]
+fn an_address_that_ends_in_0_is_refused() {
+    let text = write("test", &everything());
+    let data = "020000000B01A8C0";
+    assert!(text.to_uppercase().contains(data), "{text}");
+    let broken =
+        text.replace("020000000b01a8c0", "020000000001a8c0").replace(data, "020000000001A8C0");
+    let error = Eni::parse(broken.as_bytes()).unwrap_err().to_string();
+    assert!(error.contains("192.168.1.0 ends in .0") && error.contains("EoE"), "{error}");
 }

@@ -13,6 +13,7 @@ use super::module::{EsiSlots, slots};
 use super::pdo::{EsiPdo, pdo};
 use super::sync_manager::{EsiFmmu, EsiSyncManager, fmmu, sync_manager};
 use super::xml::Element;
+use crate::identity::RevisionRule;
 
 /// A device.
 #[derive(Clone, PartialEq, Debug)]
@@ -25,6 +26,10 @@ pub struct EsiDevice {
     pub product_code: u32,
     /// Its revision.
     pub revision: u32,
+    /// How its maker wants revisions compared: attribute `CheckRevisionNo`; `None` where nothing is said.
+    pub revision_rule: Option<RevisionRule>,
+    /// The frames of its sync units may be sent twice in a cycle: `FrameRepeatSupport` of all `Su`.
+    pub frame_repeat: bool,
     /// Its names with the number of their language (1033 is English); 0 without one.
     pub names: Vec<(u32, String)>,
     /// The group it belongs to.
@@ -149,6 +154,8 @@ fn read(element: &Element, kind: &Element, type_name: &str) -> Result<EsiDevice,
         type_name: type_name.to_owned(),
         product_code: kind.attribute_number("ProductCode")?.unwrap_or(0),
         revision: kind.attribute_number("RevisionNo")?.unwrap_or(0),
+        revision_rule: revision_rule(kind, &mut notes),
+        frame_repeat: frame_repeat(element)?,
         names: names(element)?,
         group: element.child_text("GroupType").to_owned(),
         hides: Vec::new(),
@@ -224,6 +231,29 @@ fn diagnosis_texts(profile: &Element, notes: &mut Vec<EsiError>) -> Vec<(u16, St
         }
     }
     texts
+}
+
+/// Attribute `CheckRevisionNo` of element `Type`. A word that ETG.2000 does not know is passed over, which
+/// is told in `notes`.
+fn revision_rule(kind: &Element, notes: &mut Vec<EsiError>) -> Option<RevisionRule> {
+    let word = kind.attribute("CheckRevisionNo").filter(|word| !word.is_empty())?;
+    let rule = RevisionRule::from_esi(word);
+    if rule.is_none() {
+        let reason = format!(
+            "CheckRevisionNo \"{word}\", expected EQ, EQ_OR_G, LW_EQ, LW_EQ_HW_EQ_OR_G, HW_EQ or HW_EQ_OR_G"
+        );
+        notes.push(kind.error(reason));
+    }
+    rule
+}
+
+/// Whether all its sync units (elements `Su`) allow frames that are sent twice; no where it has none.
+fn frame_repeat(element: &Element) -> Result<bool, EsiError> {
+    let mut all = None;
+    for unit in element.children("Su") {
+        all = Some(all.unwrap_or(true) & unit.flag("FrameRepeatSupport")?);
+    }
+    Ok(all.unwrap_or(false))
 }
 
 fn names(element: &Element) -> Result<Vec<(u32, String)>, EsiError> {

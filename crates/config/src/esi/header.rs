@@ -17,6 +17,8 @@ pub struct EsiHeader {
     pub product_code: u32,
     /// Its revision.
     pub revision: u32,
+    /// Where it stands in the text of the file, in bytes: within its element `Device`.
+    pub at: usize,
 }
 
 /// Most devices of a file.
@@ -39,6 +41,7 @@ pub fn headers(bytes: &[u8]) -> Vec<EsiHeader> {
             type_name: name.to_owned(),
             product_code,
             revision: attribute(attributes, "RevisionNo").unwrap_or(0),
+            at,
         });
         if headers.len() >= MOST {
             break;
@@ -74,6 +77,7 @@ mod tests {
             type_name: "EL2004".to_owned(),
             product_code: 0x07D4_3052,
             revision: 18,
+            at: 87,
         };
         assert_eq!(headers(text), [expected]);
         assert_eq!(headers(b"name = 1"), []);

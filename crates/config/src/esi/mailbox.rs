@@ -3,8 +3,9 @@
 use linesman_proto::sii::{CoeDetails, Protocols};
 
 use super::error::EsiError;
-use super::value;
 use super::xml::Element;
+use super::{setting, value};
+use crate::start_up::StartUpCommand;
 
 /// What a mailbox speaks.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
@@ -19,6 +20,10 @@ pub struct EsiMailbox {
     pub soe_channels: u8,
     /// What a MainDevice is to write when it starts the device.
     pub commands: Vec<InitCommand>,
+    /// The same by EoE and SoE.
+    pub settings: Vec<StartUpCommand>,
+    /// Commands that cannot be carried out: protocol, and how many.
+    pub left_out: Vec<(&'static str, usize)>,
 }
 
 /// A CoE download at start-up.
@@ -59,6 +64,25 @@ pub(super) fn mailbox(element: &Element) -> Result<EsiMailbox, EsiError> {
         mailbox.coe = details(coe)?;
         for command in coe.children("InitCmd") {
             mailbox.commands.push(init_command(command).map_err(|error| error.within("CoE"))?);
+        }
+    }
+    for (protocol, read) in [
+        ("EoE", setting::ethernet as fn(&Element) -> _),
+        ("SoE", setting::drive),
+        ("AoE", |_: &Element| Ok(None)),
+        ("FoE", |_: &Element| Ok(None)),
+        ("VoE", |_: &Element| Ok(None)),
+    ] {
+        let Some(commands) = element.child(protocol) else { continue };
+        let mut left_out = 0;
+        for command in commands.children("InitCmd").filter(|one| setting::is_on(one)) {
+            match read(command).map_err(|error| error.within(protocol))? {
+                Some(commands) => mailbox.settings.extend(commands),
+                None => left_out += 1,
+            }
+        }
+        if left_out > 0 {
+            mailbox.left_out.push((protocol, left_out));
         }
     }
     Ok(mailbox)

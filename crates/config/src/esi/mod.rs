@@ -20,6 +20,7 @@ pub mod sync_manager;
 pub mod write;
 
 pub(crate) mod encoding;
+pub(crate) mod setting;
 pub(crate) mod value;
 pub(crate) mod xml;
 
@@ -67,6 +68,19 @@ impl Esi {
     /// # Errors
     /// [`EsiError`] for what is no XML, or no device description.
     pub fn parse(bytes: &[u8]) -> Result<Self, EsiError> {
+        Self::read(bytes, None)
+    }
+
+    /// Reads a file, of its devices only those at these places ([`EsiHeader::at`](header::EsiHeader::at)):
+    /// the files of large makers have thousands.
+    ///
+    /// # Errors
+    /// [`EsiError`] for what is no XML, or no device description.
+    pub fn parse_only(bytes: &[u8], devices: &[usize]) -> Result<Self, EsiError> {
+        Self::read(bytes, Some(devices))
+    }
+
+    fn read(bytes: &[u8], only: Option<&[usize]>) -> Result<Self, EsiError> {
         let text = encoding::decode(bytes)?;
         let mut esi = Self::default();
         let containers = |path: &[String]| match path {
@@ -74,7 +88,13 @@ impl Esi {
             [_, inner @ ..] => inner.iter().all(|name| CONTAINERS.contains(&name.as_str())),
             [] => false,
         };
-        xml::walk(&text, &containers, &mut |path, element| esi.take(path, &element))?;
+        let others = |path: &[String], range: std::ops::Range<usize>| {
+            let wanted = || only.is_none_or(|only| only.iter().any(|at| range.contains(at)));
+            matches!(path, [.., devices, device] if devices == "Devices" && device == "Device")
+                && !wanted()
+        };
+        let skip: Option<&xml::Skip<'_>> = only.is_some().then_some(&others);
+        xml::walk_some(&text, &containers, skip, &mut |path, element| esi.take(path, &element))?;
         if esi.root.is_empty() {
             return Err(EsiError::new(1, "XML", "there is no element in it"));
         }

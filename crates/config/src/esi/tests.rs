@@ -241,3 +241,35 @@ fn a_file_of_modules_says_that_it_is_one() {
         "an EtherCATModule file: it has 1 modules, but no devices; name the file of the device"
     );
 }
+
+#[test]
+fn one_device_of_a_file_is_read_without_the_others() {
+    let device = |name: &str, code: u32| {
+        format!(
+            "<Device Physics=\"YY\"><Type ProductCode=\"{code}\" RevisionNo=\"1\" \
+             CheckRevisionNo=\"EQ_OR_G\">{name}</Type>\n<Name>{name}</Name><Su FrameRepeatSupport=\"1\">\
+             unit</Su></Device>\n"
+        )
+    };
+    let all: String = (0..50).map(|code| device(&format!("T{code}"), code)).collect();
+    let text = format!(
+        "<EtherCATInfo><Vendor><Id>2</Id></Vendor><Descriptions><Devices>{all}</Devices></Descriptions>\
+         </EtherCATInfo>"
+    );
+    let headers = header::headers(text.as_bytes());
+    assert_eq!(headers.len(), 50);
+    let whole = Esi::parse(text.as_bytes()).unwrap();
+    let some = Esi::parse_only(text.as_bytes(), &[headers[31].at, headers[7].at]).unwrap();
+    let names = |esi: &Esi| esi.usable().map(|one| one.type_name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&some), ["T7", "T31"]);
+    let of_whole: Vec<&EsiDevice> =
+        whole.usable().filter(|one| [7, 31].contains(&one.product_code)).collect();
+    assert_eq!(some.usable().collect::<Vec<_>>(), of_whole, "line numbers and all");
+    assert_eq!(of_whole[0].revision_rule, Some(crate::identity::RevisionRule::EqualOrGreater));
+    assert!(of_whole[0].frame_repeat);
+    let cut = &text[..text.len() - 60];
+    assert!(
+        Esi::parse_only(cut.as_bytes(), &[headers[7].at]).is_err(),
+        "a cut file is not believed"
+    );
+}

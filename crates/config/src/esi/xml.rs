@@ -3,6 +3,8 @@
 //! A file may be hostile: depth, number of elements and length of texts are bounded, entities are
 //! never expanded but for the five of XML itself.
 
+use std::ops::Range;
+
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
@@ -120,11 +122,25 @@ impl Element {
 /// Takes an element with the names of what is around it.
 pub(crate) type Found<'a> = dyn FnMut(&[String], Element) -> Result<(), EsiError> + 'a;
 
+/// Whether an element that lies in this range of the text is passed over unread; with the names of what is
+/// around it, its own last.
+pub(crate) type Skip<'a> = dyn Fn(&[String], Range<usize>) -> bool + 'a;
+
 /// Goes through a file. Elements whose path is in `containers` are only walked through; every other
 /// one within them is handed to `found`, with the names of what is around it.
 pub(crate) fn walk(
     text: &str,
     containers: &dyn Fn(&[String]) -> bool,
+    found: &mut Found<'_>,
+) -> Result<(), EsiError> {
+    walk_some(text, containers, None, found)
+}
+
+/// The same, passing over elements that `skip` has no use for.
+pub(crate) fn walk_some(
+    text: &str,
+    containers: &dyn Fn(&[String]) -> bool,
+    skip: Option<&Skip<'_>>,
     found: &mut Found<'_>,
 ) -> Result<(), EsiError> {
     let mut reader = Reader::from_str(text);
@@ -142,7 +158,14 @@ pub(crate) fn walk(
                 seen = true;
                 path.push(element.name.clone());
                 if !containers(&path) {
+                    let passed = match skip {
+                        Some(skip) => source.pass(&start, &|range| skip(&path, range))?,
+                        None => false,
+                    };
                     path.pop();
+                    if passed {
+                        continue;
+                    }
                     let whole = source.fill(element, path.len())?;
                     found(&path, whole)?;
                 }
@@ -192,6 +215,23 @@ impl<'a> Source<'a> {
             self.line += passed.iter().filter(|byte| **byte == b'\n').count() as u32;
             self.counted = to;
         }
+    }
+
+    /// Passes over the element that begins here, if `skip` says so of where it lies.
+    fn pass(
+        &mut self,
+        start: &BytesStart<'_>,
+        skip: &dyn Fn(Range<usize>) -> bool,
+    ) -> Result<bool, EsiError> {
+        let before = self.reader.clone();
+        let span = self.reader.read_to_end(start.name());
+        let span = span.map_err(|error| EsiError::new(self.line, "XML", format!("{error}")))?;
+        let at = |position: u64| usize::try_from(position).unwrap_or(usize::MAX);
+        if skip(at(span.start)..at(span.end)) {
+            return Ok(true);
+        }
+        self.reader = before;
+        Ok(false)
     }
 
     /// The element that begins here, still empty.

@@ -93,23 +93,14 @@ impl Plan {
 
     fn power(&self, doubts: &mut Vec<Doubt>) {
         for group in self.ebus_groups() {
-            let Some(first) = group.first_negative() else { continue };
-            let least = group.members.iter().map(|member| member.remaining_ma).min().unwrap_or(0);
-            doubts.push(Doubt {
+            let overload = group.overload(|id| self.name(id).to_owned());
+            doubts.extend(overload.map(|overload| Doubt {
                 severity: Severity::Error,
                 name: "ebus-overload",
-                device: Some(first),
-                text: format!(
-                    "the E-bus behind {} is overloaded from {} on: {} mA are missing at its end",
-                    self.name(group.feeder),
-                    self.name(first),
-                    -least
-                ),
-                advice: format!(
-                    "insert a power feed terminal (EL94xx) before {}",
-                    self.name(first)
-                ),
-            });
+                device: Some(overload.first),
+                text: overload.text,
+                advice: overload.advice,
+            }));
         }
     }
 

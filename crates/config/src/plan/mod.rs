@@ -6,7 +6,6 @@
 //! counter can be explained and two copies of a frame can be merged. The expected working counter
 //! is never a number here but a function: see [`expect`].
 
-pub mod ebus;
 pub mod expect;
 pub mod layout;
 pub mod lint;
@@ -30,7 +29,6 @@ use crate::identity::RevisionRule;
 use crate::profile::{DeviceProfile, Mailbox};
 use crate::start_up::StartUpCommand;
 
-pub use ebus::{EbusGroup, EbusMember};
 pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
 pub use lint::{Doubt, Severity};

@@ -3,6 +3,7 @@
 //!
 //! The defaults are what the MainDevice does when nothing is said.
 
+use linesman_proto::address::StationAlias;
 use linesman_proto::time::Span;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,8 @@ pub struct DeviceSettings {
     pub frame_repeat: bool,
     /// How it may be addressed.
     pub addressing: AddressingChoice,
+    /// Its second address, the station alias of its EEPROM; [`AddressingChoice::Alias`] needs it.
+    pub alias: Option<StationAlias>,
     /// Its watchdogs.
     pub watchdog: WatchdogSettings,
     /// Its distributed clock; `None` runs free.

@@ -125,11 +125,7 @@ impl ClockChoice {
     ///
     /// # Errors
     /// A mode that its description does not have.
-    pub(super) fn settings(
-        &self,
-        modes: &[ClockMode],
-        cycle: Span,
-    ) -> Result<ClockSettings, String> {
+    pub fn settings(&self, modes: &[ClockMode], cycle: Span) -> Result<ClockSettings, String> {
         let mode = match &self.mode {
             None => ClockMode::default(),
             Some(name) => {
@@ -197,7 +193,8 @@ pub struct Mapping {
     pub entries: Vec<super::DescribedEntry>,
 }
 
-/// A command at start-up: `[[device.start_up]]`, either for an object or for registers.
+/// A command at start-up: `[[device.start_up]]`, for an object, for registers, for an identification
+/// number of a drive, or for the addresses of an Ethernet port.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StartUpEntry {
@@ -216,7 +213,19 @@ pub struct StartUpEntry {
     /// The first register, instead of an object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub register: Option<u16>,
+    /// An identification number of a drive that speaks SoE, such as `S-0-0032`, instead of an object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(regex(pattern = "^[SP]-[0-7]-[0-9]{1,4}$"))]
+    pub idn: Option<String>,
+    /// With `idn`: which drive of the device.
+    #[serde(default)]
+    #[schemars(range(max = 7))]
+    pub drive: u8,
+    /// Addresses of an Ethernet port, instead of an object and data.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eoe: Option<super::EthernetChoice>,
     /// What is written: bytes in the order on the wire, as hexadecimal digits, such as `"08 00"`.
+    #[serde(default)]
     pub data: String,
     /// What it is for.
     #[serde(default)]

@@ -252,6 +252,7 @@ impl Description {
     /// # Errors
     /// A port or protocol that does not exist, in words.
     pub fn profile(&self, type_name: &str) -> Result<DeviceProfile, String> {
+        self.check_ranges()?;
         let mut profile = DeviceProfile {
             type_name: type_name.to_owned(),
             mailbox: self.mailbox.as_ref().map(DescribedMailbox::mailbox).transpose()?,
@@ -279,6 +280,36 @@ impl Description {
         }
         profile.measure();
         Ok(profile)
+    }
+
+    /// Whether what it names is within a controller: 16 SyncManagers and FMMUs, 64 kB.
+    fn check_ranges(&self) -> Result<(), String> {
+        const MOST: usize = 16;
+        let beyond = |start: u16, len: u16| u32::from(start) + u32::from(len) > 0x1_0000;
+        for DescribedSyncManager { index, start, len, .. } in &self.sync_managers {
+            if usize::from(*index) >= MOST {
+                return Err(format!("description: sync_managers: index {index}, expected 0 to 15"));
+            }
+            if beyond(*start, *len) {
+                return Err(format!(
+                    "description: sync_managers: {len} bytes from 0x{start:04X} on end beyond 0xFFFF"
+                ));
+            }
+        }
+        if self.fmmus.len() > MOST {
+            return Err(format!("description: {} fmmus, expected at most 16", self.fmmus.len()));
+        }
+        let Some(mailbox) = &self.mailbox else { return Ok(()) };
+        let [a, b] = [mailbox.receive, mailbox.send];
+        let bootstrap = mailbox.bootstrap.map_or([[0; 2]; 2], |[c, d, e, f]| [[c, d], [e, f]]);
+        for [start, len] in [a, b].into_iter().chain(bootstrap) {
+            if beyond(start, len) {
+                return Err(format!(
+                    "description: mailbox: {len} bytes from 0x{start:04X} on end beyond 0xFFFF"
+                ));
+            }
+        }
+        Ok(())
     }
 
     fn usages(&self) -> Vec<FmmuUsage> {

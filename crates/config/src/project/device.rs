@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use linesman_proto::address::{DeviceId, StationAddress};
+use linesman_proto::mailbox::soe::Idn;
 use linesman_proto::port::Port;
 use linesman_proto::sii::Identity;
 use linesman_proto::state::AlState;
@@ -36,9 +37,9 @@ pub struct ProjectDevice {
     /// Revision number.
     #[serde(default)]
     pub revision: Option<u32>,
-    /// How the revision is compared.
+    /// How the revision is compared; as its maker says (ESI `CheckRevisionNo`), else `equal`, unless said.
     #[serde(default)]
-    pub revision_rule: RevisionRule,
+    pub revision_rule: Option<RevisionRule>,
     /// Serial number; not compared when absent.
     #[serde(default)]
     pub serial: Option<u32>,
@@ -67,10 +68,12 @@ pub struct ProjectDevice {
     /// Commands for its process data; those of the network unless said.
     #[serde(default)]
     pub access: Option<ProcessAccess>,
-    /// Its frame may be sent twice in a cycle.
+    /// Its frame may be sent twice in a cycle; as its maker says (ESI `FrameRepeatSupport`) unless said.
     #[serde(default)]
-    pub frame_repeat: bool,
-    /// How it may be addressed.
+    pub frame_repeat: Option<bool>,
+    /// How it may be addressed: by its position until it has its station address (`auto`), never by its
+    /// position but by its `alias`, wherever it is plugged in (`alias`), or by its position only, without
+    /// a station address (`position`).
     #[serde(default)]
     pub addressing: AddressingChoice,
     /// What becomes of its inputs when a working counter is wrong; as in the network unless said.
@@ -113,7 +116,7 @@ impl ProjectDevice {
             vendor_id: None,
             product_code: None,
             revision: None,
-            revision_rule: RevisionRule::Equal,
+            revision_rule: None,
             serial: None,
             alias: None,
             on,
@@ -123,7 +126,7 @@ impl ProjectDevice {
             task: None,
             sync_unit: None,
             access: None,
-            frame_repeat: false,
+            frame_repeat: None,
             addressing: AddressingChoice::Auto,
             on_wrong_counter: None,
             watchdog: WatchdogChoice::default(),
@@ -149,9 +152,9 @@ impl ProjectDevice {
 
     /// How its revision is compared: not at all when none was given.
     #[must_use]
-    pub const fn rule(&self) -> RevisionRule {
+    pub fn rule(&self) -> RevisionRule {
         match self.revision {
-            Some(_) => self.revision_rule,
+            Some(_) => self.revision_rule.unwrap_or_default(),
             None => RevisionRule::Any,
         }
     }
@@ -194,12 +197,8 @@ impl ProjectDevice {
         if let Some(revision) = self.revision {
             line("revision", hex(revision));
         }
-        if self.revision_rule != RevisionRule::Equal {
-            line(
-                "revision_rule",
-                toml::Value::try_from(self.revision_rule)
-                    .map_or_else(|_| quoted("equal"), |rule| rule.to_string()),
-            );
+        if let Some(rule) = &self.revision_rule {
+            line("revision_rule", inline(rule));
         }
         if let Some(serial) = self.serial {
             line("serial", serial.to_string());
@@ -223,7 +222,7 @@ impl ProjectDevice {
         choice("task", self.task.as_ref().map(inline));
         choice("sync_unit", self.sync_unit.as_ref().map(inline));
         choice("access", self.access.as_ref().map(inline));
-        choice("frame_repeat", self.frame_repeat.then(|| "true".to_owned()));
+        choice("frame_repeat", self.frame_repeat.as_ref().map(inline));
         let addressing = &self.addressing;
         choice("addressing", (*addressing != AddressingChoice::Auto).then(|| inline(addressing)));
         choice("on_wrong_counter", self.on_wrong_counter.as_ref().map(inline));
@@ -262,6 +261,12 @@ impl ProjectDevice {
         {
             return wrong(format!("state `{state}`, expected INIT, PREOP, SAFEOP, OP or BOOT"));
         }
+        if self.addressing == AddressingChoice::Alias && self.alias.is_none_or(|alias| alias == 0) {
+            return wrong(
+                "addressing = \"alias\" needs its second address: expected `alias`, 1 to 65535"
+                    .to_owned(),
+            );
+        }
         for command in &self.start_up {
             if Transition::from_letters(&command.transition).is_none() {
                 let given = &command.transition;
@@ -269,8 +274,42 @@ impl ProjectDevice {
                     "start_up: transition `{given}`, expected two of the letters I, P, S, O, B"
                 ));
             }
-            if command.index.is_some() == command.register.is_some() {
-                return wrong("start_up: expected either `index` or `register`".to_owned());
+            let what = [
+                command.index.is_some(),
+                command.register.is_some(),
+                command.idn.is_some(),
+                command.eoe.is_some(),
+            ];
+            if what.iter().filter(|there| **there).count() != 1 {
+                let reason = "start_up: expected one of `index`, `register`, `idn` and `eoe`";
+                return wrong(reason.to_owned());
+            }
+            match &command.eoe {
+                Some(choice) => {
+                    if choice.port > 15 {
+                        return wrong(format!(
+                            "start_up: eoe: port {}, expected 0 to 15",
+                            choice.port
+                        ));
+                    }
+                    if let Err(reason) = choice.parameters() {
+                        return wrong(format!("start_up: {reason}"));
+                    }
+                }
+                None if command.data.trim().is_empty() => {
+                    return wrong(
+                        "start_up: there is no `data`, expected bytes such as \"08 00\"".to_owned(),
+                    );
+                }
+                None => {}
+            }
+            if let Some(idn) = &command.idn
+                && (Idn::from_text(idn).is_none() || command.drive > 7)
+            {
+                return wrong(format!(
+                    "start_up: idn `{idn}` of drive {}, expected one such as S-0-0032 of drive 0 to 7",
+                    command.drive
+                ));
             }
             if let Err(reason) = value::bytes(&command.data) {
                 return wrong(format!("start_up: data: {reason}"));

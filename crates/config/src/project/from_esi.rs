@@ -5,7 +5,7 @@ use crate::esi::image::image;
 use crate::esi::mailbox::InitCommand;
 use crate::esi::{Esi, EsiDevice, EsiModule, EsiPdo};
 use crate::profile::DeviceProfile;
-use crate::start_up::{StartUpAction, StartUpCommand, Transition};
+use crate::start_up::{StartUpAction, StartUpCommand, Transition, left_out};
 use linesman_proto::mailbox::coe::ObjectAddress;
 
 impl Described {
@@ -15,9 +15,16 @@ impl Described {
     /// A module that does not fit, or a description that no SII has room for, in words.
     pub fn from_esi(esi: &Esi, device: &EsiDevice, wanted: &ProjectDevice) -> Result<Self, String> {
         let mut pdos: Vec<EsiPdo> = device.pdos.clone();
-        let mut start_up = Vec::new();
+        let (mut start_up, mut notes) = (Vec::new(), Vec::new());
         if let Some(mailbox) = &device.mailbox {
             start_up.extend(commands(&mailbox.commands));
+            start_up.extend(mailbox.settings.iter().cloned());
+            notes.extend(
+                mailbox
+                    .left_out
+                    .iter()
+                    .map(|(protocol, count)| left_out(&wanted.name, protocol, *count, &[])),
+            );
         }
         let mut idents = Vec::new();
         let given = wanted.modules.len();
@@ -39,7 +46,15 @@ impl Described {
         let made = image(device, esi.vendor_id, &pdos).map_err(|error| error.to_string())?;
         let identity = Some([esi.vendor_id, device.product_code, device.revision]);
         let profile = DeviceProfile::from_sii(&made);
-        Ok(Self { profile, start_up, modules: idents, identity })
+        Ok(Self {
+            profile,
+            start_up,
+            modules: idents,
+            identity,
+            revision_rule: device.revision_rule,
+            frame_repeat: device.frame_repeat,
+            notes,
+        })
     }
 }
 

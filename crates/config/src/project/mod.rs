@@ -17,6 +17,7 @@
 mod choice;
 mod description;
 mod device;
+pub mod ethernet;
 mod from_esi;
 mod resolve;
 
@@ -29,6 +30,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::attachment::Attachment;
 use crate::inventory::Inventory;
+use crate::plan::AddressingChoice;
 
 pub use choice::{ClockChoice, Mapping, Network, ProjectTask, StartUpEntry, WatchdogChoice};
 pub use description::{
@@ -36,6 +38,7 @@ pub use description::{
     Way,
 };
 pub use device::ProjectDevice;
+pub use ethernet::EthernetChoice;
 pub use resolve::{Described, Lookup, ResolveError, Resolved};
 
 /// A project.
@@ -236,6 +239,26 @@ impl Project {
             }
             device.check()?;
         }
+        self.check_aliases(&stations)
+    }
+
+    /// Whether the second addresses by which SubDevices are looked for are theirs alone.
+    fn check_aliases(&self, stations: &BTreeMap<u16, &String>) -> Result<(), ProjectError> {
+        let mut aliases = BTreeMap::new();
+        let by_alias = |device: &&ProjectDevice| device.addressing == AddressingChoice::Alias;
+        for device in self.devices.iter().filter(by_alias) {
+            let Some(alias) = device.alias else { continue };
+            let station = stations.get(&alias).filter(|other| **other != &device.name);
+            let other = aliases.insert(alias, &device.name).or(station.copied());
+            if let Some(other) = other {
+                let whose = format!("device `{}`", device.name);
+                let reason = format!(
+                    "alias {alias} (0x{alias:04X}) is an address of `{other}` too: by it alone neither can \
+                     be found"
+                );
+                return Err(ProjectError::Value { whose, reason });
+            }
+        }
         Ok(())
     }
 
@@ -406,6 +429,7 @@ sync_unit = "axes"
 access = "separate"
 frame_repeat = true
 addressing = "alias"
+alias = 4711
 watchdog = { process_data = 500 }
 clock = { assign_activate = 0x0700, sync0_cycle_us = 500, reference = true }
 pdos = [0x1601, 0x1A00]
@@ -450,7 +474,7 @@ pdos = [
             ("transition = \"PS\"", "transition = \"X\"", "letters I, P, S, O, B"),
             ("data = \"08\"", "data = \"8\"", "two for each byte"),
             ("cycle_us = 500", "cycle_us = 0", "expected a cycle time"),
-            ("index = 0x6060", "", "either `index` or `register`"),
+            ("index = 0x6060", "", "one of `index`, `register`, `idn` and `eoe`"),
             ("layout = \"compact\"", "layout = \"tight\"", "unknown variant `tight`"),
             (
                 "watchdog = { process_data",

@@ -1,8 +1,9 @@
 //! From a project to what the planner needs: each device with what its description says and what the
 //! user chose, in processing order.
 
-use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::address::{DeviceId, RegisterAddress, StationAlias};
 use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::mailbox::soe::{Idn, VALUE};
 use linesman_proto::sii::Direction;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
@@ -27,6 +28,12 @@ pub struct Described {
     pub modules: Vec<u32>,
     /// Vendor, product and revision.
     pub identity: Option<[u32; 3]>,
+    /// How its maker wants revisions compared; `None` where nothing is said.
+    pub revision_rule: Option<RevisionRule>,
+    /// Its maker allows frames that are sent twice in a cycle.
+    pub frame_repeat: bool,
+    /// What of its description is not carried out, in words.
+    pub notes: Vec<String>,
 }
 
 /// All that the planner needs.
@@ -130,7 +137,15 @@ impl Project {
         id: DeviceId,
         known: Described,
     ) -> Result<PlannedDevice, String> {
-        let Described { mut profile, mut start_up, modules, identity } = known;
+        let Described {
+            mut profile,
+            mut start_up,
+            modules,
+            identity,
+            revision_rule,
+            frame_repeat,
+            notes: _,
+        } = known;
         if !device.type_name.is_empty() {
             profile.type_name.clone_from(&device.type_name);
         }
@@ -144,8 +159,9 @@ impl Project {
             task: device.task.clone(),
             sync_unit: device.sync_unit.clone(),
             access: device.access.unwrap_or(self.network.access),
-            frame_repeat: device.frame_repeat,
+            frame_repeat: device.frame_repeat.unwrap_or(frame_repeat),
             addressing: device.addressing,
+            alias: device.alias.map(StationAlias),
             watchdog: device.watchdog.settings(),
             clock: clock.transpose()?,
             on_wrong_counter: device.on_wrong_counter.unwrap_or(self.network.on_wrong_counter),
@@ -162,7 +178,7 @@ impl Project {
                 serial_number: device.serial.unwrap_or(0),
             },
             revision_rule: match device.revision {
-                Some(_) => device.revision_rule,
+                Some(_) => device.revision_rule.or(revision_rule).unwrap_or_default(),
                 None => RevisionRule::Any,
             },
             profile,
@@ -177,6 +193,17 @@ impl Project {
 fn command(entry: &super::StartUpEntry) -> Option<StartUpCommand> {
     let data = value::bytes(&entry.data).ok()?;
     let action = match (entry.index, entry.register) {
+        (None, None) => match (&entry.eoe, &entry.idn) {
+            (Some(choice), _) => StartUpAction::SetAddresses {
+                port: choice.port,
+                parameters: choice.parameters().ok()?,
+            },
+            (None, Some(idn)) => {
+                let idn = Idn::from_text(idn)?;
+                StartUpAction::WriteIdn { drive: entry.drive, idn, elements: VALUE, data }
+            }
+            (None, None) => return None,
+        },
         (Some(index), _) => StartUpAction::CoeDownload {
             object: ObjectAddress::new(index, entry.subindex),
             complete_access: entry.complete_access,
@@ -185,7 +212,6 @@ fn command(entry: &super::StartUpEntry) -> Option<StartUpCommand> {
         (None, Some(register)) => {
             StartUpAction::RegisterWrite { address: RegisterAddress(register), data }
         }
-        (None, None) => return None,
     };
     let transition = Transition::from_letters(&entry.transition)?;
     Some(StartUpCommand { transition, action, comment: entry.comment.clone() })

@@ -1,22 +1,26 @@
 //! The whole of diagnosis: frames and host observations in, findings out.
 
+mod bisect;
 mod setup;
+mod survey;
+mod watched;
 
 use std::collections::VecDeque;
 
-use linesman_proto::address::{Network, RegisterAddress};
+use linesman_proto::address::{DeviceId, Network, RegisterAddress};
 use linesman_proto::frame::{FrameError, FrameView};
 use linesman_proto::time::{Instant, Span};
 
-use crate::finding::{Book, Condition, Finding, Severity};
-use crate::line::{Learner, Line, Seen};
+use crate::finding::{Book, Finding, Severity};
+use crate::line::{Line, Seen};
 use crate::observe::{
-    Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, Pairing,
+    Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome,
 };
 use crate::report::{self, Diagnosis, NetworkReport, Number, Verdict};
 use crate::rule::{RULES, View};
 
-pub use setup::{Event, EventKind, Probe, ProbeEffect, Setup};
+pub use setup::{Asked, Event, EventKind, Probe, ProbeEffect, Setup};
+use watched::Watched;
 
 /// The rules are asked at most this often; what they find keeps the time of its evidence.
 const JUDGE_EVERY: Span = Span::ms(10);
@@ -24,66 +28,6 @@ const JUDGE_EVERY: Span = Span::ms(10);
 /// Rules are asked again after so long although nothing new was learnt, while something is open: a
 /// counter that did *not* rise since tells as much as one that did.
 const JUDGE_AGAIN: Span = Span::ms(100);
-
-/// For so long after its last rise a counter is watched in this way.
-const WATCHED_AFTER_RISE: Span = Span::s(15);
-
-/// So long after a frame was lost the counters are awaited that tell where, or where not.
-const WATCHED_AFTER_LOSS: Span = Span::s(2);
-
-/// One network.
-#[derive(Clone, Debug)]
-struct Watched {
-    line: Line,
-    learner: Learner,
-    pairing: Pairing,
-    judged: u64,
-    /// When to ask the rules again, though nothing new was learnt.
-    again: Option<Instant>,
-    conditions: Vec<Condition>,
-    probed: Option<Instant>,
-    probed_for: (u64, u64),
-}
-
-impl Watched {
-    fn new(line: Line) -> Self {
-        let learner = Learner::new(&line);
-        Self {
-            line,
-            learner,
-            pairing: Pairing::default(),
-            judged: 0,
-            again: None,
-            conditions: Vec::new(),
-            probed: None,
-            probed_for: (0, 0),
-        }
-    }
-
-    /// Whether the rules have something to do at `now`.
-    fn is_due(&self, now: Instant) -> bool {
-        self.line.revision() != self.judged || self.again.is_some_and(|again| again <= now)
-    }
-
-    /// Whether time alone can change what the rules say.
-    fn is_watched(&self, now: Instant) -> bool {
-        let is_open = self.conditions.iter().any(|condition| condition.ended.is_none());
-        // Counters that are read after a frame was lost tell by standing still.
-        let is_recent = |at: Option<Instant>| at.is_some_and(|at| now < at + WATCHED_AFTER_LOSS);
-        is_open
-            || self.line.devices.iter().any(|device| device.mailbox.is_open())
-            || is_recent(self.line.traffic.lost.last)
-            || self.line.devices.iter().any(|device| {
-                device.counters.last_rise().is_some_and(|at| now < at + WATCHED_AFTER_RISE)
-            })
-    }
-
-    /// What makes it worth asking: frames lost, and working counters that fell.
-    fn alarms(&self) -> (u64, u64) {
-        let deficits = self.line.cyclic.iter().map(|cyclic| cyclic.deficits.len() as u64).sum();
-        (self.line.traffic.lost.times, deficits)
-    }
-}
 
 /// The diagnosis of any number of networks.
 #[derive(Clone, Debug)]
@@ -141,6 +85,7 @@ impl Engine {
         let now = self.now;
         let watched = self.watched(frame.network);
         take(watched, frame, now);
+        self.survey();
         self.judge_if_due();
     }
 
@@ -165,6 +110,7 @@ impl Engine {
             line.now = line.now.max(now);
             pairing.expire(now, &mut |exchange| learner.learn(line, exchange));
         }
+        self.survey();
         self.judge_if_due();
     }
 
@@ -178,10 +124,9 @@ impl Engine {
             (Some(one), Some(other)) => Some(one.min(other)),
             (one, other) => one.or(other),
         };
-        match (lost, judgement) {
-            (Some(one), Some(other)) => Some(one.min(other)),
-            (one, other) => one.or(other),
-        }
+        let surveys = self.networks.iter().filter_map(|watched| watched.survey.next());
+        let survey = surveys.min().filter(|_| self.setup.probes && !self.has_ended);
+        [lost, judgement, survey].into_iter().flatten().min()
     }
 
     /// What happened to findings, in order.
@@ -280,7 +225,9 @@ impl Engine {
             for rule in RULES {
                 (rule.judge)(&view, &mut watched.conditions);
             }
-            let is_watched = watched.is_watched(now) && !has_ended;
+            let is_active = self.setup.probes && self.setup.active;
+            let is_curious = is_active && (watched.bisect.is_some() || watched.lacks_controls());
+            let is_watched = (watched.is_watched(now) || is_curious) && !has_ended;
             watched.again = is_watched.then_some(now + JUDGE_AGAIN);
         }
         let all = self.networks.iter().flat_map(|watched| watched.conditions.iter().cloned());
@@ -299,27 +246,48 @@ impl Engine {
             return;
         }
         let now = self.now;
+        if self.setup.active {
+            for watched in &mut self.networks {
+                self.probes.extend(watched.search(now));
+            }
+        }
         for watched in &mut self.networks {
             let alarms = watched.alarms();
             let is_due = watched.probed.is_none_or(|at| now.since(at) >= Self::PROBE_EVERY);
-            if alarms == watched.probed_for || !is_due {
+            if alarms == watched.probed_for || !is_due || watched.is_silent() {
                 continue;
             }
             watched.probed_for = alarms;
             watched.probed = Some(now);
             for device in watched.line.devices.iter().filter(|device| device.answered.is_some()) {
-                for (register, len) in ASKED {
-                    if self.probes.len() < Self::MOST_WAITING {
-                        self.probes.push_back(Probe {
-                            network: watched.line.network,
-                            device: device.id,
-                            register: RegisterAddress(register),
-                            len,
-                            deadline: now + Self::PROBE_EVERY,
-                            effect: ProbeEffect::Reads,
-                        });
-                    }
+                for (address, len) in ASKED {
+                    let what = Asked::Register { address: RegisterAddress(address), len };
+                    push(&mut self.probes, &watched.line, device.id, what, now);
                 }
+            }
+        }
+        for watched in &mut self.networks {
+            for (device, object) in watched.survey.objects(&watched.line) {
+                push(&mut self.probes, &watched.line, device, Asked::Object(object), now);
+            }
+        }
+    }
+
+    /// Asks by turns for what shows trouble early and nobody reads.
+    fn survey(&mut self) {
+        if !self.setup.probes || self.has_ended {
+            return;
+        }
+        let now = self.now;
+        for watched in &mut self.networks {
+            let is_searching = watched.bisect.is_some();
+            for (device, (address, len)) in watched.survey.turn(&watched.line, now) {
+                // While nothing comes back, questions only stand in the way of a search.
+                if is_searching {
+                    continue;
+                }
+                let what = Asked::Register { address: RegisterAddress(address), len };
+                push(&mut self.probes, &watched.line, device, what, now);
             }
         }
     }
@@ -360,6 +328,16 @@ impl Engine {
     }
 }
 
+fn push(probes: &mut VecDeque<Probe>, line: &Line, device: DeviceId, what: Asked, now: Instant) {
+    // Who has no address cannot be asked for sure.
+    let Some(station) = line.device(device).and_then(|device| device.station) else { return };
+    if probes.len() < Engine::MOST_WAITING {
+        let (network, deadline) = (line.network, now + Engine::PROBE_EVERY);
+        let effect = ProbeEffect::Reads;
+        probes.push_back(Probe { network, device, station, what, deadline, effect });
+    }
+}
+
 /// DL status, AL status with its code, all error counters.
 const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), (0x0300, 20)];
 
@@ -375,7 +353,11 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
             return;
         }
         Err(FrameError::NotEtherCat { .. } | FrameError::CutOff { .. }) => {
-            traffic.foreign += 1;
+            let kind = frame.bytes.get(12..14).map_or(0, |at| u16::from_be_bytes([at[0], at[1]]));
+            let seen = Seen::new(kind, frame.time, Some(frame.number));
+            if traffic.record_foreign(seen, frame.direction == Direction::Received) {
+                line.touch();
+            }
             return;
         }
     };
@@ -403,18 +385,19 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
         traffic.returned_alone += mistaken;
         traffic.senders = pairing.senders().to_vec();
     }
+    let has_other_senders = pairing.senders_changed();
+    if has_other_senders {
+        traffic.senders = pairing.senders().to_vec();
+    }
     match outcome {
-        Outcome::Request | Outcome::RequestCopy => {
-            traffic.sent += 1;
-            if pairing.senders_changed() {
-                traffic.senders = pairing.senders().to_vec();
-                line.touch();
-            }
-        }
+        Outcome::Request | Outcome::RequestCopy => traffic.sent += 1,
         Outcome::Return | Outcome::ReturnAlone => {
             traffic.returned_alone += u64::from(outcome == Outcome::ReturnAlone);
             traffic.record_returned(frame.time, frame.number);
         }
         Outcome::Duplicate => traffic.duplicates += 1,
+    }
+    if has_other_senders {
+        line.touch();
     }
 }

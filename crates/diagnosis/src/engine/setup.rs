@@ -1,7 +1,8 @@
 //! What goes into the engine before it begins, and what comes out beside the report.
 
 use linesman_config::project::Project;
-use linesman_proto::address::{DeviceId, Network, RegisterAddress};
+use linesman_proto::address::{DeviceId, Network, RegisterAddress, StationAddress};
+use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::Instant;
 
 use crate::finding::Change;
@@ -16,6 +17,8 @@ pub struct Setup {
     pub host_counters: bool,
     /// Whether probes can be sent.
     pub probes: bool,
+    /// Whether probes may write what restores itself, to find where frames vanish.
+    pub active: bool,
     /// What is looked at: a selector, or a file.
     pub source: String,
     /// When the run began, RFC 3339.
@@ -38,21 +41,42 @@ pub struct Event {
 /// What happened to a finding.
 pub type EventKind = Change;
 
-/// A wish to have a register read.
+/// A wish to have a register or an object read, or a register written where the user allowed it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Probe {
     /// The network.
     pub network: Network,
     /// The controller.
     pub device: DeviceId,
-    /// Where to begin.
-    pub register: RegisterAddress,
-    /// How many bytes.
-    pub len: u16,
+    /// Its station address.
+    pub station: StationAddress,
+    /// What is to be read.
+    pub what: Asked,
     /// Later than this the answer is of no use.
     pub deadline: Instant,
     /// What the probe does to the line.
     pub effect: ProbeEffect,
+}
+
+/// What a probe asks for. Who probes need not hand the answer in: its frames are seen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Asked {
+    /// A register.
+    Register {
+        /// Where to begin.
+        address: RegisterAddress,
+        /// How many bytes.
+        len: u16,
+    },
+    /// Nothing: a register is to be written, which restores itself.
+    Written {
+        /// Where to begin.
+        address: RegisterAddress,
+        /// What.
+        data: [u8; 2],
+    },
+    /// An object of the dictionary, where the SubDevice has a mailbox.
+    Object(ObjectAddress),
 }
 
 /// What a probe does to the line.

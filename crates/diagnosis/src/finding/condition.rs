@@ -88,6 +88,8 @@ pub enum Symptom {
     Emergency(DeviceId),
     /// Frames do not come back.
     FramesLost,
+    /// Frames come back late.
+    FramesLate,
     /// Damaged frames or symbols are counted at a port of a controller.
     PortErrors(DeviceId, Port),
     /// Damaged frames are counted by the card.

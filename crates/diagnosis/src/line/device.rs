@@ -6,13 +6,16 @@ use linesman_config::identity::RevisionRule;
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias};
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::PortMap;
-use linesman_proto::register::{FmmuConfig, WatchdogDivider, WatchdogTime};
+use linesman_proto::register::{DlControl, FmmuConfig, WatchdogDivider, WatchdogTime};
 use linesman_proto::sii::Identity;
 use linesman_proto::time::{DcTime32, Instant, Span};
 use linesman_proto::topology::SeenController;
 
 use super::mailbox::MailboxHistory;
-use super::{AlChange, AlError, AlHistory, CounterHistory, DlHistory, Seen, SiiImage, push_kept};
+use super::{
+    AlChange, AlError, AlHistory, ClockHistory, CounterHistory, DlHistory, Power, Seen, SiiImage,
+    push_kept,
+};
 
 /// A controller.
 #[derive(Clone, Debug)]
@@ -35,6 +38,10 @@ pub struct Device {
     pub alias: Option<StationAlias>,
     /// Its position now; `None` when it is known to be unreachable, or never was seen.
     pub position: Option<Position>,
+    /// DL control (0x0100) as it was last read.
+    pub dl_control: Option<DlControl>,
+    /// When another controller answered to its station address, too.
+    pub shared_address: Option<SharedAddress>,
     /// When it last answered anything.
     pub answered: Option<Seen<()>>,
     /// When it did not answer for the first time since it last answered; `None` while it answers.
@@ -58,10 +65,16 @@ pub struct Device {
     pub received: Option<PortMap<DcTime32>>,
     /// Whether its SYNC signals are switched on: register 0x0981 as last written.
     pub sync_on: Option<Seen<bool>>,
+    /// How far its clock is off the reference clock.
+    pub clock: ClockHistory,
+    /// What it counts of its cycles in 0x1C32 and 0x1C33, by index and subindex, as read.
+    pub sync_counts: BTreeMap<(u16, u8), Seen<u16>>,
     /// Its FMMUs, as they were set up.
     pub fmmus: BTreeMap<u8, FmmuConfig>,
     /// What was seen of its SII.
     pub sii: SiiImage,
+    /// What that says of the E-bus.
+    pub power: Option<Seen<Power>>,
 }
 
 /// The process data watchdog of a controller: registers 0x0400 and 0x0420; what was not seen is as after
@@ -72,6 +85,19 @@ pub struct Watchdog {
     pub divider: WatchdogDivider,
     /// Ticks until it expires.
     pub time: WatchdogTime,
+    /// How it is set, once that was read or written.
+    pub setting: Option<WatchdogSetting>,
+    /// How it was set before that.
+    pub former: Option<WatchdogSetting>,
+}
+
+/// How a watchdog is set.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct WatchdogSetting {
+    /// How long it holds; `None` when it is switched off.
+    pub span: Option<Span>,
+    /// When that was first seen.
+    pub seen: Seen<()>,
 }
 
 impl Watchdog {
@@ -79,6 +105,23 @@ impl Watchdog {
     #[must_use]
     pub fn span(&self) -> Option<Span> {
         self.time.span(self.divider)
+    }
+
+    /// Its registers were read or written. Says whether it is set otherwise than before.
+    pub fn record(
+        &mut self,
+        divider: Option<WatchdogDivider>,
+        time: Option<WatchdogTime>,
+        seen: Seen<()>,
+    ) -> bool {
+        self.divider = divider.unwrap_or(self.divider);
+        self.time = time.unwrap_or(self.time);
+        let span = self.span();
+        if self.setting.is_some_and(|setting| setting.span == span) {
+            return false;
+        }
+        self.former = self.setting.replace(WatchdogSetting { span, seen });
+        true
     }
 }
 
@@ -106,6 +149,28 @@ pub struct SeenIdentity {
     pub revision: Option<Seen<u32>>,
     /// Serial number: SII word 0x0E, or CoE 0x1018:04.
     pub serial: Option<Seen<u32>>,
+}
+
+/// A station address to which two controllers answer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SharedAddress {
+    /// The address.
+    pub station: StationAddress,
+    /// What showed it first.
+    pub first: Seen<SharedBy>,
+    /// When it was last shown.
+    pub last: Instant,
+    /// How often.
+    pub times: u64,
+}
+
+/// What shows that a station address is shared.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SharedBy {
+    /// More answered than one controller can: the working counter.
+    WorkingCounter(u16),
+    /// Another controller, asked by its position, says that it has the address.
+    Reading(DeviceId),
 }
 
 /// A stretch of time in which a controller did not answer.
@@ -142,6 +207,8 @@ impl Device {
             station: None,
             alias: None,
             position: None,
+            dl_control: None,
+            shared_address: None,
             answered: None,
             silent: None,
             absences: VecDeque::new(),
@@ -153,8 +220,11 @@ impl Device {
             watchdog: Watchdog::default(),
             received: None,
             sync_on: None,
+            clock: ClockHistory::default(),
+            sync_counts: BTreeMap::new(),
             fmmus: BTreeMap::new(),
             sii: SiiImage::default(),
+            power: None,
         }
     }
 
@@ -184,6 +254,12 @@ impl Device {
         }
     }
 
+    /// Whether it started anew at least once, as far as its states tell.
+    #[must_use]
+    pub fn has_restarted(&self) -> bool {
+        self.al.changes.iter().any(super::AlChange::is_own_fall)
+    }
+
     /// Notes that it did not answer though it was asked.
     pub fn is_silent(&mut self, at: Instant, frame: Option<u64>) {
         if self.silent.is_none() {
@@ -191,6 +267,20 @@ impl Device {
             self.silent = Some(since);
             push_kept(&mut self.absences, Absence { since, ended: None });
         }
+    }
+
+    /// Notes that another controller answers to its station address, too.
+    pub fn shares_address(&mut self, station: StationAddress, seen: Seen<SharedBy>) {
+        let known = self.shared_address.filter(|known| known.station == station);
+        let mut shared =
+            known.unwrap_or(SharedAddress { station, first: seen, last: seen.at, times: 0 });
+        // Who it is, is worth more than that there is one.
+        if matches!(seen.value, SharedBy::Reading(_)) {
+            shared.first.value = seen.value;
+        }
+        shared.last = seen.at;
+        shared.times += 1;
+        self.shared_address = Some(shared);
     }
 
     /// Notes an emergency.

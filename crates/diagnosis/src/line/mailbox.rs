@@ -9,7 +9,9 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Seen, push_kept};
 
-/// From so long on an answer is slow. SubDevices answer within some ms; MainDevices wait some seconds.
+/// From so long on an answer is worth a word. SubDevices answer within some ms.
+pub const NOTABLE: Span = Span::ms(100);
+/// From so long on an answer is slow; MainDevices wait some seconds.
 pub const SLOW: Span = Span::ms(300);
 
 /// A mailbox over time.
@@ -25,7 +27,7 @@ pub struct MailboxHistory {
     pub stuck: VecDeque<(Instant, Instant)>,
     /// Requests that were refused, oldest first.
     pub refusals: VecDeque<Seen<Refusal>>,
-    /// Answers that came late, oldest first.
+    /// Answers that took [`NOTABLE`] or longer, oldest first.
     pub slow: VecDeque<Seen<SlowAnswer>>,
     /// Messages of the diagnosis history (object 0x10F3) in the order in which they were read.
     pub messages: VecDeque<Seen<HistoryMessage>>,
@@ -88,10 +90,10 @@ impl MailboxHistory {
         }
     }
 
-    /// An answer came. Says whether it was slow.
+    /// An answer came. Says whether it took long enough to be worth a word.
     pub fn answered(&mut self, at: Instant, frame: u64) -> bool {
         let Some(waiting) = self.waiting.take() else { return false };
-        if at.since(waiting.at) < SLOW {
+        if at.since(waiting.at) < NOTABLE {
             return false;
         }
         let slow = SlowAnswer { object: waiting.value, asked: waiting.at };

@@ -5,6 +5,7 @@
 
 pub mod al_history;
 pub mod beat;
+pub mod clock;
 pub mod counters;
 pub mod cyclic;
 pub mod device;
@@ -14,6 +15,7 @@ pub mod learn;
 pub mod mailbox;
 pub mod sii_image;
 pub mod traffic;
+pub mod trip;
 
 use std::collections::VecDeque;
 
@@ -26,14 +28,16 @@ use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 
 pub use al_history::{AlChange, AlError, AlHistory};
 pub use beat::{Beat, Off, Pause};
+pub use clock::{ClockHistory, Reference};
 pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cyclic::{Cyclic, Deficit, Owner};
-pub use device::{Absence, Device, Planned, SeenIdentity, Trouble};
+pub use device::{Absence, Device, Planned, SeenIdentity, SharedAddress, SharedBy, Trouble};
 pub use dl_history::{DlChange, DlHistory};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
-pub use sii_image::SiiImage;
+pub use sii_image::{Power, SiiImage};
 pub use traffic::{Silence, Traffic};
+pub use trip::Trips;
 
 /// How many changes of one kind are kept of a controller; older ones are forgotten.
 pub const CHANGES_KEPT: usize = 64;
@@ -57,6 +61,17 @@ impl<T> Seen<T> {
     }
 }
 
+/// A search for the place where frames vanish, by closing ports for a moment.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct HoleSearch {
+    /// The first request that did not come back.
+    pub since: Seen<()>,
+    /// The link (index in [`Line::tree`]) behind whose near port frames vanish.
+    pub found: Option<Seen<usize>>,
+    /// When it was over, found or not.
+    pub ended: Option<Instant>,
+}
+
 /// Errors that come after so long a time without any are a new spell.
 pub const SPELL_GAP: Span = Span::s(2);
 
@@ -75,6 +90,10 @@ pub struct Line {
     pub host: HostHistory,
     /// Logical datagrams that are sent again and again.
     pub cyclic: Vec<Cyclic>,
+    /// Reference clocks, whose time the frames hand round: one, unless the MainDevice took another.
+    pub references: Vec<Reference>,
+    /// How long frames are on their way.
+    pub trips: Trips,
     /// Frames and datagrams.
     pub traffic: Traffic,
     /// The time of the latest frame or observation.
@@ -82,6 +101,8 @@ pub struct Line {
     /// When the present spell of errors began: at the earliest time that its first reading allows.
     pub spell_began: Instant,
     last_errors: Option<Instant>,
+    /// The search for the place where frames vanish, going on or done.
+    pub hole: Option<HoleSearch>,
     revision: u64,
     /// From how many controllers and receive times the tree was derived.
     tree_basis: (usize, usize),

@@ -48,6 +48,12 @@ pub struct Traffic {
     pub frames: u64,
     /// Frames that are not EtherCAT.
     pub foreign: u64,
+    /// Those of them that came in, as a live socket tells.
+    pub foreign_received: u64,
+    /// The first of them, by its EtherType or length.
+    pub first_foreign: Option<Seen<u16>>,
+    /// When the latest was seen.
+    pub latest_foreign: Option<Instant>,
     /// Requests: frames on their way out, each once.
     pub sent: u64,
     /// Frames that came back.
@@ -133,6 +139,16 @@ impl Traffic {
         }
         let silence = Silence { since: seen, last: seen, frames: 1, ended, returns_before };
         self.silences.push_back(silence);
+    }
+
+    /// A frame that is not EtherCAT was seen. Says whether it is news.
+    pub fn record_foreign(&mut self, seen: Seen<u16>, is_received: bool) -> bool {
+        self.foreign += 1;
+        self.foreign_received += u64::from(is_received);
+        self.first_foreign.get_or_insert(seen);
+        self.latest_foreign = self.latest_foreign.max(Some(seen.at));
+        // The thousandth is none.
+        self.foreign.is_power_of_two() || self.foreign_received == 1
     }
 
     /// A frame came back.

@@ -13,6 +13,7 @@
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::Path;
+use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::route::Direction;
 use linesman_proto::topology::{End, Hop};
@@ -364,12 +365,18 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
             (EmcNoise, 0.15),
             (ReceiverDamaged, 0.1),
         ],
-        (None, false) if hits >= MANY && is_steady(survey, &group.damages) => vec![
-            (TransmitterDamaged, 0.35),
-            (ReceiverDamaged, 0.25),
-            (CableDegraded, 0.2),
-            (EmcNoise, 0.1),
-        ],
+        (None, false)
+            if hits >= MANY
+                && is_steady(survey, &group.damages)
+                && other_way_counts(survey, hop) =>
+        {
+            vec![
+                (TransmitterDamaged, 0.35),
+                (ReceiverDamaged, 0.25),
+                (CableDegraded, 0.2),
+                (EmcNoise, 0.1),
+            ]
+        }
         (None, false) if hits >= MANY => vec![
             (CableDegraded, 0.35),
             (EmcNoise, 0.25),
@@ -406,6 +413,13 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
         add_earlier(&mut list, damage);
     }
     list
+}
+
+/// Whether the other direction of a link could tell of symbols, so that their absence says something.
+fn other_way_counts(survey: &Survey<'_>, hop: Hop) -> bool {
+    let End::Controller(node, port) = hop.from else { return true };
+    let track = survey.track(node, ErrorCounter::PhysicalLayer(port));
+    track.is_some_and(|track| track.last.value < u8::MAX || track.spell_rise() > 0)
 }
 
 const fn suspect(cause: FaultName, spot: Spot, weight: f64) -> Suspect {

@@ -31,6 +31,9 @@ pub struct Damage {
     pub is_lower_bound: bool,
     /// Hops before it whose receiving ports nobody read: the damage may be there as well.
     pub or_earlier: Vec<Hop>,
+    /// The controller (index in the tree) and port that counted the frames as bad already when they came,
+    /// where the receiver itself could not count them.
+    pub shown_at: Option<(usize, Port)>,
     /// When the first was read.
     pub first: Instant,
     /// When the latest was read.
@@ -145,10 +148,20 @@ impl Walk<'_, '_> {
             let invalid = self.survey.track(node, ErrorCounter::InvalidFrame(port));
             // A counter that stood at 255 when the errors began is as good as none.
             let Some(invalid) = invalid.filter(|track| !is_stuck(track)) else {
+                found.extend(self.symbols_alone(route, *hop, node, port));
                 unread.push(*hop);
                 continue;
             };
-            found.extend(self.marked_before(route, &unread, *hop, node, port));
+            if let Some(marked) = self.marked_before(route, &unread, *hop, node, port) {
+                match found.iter_mut().find(|known: &&mut Damage| known.hop == marked.hop) {
+                    Some(known) => {
+                        (known.frames, known.shown_at) = (marked.frames, marked.shown_at);
+                        known.first = known.first.min(marked.first);
+                        known.last = known.last.max(marked.last);
+                    }
+                    None => found.push(marked),
+                }
+            }
             let damage = self.check(*hop, node, port, invalid);
             if let Some((frames, symbols, is_lower_bound)) = damage {
                 let (first, last) = self.period(node, port);
@@ -160,6 +173,7 @@ impl Walk<'_, '_> {
                     is_lower_bound,
                     // A frame that was bad before was counted by the first port that was read.
                     or_earlier: if frames > 0 { unread.clone() } else { Vec::new() },
+                    shown_at: None,
                     first,
                     last,
                 });
@@ -172,6 +186,29 @@ impl Walk<'_, '_> {
             }
         }
         found
+    }
+
+    /// Symbols that a port counted whose frame counter stands at its end, or was not read.
+    fn symbols_alone(&self, route: &Route, hop: Hop, node: usize, port: Port) -> Option<Damage> {
+        let track = self.survey.track(node, ErrorCounter::PhysicalLayer(port))?;
+        let physical = self.read(hop, track);
+        let symbols = physical.settled.saturating_sub(physical.excused);
+        // A frame that came in bad may show as a symbol; without the frame counter only more than
+        // those are damage of the hop itself.
+        let is_own = symbols > self.carried.frames && !is_stuck(track);
+        let first = self.survey.rises(track).next().map(|rise| rise.at);
+        let last = track.last_rise().map(|rise| rise.at);
+        is_own.then_some(Damage {
+            path: route.path(),
+            hop,
+            frames: 0,
+            symbols: Some(symbols),
+            is_lower_bound: true,
+            or_earlier: Vec::new(),
+            shown_at: None,
+            first: first?,
+            last: last?,
+        })
     }
 
     /// Frames that come in marked as bad although no port counted them: they were found bad at a port
@@ -198,6 +235,7 @@ impl Walk<'_, '_> {
             symbols: None,
             is_lower_bound: true,
             or_earlier: earlier.to_vec(),
+            shown_at: Some((node, port)),
             first: first?,
             last: last?,
         })

@@ -6,7 +6,7 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Route, Tree};
 
-use crate::line::{CounterTrack, Line, Rise};
+use crate::line::{Absence, CounterTrack, DlChange, Line, Rise};
 
 /// How far apart the readings that show a link's change and those that show the noise of that change
 /// may lie: link status and counters are read one after the other.
@@ -91,10 +91,27 @@ impl<'a> Survey<'a> {
     #[must_use]
     pub fn falls_with_link_change(&self, link: usize, rise: &Rise) -> bool {
         let Some(changes) = self.changes.get(link) else { return false };
+        if self.has_end_restarted(link, rise) {
+            return true;
+        }
         if rise.at.since(rise.after_time) > LONGEST_EVENT {
             return false;
         }
         changes.iter().any(|(from, to)| *from <= rise.at && rise.after_time <= *to)
+    }
+
+    /// Whether a device at either end of the link started anew between the two readings of a rise: its
+    /// links went and came with it, however long nobody could read it.
+    fn has_end_restarted(&self, link: usize, rise: &Rise) -> bool {
+        let link = self.tree.links()[link];
+        let devices = [link.upstream, link.downstream].into_iter().filter_map(|end| end.node());
+        devices.filter_map(|node| self.line.devices.get(node)).any(|device| {
+            let was_gone = |absence: &Absence| {
+                absence.since.at <= rise.at
+                    && absence.ended.is_none_or(|ended| rise.after_time <= ended + SAME_EVENT)
+            };
+            device.absences.iter().any(was_gone) && device.has_restarted()
+        })
     }
 
     /// Whether any link changed between two times: then frames were lost for that reason.
@@ -141,10 +158,16 @@ fn changes(line: &Line, tree: &Tree, link: usize) -> Vec<(Instant, Instant)> {
             }
             End::Controller(node, port) => {
                 let device = &line.devices[node];
-                let moved =
-                    device.dl.changes.iter().filter(|change| {
-                        change.from.port_state(port) != change.to.port_state(port)
-                    });
+                // A port that was closed to find where frames vanish keeps its link.
+                let was_closed = |change: &DlChange| {
+                    let is_same =
+                        change.from.port_state(port).link == change.to.port_state(port).link;
+                    is_same && line.hole.is_some_and(|hole| change.at >= hole.since.at)
+                };
+                let moved = device.dl.changes.iter().filter(|change| {
+                    change.from.port_state(port) != change.to.port_state(port)
+                        && !was_closed(change)
+                });
                 changes.extend(moved.map(|change| around(change.at, change.at)));
                 let lost = device.counters.track(ErrorCounter::LostLink(port));
                 let rises = lost.into_iter().flat_map(|track| &track.rises);

@@ -266,7 +266,7 @@ impl ObservationFile {
     pub fn project(&self) -> Project {
         let devices = self.devices.iter().map(|device| ProjectDevice {
             type_name: device.type_name.clone(),
-            revision_rule: RevisionRule::Any,
+            revision_rule: Some(RevisionRule::Any),
             entry: device.entry.clone(),
             station: device.station,
             ..ProjectDevice::at(&device.label(), device.on.clone())

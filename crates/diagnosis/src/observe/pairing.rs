@@ -17,9 +17,8 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
-use super::sender::OWN;
+use super::sender::Senders;
 use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen, Sender};
-use crate::line::Seen;
 
 /// Most requests waiting for their return; beyond, the oldest is lost.
 const MOST_PENDING: usize = 256;
@@ -38,8 +37,6 @@ const IN_FLIGHT: Span = Span::ms(5);
 const OTHER_CARD: Span = Span::ms(1);
 /// How many returns are remembered to know one that was recorded twice.
 const REMEMBERED: usize = 8;
-/// Senders kept.
-const MOST_SENDERS: usize = 4;
 
 /// What a frame turned out to be, besides the exchange it may complete.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -64,8 +61,7 @@ pub struct Pairing {
     spare_sums: Vec<Vec<u16>>,
     returned: [Option<(Fingerprint, Instant)>; REMEMBERED],
     returned_next: usize,
-    senders: Vec<Sender>,
-    senders_changed: bool,
+    senders: Senders,
     returns: u64,
     one_way: OneWay,
     /// The second card of a ring, where cards are not told apart: it sends what the first one sends.
@@ -141,16 +137,7 @@ impl Pairing {
                 self.weigh_one_way(source, print, settle);
             }
             self.remember(print, frame.time);
-            let is_ours = |one: &Sender| one.mac == source || one.mac.marked() == source;
-            if frame.direction == Direction::Received && !self.senders.iter().any(is_ours) {
-                // Nobody here sent that.
-                self.note_sender(frame, source, false);
-            } else if let Some(other) =
-                self.senders.iter_mut().find(|one| one.mac == source && !one.is_host)
-            {
-                other.own += u64::from(frame.direction == Direction::Received);
-                self.senders_changed |= other.own == OWN;
-            }
+            self.note_elsewhere(frame, view, source, print);
             settle(&Exchange {
                 request: None,
                 reply: Some(copy(frame)),
@@ -207,12 +194,12 @@ impl Pairing {
     /// Who sent requests, at most four.
     #[must_use]
     pub fn senders(&self) -> &[Sender] {
-        &self.senders
+        self.senders.all()
     }
 
     /// Whether there is a new sender, or one proved to be none's second card, since this was asked.
     pub fn senders_changed(&mut self) -> bool {
-        std::mem::take(&mut self.senders_changed)
+        self.senders.take_changed()
     }
 
     /// How many requests turned out to be returns whose request was not seen, since this was asked.
@@ -226,7 +213,7 @@ impl Pairing {
             let is_own = |sender: &Sender| !sender.mac.is_marked() && sender.mac.marked() == source;
             return print.is_answered
                 || self.one_way == OneWay::From(source)
-                || self.senders.iter().any(is_own);
+                || self.senders.all().iter().any(is_own);
         };
         // The copy of the other card comes back as it went, as long as the ring is whole: nobody on its
         // way processes it.
@@ -256,7 +243,7 @@ impl Pairing {
         match self.one_way {
             OneWay::Open if print.is_answered && source.is_marked() => {
                 self.one_way = OneWay::From(source);
-                self.senders.retain(|sender| sender.mac != source);
+                self.senders.forget(source);
                 while let Some(at) = self.pending.iter().position(|one| one.source == source) {
                     let reply = Some(self.pending[at].copy());
                     let returns_before = self.returns;
@@ -317,7 +304,7 @@ impl Pairing {
             pending.copy_by = Some(source);
             pending.out += 1;
             self.other_card = Some(source);
-            self.note_sender(frame, source, is_repeated);
+            self.senders.note(frame, source, is_repeated);
             return Outcome::RequestCopy;
         }
         let was_recorded = |pending: &Pending| {
@@ -332,7 +319,7 @@ impl Pairing {
         {
             return Outcome::Duplicate;
         }
-        self.note_sender(frame, source, is_repeated);
+        self.senders.note(frame, source, is_repeated);
         if self.pending.len() >= MOST_PENDING {
             self.lose(0, false, settle);
         }
@@ -361,22 +348,28 @@ impl Pairing {
         Outcome::Request
     }
 
-    fn note_sender(&mut self, frame: &FrameSeen<'_>, mac: MacAddress, is_repeated: bool) {
-        let own = u64::from(!is_repeated);
-        let count = self.senders.len();
-        match self.senders.iter_mut().find(|sender| sender.mac == mac) {
-            Some(sender) => {
-                sender.own += own;
-                self.senders_changed |= own > 0 && sender.own == OWN;
-            }
-            None if count < MOST_SENDERS => {
-                let first = Seen::new((), frame.time, Some(frame.number));
-                let is_host = frame.direction == Direction::Sent;
-                self.senders.push(Sender { mac, first, own, is_host });
-                self.senders_changed = true;
-            }
-            None => {}
+    /// A return of a request that was not seen: where requests are, somebody else sent it.
+    fn note_elsewhere(
+        &mut self,
+        frame: &FrameSeen<'_>,
+        view: &FrameView<'_>,
+        source: MacAddress,
+        print: Fingerprint,
+    ) {
+        // A recording may begin, or have gaps, between a request and its return: but then the address
+        // is known from others.
+        let is_told = match frame.direction {
+            Direction::Received => true,
+            Direction::Unknown => print.is_answered && self.one_way == OneWay::No,
+            Direction::Sent => false,
+        };
+        if !is_told {
+            return;
         }
+        let commands = view.datagrams().map_while(Result::ok);
+        let mut commands = commands.filter_map(|datagram| datagram.command());
+        let writes = commands.any(|command| command.effect().writes);
+        self.senders.note_elsewhere(frame, source, writes);
     }
 
     /// Pairs a return with pending request `found`.

@@ -1,11 +1,16 @@
 //! Who sends requests: one MainDevice, its second card, or somebody else.
 
 use linesman_proto::ethernet::MacAddress;
+use linesman_proto::time::Instant;
 
+use super::{Direction, FrameSeen};
 use crate::line::Seen;
 
 /// So many requests of its own make a sender one for sure.
 pub const OWN: u64 = 16;
+
+/// Senders kept.
+const MOST: usize = 4;
 
 /// Somebody who sends requests.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -18,4 +23,80 @@ pub struct Sender {
     pub own: u64,
     /// Whether it is a card of this host, so that several of them are one MainDevice.
     pub is_host: bool,
+    /// Whether only returns of its frames were seen, among requests of others: it sends from another
+    /// place of the line.
+    pub is_elsewhere: bool,
+    /// Frames of its own that write into SubDevices, as far as only their returns were seen.
+    pub writes: u64,
+    /// Its latest frame.
+    pub last: Instant,
+}
+
+/// All who send.
+#[derive(Clone, Default, Debug)]
+pub(super) struct Senders {
+    all: Vec<Sender>,
+    has_changed: bool,
+}
+
+impl Senders {
+    /// In the order in which they were first seen.
+    pub(super) fn all(&self) -> &[Sender] {
+        &self.all
+    }
+
+    /// Whether anything of them has changed since this was asked last.
+    pub(super) const fn take_changed(&mut self) -> bool {
+        std::mem::replace(&mut self.has_changed, false)
+    }
+
+    /// What was taken for a sender is none.
+    pub(super) fn forget(&mut self, mac: MacAddress) {
+        self.all.retain(|sender| sender.mac != mac);
+    }
+
+    /// A return came of a request that was not seen here: somebody sends from another place of the line.
+    pub(super) fn note_elsewhere(&mut self, frame: &FrameSeen<'_>, mac: MacAddress, writes: bool) {
+        let is_known = |one: &Sender| one.mac == mac || one.mac.marked() == mac;
+        if !self.all.iter().any(is_known) {
+            self.note(frame, mac, true);
+            if let Some(new) = self.all.iter_mut().find(|one| one.mac == mac) {
+                new.is_elsewhere = true;
+            }
+        }
+        if let Some(other) = self.all.iter_mut().find(|one| one.mac == mac && !one.is_host) {
+            other.own += 1;
+            other.writes += u64::from(writes);
+            other.last = frame.time;
+            self.has_changed = true;
+        }
+    }
+
+    /// Somebody sent a request; a repeated one may be that of a second card.
+    pub(super) fn note(&mut self, frame: &FrameSeen<'_>, mac: MacAddress, is_repeated: bool) {
+        let own = u64::from(!is_repeated);
+        let count = self.all.len();
+        match self.all.iter_mut().find(|sender| sender.mac == mac) {
+            Some(sender) => {
+                sender.own += own;
+                sender.last = frame.time;
+                self.has_changed |= own > 0 && sender.own == OWN;
+            }
+            None if count < MOST => {
+                let first = Seen::new((), frame.time, Some(frame.number));
+                let is_host = frame.direction == Direction::Sent;
+                self.all.push(Sender {
+                    mac,
+                    first,
+                    own,
+                    is_host,
+                    is_elsewhere: false,
+                    writes: 0,
+                    last: frame.time,
+                });
+                self.has_changed = true;
+            }
+            None => {}
+        }
+    }
 }

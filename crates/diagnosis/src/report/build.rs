@@ -1,5 +1,6 @@
 //! From findings to the report.
 
+use linesman_config::fault::FaultName;
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::time::Instant;
@@ -9,7 +10,9 @@ use super::{
     AlternativeReport, DirectionReport, EndReport, EvidenceReport, FindingReport, FindingState,
     Number, PlaceReport,
 };
-use crate::finding::{Alternative, Book, Evidence, Finding, LinkDirection, LinkEnd, Place};
+use crate::finding::{
+    Alternative, Book, Evidence, Finding, LinkDirection, LinkEnd, Place, told_apart_by,
+};
 
 /// A finding with all that follows from it.
 #[must_use]
@@ -44,7 +47,11 @@ pub fn alone(finding: &Finding) -> FindingReport {
         place: place(&condition.place),
         cause: condition.cause,
         confidence: rounded(condition.confidence),
-        alternatives: condition.alternatives.iter().map(alternative).collect(),
+        alternatives: condition
+            .alternatives
+            .iter()
+            .map(|other| alternative(condition.cause, other))
+            .collect(),
         evidence: condition.evidence.iter().map(evidence).collect(),
         actions: condition.actions.clone(),
         consequences: Vec::new(),
@@ -82,11 +89,12 @@ fn end(end: LinkEnd) -> EndReport {
     }
 }
 
-fn alternative(alternative: &Alternative) -> AlternativeReport {
+fn alternative(first: FaultName, alternative: &Alternative) -> AlternativeReport {
     AlternativeReport {
         cause: alternative.cause,
         place: alternative.place.as_ref().map(place),
         confidence: rounded(alternative.confidence),
+        told_apart_by: told_apart_by(first, alternative.cause).map(str::to_owned),
     }
 }
 

@@ -188,6 +188,9 @@ pub struct AlternativeReport {
     /// How sure, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub confidence: f64,
+    /// What would tell it from the first cause, where something does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub told_apart_by: Option<String>,
 }
 
 /// What shows it.

@@ -247,6 +247,18 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
             condition.evidence.push(evidence);
         }
     }
+    if let Some((node, marked_at)) = damage.shown_at {
+        let (by, counter) = (DeviceId(node as u32), ErrorCounter::Forwarded(marked_at));
+        if let Some(rise) = survey.track(node, counter).and_then(|track| track.last_rise()) {
+            let text = format!(
+                "SubDevice {} counts {frames} frames that were bad already when they came; port {port} of \
+                 SubDevice {label}, whose own counter tells nothing, has let them pass",
+                survey.line().label(by),
+            );
+            let evidence = Evidence::rise(by, counter.address(), Some(marked_at), rise, text);
+            condition.evidence.push(evidence);
+        }
+    }
 }
 
 fn card_evidence(last_hop: &LastHop) -> Evidence {

@@ -115,7 +115,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         Some(Verdict::Bad) => Severity::Error,
         None => return,
     };
-    let (cause, other) = if spell.at_sending {
+    // Single frames are kept back by the computer, most of them by a queue.
+    let is_single = view.line.trips.late_count > 0 && !view.line.trips.is_queue();
+    let (cause, other) = if spell.at_sending || is_single {
         (FaultName::HostJitter, FaultName::LateFrames)
     } else {
         (FaultName::LateFrames, FaultName::HostJitter)
@@ -126,6 +128,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         .confirmed(spell.off[OFTEN - 1].at)
         .shown_by(evidence(&spell, last.at, in_step.len()))
         .explaining(in_step.iter().map(|device| Symptom::StateLost(device.id)))
+        .explaining([Symptom::FramesLate])
         .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
         .advise("Lengthen the cycle, or move the shift of the SYNC signal away from the frame.");
     condition.severity = severity;

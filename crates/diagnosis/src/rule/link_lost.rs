@@ -12,6 +12,8 @@
 //!   power. On a line without a ring frames cannot tell these two apart, since the device cannot be
 //!   asked; the lamps on it can. When it is back in its old state, it was the cable; when it is back in
 //!   INIT, with its address and counters cleared, it was the supply.
+//! * One end has lost the link, the other has not: one pair of wires is broken, or something between the two,
+//!   such as a media converter, shows a link whatever happens behind it.
 //! * The link comes and goes: a contact is loose, a plug not locked, a cable broken inside.
 //!
 //! What follows (SubDevices that do not answer, working counters, watchdogs) is listed beneath.
@@ -49,6 +51,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const SHORT: Span = Span::s(1);
 /// What was on its way when a link was lost comes back by then.
 const ANSWERS_LATE: Span = Span::ms(100);
+/// Cards are looked at now and then only.
+const CARRIER_LATE: Span = Span::ms(300);
 /// A link that was lost again, before it was mended, comes and goes.
 const AGAIN: u64 = 2;
 /// So many losses are no accident.
@@ -59,6 +63,14 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let all = Drops::all(view.line);
     for drops in &all {
         let mut condition = condition(view.line, tree, drops);
+        if condition
+            .alternatives
+            .first()
+            .is_some_and(|other| other.confidence > condition.confidence)
+        {
+            // What was never there is a matter of the device rather than of the link.
+            lead_with_device(&mut condition);
+        }
         if let Some(node) = dead_on_ring(view.line, tree, &all, drops) {
             blame(view.line, tree, node, &mut condition);
         }
@@ -162,16 +174,35 @@ fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
         .advise("On the terminal bus, press the terminals together and look at the contacts.")
 }
 
+/// Puts the first alternative, which is likelier, in front.
+fn lead_with_device(condition: &mut Condition) {
+    let Some(first) = condition.alternatives.first_mut() else { return };
+    let place = first.place.replace(condition.place);
+    std::mem::swap(&mut first.cause, &mut condition.cause);
+    std::mem::swap(&mut first.confidence, &mut condition.confidence);
+    condition.place = place.unwrap_or(condition.place);
+}
+
 type Causes = (FaultName, f64, Vec<(FaultName, Option<usize>, f64)>);
 
 fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Causes {
     use FaultName::{
-        BrownOut, CableDegraded, DeviceOff, LinkFlapping, LinkOpen, RingOpen, SupplyOff,
+        BrownOut, CableDegraded, DeviceMissing, DeviceOff, FalseLink, LinkFlapping, LinkOpen,
+        RingOpen, SupplyOff,
     };
+    if drops.count < OFTEN && is_one_sided(line, tree, drops) {
+        return (FalseLink, 0.5, vec![(LinkOpen, None, 0.35)]);
+    }
+    if let Some(node) = behind.filter(|node| never_was_there(line, tree, drops, *node)) {
+        let device = Some(node);
+        return (LinkOpen, 0.3, vec![(DeviceMissing, device, 0.45), (DeviceOff, device, 0.15)]);
+    }
     let is_repeated = drops.count >= AGAIN;
     let sure = if drops.count >= OFTEN { 0.75 } else { 0.6 };
     match drops.longest() {
-        None if tree.is_on_ring(drops.link) => (LinkOpen, 0.6, vec![(RingOpen, None, 0.3)]),
+        None if tree.is_on_ring(drops.link) && !is_repeated => {
+            (RingOpen, 0.75, vec![(LinkFlapping, None, 0.15)])
+        }
         None => {
             let off = if behind.is_some_and(|node| is_on_terminal_bus(line, node)) {
                 (0.5, 0.35, 0.05)
@@ -187,6 +218,7 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
         Some(_) if is_repeated => {
             (LinkFlapping, sure, vec![(BrownOut, behind, 0.1), (CableDegraded, None, 0.05)])
         }
+        Some(_) if tree.is_on_ring(drops.link) => (RingOpen, 0.6, vec![(LinkFlapping, None, 0.3)]),
         Some(longest) if longest < SHORT => {
             (LinkOpen, 0.45, vec![(LinkFlapping, None, 0.35), (BrownOut, behind, 0.1)])
         }
@@ -194,9 +226,49 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
     }
 }
 
+/// Whether a planned device never answered, and the port before it never had a link since its controller was
+/// switched on: its counter of lost links is 0.
+fn never_was_there(line: &Line, tree: &Tree, drops: &Drops, node: usize) -> bool {
+    let End::Controller(near, port) = tree.links()[drops.link].upstream else { return false };
+    let lost = line.devices[near].counters.track(ErrorCounter::LostLink(port));
+    let is_from_start = matches!(drops.seen[..], [drop] if drop.frame.is_some());
+    line.tree_is_planned
+        && line.devices[node].answered.is_none()
+        && is_from_start
+        && lost.is_some_and(|track| track.last.value == 0)
+}
+
+/// Whether one end has lost the link while the other one had it all the time: one pair of wires, or
+/// something between that shows a link by itself. Only where both were read afterwards.
+fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
+    let link = tree.links()[drops.link];
+    let saw = |end: End| -> Option<bool> {
+        let seen = drops.seen.iter().any(|drop| drop.end == end);
+        match end {
+            End::Controller(node, port) => {
+                let device = line.devices.get(node)?;
+                let lost = device.counters.track(ErrorCounter::LostLink(port))?;
+                let has_risen = lost.rises.iter().any(|rise| rise.at >= drops.first);
+                let was_read = device.silent.is_none()
+                    && lost.last.at > drops.last
+                    && lost.last.value < u8::MAX
+                    && !device.has_restarted();
+                (seen || has_risen || was_read).then_some(seen || has_risen)
+            }
+            End::MainDevice(path) => {
+                let carrier = line.host.card(path).carrier?;
+                let has_changed = !carrier.value || carrier.at >= drops.first.before(CARRIER_LATE);
+                (seen || drops.last + CARRIER_LATE < line.now)
+                    .then_some(seen || (has_changed && line.host.card(path).carrier_changes > 0))
+            }
+        }
+    };
+    matches!((saw(link.upstream), saw(link.downstream)), (Some(one), Some(other)) if one != other)
+}
+
 /// Whether a device hangs on the terminal bus, as far as its type tells: there a contact and the device
 /// behind it fail alike.
-fn is_on_terminal_bus(line: &Line, node: usize) -> bool {
+pub(super) fn is_on_terminal_bus(line: &Line, node: usize) -> bool {
     let name = line.devices[node].type_name.as_deref().unwrap_or_default();
     ["EL", "ES", "EJ", "EM", "KM"].iter().any(|family| name.starts_with(family))
 }

@@ -4,7 +4,7 @@
 //!
 //! **How it is found.** Requests and answers are seen in the mailbox areas behind 0x1000. `S250`: an SDO is
 //! aborted, or the mailbox answers with an error of its own. `S251`: an answer came 300 ms or longer after
-//! its request. `S252`: for nearly a second a request is not taken (working counter 0: the one before is
+//! its request; from 100 ms on it is told and is no warning yet. `S252`: for nearly a second a request is not taken (working counter 0: the one before is
 //! still in the mailbox), or it is taken and the MainDevice looks for the answer in vain, while the controller answers as always.
 //!
 //! **What it means.** The mailbox is served by another part of the firmware than process data and states:
@@ -23,7 +23,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::mailbox::{Refusal, STUCK};
+use crate::line::mailbox::{Refusal, SLOW as SLOW_ANSWER, STUCK};
 use crate::line::{Device, Line, Seen};
 
 /// Requests are refused.
@@ -111,6 +111,10 @@ fn slow(line: &Line, device: &Device) -> Option<Condition> {
     let mut condition = begin(line, device, &SLOW, FaultName::MailboxSlow, since, last.at)
         .confidence(0.7)
         .or(FaultName::FirmwareFault, 0.2);
+    if all.iter().all(|seen| seen.at.since(seen.value.asked) < SLOW_ANSWER) {
+        // Slower than most, and no MainDevice minds.
+        condition.severity = Severity::Info;
+    }
     for seen in all.iter().rev().take(SHOWN) {
         let ms = seen.at.since(seen.value.asked).as_nanos() / 1_000_000;
         let what = seen.value.object.map_or_else(String::new, |object| format!(" to {object}"));

@@ -3,23 +3,32 @@
 //! A rule is a pure function of the line. It is asked whenever something was learnt, and says all
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
+pub mod clock_drift;
 pub mod counters;
 pub mod device_message;
+pub mod early_link;
+pub mod ebus_budget;
 pub mod emergency;
+pub mod foreign_frames;
 pub mod frame_errors;
 pub mod host_trouble;
 pub mod identity;
 pub mod jitter;
+pub mod late;
 pub mod link_lost;
 pub mod mailbox;
 pub mod nobody_answers;
 pub mod not_answering;
 pub mod one_direction;
 pub mod paused;
+pub mod processor_stopped;
+pub mod reference_clock;
 pub mod reported_wrong;
 pub mod restarted;
 pub mod second_maindevice;
+pub mod shared_address;
 pub mod state_error;
+pub mod watchdog_short;
 pub mod wiring;
 pub mod working_counter;
 
@@ -83,26 +92,35 @@ pub struct View<'a> {
 pub const RULES: &[Rule] = &[
     // Hardware, configuration and host: frame errors, links, devices.
     link_lost::RULE,
+    early_link::RULE,
     not_answering::RULE,
     frame_errors::RULE,
     identity::RULE,
     wiring::RULE,
+    ebus_budget::RULE,
     reported_wrong::RULE,
     //
     // The network as a whole, working counters and states.
     nobody_answers::RULE,
+    shared_address::RULE,
     restarted::RULE,
+    reference_clock::RULE,
+    clock_drift::RULE,
+    processor_stopped::RULE,
+    watchdog_short::RULE,
     state_error::RULE,
     working_counter::RULE,
     one_direction::RULE,
     emergency::RULE,
     host_trouble::RULE,
     jitter::RULE,
+    late::RULE,
     paused::RULE,
     mailbox::RULE,
     device_message::RULE,
     counters::RULE,
     second_maindevice::RULE,
+    foreign_frames::RULE,
 ];
 
 /// The manual: every page of every rule, by code.

@@ -9,6 +9,11 @@
 //! **What it means.** Usually the first cable is not plugged, is broken, or the first SubDevice has
 //! no supply. If the card has a link and frames still vanish, something shows a link that does not
 //! forward: a media converter, a switch, a device that is not EtherCAT, or a damaged controller.
+//! If that is over again, and no SubDevice has lost a link or started anew meanwhile, no cable was out: for
+//! single frames among others that came back it is damage (`H110`, `H112`), for a long silence a false
+//! link. Where it was, a recording cannot say; `diagnose --active` can while it lasts: it closes ports one after the
+//! other, for temporary use (0x0100 bit 1), so that each opens by itself after a second, and sees when frames
+//! come back.
 //! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
 //! every frame; which link it is, no counter can be asked.
 //!
@@ -17,12 +22,16 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::time::Instant;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::state::AlStatusCode;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
+use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
-use crate::finding::{Condition, Evidence, LinkEnd, Place, Severity, Symptom};
-use crate::line::{Line, Silence};
+use crate::finding::{Condition, Evidence, LinkDirection, LinkEnd, Place, Severity, Symptom};
+use crate::line::{Device, Line, Seen, Silence};
+use crate::locate::Survey;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -42,6 +51,14 @@ const CERTAIN: u64 = 8;
 const LONG: u64 = 32;
 /// How likely it is the card.
 const CARD: f64 = 0.1;
+/// Cards are looked at now and then only: a silence must last so long before their link proves anything.
+const CARRIER_LATE: Span = Span::ms(300);
+/// The watchdog of a SyncManager expired. Reference: ETG.1000.6, AL status codes.
+const OUTPUT_WATCHDOG: AlStatusCode = AlStatusCode(0x001B);
+/// States are read in turn: so long after a silence they tell of it.
+const STARVED_WITHIN: Span = Span::s(1);
+/// Ports that were closed in a silence keep it from being one; what follows so soon belongs to it.
+const SAME_SILENCE: Span = Span::ms(100);
 /// With fewer, the end of the input may have cut off the answer.
 const FEW: u64 = 3;
 
@@ -55,14 +72,69 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let is_long =
         |silence: &&Silence| silence.frames >= CERTAIN || (silence.frames >= FEW && view.has_ended);
     if let Some(silence) = traffic.silences.iter().rev().find(is_long) {
-        conditions.push(vanished(view, silence));
+        let silence = &searched(line, silence);
+        let is_hole = nothing_was_cut(view, silence);
+        let was_searched = line.hole.is_some_and(|hole| hole.since == silence.since);
+        if is_hole && !was_searched && is_among_others(line, silence) {
+            // Frames are lost here and there: damage, which other rules place.
+            return;
+        }
+        conditions.push(vanished(view, silence, is_hole));
     } else if traffic.answered == 0 && traffic.returned >= FEW && traffic.unanswered >= CERTAIN {
         conditions.push(ignored(view));
     }
 }
 
+/// A silence as it is without the ports that were closed to find its place: frames that come back meanwhile
+/// do not end it.
+fn searched(line: &Line, silence: &Silence) -> Silence {
+    let mut whole = *silence;
+    if let Some(hole) = line.hole.filter(|hole| hole.since.at <= silence.since.at) {
+        let is_one = hole.ended.is_none_or(|ended| silence.since.at <= ended + SAME_SILENCE);
+        if is_one {
+            whole.since = hole.since;
+            whole.ended = silence.ended.filter(|_| hole.ended.is_some());
+        }
+    }
+    whole
+}
+
+/// The link behind which frames vanish, if it was looked for in this silence and found.
+fn found_hole(line: &Line, silence: &Silence) -> Option<Seen<usize>> {
+    let has_link = line.host.card(Path::A).carrier.is_some_and(|carrier| carrier.value);
+    line.hole.filter(|hole| hole.since == silence.since && has_link)?.found
+}
+
+/// Whether a silence is over, and neither a link nor the first SubDevice was lost meanwhile, as what was
+/// read of the first SubDevice since then shows.
+fn nothing_was_cut(view: &View<'_>, silence: &Silence) -> bool {
+    let line = view.line;
+    let (Some(ended), Some(survey)) = (silence.ended, Survey::of(line, view.has_ended)) else {
+        return false;
+    };
+    let Some(End::Controller(first, port)) = first_end(line) else { return false };
+    let Some(device) = line.device(first) else { return false };
+    let lost = device.counters.track(ErrorCounter::LostLink(port));
+    let was_read = lost.is_some_and(|track| track.last.at > ended);
+    let was_card_cut = line.host.card(Path::A).carrier.is_some_and(|carrier| {
+        !carrier.value
+            || (carrier.at >= silence.since.at && line.host.card(Path::A).carrier_changes > 0)
+    });
+    let has_fallen = line.devices.iter().any(|device| {
+        device.al.changes.iter().any(|change| change.at >= silence.since.at && change.is_own_fall())
+    });
+    was_read && !was_card_cut && !has_fallen && !survey.any_link_changed(silence.since.at, ended)
+}
+
+/// Whether other frames were lost than those of a silence, with others coming back between them.
+fn is_among_others(line: &Line, silence: &Silence) -> bool {
+    let lost = line.traffic.lost;
+    let share = lost.of_spell().saturating_sub(silence.frames);
+    share >= FEW && share * 50 >= silence.frames
+}
+
 /// Nothing comes back.
-fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
+fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
     let line = view.line;
     let was_answered = line.traffic.answered > 0;
     let carrier = carrier_during(line, silence);
@@ -75,8 +147,14 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
     let spoiled = line.host.card(Path::A).crc;
     let is_spoiled = spoiled.of_spell() > 0 && spoiled.last.is_some_and(|last| last >= since.at);
     let frame = since.frame.unwrap_or(0);
-    let mut condition =
-        if is_spoiled { spoiling(line, since.at) } else { cut(line, since.at, carrier) };
+    let lasted = silence.last.at.since(silence.since.at);
+    let found = found_hole(line, silence);
+    let mut condition = match (found, is_spoiled, is_hole) {
+        (Some(found), ..) => placed(line, since.at, found),
+        (None, true, _) => spoiling(line, since.at),
+        (None, false, true) => hole(line, silence),
+        (None, false, false) => cut(line, since.at, carrier.filter(|_| lasted >= CARRIER_LATE)),
+    };
     condition = condition.shown_by(Evidence::frame(since.at, frame, text));
     if is_spoiled {
         let text = format!(
@@ -130,6 +208,12 @@ fn vanished(view: &View<'_>, silence: &Silence) -> Condition {
             )
             .advise("Then read the error counters: they name the link.");
     }
+    if found.is_none() && was_answered && carrier == Some(true) && silence.ended.is_none() {
+        condition = condition.advise(
+            "While it lasts, let `linesman diagnose --active` search: it closes one port after the other \
+             for a moment, until frames come back, and names the link.",
+        );
+    }
     advise(condition, carrier)
 }
 
@@ -138,7 +222,13 @@ fn cut(line: &Line, at: Instant, carrier: Option<bool>) -> Condition {
     // Without a carrier it is the first hop for sure; with one, something forwards nothing.
     let (open, off, dead_link) = match carrier {
         Some(false) => (0.6, 0.3, 0.0),
-        Some(true) => (0.35, 0.25, 0.2),
+        Some(true) => {
+            return Condition::new(&PAGE, first_link(line), FaultName::FalseLink, at)
+                .confidence(0.5)
+                .or_at(FaultName::FalseLink, Place::Network { network: line.network }, 0.25)
+                .or_at(FaultName::NicDamaged, Place::Host, CARD)
+                .or(FaultName::LinkOpen, 0.05);
+        }
         None => (0.45, 0.3, 0.1),
     };
     let condition =
@@ -152,6 +242,78 @@ fn cut(line: &Line, at: Instant, carrier: Option<bool>) -> Condition {
         Some(true) | None => condition.or(FaultName::FalseLink, dead_link),
     };
     condition.or_at(FaultName::NicDamaged, Place::Host, CARD)
+}
+
+/// Where frames vanish was found by closing ports.
+fn placed(line: &Line, at: Instant, found: Seen<usize>) -> Condition {
+    let place = match line.links().nth(found.value) {
+        Some(link) => Place::link(line.network, link, Some(LinkDirection::Both)),
+        None => Place::Network { network: line.network },
+    };
+    let text = "with the port before this link closed for a moment frames came back, with any port behind \
+                it closed they did not";
+    Condition::new(&PAGE, place, FaultName::FalseLink, at)
+        .confidence(0.8)
+        .or(FaultName::LinkOpen, 0.1)
+        .shown_by(Evidence::host(Some(found.at), text))
+        .advise(
+            "Look at what is between the two ports, such as a media converter or a switch, and at the \
+             device behind: its link lives, its controller does not.",
+        )
+}
+
+/// Nothing came back for a while, and nobody has lost a link: something took the frames that shows one.
+fn hole(line: &Line, silence: &Silence) -> Condition {
+    let network = Place::Network { network: line.network };
+    let (place, confidence) = match before_the_starved(line, silence) {
+        Some((link, sure)) => (link, sure),
+        None => (network, 0.5),
+    };
+    Condition::new(&PAGE, place, FaultName::FalseLink, silence.since.at)
+        .confidence(confidence)
+        .or_at(FaultName::NicDamaged, Place::Host, CARD)
+        .or_at(FaultName::HostDrops, Place::Host, CARD)
+        .or_at(FaultName::CableDegraded, first_link(line), CARD)
+}
+
+/// Frames reach all that lie before a hole: those whose outputs' watchdog expired lie behind it, those whose
+/// did not, though the silence was longer, before it. The link that parts them, the nearest to the card
+/// first and cables before contacts, with how sure.
+fn before_the_starved(line: &Line, silence: &Silence) -> Option<(Place, f64)> {
+    let tree = line.tree.as_ref().filter(|tree| tree.closes_at().is_none())?;
+    let (from, to) = (silence.since.at, silence.ended? + STARVED_WITHIN);
+    let lasted = silence.last.at.since(from);
+    let is_starved = |device: &Device| {
+        device.al.errors.iter().any(|error| {
+            let is_watchdog = error.code.is_some_and(|code| code.value == OUTPUT_WATCHDOG);
+            is_watchdog && from <= error.status.at && error.status.at <= to
+        })
+    };
+    let takes_outputs = |device: &&Device| {
+        let owned = line.cyclic.iter().flat_map(|cyclic| line.owners(cyclic));
+        let is_short = device.watchdog.span().is_some_and(|span| span * 2 < lasted);
+        is_short && owned.into_iter().any(|owner| owner.device == device.id && owner.writes)
+    };
+    let (starved, fed): (Vec<&Device>, Vec<&Device>) =
+        line.devices.iter().filter(takes_outputs).partition(|device| is_starved(device));
+    if starved.is_empty() {
+        return None;
+    }
+    let parts = |link: &usize| {
+        let Some(node) = tree.links()[*link].downstream.node() else { return false };
+        let behind = tree.subtree(node);
+        let has = |device: &&Device| behind.contains(&device.id.index());
+        starved.iter().all(has) && !fed.iter().any(has)
+    };
+    let mut parting: Vec<usize> = (0..tree.links().len()).filter(parts).collect();
+    let is_contact = |link: &usize| {
+        tree.links()[*link].downstream.node().is_some_and(|node| is_on_terminal_bus(line, node))
+    };
+    parting.sort_by_key(|link| (is_contact(link), *link));
+    let cables = parting.iter().filter(|link| !is_contact(link)).count().max(1);
+    let link = tree.links()[*parting.first()?].map(|node| DeviceId(node as u32));
+    let place = Place::link(line.network, link, Some(LinkDirection::Both));
+    Some((place, 0.6 / cables as f64))
 }
 
 /// Frames do come back, but damaged, and no counter can be asked where.
@@ -216,16 +378,18 @@ fn advise(condition: Condition, carrier: Option<bool>) -> Condition {
         .advise("Exchange the cable; then try the first SubDevice alone, then another card.")
 }
 
+/// The end of the first link at the first controller.
+fn first_end(line: &Line) -> Option<LinkEnd> {
+    let mut links = line.links();
+    links.find(|link| link.upstream == End::MainDevice(Path::A)).map(|link| link.downstream)
+}
+
 /// From the card to the first controller, whose end is not known before it was seen.
 fn first_link(line: &Line) -> Place {
     let a: LinkEnd = End::MainDevice(Path::A);
-    let mut links = line.links();
-    let b = links.find(|link| link.upstream == a).map(|link| link.downstream);
-    Place::Link { network: line.network, a, b, direction: None }
+    Place::Link { network: line.network, a, b: first_end(line), direction: None }
 }
 
 fn first_device(line: &Line) -> Option<DeviceId> {
-    let mut links = line.links();
-    let link = links.find(|link| link.upstream == End::MainDevice(Path::A));
-    link.and_then(|link| link.downstream.node())
+    first_end(line).and_then(|end| end.node())
 }

@@ -8,6 +8,10 @@
 //! come back, or nobody was there any more to send them to, the line is to blame: then this rule says nothing,
 //! and findings about links and damage do.
 //!
+//! Without any watchdog that expired: all frames stayed away for 20 ms or more and then came again, while no
+//! link was lost, no SubDevice restarted, and no counter of any of them moved. Then they did not leave this
+//! computer, or did not get into it.
+//!
 //! **What it means.** The application, or the program that sends, stood still: a long call within the cycle
 //! (an SDO, a file, a print), a garbage collector, a debugger, a process without real-time priority, a
 //! virtual machine whose host was busy. The SubDevices are well, and did what they should.
@@ -18,7 +22,8 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::state::AlStatusCode;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
@@ -39,6 +44,10 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// SyncManager watchdog.
 const WATCHDOG: AlStatusCode = AlStatusCode(0x001B);
+/// So many frames in a row that do not come back …
+const SEVERAL: u64 = 3;
+/// … for so long are no accident.
+const STALLED: Span = Span::ms(20);
 /// States are polled after the pause: an expiry is read so long after it at most.
 const READ_WITHIN: Span = Span::ms(1500);
 
@@ -63,7 +72,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         }
     }
     // One finding, however often it came: the latest pause is shown.
-    let Some(latest) = all.iter().max_by_key(|found| found.pause.to) else { return };
+    let Some(latest) = all.iter().max_by_key(|found| found.pause.to) else {
+        conditions.extend(stalled(line));
+        return;
+    };
     let devices: Vec<DeviceId> =
         all.iter().flat_map(|found| found.devices.iter().map(|device| device.id)).collect();
     conditions.push(condition(line, latest, &devices));
@@ -96,7 +108,7 @@ fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause,
             let is_ours = match refused {
                 Some(card) => !lost_its_link(line, card, pause),
                 None => !was_silent(line, pause),
-            };
+            } && kept_links(line, pause);
             return is_ours.then_some((pause, None));
         }
         if let (Some(card), Some(last)) = (refused, line.traffic.latest_returned) {
@@ -155,10 +167,88 @@ fn condition(line: &Line, found: &Found<'_>, all: &[DeviceId]) -> Condition {
         .ended(to)
         .shown_by(Evidence::host(Some(from), text))
         .explaining(symptoms)
-        .explaining([Symptom::FramesLost, Symptom::NobodyAnswers].into_iter().filter(|_| found.at_card.is_some()))
+        .explaining([Symptom::FramesLost, Symptom::NobodyAnswers])
         .advise("Find what stood still: mailbox or files within the cyclic thread, a debugger, a busy host.")
         .advise("Run `linesman host`: it tells what lets this computer stop a program.")
         .advise("Lengthen the watchdog only if the machine stays safe for that long without control.")
+}
+
+/// Everything stopped and went on, and no link was lost, nothing restarted, nothing was counted anywhere:
+/// the frames did not leave this computer, or did not come into it.
+fn stalled(line: &Line) -> Option<Condition> {
+    let over = line.traffic.silences.iter().rev().filter_map(|one| Some((one, one.ended?)));
+    let (silence, ended) = over
+        .into_iter()
+        .find(|(one, ended)| one.frames >= SEVERAL && ended.since(one.since.at) >= STALLED)?;
+    let pause = Pause { from: silence.since.at, to: ended };
+    // Only counters that were read since then can say that nothing was counted.
+    let were_read = line.devices.iter().any(|device| {
+        let mut tracks = device.counters.tracks();
+        tracks.any(|(counter, track)| {
+            matches!(counter, ErrorCounter::LostLink(_)) && track.last.at > ended
+        })
+    });
+    let kept_carrier = Path::ALL.into_iter().all(|card| !lost_its_link(line, card, pause));
+    if !(were_read && kept_carrier && kept_links(line, pause)) {
+        return None;
+    }
+    let ms = pause.span().as_secs_f64() * 1e3;
+    let text = format!(
+        "{} frames in a row did not come back, for {ms:.1} ms, then all did; no link was lost and no \
+         counter of any SubDevice moved",
+        silence.frames
+    );
+    let refused = Path::ALL.into_iter().find(|card| {
+        let last = line.host.card(*card).send_failures.last;
+        last.is_some_and(|last| last >= pause.from && last <= pause.to + READ_WITHIN)
+    });
+    let frame = silence.since.frame.unwrap_or(0);
+    let mut condition = Condition::new(&PAGE, Place::Host, FaultName::WatchdogStarved, pause.from)
+        .confidence(if refused.is_some() { 0.8 } else { 0.5 })
+        .or(FaultName::HostDrops, 0.1)
+        .confirmed(pause.to)
+        .ended(pause.to)
+        .shown_by(Evidence::frame(pause.from, frame, text));
+    // Nobody was hurt: no watchdog expired.
+    condition.severity = if refused.is_some() { Severity::Warning } else { Severity::Info };
+    if let Some(card) = refused {
+        let text = format!("card {card} had a link and took no frames meanwhile");
+        condition = condition.shown_by(Evidence::host(Some(pause.from), text));
+    } else {
+        condition = condition.or(FaultName::FalseLink, 0.2);
+    }
+    let follows = line.devices.iter().flat_map(|device| {
+        let id = device.id;
+        [
+            Symptom::Silent(id),
+            Symptom::StateLost(id),
+            Symptom::WorkingCounter(id),
+            Symptom::Emergency(id),
+        ]
+    });
+    Some(
+        condition
+            .explaining(follows)
+            .explaining([Symptom::FramesLost, Symptom::NobodyAnswers])
+            .advise("Look into the system's log for messages of the card's driver.")
+            .advise("Run `linesman host`: it tells what lets this computer stop a program."),
+    )
+}
+
+/// Whether no controller lost a link, found damage or started anew about a pause.
+fn kept_links(line: &Line, pause: Pause) -> bool {
+    line.devices.iter().all(|device| {
+        let tracks = device.counters.tracks();
+        let mut rises = tracks.flat_map(|(_, track)| &track.rises);
+        let mut changes = device.dl.changes.iter().map(|change| change.at);
+        let mut falls = device.al.changes.iter().filter(|change| {
+            change.is_own_fall() && change.to.state().state() == Some(AlState::Init)
+        });
+        let until = pause.to + READ_WITHIN;
+        !rises.any(|rise| rise.after_time <= pause.to && rise.at >= pause.from)
+            && !changes.any(|at| at >= pause.from && at <= until)
+            && !falls.any(|change| change.at >= pause.from && change.at <= until)
+    })
 }
 
 /// When the first of the watchdogs had expired.

@@ -21,12 +21,13 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::port::Port;
 use linesman_proto::state::AlState;
+use linesman_proto::state::status_code::Class as CodeClass;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{AlChange, Device, Line, Seen};
+use crate::line::{AlChange, AlError, Device, Line, Seen};
 use crate::locate::Drops;
 
 /// Back in INIT.
@@ -176,6 +177,10 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
     for (cause, confidence) in others {
         condition = condition.or(cause, confidence);
     }
+    if link_lost::is_on_terminal_bus(line, device.id.index()) {
+        // Terminals that lose the voltage of the E-bus start anew, whatever took it.
+        condition = condition.or(FaultName::EbusOverload, 0.05);
+    }
     if let Some((since, until)) = fall.gone {
         let text = format!(
             "SubDevice {} was gone for {:.0} ms before that",
@@ -220,6 +225,7 @@ fn consequences(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
     let mut follows = links_lost_with(line, fall);
     let own = [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)];
     follows.extend(own);
+    follows.extend(out_of_step(line, fall.device));
     if let Some(tree) = line.tree.as_ref().filter(|tree| id.index() < tree.len()) {
         for behind in tree.subtree(id.index()).iter().map(|node| DeviceId(*node as u32)) {
             if behind != id {
@@ -238,6 +244,28 @@ fn consequences(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
     // Its own fall is what it is about, not what follows.
     follows.retain(|symptom| *symptom != Symptom::StateLost(id));
     follows
+}
+
+/// Who lost step because the reference clock started anew: its time does, too.
+fn out_of_step(line: &Line, device: &Device) -> Vec<Symptom> {
+    if !line.references.iter().any(|reference| reference.device == device.id) {
+        return Vec::new();
+    }
+    let falls = || device.al.changes.iter().filter(|change| change.is_own_fall());
+    let is_then = |error: &AlError| {
+        let at = error.status.at;
+        falls().any(|fall| fall.at.before(BEFORE) <= at && at <= fall.at + BEFORE)
+    };
+    let is_timing = |error: &AlError| {
+        error.code.is_some_and(|code| code.value.explain().class == CodeClass::Timing)
+    };
+    let lost = line.devices.iter().filter(|other| {
+        let errors = &other.al.errors;
+        other.id != device.id
+            && !errors.is_empty()
+            && errors.iter().all(|error| is_timing(error) && is_then(error))
+    });
+    lost.map(|other| Symptom::StateLost(other.id)).collect()
 }
 
 /// What follows from a restart at the links of the device: without supply it has no link, so its
@@ -261,12 +289,29 @@ fn links_lost_with(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
         let is_then = drops.first + TOGETHER >= earliest
             && (drops.last <= fall.change.at + LINKS_COUNTED || was_never_up)
             && !drops.is_down;
-        let is_as_often = drops.count <= falls.len() as u64 || was_never_up;
+        let is_as_often = drops.count <= falls.len() as u64
+            || was_never_up
+            || was_away_at_each(device, &drops, falls.len());
         if is_its && is_then && is_as_often {
             follows.extend(link_lost::follows(line, tree, drops.link));
         }
     }
     follows
+}
+
+/// Whether each loss lies in one of the times in which the device was away, and it fell nearly each time: one
+/// that falls again before it answers was away for both.
+fn was_away_at_each(device: &Device, drops: &Drops, falls: usize) -> bool {
+    let is_in = |at: Instant| {
+        device.absences.iter().any(|absence| {
+            absence.since.at.before(TOGETHER) <= at
+                && absence.ended.is_none_or(|ended| at <= ended + TOGETHER)
+        })
+    };
+    !drops.seen.is_empty()
+        && drops.count <= drops.seen.len() as u64
+        && drops.seen.iter().all(|drop| is_in(drop.at))
+        && falls * 10 >= device.absences.len() * 8
 }
 
 /// Whether a device was not seen in its former state again between a fall and `until`.
@@ -284,6 +329,7 @@ fn fell(line: &Line, fall: &Fall<'_>) -> Condition {
         .or(FaultName::BrownOut, 0.1)
         .confirmed(fall.change.at)
         .shown_by(state_evidence(fall))
+        .about([Symptom::StateLost(id)])
         .explaining([Symptom::WorkingCounter(id)])
         .advise("Read the SubDevice's diagnosis history (object 0x10F3), if it has one.")
         .advise("Note its firmware version and ask the manufacturer, with a capture.");

@@ -4,17 +4,22 @@
 //!
 //! **How it is found.** Frames on their way out carry the address of the card that sent them. Two
 //! addresses that each send requests of their own are two senders on one line; the second card of a ring
-//! only repeats what the first one sends.
+//! only repeats what the first one sends. A MainDevice that is plugged in behind the point of observation
+//! shows by its returns alone: frames come back, processed, that nobody here has sent.
 //!
 //! **What it means.** Two MainDevices fight for the line: each changes states, clears counters and writes
-//! outputs that the other one does not expect. Or a configuration tool is plugged in beside.
+//! outputs that the other one does not expect. Or a configuration tool is plugged in beside. As long as it
+//! only reads, it does no harm but takes time on the line; once it writes, SubDevices that leave their
+//! state, refuse one, or are missing in working counters are its doing, and listed beneath.
 //!
 //! **What to do.** Find out who else is on the line and stop it, or listen only.
 
 use linesman_config::fault::{Class, FaultName};
+use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
-use crate::finding::{Condition, Evidence, Place, Severity};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::observe::Sender;
 use crate::observe::sender::OWN;
 
 /// The page.
@@ -29,10 +34,22 @@ pub const PAGE: RulePage = RulePage {
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
+/// Where no direction is told, so many returns that nobody here asked for: a recording may miss a request.
+const UNASKED: u64 = 4;
+/// Who did not send anything for so long has gone. A tool that looks now and then does so every second.
+const GONE: Span = Span::s(3);
+
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
-    let senders = line.traffic.senders.iter();
-    let own: Vec<_> = senders.filter(|sender| sender.own >= OWN).collect();
+    let senders = &line.traffic.senders;
+    let has_host = senders.iter().any(|sender| sender.is_host);
+    let is_one = |sender: &&Sender| {
+        sender.own >= OWN
+            || sender.is_elsewhere && (has_host || sender.own >= UNASKED)
+            // Whoever has sent anything here is the other one.
+            || !sender.is_elsewhere && senders.iter().any(|other| other.is_elsewhere)
+    };
+    let own: Vec<_> = senders.iter().filter(is_one).collect();
     // The cards of this host are one MainDevice.
     let ours = own.iter().position(|sender| sender.is_host);
     let others = own.iter().enumerate().filter(|(at, sender)| !sender.is_host || ours == Some(*at));
@@ -42,11 +59,33 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let text =
         format!("requests of their own come from {} addresses: {}", apart.len(), names.join(", "));
     let place = Place::Network { network: line.network };
+    let mut condition = Condition::new(&PAGE, place, FaultName::SecondMainDevice, shown.first.at)
+        .confidence(0.85)
+        .confirmed(shown.first.at)
+        .shown_by(Evidence::frame(shown.first.at, shown.first.frame.unwrap_or(0), text));
+    let elsewhere = || apart.iter().filter(|sender| sender.is_elsewhere);
+    let (frames, writes) = elsewhere()
+        .fold((0, 0), |(frames, writes), sender| (frames + sender.own, writes + sender.writes));
+    if let Some(last) = elsewhere().map(|sender| sender.last).max() {
+        let text = format!(
+            "{frames} frames came back that nobody here has sent; {writes} of them write into SubDevices"
+        );
+        condition = condition.shown_by(Evidence::host(Some(last), text));
+        if elsewhere().count() + 1 == apart.len() && last + GONE < view.now {
+            condition = condition.ended(last);
+        }
+    }
+    if writes > 0 || elsewhere().count() == 0 {
+        condition = condition.explaining(line.devices.iter().flat_map(|device| {
+            let id = device.id;
+            [Symptom::StateLost(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)]
+        }));
+    }
+    if writes > 0 {
+        condition.severity = Severity::Error;
+    }
     conditions.push(
-        Condition::new(&PAGE, place, FaultName::SecondMainDevice, shown.first.at)
-            .confidence(0.8)
-            .confirmed(shown.first.at)
-            .shown_by(Evidence::frame(shown.first.at, shown.first.frame.unwrap_or(0), text))
+        condition
             .advise("Find out which computer or controller has the other address, and stop it.")
             .advise("If it has to run, use `listen:` and do not send beside it."),
     );

@@ -13,6 +13,10 @@
 //! device itself. If there is trouble with cables at the same moment, that comes first: the code is then
 //! what follows.
 //!
+//! A SubDevice that works in step with SYNC signals and leaves OP with 0x001A was not done in time: its work
+//! takes longer than the cycle, or its outputs come late. It counts both, in 0x1C32 and 0x1C33 (subindex 12
+//! and 11); live, the diagnosis reads them. With 0x002C, 0x002D and 0x0033 its signals themselves do not come.
+//!
 //! **What to do.** The code says more than the state: its own page has the checks, most promising first.
 
 use linesman_config::fault::{Class, FaultName};
@@ -70,6 +74,9 @@ const GIVEN_UP: Span = Span::s(10);
 const AL_CONTROL: RegisterAddress = RegisterAddress(0x0120);
 const AL_STATUS: RegisterAddress = RegisterAddress(0x0130);
 const AL_STATUS_CODE: RegisterAddress = RegisterAddress(0x0134);
+/// Subindices of 0x1C32 and 0x1C33 (ETG.1020): SM event missed, cycle time too small.
+const EVENT_MISSED: u8 = 0x0B;
+const CYCLE_EXCEEDED: u8 = 0x0C;
 /// SyncManager watchdog.
 const WATCHDOG_CODE: AlStatusCode = AlStatusCode(0x001B);
 
@@ -117,9 +124,13 @@ fn condition(
     let place = Place::device(line.network, device.id);
     let meaning = error.code.map(|code| code.value.explain());
     let cause = match page.code {
+        // The code itself blames what was configured.
+        "S200" if meaning.is_some_and(|meaning| meaning.class == CodeClass::Configuration) => {
+            FaultName::ConfigMismatch
+        }
         "S200" => FaultName::InitRefused,
         "S202" => FaultName::WatchdogStarved,
-        "T400" => FaultName::SyncLost,
+        "T400" => out_of_step(device, error),
         _ => FaultName::FirmwareFault,
     };
     let mut condition = Condition::new(page, place, cause, error.status.at)
@@ -128,9 +139,7 @@ fn condition(
         .about([Symptom::StateLost(device.id)])
         .explaining([Symptom::WorkingCounter(device.id), Symptom::Emergency(device.id)]);
     condition = match (cause, meaning.map(|meaning| meaning.class)) {
-        (FaultName::InitRefused, Some(CodeClass::Configuration)) => {
-            condition.or(FaultName::ConfigMismatch, 0.15)
-        }
+        (FaultName::ConfigMismatch, _) => condition.or(FaultName::InitRefused, 0.15),
         (FaultName::InitRefused, Some(CodeClass::Timing)) => {
             condition.or(FaultName::SyncLost, 0.15)
         }
@@ -141,8 +150,22 @@ fn condition(
         (FaultName::SyncLost, _) => {
             condition.or_at(FaultName::HostJitter, Place::Host, 0.1).or(FaultName::ClockDrift, 0.05)
         }
+        (FaultName::CycleTooFast, _) => {
+            let is_counted = exceeded(device).is_some();
+            let (sure, other) = if is_counted { (0.9, 0.03) } else { (0.6, 0.12) };
+            condition
+                .confidence(sure)
+                .or(FaultName::FirmwareFault, other)
+                .or(FaultName::ClockDrift, other)
+                .or_at(FaultName::HostJitter, Place::Host, 0.03)
+        }
         _ => condition.or(FaultName::ConfigMismatch, 0.1),
     };
+    if page.code == "T400" {
+        // What it refuses on its way back is more of the same.
+        condition = condition.explaining([Symptom::StateLost(device.id)]);
+        condition.evidence.extend(counted(device));
+    }
     if let Some(ended) = over(view, device, error) {
         condition = condition.ended(ended);
     }
@@ -162,6 +185,39 @@ fn condition(
         }
     }
     condition
+}
+
+/// Why a SubDevice that keeps step lost it: by its own code its SYNC signals do not come, or it is not done
+/// in time, with outputs that come too late or work that takes too long. What can be seen elsewhere (frames
+/// that come unevenly, clocks that go astray) is told by rules of its own, beneath which this hangs.
+fn out_of_step(device: &Device, error: &AlError) -> FaultName {
+    let is_late = error.code.is_some_and(|code| code.value == AlStatusCode::SYNCHRONIZATION_ERROR);
+    let missed_only = exceeded(device).is_none()
+        && device
+            .sync_counts
+            .iter()
+            .any(|((_, subindex), seen)| *subindex == EVENT_MISSED && seen.value > 0);
+    if is_late && !missed_only { FaultName::CycleTooFast } else { FaultName::SyncLost }
+}
+
+/// How often it was not done with a cycle when the next began, where it counts that.
+fn exceeded(device: &Device) -> Option<u16> {
+    let counts = device.sync_counts.iter();
+    let exceeded = counts.filter(|((_, subindex), _)| *subindex == CYCLE_EXCEEDED);
+    exceeded.map(|(_, seen)| seen.value).max().filter(|count| *count > 0)
+}
+
+/// What it counts of its cycles.
+fn counted(device: &Device) -> impl Iterator<Item = Evidence> {
+    device.sync_counts.iter().filter(|(_, seen)| seen.value > 0).map(|((index, subindex), seen)| {
+        let what = match *subindex {
+            EVENT_MISSED => "outputs or inputs that did not come before their SYNC",
+            CYCLE_EXCEEDED => "cycles that began before the last was done",
+            _ => "outputs that came too shortly before their SYNC",
+        };
+        let text = format!("0x{index:04X}:{subindex:02}: {} {what}", seen.value);
+        Evidence::frame(seen.at, seen.frame.unwrap_or(0), text)
+    })
 }
 
 /// When it was over. An acknowledged error is not: the MainDevice acknowledges and tries again, so only

@@ -355,18 +355,36 @@ impl<'a> Found<'a> {
             | Difference::Swapped { .. } => None,
         });
         let concerned = behind.chain(swapped);
-        concerned
-            .flat_map(|id| {
-                let ports = Port::ALL.into_iter().flat_map(move |port| {
-                    [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
-                });
-                ports.chain([
-                    Symptom::Silent(id),
-                    Symptom::WorkingCounter(id),
-                    Symptom::StateLost(id),
-                ])
-            })
-            .collect()
+        let ends = comparison.differences.iter().flat_map(|difference| match difference {
+            Difference::Reversed { planned, .. } => self.ends_around(*planned),
+            Difference::Moved { .. }
+            | Difference::Missing { .. }
+            | Difference::Extra { .. }
+            | Difference::Wrong { .. }
+            | Difference::Swapped { .. } => Vec::new(),
+        });
+        let symptoms = concerned.flat_map(|id| {
+            let ports = Port::ALL.into_iter().flat_map(move |port| {
+                [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
+            });
+            ports.chain([Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)])
+        });
+        symptoms.chain(ends).collect()
+    }
+
+    /// The far ends of the cables of a device that sits in the line the other way round: one of its own
+    /// ports has no link where one belongs, and the plan sees that as both ends of a cable.
+    fn ends_around(&self, planned: usize) -> Vec<Symptom> {
+        let far = |port| self.planned.opposite(End::Controller(planned, port));
+        let ends = Port::ALL.into_iter().filter_map(far);
+        ends.flat_map(|end| match end {
+            End::Controller(node, port) => {
+                let id = DeviceId(node as u32);
+                vec![Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
+            }
+            End::MainDevice(_) => Vec::new(),
+        })
+        .collect()
     }
 
     fn place(&self, planned: usize) -> Place {

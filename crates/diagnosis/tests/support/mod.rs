@@ -8,6 +8,7 @@
 )]
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
+pub mod plant;
 pub mod script;
 pub mod watcher;
 

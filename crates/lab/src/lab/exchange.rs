@@ -2,6 +2,7 @@
 
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{ClockSettings, Plan, PlanOptions, PlannedDevice};
+use linesman_diagnosis::Asked;
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_maindevice::{Event, ProbeRequest, Target};
 use linesman_proto::address::{DeviceId, Path};
@@ -24,7 +25,8 @@ impl Lab {
 
     /// The plan's identity of a SubDevice of the project; the other way round than
     /// [`Lab::of_plan`].
-    pub(super) fn in_plan(&self, id: DeviceId) -> DeviceId {
+    #[must_use]
+    pub fn in_plan(&self, id: DeviceId) -> DeviceId {
         let at = self.tree.order().iter().position(|node| *node == id.index());
         at.map_or(id, |at| DeviceId(at as u32))
     }
@@ -52,13 +54,22 @@ impl Lab {
                 self.plan.as_ref().and_then(|plan| plan.device(self.in_plan(probe.device)));
             // Who is not of the plan has no address that could be asked.
             let Some(device) = device else { continue };
-            let request = ProbeRequest {
-                target: Target::Station(device.station),
-                register: probe.register,
-                len: probe.len,
-                write: None,
-            };
-            self.main.probe(self.now, request);
+            match probe.what {
+                Asked::Register { address, len } => {
+                    let target = Target::Station(device.station);
+                    let request = ProbeRequest { target, register: address, len, write: None };
+                    self.main.probe(self.now, request);
+                }
+                Asked::Written { address, data } => {
+                    let target = Target::Station(device.station);
+                    let write = Some(Vec::from(data));
+                    let request = ProbeRequest { target, register: address, len: 2, write };
+                    self.main.probe(self.now, request);
+                }
+                Asked::Object(object) => {
+                    self.main.sdo_upload(self.now, device.id, object, false);
+                }
+            }
         }
         while let Some(event) = self.engine.poll_event() {
             if self.finding_events.len() >= KEPT_EVENTS {
@@ -71,6 +82,9 @@ impl Lab {
 
     pub(super) fn show(&mut self, direction: Direction, path: Path, time: Instant, bytes: &[u8]) {
         self.frames += 1;
+        if self.veil.as_mut().is_some_and(|veil| veil.hides(direction, bytes)) {
+            return;
+        }
         let seen = FrameSeen {
             network: self.network,
             path: Some(path),
@@ -142,6 +156,9 @@ impl Lab {
                 let observation =
                     HostObservation { network: self.network, path, time: self.now, what };
                 self.engine.handle_host(&observation);
+                if let Some(tap) = &mut self.host_tap {
+                    tap(&observation);
+                }
             };
             if before.is_none_or(|before| before.carrier != port.carrier) {
                 note(HostEvent::Carrier(port.carrier));

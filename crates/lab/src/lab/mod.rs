@@ -9,25 +9,28 @@ mod exchange;
 mod object;
 mod register;
 mod truth;
+mod veil;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::Plan;
 use linesman_config::project::Project;
-use linesman_diagnosis::observe::{Direction, FrameSeen};
+use linesman_diagnosis::observe::{Direction, FrameSeen, HostObservation};
 use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
 use linesman_diagnosis::{Engine, Event as FindingEvent, Setup};
 use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::address::{DeviceId, Network};
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::{End, Tree};
+use linesman_proto::topology::Tree;
+use linesman_sim::seed::Stream;
 use linesman_sim::segment::{HostPort, Segment};
 use linesman_sim::segment_file::SegmentFile;
-use linesman_sim::truth::{FaultId, TruthLog};
+use linesman_sim::truth::TruthLog;
 
 pub use error::LabError;
 
+use self::veil::Veil;
 use crate::options::{Begin, LabOptions};
 
 /// How often the card's counters are looked at.
@@ -44,6 +47,9 @@ const DRIFT_FRAMES: u32 = 2_000;
 /// Sees every frame as the diagnosis does.
 pub type Tap = Box<dyn FnMut(&FrameSeen<'_>) + Send>;
 
+/// Sees what the host observed as the diagnosis does.
+pub type HostTap = Box<dyn FnMut(&HostObservation) + Send>;
+
 /// A segment, a MainDevice and a diagnosis.
 pub struct Lab {
     now: Instant,
@@ -55,11 +61,12 @@ pub struct Lab {
     main: MainDevice,
     engine: Engine,
     tap: Option<Tap>,
+    host_tap: Option<HostTap>,
+    veil: Option<Veil>,
     frames: u64,
     events: Vec<(Instant, Event)>,
     finding_events: VecDeque<FindingEvent>,
     failure: Option<String>,
-    blind: BTreeMap<FaultId, Vec<End<DeviceId>>>,
     inventory: Option<Inventory>,
     plan: Option<Plan>,
     host_next: Instant,
@@ -84,6 +91,7 @@ impl Lab {
             project: options.project.then(|| project.clone()),
             host_counters: options.host_counters,
             probes: options.probes,
+            active: options.active,
             source: match options.source.as_str() {
                 "" => format!("lab:{}", file.name),
                 source => source.to_owned(),
@@ -106,11 +114,12 @@ impl Lab {
             main,
             engine: Engine::new(setup),
             tap: None,
+            host_tap: None,
+            veil: None,
             frames: 0,
             events: Vec::new(),
             finding_events: VecDeque::new(),
             failure: None,
-            blind: BTreeMap::new(),
             inventory: None,
             plan: None,
             host_next: Instant::ZERO,
@@ -129,6 +138,16 @@ impl Lab {
     /// Lets `tap` see every frame from now on.
     pub fn set_tap(&mut self, tap: Tap) {
         self.tap = Some(tap);
+    }
+
+    /// Lets `tap` see every observation of the host from now on.
+    pub fn set_host_tap(&mut self, tap: HostTap) {
+        self.host_tap = Some(tap);
+    }
+
+    /// Hides a share of the exchanges in which error counters are read from the diagnosis and the tap.
+    pub fn hide_counters(&mut self, share: f64, stream: Stream) {
+        self.veil = (share > 0.0).then(|| Veil::new(stream, share));
     }
 
     /// The present.

@@ -3,17 +3,16 @@
 use std::collections::BTreeSet;
 
 use linesman_config::attachment::Attachment;
+use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::port::Port;
-use linesman_proto::register::ErrorCounter;
 use linesman_proto::topology::End;
 use linesman_sim::segment::PlugError;
 use linesman_sim::segment_file::FaultEntry;
 use linesman_sim::truth::{FaultId, Unexplained};
 
 use super::{Lab, LabError};
-use crate::verdict::Truth;
 use crate::verdict::judge::truth_of;
+use crate::verdict::{Truth, TruthPlace, sets};
 
 impl Lab {
     /// Puts a fault on the line.
@@ -21,38 +20,29 @@ impl Lab {
     /// # Errors
     /// The segment's, when the entry names no place or parameter.
     pub fn inject(&mut self, entry: &FaultEntry) -> Result<FaultId, LabError> {
-        let id = self.segment.inject(self.now, entry)?;
-        let blind = self.blind_ports();
-        self.blind.insert(id, blind);
-        Ok(id)
+        Ok(self.segment.inject(self.now, entry)?)
     }
 
     /// A fault of the run as a verdict is held against it; `None` if there is no such fault.
     #[must_use]
     pub fn truth_of(&self, id: FaultId) -> Option<Truth> {
         let log = self.truth();
-        let blind = self.blind.get(&id).cloned().unwrap_or_default();
-        let remakes = |id: &DeviceId| {
-            let controller = self.segment.controller(*id);
-            controller.is_some_and(|known| known.hardware().counting.remakes_symbol_errors)
-        };
-        let remaking = self.segment.devices().filter(remakes).collect();
-        Some(Truth { blind, remaking, ..truth_of(log, log.fault(id)?) })
+        let mut truth = truth_of(log, log.fault(id)?);
+        if truth.name == FaultName::TwinsSwapped && !self.has_identities(&truth) {
+            truth.unseen = Some(&sets::TWINS);
+        }
+        Some(truth)
     }
 
-    /// Ports whose symbol counter stands at its end.
-    fn blind_ports(&self) -> Vec<End<DeviceId>> {
-        let mut blind = Vec::new();
-        for id in self.segment.devices() {
-            let Some(controller) = self.segment.controller(id) else { continue };
-            let counters = controller.error_counters();
-            for port in Port::ALL {
-                if counters.value(ErrorCounter::PhysicalLayer(port)) == Some(u8::MAX) {
-                    blind.push(End::Controller(id, port));
-                }
+    /// Whether the project knows the devices of a fault by more than their type.
+    fn has_identities(&self, truth: &Truth) -> bool {
+        truth.places.iter().any(|place| match place {
+            TruthPlace::Device(id) => {
+                let planned = self.project().devices.get(id.index());
+                planned.is_some_and(|planned| planned.alias.is_some() || planned.serial.is_some())
             }
-        }
-        blind
+            TruthPlace::Hop(..) | TruthPlace::Link(..) | TruthPlace::Host(_) => false,
+        })
     }
 
     /// Pulls the cable of a SubDevice, or those of a hot connect group.
@@ -60,10 +50,7 @@ impl Lab {
     /// # Errors
     /// The segment's, when there is no such SubDevice or group, or it is out already.
     pub fn unplug(&mut self, name: &str) -> Result<Vec<FaultId>, PlugError> {
-        let faults = self.segment.unplug(self.now, name)?;
-        let blind = self.blind_ports();
-        self.blind.extend(faults.iter().map(|fault| (*fault, blind.clone())));
-        Ok(faults)
+        self.segment.unplug(self.now, name)
     }
 
     /// Plugs a SubDevice in again, where it was or elsewhere.

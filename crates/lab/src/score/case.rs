@@ -7,6 +7,7 @@ use linesman_sim::fault::KINDS;
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment_file::{PlantOptions, SegmentFile, plant};
 
+use super::perturb::Perturbation;
 use crate::choice::AT_RUN_TIME;
 
 /// Choices for a score.
@@ -16,6 +17,10 @@ pub struct ScoreOptions {
     pub fault: Option<FaultName>,
     /// Only recordings are judged, and nobody asks for registers while they are made.
     pub capture_only: bool,
+    /// Nothing is wrong in any case, but much is done that is no fault.
+    pub healthy: bool,
+    /// What is other than the diagnosis expects.
+    pub perturb: Option<Perturbation>,
 }
 
 /// What kind of case it is.
@@ -50,6 +55,8 @@ pub struct Case {
     pub clocks: bool,
     /// Whether the controllers count forwarded errors, as far as their type does.
     pub forwarded: bool,
+    /// Whether what may begin early or late begins before the line is brought up.
+    pub from_start: bool,
 }
 
 impl Case {
@@ -64,16 +71,21 @@ impl Case {
         let has = |names: &[FaultName]| faults.iter().any(|name| names.contains(name));
         let ring = has(&[FaultName::RingOpen]) || stream.chance(0.12);
         let clocks = has(&CLOCKED) || stream.chance(0.2);
+        let from_start = seed.stream("score begin").chance(0.5);
         let forwarded = !stream.chance(0.2);
         let host_counters = stream.chance(0.6);
         let cycle = Span::ms(*stream.pick(&[1, 2, 2, 4, 5]).unwrap_or(&2));
         let mut file = line(seed, attempt, ring, &mut stream);
         file.counts_forwarded = (!forwarded).then_some(false);
         file.noise_at_link_up = stream.chance(0.2).then_some(3.0);
-        if kind == CaseKind::Masked {
+        let is_masked = kind == CaseKind::Masked || (options.healthy && stream.chance(0.5));
+        if is_masked {
             mask(&mut file, &mut stream);
         }
-        Self { seed, kind, faults, file, cycle, host_counters, clocks, forwarded }
+        if let Some(perturb) = options.perturb {
+            perturb.plant(&mut file, &mut seed.stream("score perturbed"));
+        }
+        Self { seed, kind, faults, file, cycle, host_counters, clocks, forwarded, from_start }
     }
 }
 
@@ -94,7 +106,13 @@ fn faults(options: &ScoreOptions, stream: &mut Stream) -> (CaseKind, Vec<FaultNa
     };
     let catalogue = KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>();
     let drawn = stream.pick(&catalogue).copied();
-    let physical = [stream.pick(&AT_RUN_TIME).copied(), stream.pick(&AT_RUN_TIME).copied()];
+    // Behind a damaged card everything is hidden: it cannot be one of two that are both seen.
+    let apart = |name: &FaultName| kind != CaseKind::Double || *name != FaultName::NicDamaged;
+    let menu: Vec<FaultName> = AT_RUN_TIME.into_iter().filter(apart).collect();
+    let physical = [stream.pick(&menu).copied(), stream.pick(&menu).copied()];
+    if options.healthy {
+        return (CaseKind::Healthy, Vec::new());
+    }
     if let Some(fault) = options.fault {
         let kind = if kind == CaseKind::Masked { kind } else { CaseKind::Single };
         return (kind, vec![fault]);

@@ -3,6 +3,8 @@
 
 #![expect(clippy::wildcard_enum_match_arm, reason = "menus, not tables of all faults")]
 
+mod others;
+
 use linesman_config::fault::FaultName::{self, *};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::Span;
@@ -53,14 +55,18 @@ pub struct Offer<'a> {
     pub clocked: &'a [DeviceId],
     /// The reference clock.
     pub reference: Option<DeviceId>,
+    /// When the fault is put in.
+    pub when: When,
 }
 
-/// When a fault of this name is put in.
+/// When a fault of this name is put in; `early` for those that may begin either way.
 #[must_use]
-pub fn when(name: FaultName) -> When {
+pub fn when(name: FaultName, early: bool) -> When {
     let built_in = linesman_sim::fault::kind(name).is_some_and(|kind| kind.is_built_in());
-    // What a device refuses on its way up is refused on the way up.
-    if built_in || matches!(name, InitRefused | ConfigMismatch) {
+    // What a device refuses on its way up is refused on the way up; inputs that are frozen and a dead
+    // state machine show there only.
+    if built_in || matches!(name, InitRefused | ConfigMismatch) || (early && name == FirmwareFault)
+    {
         When::FromStart
     } else {
         When::Running
@@ -94,6 +100,12 @@ pub fn draw(name: FaultName, offer: &Offer<'_>, stream: &mut Stream) -> Option<D
         _ => None,
     }
 }
+
+/// A dip of a supply lasts so long at most, in ms: IEC 61000-4-29 tests DC ports with dips and short
+/// interruptions of up to a second.
+const DIP_MS: f64 = 1_000.0;
+/// A device that comes back earlier than this, in ms, had a dip of its supply.
+const OFF_MS: f64 = 3_000.0;
 
 struct Drawer<'a, 's> {
     name: FaultName,
@@ -158,6 +170,10 @@ impl Drawer<'_, '_> {
         let ground = self.offer.ground;
         let link =
             if is_false { ground.any_cable(self.stream) } else { ground.any_link(self.stream) }?;
+        // A link of a ring that is open is a ring that is open.
+        if !is_false && ground.tree.is_on_ring(link) {
+            return None;
+        }
         let one_way = self.stream.chance(if is_false { 0.3 } else { 0.1 });
         let at = if one_way { self.one(link) } else { self.both(link) };
         let mut entry = self.entry().at(at);
@@ -220,6 +236,15 @@ impl Drawer<'_, '_> {
             if is_cable { ground.any_cable(self.stream) } else { ground.any_link(self.stream) }?;
         let is_whole = is_cable && self.stream.chance(0.5);
         let at = if is_whole { self.both(link) } else { self.one(link) };
+        // The transmitter and the receiver of the card are parts of it: that is `nic-damaged`.
+        let is_of_card = match self.name {
+            TransmitterDamaged => at.starts_with("maindevice"),
+            ReceiverDamaged => at.contains(">maindevice"),
+            _ => false,
+        };
+        if is_of_card {
+            return None;
+        }
         let mut entry = self.entry().at(at.clone());
         if self.name == EmcNoise {
             let mut places = vec![at];
@@ -262,11 +287,15 @@ impl Drawer<'_, '_> {
         let (device, id) = self.any_device()?;
         let mut names = vec![device.name.clone()];
         if self.name == SupplyOff {
-            for _ in 0..self.stream.below(3) {
+            for _ in 0..=self.stream.below(3) {
                 let (other, _) = self.any_device()?;
                 if !names.contains(&other.name) {
                     names.push(other.name.clone());
                 }
+            }
+            // A supply of one device alone is that device's power.
+            if names.len() < 2 {
+                return None;
             }
         }
         let mut entry = self.entry();
@@ -275,10 +304,11 @@ impl Drawer<'_, '_> {
             _ => entry.devices = Some(names),
         }
         let drawn = if self.name == BrownOut {
-            entry = entry.with("dip_ms", self.number(0.5, 3_000.0));
+            entry = entry.with("dip_ms", self.number(0.5, DIP_MS));
             self.lasting(entry, 3_000.0, 4_000.0)
         } else {
-            self.hard(entry)
+            let hard = self.hard(entry.clone());
+            Drawn { ends: hard.ends, ..self.lasting(entry, OFF_MS, 2.0 * OFF_MS) }
         };
         Some(Self::at_device(drawn, id))
     }
@@ -298,24 +328,6 @@ impl Drawer<'_, '_> {
             .with("on_ms", self.number(300.0, 3_000.0));
         let drawn = self.lasting(entry, 2_000.0, 5_000.0);
         Some(Self::at_device(drawn, self.id(device)?))
-    }
-
-    fn refused(&mut self) -> Option<Drawn> {
-        if self.name == ConfigMismatch {
-            let (device, id) = self.with_mailbox()?;
-            let what = self.word(&["process-data", "mailbox", "modules"]);
-            let entry = self.entry().device(&device.name).with("what", what);
-            return Some(Self::at_device(self.for_ever(entry), id));
-        }
-        let (device, id) = self.any_device()?;
-        let codes = [0x0001, 0x0014, 0x001D, 0x001E, 0x0022, 0x0030, 0x0050, 0x8000];
-        let entry = self
-            .entry()
-            .device(&device.name)
-            .with("to", self.word(&["SAFEOP", "PREOP", "OP"]))
-            .with("code", *self.stream.pick(&codes)?)
-            .with("refusals", self.stream.below(4) as u32);
-        Some(Self::at_device(self.for_ever(entry), id))
     }
 
     fn for_ever(&mut self, entry: FaultEntry) -> Drawn {
@@ -339,12 +351,19 @@ impl Drawer<'_, '_> {
             WatchdogStarved => entry.with("watchdog_ms", self.number(0.1, 3.0)),
             CycleTooFast => entry.with("needs_us", self.number(5_500.0, 50_000.0)),
             FirmwareFault => {
-                let how = self.word(&["hangs", "restarts"]);
+                let how = match self.offer.when {
+                    When::Running => self.word(&["hangs", "restarts"]),
+                    When::FromStart => self.word(&["inputs-frozen", "state-machine-dead"]),
+                };
                 entry.with("how", how)
             }
             _ => entry,
         };
-        let drawn = self.lasting(entry.device(&device.name), 1_000.0, 4_000.0);
+        let entry = entry.device(&device.name);
+        let drawn = match self.offer.when {
+            When::Running => self.lasting(entry, 1_000.0, 4_000.0),
+            When::FromStart => self.for_ever(entry),
+        };
         Some(Self::at_device(drawn, id))
     }
 
@@ -381,70 +400,6 @@ impl Drawer<'_, '_> {
         };
         let drawn = self.lasting(entry, 3_000.0, 5_000.0);
         Some(Self::at_device(drawn, id))
-    }
-
-    fn host(&mut self) -> Option<Drawn> {
-        let entry = self.entry().at("maindevice");
-        let hits = self.stream.log_uniform(1.0, 200.0).round() as u32;
-        let entry = match self.name {
-            HostDrops => entry.with("hits", hits),
-            HostJitter => entry.with("hits", hits).with("delay_us", self.number(100.0, 5_000.0)),
-            _ => entry.with("late_us", self.number(200.0, 3_000.0)),
-        };
-        Some(self.lasting(entry, 500.0, 3_000.0))
-    }
-
-    fn strangers(&mut self) -> Option<Drawn> {
-        let entry = self.entry().with("frames_per_s", self.number(1.0, 500.0));
-        let entry = if self.name == SecondMainDevice {
-            entry.with("does", self.word(&["scan", "init", "preop", "clear-counters"]))
-        } else {
-            entry.with("protocol", self.word(&["mixed", "arp", "ipv4", "lldp"]))
-        };
-        Some(self.lasting(entry, 1_000.0, 4_000.0))
-    }
-
-    fn pair(&mut self) -> Option<Drawn> {
-        let (one, id) = self.any_device()?;
-        let wants_twin = self.name == TwinsSwapped;
-        let fits = |other: &&SegmentDevice| {
-            let is_twin = other.type_name == one.type_name;
-            other.name != one.name && (self.name == DuplicateAddress || is_twin == wants_twin)
-        };
-        let others: Vec<_> = self.offer.file.devices.iter().filter(fits).collect();
-        let other = *self.stream.pick(&others)?;
-        let mut entry = self.entry();
-        entry.devices = Some(vec![one.name.clone(), other.name.clone()]);
-        if self.name == DuplicateAddress {
-            entry = entry.with("which", "station");
-        }
-        let drawn = self.lasting(entry, 2_000.0, 4_000.0);
-        Some(Self::at_device(drawn, id))
-    }
-
-    fn built_in(&mut self) -> Option<Drawn> {
-        let (device, id) = self.any_device()?;
-        let entry = match self.name {
-            MainDeviceWrongPort => self.entry().at("maindevice"),
-            DeviceExtra => self
-                .entry()
-                .device("extra")
-                .with("type", if self.stream.chance(0.5) { "EL1008" } else { "EL2004" })
-                .with("on", device.on.to_string().as_str()),
-            DeviceWrong if self.stream.chance(0.4) => self
-                .entry()
-                .device(&device.name)
-                .with("revision", self.stream.between(1, 0x00FF_0000) as u32),
-            DeviceWrong => {
-                let other = self.any_device()?.0;
-                if other.type_name == device.type_name {
-                    return None;
-                }
-                self.entry().device(&device.name).with("type", other.type_name.as_str())
-            }
-            _ => self.entry().device(&device.name),
-        };
-        Some(Self::at_device(self.for_ever(entry), id))
     }
 
     fn any_device(&mut self) -> Option<(SegmentDevice, DeviceId)> {

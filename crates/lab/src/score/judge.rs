@@ -2,7 +2,7 @@
 
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, Severity};
 use linesman_proto::address::DeviceId;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use crate::verdict::judge::{Company, may_be_common};
@@ -26,6 +26,9 @@ pub struct Judged {
     pub findings: Vec<String>,
     /// Cycles from the first effect to the first finding at the right place, where that is known.
     pub cycles: Option<u64>,
+    /// From the first effect to the first finding with the right cause at the right place, where that is
+    /// known.
+    pub named_after: Option<Span>,
 }
 
 /// A finding's claim, with SubDevices by the identity of the project.
@@ -75,11 +78,16 @@ pub fn judge(
     });
     let others = others.count() as u64;
     let findings = of_its_time.iter().map(|finding| text(finding, naming)).collect();
+    let is_silent = of_its_time.iter().all(|finding| finding.severity == Severity::Info);
     let (fits, said, confidence) = match best {
+        _ if is_silent && let Some(set) = truth.unseen => {
+            let silence = Grade::Admitted(set.why);
+            (Match { place: silence, cause: silence }, String::new(), 0.0)
+        }
         Some((finding, fits)) => (fits, text(finding, naming), finding.confidence),
         None => (Match::NONE, String::new(), 0.0),
     };
-    Judged { fits, said, confidence, others, findings, cycles: None }
+    Judged { fits, said, confidence, others, findings, cycles: None, named_after: None }
 }
 
 /// Whether any of the faults allows a finding at its place.

@@ -2,19 +2,24 @@
 //!
 //! A seed gives a [`case`]: a plant, its features, and faults of the whole catalogue with wide
 //! parameters ([`draw`]). [`play`] runs it, live and as a recording, [`judge`] holds what was said
-//! against the truth log, [`report`] adds up. A case counts when the truth log shows an effect,
+//! against the truth log, [`report`] adds up. [`disturb`] does to a healthy line what is no fault,
+//! [`perturb`] makes a plant other than the diagnosis expects. A case counts when the truth log shows an effect,
 //! whether or not the diagnosis saw it.
 
 pub mod baseline;
+pub mod built_in;
 pub mod case;
+pub mod disturb;
 pub mod draw;
 pub mod judge;
+pub mod perturb;
 pub mod play;
 pub mod rate;
 pub mod report;
 pub mod tally;
 
 pub use case::{CaseKind, ScoreOptions};
+pub use perturb::Perturbation;
 pub use play::{CaseReport, FaultOutcome, run_case};
 pub use rate::Rate;
 pub use report::ScoreReport;

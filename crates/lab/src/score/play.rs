@@ -11,12 +11,13 @@ use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 use linesman_sim::seed::Stream;
-use linesman_sim::segment_file::SegmentFile;
 use linesman_sim::truth::{FaultId, FaultRecord};
 
 use super::baseline;
+use super::built_in::{Stop, with_built_in};
 use super::case::{Case, CaseKind, ScoreOptions};
-use super::draw::{Drawn, Ends, Offer, When, draw, when};
+use super::disturb::disturb;
+use super::draw::{Drawn, Ends, Offer, When, draw};
 use super::judge::{Judged, alarms, claim, judge};
 use crate::choice::{Ground, are_apart, text};
 use crate::lab::{Lab, LabError};
@@ -34,7 +35,7 @@ const VERDICT: Span = Span::ms(2_500);
 /// How long a line may take to come back.
 const RECOVERY: Span = Span::s(8);
 /// How often plants are drawn for a fault that needs a place of its own.
-const ATTEMPTS: u32 = 12;
+const ATTEMPTS: u32 = 40;
 
 /// What came of one seed.
 #[derive(Clone, Debug)]
@@ -53,6 +54,8 @@ pub struct CaseReport {
     pub host_counters: bool,
     /// What a healthy line was accused of, live and in its recording; `None` where it never was healthy.
     pub healthy: Option<(Vec<String>, Vec<String>)>,
+    /// Cycle of the process data.
+    pub cycle: Span,
     /// Its faults.
     pub faults: Vec<FaultOutcome>,
     /// Why it could not be played.
@@ -92,7 +95,10 @@ pub fn run_case(seed: u64, options: &ScoreOptions) -> CaseReport {
         let case = Case::draw(seed, attempt, options);
         match Play::new(&case, options).and_then(Play::play) {
             Ok(report) => return report,
-            Err(Stop::NoPlace) => why = "no place for its faults in any plant".to_owned(),
+            Err(Stop::NoPlace) => {
+                let names: Vec<&str> = case.faults.iter().map(|name| name.name()).collect();
+                why = format!("no place for {} in any plant", names.join(" and "));
+            }
             Err(Stop::Failed(error)) => {
                 why = error;
                 break;
@@ -112,22 +118,9 @@ fn empty(case: &Case, devices: usize) -> CaseReport {
         forwarded: case.forwarded,
         host_counters: case.host_counters,
         healthy: None,
+        cycle: case.cycle,
         faults: Vec::new(),
         unplayable: None,
-    }
-}
-
-/// Why a case ends early.
-enum Stop {
-    /// This plant has no place for the faults.
-    NoPlace,
-    /// It cannot be played at all.
-    Failed(String),
-}
-
-impl From<LabError> for Stop {
-    fn from(error: LabError) -> Self {
-        Self::Failed(error.to_string())
     }
 }
 
@@ -136,6 +129,13 @@ struct Active {
     id: FaultId,
     drawn: Drawn,
     until: Instant,
+}
+
+/// When something was first said rightly, after the first effect.
+#[derive(Clone, Copy, Default)]
+struct First {
+    place: Option<Span>,
+    cause: Option<Span>,
 }
 
 struct Play<'a> {
@@ -149,6 +149,8 @@ struct Play<'a> {
     built_in: Vec<Drawn>,
     /// Whether the recording is judged with the project beside it.
     has_project: bool,
+    /// How much goes on beside the faults of the case.
+    beside: usize,
 }
 
 impl<'a> Play<'a> {
@@ -160,6 +162,7 @@ impl<'a> Play<'a> {
             host_counters: case.host_counters,
             clocks: case.clocks,
             probes: !options.capture_only,
+            active: !options.capture_only,
             ..LabOptions::default()
         };
         // What cannot be built so is no case.
@@ -170,6 +173,9 @@ impl<'a> Play<'a> {
             clock: "virtual".to_owned(),
             ..Setup::default()
         };
+        if let Some(perturb) = options.perturb {
+            lab.hide_counters(perturb.unseen(), case.seed.stream("score unseen"));
+        }
         let recording = Arc::new(Mutex::new(Engine::new(setup)));
         let reader = Arc::clone(&recording);
         lab.set_tap(Box::new(move |seen| {
@@ -177,7 +183,7 @@ impl<'a> Play<'a> {
             let frame = FrameSeen { path: None, direction: Direction::Unknown, ..*seen };
             reader.lock().unwrap_or_else(PoisonError::into_inner).handle_frame(&frame);
         }));
-        Ok(Self { case, options, stream, lab, recording, built_in, has_project })
+        Ok(Self { case, options, stream, lab, recording, built_in, has_project, beside: 0 })
     }
 
     fn play(mut self) -> Result<CaseReport, Stop> {
@@ -188,6 +194,7 @@ impl<'a> Play<'a> {
             self.run(CALM)?;
             report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
             if self.case.kind == CaseKind::Healthy {
+                disturb(&mut self.lab, self.case.cycle, &mut self.stream)?;
                 self.run(VERDICT)?;
                 report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
                 return Ok(report);
@@ -205,9 +212,9 @@ impl<'a> Play<'a> {
         self.wait(&mut active)?;
         let recorded = self.recorded();
         let diagnosis = self.lab.diagnosis();
-        let cycles = self.cycles(&active);
-        for (active, cycles) in active.iter().zip(cycles) {
-            report.faults.extend(self.outcome(active, &diagnosis, &recorded, cycles));
+        let firsts = self.firsts(&active);
+        for (active, first) in active.iter().zip(firsts) {
+            report.faults.extend(self.outcome(active, &diagnosis, &recorded, first));
         }
         Ok(report)
     }
@@ -218,11 +225,19 @@ impl<'a> Play<'a> {
 
     /// Puts the faults in, one a while after the other.
     fn break_line(&mut self, active: &mut Vec<Active>) -> Result<(), Stop> {
+        let beside = self.options.perturb.and_then(|perturb| perturb.beside(&mut self.stream));
+        if let Some(entry) = beside {
+            self.lab.inject(&entry).map_err(|_| Stop::NoPlace)?;
+            self.beside = 1;
+        }
         for name in self.case.faults.clone() {
             let pause = Span::us(self.stream.between(0, 200_000));
             self.run(pause)?;
             let drawn = self.draw(name, active)?;
             let mut entry = drawn.choice.entry.clone();
+            if let Some(perturb) = self.options.perturb {
+                perturb.fault(&mut entry, &mut self.stream);
+            }
             let until = self.lab.now() + drawn.choice.lasts;
             if entry.parameters.contains_key("hits") {
                 // So many in just this time.
@@ -254,7 +269,13 @@ impl<'a> Play<'a> {
             .map(|device| self.lab.of_plan(device.id))
             .collect();
         let reference = plan.and_then(|plan| plan.reference_clock()).map(|id| self.lab.of_plan(id));
-        let offer = Offer { ground: &ground, file: &self.case.file, clocked: &clocked, reference };
+        let offer = Offer {
+            ground: &ground,
+            file: &self.case.file,
+            clocked: &clocked,
+            reference,
+            when: When::Running,
+        };
         for _ in 0..10 {
             let drawn = draw(name, &offer, &mut self.stream);
             // One of two faults must not hide the other.
@@ -309,32 +330,48 @@ impl<'a> Play<'a> {
         engine.diagnosis()
     }
 
-    /// By fault: when the live diagnosis first named its place.
-    fn cycles(&mut self, active: &[Active]) -> Vec<Option<u64>> {
+    /// By fault: when the live diagnosis first named its place, and its cause, after the first effect.
+    fn firsts(&mut self, active: &[Active]) -> Vec<First> {
         let events: Vec<_> = std::iter::from_fn(|| self.lab.poll_finding_event()).collect();
-        let first = |active: &Active| {
-            let record = self.lab.truth().fault(active.id)?;
-            let began = record.first_effect?;
-            let truth = self.truth(active)?;
-            let names_it = |answered_again: bool, event: &linesman_diagnosis::Event| {
-                let scene = Scene {
-                    tree: self.lab.tree(),
-                    host_counters: self.case.host_counters,
-                    answered_again,
-                };
-                matches(&truth, &scene, claim(&event.finding, &|id| id)).place != Grade::Wrong
+        let of = |active: &Active| {
+            let mut first = First::default();
+            let Some(began) =
+                self.lab.truth().fault(active.id).and_then(|fault| fault.first_effect)
+            else {
+                return first;
             };
-            let event = events.iter().find(|event| {
-                event.at >= began && (names_it(false, event) || names_it(true, event))
-            })?;
-            let cycle = self.case.cycle.as_nanos().max(1);
-            Some(event.at.since(began).as_nanos().div_ceil(cycle))
+            let Some(truth) = self.truth(active) else { return first };
+            let mut truths = vec![(truth.clone(), true), (truth.clone(), false)];
+            if matches!(truth.name, FaultName::BrownOut | FaultName::EbusOverload) {
+                // While it lasts, a dip is a device without power.
+                let dark = truth.dark.iter().map(|id| TruthPlace::Device(*id)).collect();
+                truths.push((Truth::new(FaultName::DeviceOff, dark), false));
+            }
+            for event in events.iter().filter(|event| event.at >= began) {
+                let claim = claim(&event.finding, &|id| id);
+                for (truth, answered_again) in &truths {
+                    let scene = Scene {
+                        tree: self.lab.tree(),
+                        host_counters: self.case.host_counters,
+                        answered_again: *answered_again,
+                    };
+                    let fits = matches(truth, &scene, claim);
+                    let after = Some(event.at.since(began));
+                    first.place = first.place.or(after.filter(|_| fits.place != Grade::Wrong));
+                    first.cause = first.cause.or(after.filter(|_| fits.cause != Grade::Wrong));
+                }
+            }
+            first
         };
-        active.iter().map(first).collect()
+        active.iter().map(of).collect()
     }
 
     fn truth(&self, active: &Active) -> Option<Truth> {
         let mut truth = self.lab.truth_of(active.id)?;
+        // A contact that opened once is an opened link, whatever it would have done next.
+        if truth.name == FaultName::LinkFlapping && truth.opened_once() && truth.signals_lost > 0 {
+            truth.name = FaultName::LinkOpen;
+        }
         // Who was put in between is also told by whom it has pushed on.
         let on = active.drawn.choice.entry.parameters.get("on");
         if truth.name == FaultName::DeviceExtra
@@ -367,7 +404,7 @@ impl<'a> Play<'a> {
         active: &Active,
         live: &Diagnosis,
         recorded: &Diagnosis,
-        cycles: Option<u64>,
+        first: First,
     ) -> Option<FaultOutcome> {
         let record = self.lab.truth().fault(active.id)?;
         let truth = self.truth(active)?;
@@ -383,9 +420,14 @@ impl<'a> Play<'a> {
         let answered_again = self.lab.reached().len() >= tree.len();
         let scene = Scene { tree, host_counters: self.case.host_counters, answered_again };
         let company = Company::of(self.lab.truth(), record);
-        let when = (company, self.case.faults.len().max(1));
-        let live = (!self.options.capture_only)
-            .then(|| Judged { cycles, ..judge(live, &truth, &all, &scene, when, &|id| id) });
+        let when = (company, self.case.faults.len().max(1) + self.beside);
+        let cycle = self.case.cycle.as_nanos().max(1);
+        let cycles = first.place.map(|after| after.as_nanos().div_ceil(cycle));
+        let live = (!self.options.capture_only).then(|| Judged {
+            cycles,
+            named_after: first.cause,
+            ..judge(live, &truth, &all, &scene, when, &|id| id)
+        });
         let by_position = |id: DeviceId| self.lab.of_plan(id);
         let as_planned = |id: DeviceId| id;
         let naming: &dyn Fn(DeviceId) -> DeviceId =
@@ -394,7 +436,7 @@ impl<'a> Play<'a> {
         let capture = judge(recorded, &truth, &all, &scene, when, naming);
         let baseline = baseline::first_counter(&self.lab);
         Some(FaultOutcome {
-            name: record.name,
+            name: truth.name,
             entry: text(&active.drawn.choice.entry),
             effects: effects(record),
             live,
@@ -402,29 +444,6 @@ impl<'a> Play<'a> {
             baseline: baseline.is_some_and(|site| baseline::is_right(site, &truth, tree)),
         })
     }
-}
-
-/// The segment with those faults in it that are so from the start.
-fn with_built_in(case: &Case, stream: &mut Stream) -> Result<(SegmentFile, Vec<Drawn>), Stop> {
-    let names: Vec<FaultName> =
-        case.faults.iter().copied().filter(|name| when(*name) == When::FromStart).collect();
-    let mut file = case.file.clone();
-    let mut built_in = Vec::new();
-    if names.is_empty() {
-        return Ok((file, built_in));
-    }
-    let project = case.file.project().map_err(|_| Stop::NoPlace)?;
-    let tree = project.tree().map_err(|_| Stop::NoPlace)?;
-    let devices: Vec<String> = project.devices.iter().map(|device| device.name.clone()).collect();
-    let cabled = vec![true; tree.links().len()];
-    let ground = Ground { tree: &tree, names: &devices, cabled: &cabled };
-    for name in names {
-        let offer = Offer { ground: &ground, file: &case.file, clocked: &[], reference: None };
-        let drawn = (0..10).find_map(|_| draw(name, &offer, stream)).ok_or(Stop::NoPlace)?;
-        file.faults.push(drawn.choice.entry.clone());
-        built_in.push(drawn);
-    }
-    Ok((file, built_in))
 }
 
 /// How often a fault has acted.

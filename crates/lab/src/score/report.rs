@@ -25,6 +25,8 @@ pub struct ScoreReport {
     pub fault: Option<FaultName>,
     /// Whether only recordings were judged.
     pub capture_only: bool,
+    /// What was other than the diagnosis expects, if anything.
+    pub perturbed: Option<String>,
     /// Cases: one for each seed.
     pub cases: u64,
     /// Cases in which a fault had an effect.
@@ -63,6 +65,10 @@ pub struct ScoreReport {
     pub by_effects: Vec<Bucket>,
     /// How often findings were right that were so sure: cause and place, without admitted sets.
     pub calibration: Vec<Bin>,
+    /// How far confidence is from that on average, weighted by findings: 0 is honest.
+    pub calibration_error: f64,
+    /// Hard faults at a cycle of 1 ms: share whose cause was named within 100 ms of virtual time, live.
+    pub named_in_100_ms: BTreeMap<String, Rate>,
     /// Single faults by name.
     pub per_fault: BTreeMap<String, GroupReport>,
     /// Seeds that could not be played, and why.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use linesman_config::fault::FaultName;
+use linesman_proto::time::Span;
 
 use super::case::{CaseKind, ScoreOptions};
 use super::judge::Judged;
@@ -18,6 +19,19 @@ use crate::verdict::Grade;
 const BINS: usize = 10;
 /// Cases shown in which the first finding was wrong.
 const MOST_WRONG: usize = 2_000;
+
+/// Faults that leave no doubt that something is wrong.
+const HARD: [FaultName; 5] = [
+    FaultName::LinkOpen,
+    FaultName::DeviceOff,
+    FaultName::SupplyOff,
+    FaultName::BrownOut,
+    FaultName::SyncLost,
+];
+/// At this cycle it is measured how soon they are named.
+const FAST_CYCLE: Span = Span::ms(1);
+/// Named so soon they are named fast.
+const SOON: Span = Span::ms(100);
 
 /// By effects: up to so many.
 const EFFECTS: [(u64, u64); 4] = [(1, 1), (2, 9), (10, 99), (100, u64::MAX)];
@@ -135,6 +149,7 @@ pub struct Tally {
     by_effects: [Group; EFFECTS.len()],
     per_fault: BTreeMap<FaultName, Group>,
     confidence: [Confidence; BINS],
+    fast: BTreeMap<FaultName, Count>,
     wrong: Vec<WrongReport>,
 }
 
@@ -206,6 +221,10 @@ impl Tally {
             self.confidence[bin].count.add(judged.fits.cause == Grade::Exact);
             self.confidence[bin].sum += judged.confidence;
         }
+        if case.cycle == FAST_CYCLE && HARD.contains(&fault.name) && fault.live.is_some() {
+            let is_fast = judged.named_after.is_some_and(|after| after <= SOON);
+            self.fast.entry(fault.name).or_default().add(is_fast);
+        }
         self.note_wrong(case, fault);
     }
 
@@ -239,6 +258,7 @@ impl Tally {
             let right = bin.count.rate();
             Bin { confidence: rounded(bin.sum / right.of as f64), right }
         });
+        let bins: Vec<Bin> = bins.collect();
         let (healthy, healthy_capture) = (self.healthy.rate(), self.healthy_capture.rate());
         ScoreReport {
             schema: SCHEMA.to_owned(),
@@ -246,6 +266,7 @@ impl Tally {
             seeds: self.seeds.unwrap_or_default(),
             fault: self.options.fault,
             capture_only: self.options.capture_only,
+            perturbed: self.options.perturb.map(|one| one.name().to_owned()),
             cases: self.cases,
             effective_cases: self.effective,
             place_at_1: first.place_at_1.share,
@@ -282,7 +303,13 @@ impl Tally {
                     group: group.report(),
                 })
                 .collect(),
-            calibration: bins.collect(),
+            calibration_error: calibration_error(&bins),
+            calibration: bins,
+            named_in_100_ms: self
+                .fast
+                .iter()
+                .map(|(name, count)| (name.name().to_owned(), count.rate()))
+                .collect(),
             per_fault: self
                 .per_fault
                 .iter()
@@ -292,6 +319,15 @@ impl Tally {
             wrong: self.wrong.clone(),
         }
     }
+}
+
+/// The expected calibration error: how far share and confidence are apart in each bin, weighted by
+/// its findings.
+fn calibration_error(bins: &[Bin]) -> f64 {
+    let all: u64 = bins.iter().map(|bin| bin.right.of).sum();
+    let apart =
+        bins.iter().map(|bin| (bin.confidence - bin.right.share).abs() * bin.right.of as f64);
+    rounded(apart.sum::<f64>() / (all.max(1)) as f64)
 }
 
 /// What was said, and how well it fits.

@@ -391,7 +391,8 @@ fn verdict(on: Option<FaultName>, lab: &Lab, diagnosis: &Diagnosis) -> Result<()
             let over = !fault.is_active();
             let scene = Scene { tree: lab.tree(), host_counters, answered_again };
             (over || !answered_again)
-                && best_finding(diagnosis, &truth, &scene, Company::of(log, fault)).is_some()
+                && best_finding(diagnosis, &truth, &scene, Company::of(log, fault))
+                    .is_some_and(|(_, fits)| fits.is_right())
         });
         if !fits {
             return Err(format!(

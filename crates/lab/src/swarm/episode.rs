@@ -314,19 +314,20 @@ impl<'a> Episode<'a> {
         Ok(Some(recovered_in))
     }
 
-    /// Every finding has a cause in the log.
+    /// Every finding is at a place where something was wrong. How often its cause is right measures the
+    /// score.
     fn explain_findings(&mut self) {
         let diagnosis = self.lab.diagnosis();
         let acted = self.lab.truth().faults().iter().filter(|fault| fault.first_effect.is_some());
         let truths: Vec<Truth> = acted.filter_map(|fault| self.lab.truth_of(fault.id)).collect();
         for finding in diagnosis.findings.iter().filter(|f| f.severity != Severity::Info) {
             let graded = explains(&truths, self.lab.tree(), self.host_counters, finding);
-            if !graded.is_right() {
+            if !graded.place.is_right() {
                 let site = Site::from(&finding.place);
                 let faults: Vec<String> =
                     self.lab.truth().faults().iter().map(|fault| fault.name.to_string()).collect();
                 self.violation(format!(
-                    "{} {} {} at {site} has no cause (opened at {}: {}); injected so far: {}",
+                    "{} {} {} at {site} has no fault there (opened at {}: {}); injected so far: {}",
                     finding.id,
                     finding.code,
                     finding.cause,

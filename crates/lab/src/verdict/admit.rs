@@ -23,19 +23,14 @@ pub struct Truth {
     pub name: FaultName,
     /// Where it sits; several for one that acts on several places at once.
     pub places: Vec<TruthPlace>,
-    /// The AL status code that a refusing device gives.
-    pub al_code: Option<u16>,
-    /// Ports whose symbol counter stood at its end when the fault began: they could not tell
-    /// symbol errors from clean symbols any more.
-    pub blind: Vec<End<DeviceId>>,
-    /// Devices that make a symbol error anew when they send a bad frame on.
-    pub remaking: Vec<DeviceId>,
     /// The hops on which it has hit symbols or frames so far, from sender to receiver.
     pub hops: Vec<Hop>,
     /// How often an end of a link found its signal gone.
     pub signals_lost: u64,
     /// Devices that it has taken the supply from, in order.
     pub dark: Vec<DeviceId>,
+    /// The set by which nothing may be said of it at all, if there is one.
+    pub unseen: Option<&'static AdmittedSet>,
 }
 
 /// One direction of a link: sender and receiver.
@@ -45,26 +40,26 @@ impl Truth {
     /// A fault at places, of which nothing more is known.
     #[must_use]
     pub fn new(name: FaultName, places: Vec<TruthPlace>) -> Self {
-        Self {
-            name,
-            places,
-            al_code: None,
-            blind: Vec::new(),
-            remaking: Vec::new(),
-            hops: Vec::new(),
-            signals_lost: 0,
-            dark: Vec::new(),
-        }
+        Self { name, places, hops: Vec::new(), signals_lost: 0, dark: Vec::new(), unseen: None }
     }
 
     /// Whether a link was lost at most once: each of its ends finds out once.
-    fn opened_once(&self) -> bool {
+    #[must_use]
+    pub fn opened_once(&self) -> bool {
         self.signals_lost <= 2
     }
 
     /// Whether both directions of a link were hit.
     fn hit_both_ways(&self, one: End<DeviceId>, other: End<DeviceId>) -> bool {
         self.hops.contains(&(one, other)) && self.hops.contains(&(other, one))
+    }
+
+    /// Devices that it sits in.
+    fn devices(&self) -> impl Iterator<Item = DeviceId> {
+        self.places.iter().filter_map(|place| match place {
+            TruthPlace::Device(id) => Some(*id),
+            TruthPlace::Hop(..) | TruthPlace::Link(..) | TruthPlace::Host(_) => None,
+        })
     }
 }
 
@@ -126,7 +121,7 @@ impl List<'_> {
         self.entries.push(Admitted { cause, site, set: None });
     }
 
-    /// A cause at a place, if the set has it.
+    /// A cause of a set at a place.
     fn add(&mut self, cause: FaultName, site: Site, set: &'static AdmittedSet) {
         if set.has(cause) {
             self.entries.push(Admitted { cause, site, set: Some(set) });
@@ -140,7 +135,7 @@ impl List<'_> {
             TruthPlace::Link(one, other) => {
                 self.exact(name, Site::link(tree, one, other));
                 match name {
-                    LinkOpen | LinkFlapping | RingOpen => self.open(truth, one, other),
+                    LinkOpen => self.open(truth, one, other),
                     CableDegraded | EmcNoise if truth.hit_both_ways(one, other) => {
                         for cause in sets::BOTH_WAYS.causes {
                             self.add(*cause, Site::link(tree, one, other), &sets::BOTH_WAYS);
@@ -178,90 +173,56 @@ impl List<'_> {
                 self.exact(name, end_site(to));
                 self.symbols(truth, (from, to));
             }
-            DeviceInternal => {
-                self.exact(name, end_site(from));
-                self.clean(truth, (from, to));
-            }
-            LinkOpen | LinkFlapping if truth.signals_lost == 1 => {
-                self.exact(name, Site::link(tree, from, to));
-                self.add(FalseLink, Site::link(tree, from, to), &sets::ONE_PAIR);
-            }
-            LinkOpen | LinkFlapping => {
-                self.exact(name, Site::link(tree, from, to));
-                self.open(truth, from, to);
-            }
+            DeviceInternal => self.exact(name, end_site(from)),
+            // On copper the other direction goes with it.
+            LinkOpen | LinkFlapping => self.exact(name, Site::link(tree, from, to)),
             // Who else sends is not at a place of the line; its frames are everywhere on it.
             SecondMainDevice | ForeignFrames => self.exact(name, Site::Network),
             _ => {}
         }
     }
 
-    /// No signal between two ends.
+    /// No signal between two ends. In a ring both neighbours of a dead device see it; a cut shows at two
+    /// live ends.
     fn open(&mut self, truth: &Truth, one: End<DeviceId>, other: End<DeviceId>) {
         let tree = self.scene.tree;
-        let link = Site::link(tree, one, other);
         let is_ring = tree.link_at(one.map(DeviceId::index)).is_some_and(|at| tree.is_on_ring(at));
-        if is_ring {
-            // In a ring both neighbours of a dead device see it; a cut shows at two live ends.
-            for cause in sets::RING_CUT.causes {
-                if truth.opened_once() || *cause != LinkOpen {
-                    self.add(*cause, link, &sets::RING_CUT);
-                }
-            }
+        if is_ring || self.scene.answered_again || !truth.opened_once() {
             return;
         }
-        if !truth.opened_once() {
-            return;
-        }
-        if self.scene.answered_again {
-            for cause in sets::ONE_OPENING.causes {
-                self.add(*cause, link, &sets::ONE_OPENING);
-            }
-            return;
-        }
+        let link = Site::link(tree, one, other);
         let Site::Link { b: Some(End::Controller(behind, _)), .. } = link else { return };
-        self.silent(link, behind, &sets::SILENT);
+        self.silent(link, behind);
     }
 
-    /// Silence behind a link.
-    fn silent(&mut self, link: Site, behind: DeviceId, set: &'static AdmittedSet) {
-        for cause in [LinkOpen, LinkFlapping] {
-            self.add(cause, link, set);
-        }
-        for cause in [DeviceOff, SupplyOff, BrownOut] {
-            self.add(cause, Site::Device(behind), set);
-        }
+    /// Silence of a device and all behind it.
+    fn silent(&mut self, above: Site, id: DeviceId) {
+        self.add(LinkOpen, above, &sets::SILENT);
+        self.add(DeviceOff, Site::Device(id), &sets::SILENT);
+        self.add(SupplyOff, Site::Device(id), &sets::SILENT);
     }
 
     /// Symbol errors on what `from` sends and `to` receives.
     fn symbols(&mut self, truth: &Truth, (from, to): Hop) {
         let set = match (from, to) {
-            (End::MainDevice(_), _) if truth.name == TransmitterDamaged => &sets::CARD_OUTPUT,
             (End::MainDevice(_), _) => &sets::FIRST_HOP,
-            (_, End::MainDevice(_)) => self.last_hop(truth),
+            (_, End::MainDevice(_)) if self.scene.host_counters => &sets::LAST_HOP,
+            (_, End::MainDevice(_)) => &sets::UNCOUNTED,
             (End::Controller(..), End::Controller(..)) => &sets::SYMBOLS,
         };
-        self.on_hop((from, to), set);
+        self.on_hop(truth, (from, to), set);
     }
 
-    fn last_hop(&self, truth: &Truth) -> &'static AdmittedSet {
-        match (self.scene.host_counters, truth.name) {
-            (true, ReceiverDamaged) => &sets::CARD_INPUT,
-            (true, DeviceInternal) => &sets::LAST_HOP_CLEAN,
-            (true, _) => &sets::LAST_HOP,
-            (false, TransmitterDamaged) => &sets::UNCOUNTED_OUTPUT,
-            (false, DeviceInternal) => &sets::UNCOUNTED_INSIDE,
-            (false, _) => &sets::UNCOUNTED,
+    /// All causes of a set on a hop, each at the places where it sits, if the fault is one of them.
+    fn on_hop(&mut self, truth: &Truth, (from, to): Hop, set: &'static AdmittedSet) {
+        if !set.has(truth.name) {
+            return;
         }
-    }
-
-    /// All causes of a set on a hop, each at the places where it sits.
-    fn on_hop(&mut self, (from, to): Hop, set: &'static AdmittedSet) {
         let hop = Site::hop(self.scene.tree, from, to);
         for cause in set.causes {
             match cause {
                 NicDamaged | HostDrops => self.add(*cause, Site::Host, set),
-                TransmitterDamaged | DeviceInternal => {
+                TransmitterDamaged => {
                     self.add(*cause, hop, set);
                     self.add(*cause, end_site(from), set);
                 }
@@ -274,47 +235,23 @@ impl List<'_> {
         }
     }
 
-    /// Bad frames with clean symbols from `from` to `to`.
-    fn clean(&mut self, truth: &Truth, (from, to): Hop) {
-        let is_remade = from.node().is_some_and(|sender| truth.remaking.contains(&sender));
-        if let End::MainDevice(_) = to {
-            // Where it spoils frames on other ways, too, those tell.
-            if truth.hops.iter().all(|(_, to)| to.node().is_none()) {
-                self.on_hop((from, to), self.last_hop(truth));
-            }
-        } else if truth.blind.contains(&to) {
-            self.on_hop((from, to), &sets::BLIND);
-        } else if is_remade {
-            self.on_hop((from, to), &sets::REMADE);
-        }
-    }
-
     fn host(&mut self, truth: &Truth, path: Path) {
         let card = End::MainDevice(path);
+        let Some(far) = opposite(self.scene.tree, card) else { return };
         match truth.name {
             NicDamaged => {
-                let Some(far) = opposite(self.scene.tree, card) else { return };
                 let was_hit = |hop| truth.hops.is_empty() || truth.hops.contains(&hop);
                 for hop in [(card, far), (far, card)].into_iter().filter(|hop| was_hit(*hop)) {
                     self.symbols(truth, hop);
                 }
             }
             HostDrops if !self.scene.host_counters => {
-                if let Some(far) = opposite(self.scene.tree, card) {
-                    self.on_hop((far, card), &sets::UNCOUNTED);
-                }
+                self.on_hop(truth, (far, card), &sets::UNCOUNTED);
             }
             MainDeviceWrongPort => {
                 // The plug has two ends: the card's cable, and the port it sits in.
-                if let Some(far) = opposite(self.scene.tree, card) {
-                    self.exact(truth.name, Site::link(self.scene.tree, card, far));
-                    self.exact(truth.name, end_site(far));
-                }
-            }
-            HostJitter | LateFrames => {
-                for cause in sets::LATE.causes {
-                    self.add(*cause, Site::Host, &sets::LATE);
-                }
+                self.exact(truth.name, Site::link(self.scene.tree, card, far));
+                self.exact(truth.name, end_site(far));
             }
             _ => {}
         }
@@ -322,18 +259,15 @@ impl List<'_> {
 
     fn device(&mut self, truth: &Truth, id: DeviceId) {
         match truth.name {
-            DeviceOff | SupplyOff | BrownOut => self.unpowered(truth, id),
+            DeviceOff | SupplyOff => self.unpowered(truth, id),
             EbusOverload => {
-                for fallen in truth.dark.iter().chain([&id]) {
-                    for cause in sets::OVERLOAD.causes {
-                        self.add(*cause, Site::Device(*fallen), &sets::OVERLOAD);
-                    }
+                for fallen in &truth.dark {
+                    self.add(BrownOut, Site::Device(*fallen), &sets::OVERLOAD);
                 }
             }
             DeviceInternal => {
                 for (here, far) in self.links_of(id) {
                     self.exact(DeviceInternal, Site::hop(self.scene.tree, here, far));
-                    self.clean(truth, (here, far));
                 }
             }
             TransmitterDamaged => {
@@ -346,40 +280,21 @@ impl List<'_> {
                     self.symbols(truth, (far, here));
                 }
             }
-            InitRefused if truth.al_code.is_some_and(is_configuration) => {
-                self.add(ConfigMismatch, Site::Device(id), &sets::REFUSAL);
-            }
-            InitRefused if truth.al_code == Some(OUTPUT_WATCHDOG) => {
-                self.add(WatchdogStarved, Site::Device(id), &sets::WATCHDOG_CODE);
-            }
-            // What it refuses, it refuses for its settings: the codes of this fault all say so.
-            ConfigMismatch => self.add(InitRefused, Site::Device(id), &sets::REFUSAL),
-            FirmwareFault | CycleTooFast => {
-                for cause in sets::OVERRUN.causes {
-                    self.add(*cause, Site::Device(id), &sets::OVERRUN);
-                }
-            }
             _ => {}
         }
     }
 
-    /// A device that is, or was, without supply.
+    /// A device without supply, and nothing dark but what hangs behind it.
     fn unpowered(&mut self, truth: &Truth, id: DeviceId) {
         let tree = self.scene.tree;
-        if self.scene.answered_again {
-            let set = if truth.places.len() > 1 { &sets::SHARED_RESTART } else { &sets::RESTART };
-            for cause in set.causes {
-                self.add(*cause, Site::Device(id), set);
-            }
+        let is_behind =
+            |other: DeviceId| other == id || tree.is_downstream_of(other.index(), id.index());
+        let is_ring = tree.link_above(id.index()).is_some_and(|link| tree.is_on_ring(link));
+        if is_ring || self.scene.answered_again || !truth.devices().all(is_behind) {
             return;
         }
-        let set = if truth.name == BrownOut { &sets::DIP_LASTS } else { &sets::SILENT };
-        for cause in [DeviceOff, SupplyOff] {
-            self.add(cause, Site::Device(id), set);
-        }
-        let is_ring = tree.link_above(id.index()).is_some_and(|link| tree.is_on_ring(link));
-        if let Some(above) = Site::above(tree, id).filter(|_| !is_ring) {
-            self.silent(above, id, set);
+        if let Some(above) = Site::above(tree, id) {
+            self.silent(above, id);
         }
     }
 
@@ -397,15 +312,6 @@ fn end_site(end: End<DeviceId>) -> Site {
         End::MainDevice(_) => Site::Host,
         End::Controller(id, _) => Site::Device(id),
     }
-}
-
-/// AL status code of an expired SyncManager watchdog. Reference: ETG.1000.6, AL status codes.
-const OUTPUT_WATCHDOG: u16 = 0x001B;
-
-/// AL status codes that blame what the MainDevice configured: mailbox and process data
-/// SyncManagers, mappings, watchdog. Reference: ETG.1000.6, AL status codes.
-fn is_configuration(code: u16) -> bool {
-    matches!(code, 0x0014 | 0x0016 | 0x0017 | 0x001C..=0x001F | 0x0021..=0x0026 | 0x0060 | 0x0070)
 }
 
 /// The other end of the link at `end`.
@@ -478,38 +384,40 @@ mod tests {
     #[test]
     fn the_last_hop_needs_the_cards_counters() {
         let card = End::MainDevice(Path::A);
+        let cable = truth(CableDegraded, TruthPlace::Hop(end(0, A), card));
+        assert!(grade(&cable, true, NicDamaged, Site::Host).is_right());
+        assert!(!grade(&cable, true, HostDrops, Site::Host).is_right());
+        assert!(grade(&cable, false, HostDrops, Site::Host).is_right());
         let inner = truth(DeviceInternal, TruthPlace::Hop(end(0, A), card));
-        let first = Site::Device(DeviceId(0));
-        assert_eq!(grade(&inner, true, DeviceInternal, first), Grade::Exact);
-        assert!(grade(&inner, true, NicDamaged, Site::Host).is_right());
-        assert!(!grade(&inner, true, HostDrops, Site::Host).is_right());
-        assert!(grade(&inner, false, HostDrops, Site::Host).is_right());
+        assert_eq!(grade(&inner, true, DeviceInternal, Site::Device(DeviceId(0))), Grade::Exact);
+        for counters in [true, false] {
+            assert!(!grade(&inner, counters, NicDamaged, Site::Host).is_right());
+        }
     }
 
     #[test]
-    fn a_counter_at_its_end_cannot_tell_clean_symbols() {
-        let mut inner = truth(DeviceInternal, TruthPlace::Device(DeviceId(1)));
-        let hop = Site::Link { a: end(1, B), b: Some(end(2, A)), way: Some(Way::AToB) };
-        assert!(!grade(&inner, true, CableDegraded, hop).is_right());
-        inner.blind.push(end(2, A));
-        assert!(grade(&inner, true, CableDegraded, hop).is_right());
-        inner.blind.clear();
-        inner.remaking.push(DeviceId(1));
-        assert!(grade(&inner, true, CableDegraded, hop).is_right());
-        inner.remaking.clear();
-        inner.blind.push(end(2, A));
-        let back = Site::Link { a: end(0, B), b: Some(end(1, A)), way: Some(Way::BToA) };
-        assert!(!grade(&inner, true, CableDegraded, back).is_right());
+    fn what_is_dark_on_two_branches_is_no_cut() {
+        let off = |name, ids: &[u32]| {
+            Truth::new(name, ids.iter().map(|id| TruthPlace::Device(DeviceId(*id))).collect())
+        };
+        let above = Site::Link { a: end(0, B), b: Some(end(1, A)), way: None };
+        assert!(grade(&off(SupplyOff, &[1, 2]), true, LinkOpen, above).is_right());
+        assert!(!grade(&off(SupplyOff, &[1, 3]), true, LinkOpen, above).is_right());
+        assert!(!grade(&off(BrownOut, &[1]), true, LinkOpen, above).is_right());
+        let tree = tree();
+        let scene = Scene { tree: &tree, host_counters: true, answered_again: true };
+        let claim = Claim { cause: LinkOpen, site: above };
+        assert!(!matches(&off(DeviceOff, &[1]), &scene, claim).is_right(), "it has started anew");
     }
 
     #[test]
-    fn a_refusal_may_be_called_what_its_code_says() {
-        let mut refusal = truth(InitRefused, TruthPlace::Device(DeviceId(2)));
+    fn a_fault_that_is_in_no_set_is_only_itself() {
         let here = Site::Device(DeviceId(2));
-        refusal.al_code = Some(0x001D);
-        assert!(grade(&refusal, true, ConfigMismatch, here).is_right());
-        refusal.al_code = Some(0x0001);
-        assert!(!grade(&refusal, true, ConfigMismatch, here).is_right());
-        assert_eq!(grade(&refusal, true, InitRefused, here), Grade::Exact);
+        for name in [InitRefused, ConfigMismatch, FirmwareFault, CycleTooFast, BrownOut] {
+            let fault = truth(name, TruthPlace::Device(DeviceId(2)));
+            let right =
+                FaultName::ALL.iter().filter(|cause| grade(&fault, true, **cause, here).is_right());
+            assert_eq!(right.collect::<Vec<_>>(), [&name]);
+        }
     }
 }

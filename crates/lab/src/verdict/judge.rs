@@ -25,7 +25,6 @@ pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
             continue;
         }
         match (effect, place) {
-            (Effect::StateRefused { code }, _) => truth.al_code = Some(*code),
             (Effect::SymbolError | Effect::FrameSpoiled { .. }, Place::Direction(from, to)) => {
                 if !truth.hops.contains(&(*from, *to)) {
                     truth.hops.push((*from, *to));
@@ -67,7 +66,7 @@ impl Company {
 /// Faults that began so close together are one event to whoever reads counters and states in turn.
 const TOGETHER: Span = Span::ms(500);
 
-/// The finding that fits a fault best, with how well; open ones are preferred to closed ones. What
+/// The finding that fits a fault best, at its place at least, with how well; open ones are preferred to closed ones. What
 /// was over before the fault began is about something else.
 ///
 /// Two faults that begin together may look like one source: interference on several links, a supply
@@ -89,8 +88,8 @@ pub fn best_finding<'a>(
         let graded = matches(truth, scene, Claim::of(finding));
         (finding, graded)
     });
-    graded.filter(|(_, graded)| graded.is_right()).max_by_key(|(finding, graded)| {
-        (finding.state != FindingState::Closed, graded.cause, graded.place)
+    graded.filter(|(_, graded)| graded.place.is_right()).max_by_key(|(finding, graded)| {
+        (graded.is_right(), finding.state != FindingState::Closed, graded.cause, graded.place)
     })
 }
 
@@ -116,7 +115,7 @@ pub fn explains(
         for answered_again in [false, true] {
             let scene = Scene { tree, host_counters, answered_again };
             let graded = matches(truth, &scene, claim);
-            if graded.cause > best.cause {
+            if (graded.cause, graded.place) > (best.cause, best.place) {
                 best = graded;
             }
         }

@@ -2,11 +2,13 @@
 //!
 //! A verdict is right when it names what was injected. It is *admitted* when it names something
 //! that the same evidence allows: no reading on a live line tells a cut cable from a dead neighbour.
-//! What is admitted follows from physics ([`admit`], [`sets`]), never from what the diagnosis likes to say.
+//! What is admitted follows from physics ([`admit`], [`sets`], shown by [`proof`]), never from what the
+//! diagnosis likes to say.
 
 pub mod admit;
 pub mod claim;
 pub mod judge;
+pub mod proof;
 pub mod sets;
 pub mod site;
 

@@ -55,8 +55,9 @@ pub(crate) struct Arguments {
     /// Write what is seen to a capture file, for Wireshark or to be judged again
     #[arg(long, value_name = "FILE.pcapng")]
     record: Option<PathBuf>,
-    /// On a card: also what writes, that is station addresses and the reading of each SII. States
-    /// and counters are left alone in any case
+    /// Also what writes: on a card station addresses and the reading of each SII; where frames vanish though
+    /// every port shows a link, ports are closed for a second at most, one after the other. States and
+    /// counters are left alone in any case
     #[arg(long)]
     active: bool,
     /// On a virtual segment: the state that its SubDevices are driven to
@@ -120,7 +121,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
         Selector::Segment(path) => {
             let session = Session::new(arguments, &selector, None);
-            segment::run(path, arguments.to.unwrap_or_default().into(), session, output)
+            let target = arguments.to.unwrap_or_default().into();
+            segment::run(path, target, arguments.active, session, output)
         }
         Selector::Observations(path) => {
             observations::run(path, Session::new(arguments, &selector, project), output)
@@ -138,7 +140,7 @@ fn refuse_misplaced(arguments: &Arguments, selector: &Selector) -> Result<(), Fa
         ("--record", record.is_some() && is_file, "there is nothing to record"),
         ("--seconds", seconds.is_some() && is_file, "the file is judged to its end"),
         ("--project", project.is_some() && is_segment, "the file says itself what was planned"),
-        ("--active", *active && !is_driven, "only a line on a card can be written to"),
+        ("--active", *active && !is_driven && !is_segment, "nothing there can be written to"),
         ("--to", to.is_some() && !is_segment, "only a virtual segment is driven to a state"),
     ];
     match rows.into_iter().find(|(_, is_misplaced, _)| *is_misplaced) {

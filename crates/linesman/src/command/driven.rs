@@ -34,7 +34,12 @@ pub(crate) fn refuse(names: &[String]) -> Result<(), Failure> {
 
 /// Why nobody answers, with what to check.
 pub(crate) fn nobody(error: &dyn std::error::Error) -> Failure {
-    let mut failure = Failure::from_error(error);
+    nobody_since(&error.to_string())
+}
+
+/// The same from the words of an error.
+pub(crate) fn nobody_since(why: &str) -> Failure {
+    let mut failure = Failure::from_text(why);
     if failure.next_step.is_empty() {
         "check that the first SubDevice is on, that its IN port is wired to this card, and that \
          the card has a link (`linesman interfaces`)"

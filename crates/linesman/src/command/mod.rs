@@ -5,6 +5,7 @@ pub(crate) mod counters;
 pub(crate) mod demo;
 pub(crate) mod diagnose;
 pub(crate) mod driven;
+pub(crate) mod ebus;
 pub(crate) mod explain;
 pub(crate) mod fault;
 pub(crate) mod foe;

@@ -25,8 +25,9 @@ use linesman_runtime::run::{
 use linesman_runtime::selector::Selector;
 use linesman_runtime::service::ServiceDesk;
 use linesman_runtime::stop::Stop;
+use linesman_runtime::system_log::SystemLog;
 
-use self::told::Teller;
+use self::told::{Logs, Teller};
 use super::driven;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -94,6 +95,9 @@ pub(crate) struct Arguments {
     /// Keep what happens in an event log, for `linesman log`; runs are added to a file that is there
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    /// Tell the log of the system, too: `journalctl SYSLOG_IDENTIFIER=linesman`
+    #[arg(long)]
+    system_log: bool,
     /// At the end one JSON object, schema linesman.run/1, and nothing else
     #[arg(long)]
     pub(crate) json: bool,
@@ -114,7 +118,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Some(path) => Source::read(path, output)?,
         None => Source::AsFound,
     };
-    let choices = Choices { target: arguments.to, cycle: arguments.cycle_us.map(Span::us) };
+    let cycle = arguments.cycle_us.map(Span::us);
+    let choices = Choices { target: arguments.to, cycle, ..Choices::default() };
     let title = match (&source, &arguments.file) {
         (Source::Project(project), Some(path)) => {
             format!("{} of {}", count(project.devices.len() as u64, "SubDevice"), path.display())
@@ -159,7 +164,12 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         None => None,
     };
     let board = Board::new(&arguments.on);
-    let teller = Teller::new(arguments.json, began, log, board.clone());
+    let system_log = match arguments.system_log {
+        true => Some(SystemLog::open(&arguments.on).map_err(no_journal)?),
+        false => None,
+    };
+    let logs = Logs { file: log, system: system_log };
+    let teller = Teller::new(arguments.json, began, logs, board.clone());
     let application = arguments.image.clone();
     let stop = driven::stop()?;
     let said = format!(
@@ -233,6 +243,13 @@ fn desk(path: Option<&Path>, bell: Bell, board: Board) -> Result<Option<ServiceD
     Ok(Some(desk))
 }
 
+fn no_journal(error: std::io::Error) -> Failure {
+    Failure::new(
+        format!("--system-log: reaching journald at /run/systemd/journal/socket: {error}"),
+        "run it where systemd-journald runs, or keep a log of its own: `--log FILE`",
+    )
+}
+
 /// The diagnosis learns by which clock times are given.
 fn with_source(
     mut options: RunOptions,
@@ -286,6 +303,9 @@ fn drive<L: Line + Send>(
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     });
     let lasted = ended.as_ref().map_or(Span::ZERO, |ended| Span::ns(ended.report.time_ns));
+    if let Some((lost, why)) = teller.lost() {
+        output.warn(&format!("{lost} entries are missing in the system's log: {why}"));
+    }
     if let Some(log) = teller.finish(lasted)
         && (log.dropped > 0 || log.failure.is_some())
     {

@@ -1,6 +1,6 @@
 //! The strokes.
 
-use linesman_diagnosis::report::{DirectionReport, Severity};
+use linesman_diagnosis::report::DirectionReport;
 use linesman_proto::address::Path;
 use linesman_proto::state::AlState;
 use linesman_proto::topology::{End, Link};
@@ -8,6 +8,7 @@ use maud::{Markup, PreEscaped, html};
 
 use super::layout::{Cell, Layout};
 use super::scene::{Label, Mark, Scene, direction};
+use crate::text::finding::severity_word;
 use crate::text::quantity::grouped;
 
 /// Pixels from one box to the next.
@@ -24,8 +25,10 @@ const LETTERS: usize = 17;
 pub(crate) const STYLE: &str = "\
 .line{font:11px system-ui,sans-serif;background:#fff}\
 .line .box{fill:#f7f7f8;stroke:#767b85;stroke-width:1.2}\
-.line .op{fill:#e5f4e7}.line .safeop{fill:#fdf3d6}.line .preop{fill:#e4eefb}.line .init{fill:#ececef}\
-.line .error{fill:#fbe3e1}\
+.line .key{stroke:#767b85;stroke-width:1}\
+.line .op{fill:#dbe8fb}.line .safeop{fill:#dff2e2}.line .preop{fill:#fdf0c4}.line .init{fill:#fbdcd9}\
+.line .unseen{fill:#f7f7f8}.line .error{stroke:#b3261e;stroke-width:2.6}\
+.line .gone{fill:#fff;stroke:#b3261e;stroke-width:2.6;stroke-dasharray:5 3}\
 .line text{fill:#1b1d21}.line .name{font-weight:600}.line .faint{fill:#5b606b}\
 .line .port{fill:#5b606b;font-size:9px}.line .rises{fill:#b3261e;font-weight:600}\
 .line .link{fill:none;stroke:#4c515b;stroke-width:1.6}.line .closing{stroke-dasharray:6 3}\
@@ -46,8 +49,10 @@ pub(crate) fn draw(scene: &Scene<'_>, styled: bool) -> Markup {
     let ring = scene.tree.closes_at().is_some();
     let width = layout.size.column * CELL.0 + 2 * MARGIN;
     // The line that closes a ring runs beneath all.
-    let height = layout.size.row * CELL.1 + 2 * MARGIN + if ring { MARGIN } else { 0 };
-    let pen = Pen { scene, layout, floor: height - MARGIN };
+    let floor = layout.size.row * CELL.1 + MARGIN + if ring { MARGIN } else { 0 };
+    let width = width.max(KEYS.iter().map(|(_, _, key)| key).sum::<usize>() + 2 * MARGIN);
+    let height = floor + MARGIN + LEGEND;
+    let pen = Pen { scene, layout, floor };
     html! {
         svg xmlns="http://www.w3.org/2000/svg" class="line" role="img"
             viewBox={ "0 0 " (width) " " (height) } width=(width) height=(height) {
@@ -56,6 +61,7 @@ pub(crate) fn draw(scene: &Scene<'_>, styled: bool) -> Markup {
             @for link in scene.tree.links() { (pen.link(link)) }
             (pen.main_device())
             @for (node, label) in scene.boxes.iter().enumerate() { (pen.device(node, label)) }
+            (legend(scene, height))
         }
     }
 }
@@ -138,12 +144,12 @@ impl Pen<'_> {
     fn link(&self, link: &Link) -> Markup {
         let Some(way) = self.way(link) else { return html! {} };
         let marks: Vec<&Mark> = self.scene.on_link((link.upstream, link.downstream)).collect();
-        let worst = marks.iter().map(|mark| mark.severity).min();
+        let worst = marks.iter().map(|mark| mark.severity).max();
         let closing = matches!(link.downstream, End::MainDevice(_));
         let class = format!(
             "link{}{}",
             if closing { " closing" } else { "" },
-            worst.map(|severity| format!(" at-{}", word(severity))).unwrap_or_default()
+            worst.map(|severity| format!(" at-{}", severity_word(severity))).unwrap_or_default()
         );
         let points: Vec<String> = way.iter().map(|(x, y)| format!("{x},{y}")).collect();
         let letter = |end: End| match end {
@@ -194,11 +200,12 @@ impl Pen<'_> {
         let Some(cell) = self.layout.cells.get(node).copied().flatten() else { return html! {} };
         let (x, y) = corner(cell);
         let marks: Vec<&Mark> = self.scene.on_device(node).collect();
-        let worst = marks.iter().map(|mark| mark.severity).min();
+        let worst = marks.iter().map(|mark| mark.severity).max();
         let class = format!(
-            "box {}{}",
+            "box {}{}{}",
             fill(label),
-            worst.map(|severity| format!(" at-{}", word(severity))).unwrap_or_default()
+            if label.state.as_ref().is_some_and(|state| state.error) { " error" } else { "" },
+            worst.map(|severity| format!(" at-{}", severity_word(severity))).unwrap_or_default()
         );
         let head = match label.name.as_str() {
             "" => (node + 1).to_string(),
@@ -236,24 +243,47 @@ fn ends(link: &Link) -> String {
     format!("{} – {}", end(link.upstream), end(link.downstream))
 }
 
-const fn word(severity: Severity) -> &'static str {
-    match severity {
-        Severity::Error => "error",
-        Severity::Warning => "warning",
-        Severity::Info => "info",
+/// Height of the keys to the colours.
+const LEGEND: usize = 18;
+
+/// What the colours mean; those that people know from other tools (S0: INIT red, PREOP yellow, SAFEOP
+/// green, OP blue).
+const KEYS: [(&str, &str, usize); 6] = [
+    ("init", "INIT", 52),
+    ("preop", "PREOP, BOOT", 96),
+    ("safeop", "SAFEOP", 68),
+    ("op", "OP", 42),
+    ("error", "error", 54),
+    ("gone", "no answer", 76),
+];
+
+/// The keys to the colours, beneath all. A drawing of a plan, which nobody has looked at, has none.
+fn legend(scene: &Scene<'_>, bottom: usize) -> Markup {
+    let mut x = MARGIN;
+    let places = KEYS.map(|(_, _, width)| {
+        let at = x;
+        x += width;
+        at
+    });
+    html! {
+        @if scene.boxes.iter().any(|label| label.state.is_some()) {
+            @for ((class, text, _), x) in KEYS.into_iter().zip(places) {
+                rect class={ "key " (class) } x=(x) y=(bottom - 16) width="10" height="10" rx="2" {}
+                text class="port" x=(x + 14) y=(bottom - 7) { (text) }
+            }
+        }
     }
 }
 
 fn fill(label: &Label) -> &'static str {
     match &label.state {
         None => "unseen",
-        Some(state) if state.error => "error",
         Some(state) => match state.state {
             Some(AlState::Op) => "op",
             Some(AlState::SafeOp) => "safeop",
             Some(AlState::PreOp | AlState::Boot) => "preop",
             Some(AlState::Init) => "init",
-            None => "unseen",
+            None => "gone",
         },
     }
 }
@@ -273,7 +303,7 @@ fn badges(marks: &[&Mark], x: usize, y: usize) -> Markup {
             @let y = y + index * 20;
             g {
                 title { (mark.title) }
-                circle class={ "badge-" (word(mark.severity)) } cx=(x) cy=(y) r="11" {}
+                circle class={ "badge-" (severity_word(mark.severity)) } cx=(x) cy=(y) r="11" {}
                 text class="badge" x=(x) y=(y + 4) { (mark.id) }
                 @if let Some(arrow) = arrow(mark) {
                     text class="port" x=(x - 5) y=(y + 21) { (arrow) }
@@ -298,4 +328,70 @@ fn short(text: &str) -> String {
         return text.to_owned();
     }
     text.chars().take(LETTERS - 1).chain(['…']).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use linesman_diagnosis::report::{EndReport, PlaceReport, Severity};
+    use linesman_proto::port::Port;
+    use linesman_proto::topology::{Tree, Wired};
+
+    use super::super::scene::State;
+    use super::*;
+
+    // proves: DIA-12 partial: colours and borders; the tree itself is drawn in tests/pictures.rs
+    #[test]
+    fn colours_are_those_of_the_legend() {
+        let on = |node, port| Wired { on: End::Controller(node, port), entry: Port::A };
+        let first = Wired { on: End::MainDevice(Path::A), entry: Port::A };
+        let wiring = [first, on(0, Port::B), on(1, Port::B), on(2, Port::B), on(3, Port::B)];
+        let tree = Tree::from_wiring(&wiring, None).unwrap();
+        let label = |state: Option<AlState>, error| Label {
+            state: Some(State { state, text: String::new(), error }),
+            ..Label::default()
+        };
+        let states = [AlState::Init, AlState::PreOp, AlState::SafeOp, AlState::Op];
+        let mut boxes: Vec<Label> = states.map(|state| label(Some(state), false)).into();
+        boxes.push(label(None, false));
+        let drawn = draw(&Scene { tree: &tree, boxes: boxes.clone(), marks: Vec::new() }, true);
+        let drawn = drawn.into_string();
+        for (class, colour) in
+            [("init", "fbdcd9"), ("preop", "fdf0c4"), ("safeop", "dff2e2"), ("op", "dbe8fb")]
+        {
+            assert!(drawn.contains(&format!("class=\"box {class}\"")), "{class}");
+            assert!(drawn.contains(&format!("class=\"key {class}\"")), "{class}");
+            assert!(drawn.contains(&format!(".line .{class}{{fill:#{colour}}}")), "{class}");
+        }
+        assert!(drawn.contains("class=\"box gone\""), "who does not answer");
+        assert!(drawn.contains(".line .gone{fill:#fff;stroke:#b3261e"), "has a red border");
+        boxes[2] = label(Some(AlState::SafeOp), true);
+        boxes[3].rises.push((Port::B, 12));
+        let drawn = draw(&Scene { tree: &tree, boxes, marks: Vec::new() }, true).into_string();
+        assert!(drawn.contains("class=\"box safeop error\"") && drawn.contains("B +12"), "{drawn}");
+        let offline =
+            draw(&Scene { tree: &tree, boxes: vec![Label::default(); 5], marks: Vec::new() }, true);
+        assert!(!offline.into_string().contains("class=\"key"), "a plan has no states");
+    }
+
+    #[test]
+    fn of_several_marks_the_worst_is_drawn() {
+        let first = Wired { on: End::MainDevice(Path::A), entry: Port::A };
+        let tree = Tree::from_wiring(&[first], None).unwrap();
+        let end = |no| EndReport { no, port: 'A' };
+        let mark = |id: &str, severity| Mark {
+            id: id.to_owned(),
+            severity,
+            place: PlaceReport::Link { network: 0, a: end(0), b: Some(end(1)), direction: None },
+            title: String::new(),
+        };
+        let marks = vec![
+            mark("F1", Severity::Info),
+            mark("F2", Severity::Error),
+            mark("F3", Severity::Warning),
+        ];
+        let scene = Scene { tree: &tree, boxes: vec![Label::default()], marks };
+        let drawn = draw(&scene, false).into_string();
+        assert!(drawn.contains("class=\"link at-error\""), "{drawn}");
+        assert!(["F1", "F2", "F3"].iter().all(|id| drawn.contains(id)), "{drawn}");
+    }
 }

@@ -1,10 +1,10 @@
 //! What is wrong, worst first: where, why, how it is known, what to do, what follows from it.
 
-use linesman_diagnosis::report::{EvidenceReport, FindingReport, FindingState, Number, Severity};
+use linesman_diagnosis::report::{EvidenceReport, FindingReport, FindingState, Number};
 use maud::{Markup, html};
 
-use super::moment;
-use crate::text::finding::{Writer, percent, register_value, when};
+use crate::text::finding::{Writer, percent, register_value, severity_word, when};
+use crate::text::quantity::time;
 
 /// Most pieces of evidence in a table; a page with thousands of rows helps nobody.
 const MOST_EVIDENCE: usize = 200;
@@ -48,9 +48,9 @@ pub(super) fn section(findings: &[FindingReport], writer: &Writer<'_>) -> Markup
 
 fn article(finding: &FindingReport, writer: &Writer<'_>) -> Markup {
     html! {
-        article id=(finding.id) class=(severity(finding.severity)) {
+        article id=(finding.id) class=(severity_word(finding.severity)) {
             h3 {
-                span class="tag" { (severity(finding.severity)) } " "
+                span class="tag" { (severity_word(finding.severity)) } " "
                 (finding.id) " " (finding.code) " " (finding.name)
                 span class="faint" { (over(finding.state)) }
             }
@@ -65,6 +65,9 @@ fn article(finding: &FindingReport, writer: &Writer<'_>) -> Markup {
                     dd {
                         b { (other.cause) } " (" (percent(other.confidence)) "): " (other.cause.meaning())
                         @if let Some(place) = &other.place { " There: " (writer.names.place(place)) "." }
+                        @if let Some(by) = &other.told_apart_by {
+                            br; span class="faint" { "Told apart by: " (by) "." }
+                        }
                     }
                 }
                 @if writer.timed { dt { "When" } dd { (when(finding)) } }
@@ -107,7 +110,7 @@ fn row(one: &EvidenceReport, writer: &Writer<'_>) -> Markup {
     html! {
         tr {
             @if writer.timed {
-                td class="number" { @if let Some(Number(at)) = one.time_ns { (moment(at)) } }
+                td class="number" { @if let Some(Number(at)) = one.time_ns { (time(at)) } }
                 td class="number" { @if let Some(Number(frame)) = one.frame { (frame) } }
             }
             td {
@@ -139,15 +142,6 @@ fn consequences(all: &[FindingReport], writer: &Writer<'_>) -> Markup {
                 }
             }
         }
-    }
-}
-
-/// As it is written, and as classes of the style sheet are called.
-pub(super) const fn severity(severity: Severity) -> &'static str {
-    match severity {
-        Severity::Error => "error",
-        Severity::Warning => "warning",
-        Severity::Info => "info",
     }
 }
 

@@ -16,7 +16,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::drawing;
 use crate::text::finding::{Writer, tally};
-use crate::text::quantity::{count, time};
+use crate::text::quantity::count;
 
 /// What the page looks like; on paper it is black on white, with boxes to tick.
 const STYLE: &str = include_str!("style.css");
@@ -113,9 +113,4 @@ fn foot(diagnosis: &Diagnosis, writer: &Writer<'_>) -> Markup {
             ". How each finding is made: " code { "linesman explain CODE" } "."
         }
     }
-}
-
-/// A time of the run.
-fn moment(ns: u64) -> String {
-    time(ns)
 }

@@ -6,6 +6,7 @@ use linesman_diagnosis::report::{Diagnosis, FindingReport};
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 
+use crate::command::scan::report::state_name;
 use crate::drawing::{Label, Mark, Scene, State};
 use crate::text::finding::percent;
 use crate::text::names::Names;
@@ -36,9 +37,7 @@ pub(crate) fn of_scan(inventory: &Inventory) -> Scene<'_> {
     let boxes = inventory.devices.iter().map(|found| {
         let value = found.al_status.state();
         let error = found.al_status.error();
-        let name = value
-            .state()
-            .map_or_else(|| format!("0x{:X}", value.bits()), |state| state.name().to_owned());
+        let name = state_name(found);
         let text = if error { format!("{name} 0x{:04X}", found.al_code.value()) } else { name };
         Label {
             name: String::new(),

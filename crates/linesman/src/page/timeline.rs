@@ -4,9 +4,8 @@ use linesman_diagnosis::report::{FindingReport, Number};
 use linesman_proto::time::Instant;
 use maud::{Markup, html};
 
-use super::findings::severity;
-use super::moment;
-use crate::text::finding::Writer;
+use crate::text::finding::{Writer, severity_word};
+use crate::text::quantity::time;
 
 /// Most bars; consequences beyond are left out.
 const MOST: usize = 60;
@@ -42,7 +41,7 @@ pub(super) fn section(findings: &[FindingReport], at: Instant, writer: &Writer<'
                         @for quarter in 0..=4u64 {
                             @let ns = end / 4 * quarter;
                             line class="grid" x1=(tenth(x(ns))) x2=(tenth(x(ns))) y1="0" y2=(height - 20) {}
-                            text class="faint" x=(tenth(x(ns))) y=(height - 6) text-anchor="middle" { (moment(ns)) }
+                            text class="faint" x=(tenth(x(ns))) y=(height - 6) text-anchor="middle" { (time(ns)) }
                         }
                         @for (index, (depth, one)) in rows.iter().enumerate() {
                             @let y = index * ROW;
@@ -51,7 +50,7 @@ pub(super) fn section(findings: &[FindingReport], at: Instant, writer: &Writer<'
                             g {
                                 title { (one.id) " " (writer.names.place(&one.place)) }
                                 text x=(8 + depth * 14) y=(y + 14) { (one.id) " " (one.code) " " (one.name) }
-                                rect class={ "bar " (severity(one.severity)) } x=(tenth(from)) y=(y + 4)
+                                rect class={ "bar " (severity_word(one.severity)) } x=(tenth(from)) y=(y + 4)
                                     width=(tenth((to - from).max(LEAST))) height=(ROW - 8) {}
                             }
                         }

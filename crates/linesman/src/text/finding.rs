@@ -39,6 +39,9 @@ impl Writer<'_> {
         self.add(&mut text, "cause", &cause(finding));
         for other in &finding.alternatives {
             self.add(&mut text, "or", &self.alternative(other));
+            if let Some(by) = &other.told_apart_by {
+                self.add(&mut text, "", &format!("told apart by: {by}"));
+            }
         }
         if self.timed {
             self.add(&mut text, "when", &when(finding));
@@ -162,6 +165,15 @@ fn flattened(all: &[FindingReport]) -> Vec<&FindingReport> {
 fn cause(finding: &FindingReport) -> String {
     let percent = percent(finding.confidence);
     format!("{} ({percent}): {}", finding.cause, finding.cause.meaning())
+}
+
+/// A severity in plain text.
+pub(crate) const fn severity_word(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Info => "info",
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    }
 }
 
 /// `70 %`.

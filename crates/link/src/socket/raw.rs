@@ -188,6 +188,15 @@ impl RawSocket {
         self.receiver.receive_one(buffer)
     }
 
+    /// Has [`recv_one`](Self::recv_one) wait for a frame without end, or not: for who has nothing else
+    /// to do, such as a far end that answers, or a measurement of what bare receiving takes.
+    ///
+    /// # Errors
+    /// When the kernel refuses it.
+    pub fn set_waiting(&mut self, waits: bool) -> Result<(), LinkError> {
+        self.receiver.set_waiting(waits)
+    }
+
     /// Fetches what has come back, as much as `batch` has room for, without waiting; gives how
     /// many frames that were. Copies of sent frames are not among them.
     ///

@@ -23,6 +23,8 @@ pub(super) struct Receiver {
     wanted: Wanted,
     /// Set once the interface is gone: the kernel reports it one time only.
     vanished: bool,
+    /// A frame is waited for where there is none.
+    waits: bool,
     pub(super) counters: SocketCounters,
 }
 
@@ -68,7 +70,7 @@ impl Receiver {
             _ => LinkError::system(name, "opening a packet socket", error),
         })?;
         let counters = SocketCounters::default();
-        let receiver = Self { socket, interface, wanted, vanished: false, counters };
+        let receiver = Self { socket, interface, wanted, vanished: false, waits: false, counters };
         receiver.set("asking for time stamps", libc::SOL_SOCKET, libc::SO_TIMESTAMPNS)?;
         Ok(receiver)
     }
@@ -96,6 +98,14 @@ impl Receiver {
     pub(super) fn receive_buffer(&self) -> Result<usize, LinkError> {
         sockopt::socket_recv_buffer_size(&self.socket)
             .map_err(self.failed("asking for the size of the receive buffer"))
+    }
+
+    /// Has [`Receiver::receive_one`] wait for a frame, or not.
+    pub(super) fn set_waiting(&mut self, waits: bool) -> Result<(), LinkError> {
+        rustix::io::ioctl_fionbio(&self.socket, !waits)
+            .map_err(self.failed("choosing whether to wait for frames"))?;
+        self.waits = waits;
+        Ok(())
     }
 
     /// Starts receiving frames of this EtherType.
@@ -141,7 +151,10 @@ impl Receiver {
 
     pub(super) fn receive_one(&mut self, buffer: &mut [u8]) -> Result<Option<usize>, LinkError> {
         self.check_presence()?;
-        let flags = RecvFlags::DONTWAIT | RecvFlags::TRUNC;
+        let flags = match self.waits {
+            true => RecvFlags::TRUNC,
+            false => RecvFlags::DONTWAIT | RecvFlags::TRUNC,
+        };
         for _ in 0..RETRIES {
             match recv(&self.socket, &mut *buffer, flags) {
                 Ok((_, len)) => {

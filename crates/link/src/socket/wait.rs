@@ -62,9 +62,11 @@ pub fn wait_any<const N: usize>(
     let mut polled = std::array::from_fn::<_, N, _>(|index| {
         PollFd::from_borrowed_fd(waited[index].socket, PollFlags::IN)
     });
-    let left = timespec(deadline.since(clock.now()).as_nanos());
-    let timeout = (deadline != Instant::MAX).then_some(&left);
-    match poll(&mut polled, timeout) {
+    let left = match deadline {
+        Instant::MAX => None,
+        _ => Some(timespec(deadline.since(clock.now()).as_nanos())),
+    };
+    match poll(&mut polled, left.as_ref()) {
         Ok(0) => Ok(Ready::Deadline),
         Ok(_) => Ok(Ready::Readable),
         Err(Errno::INTR) => Ok(Ready::Interrupted),

@@ -15,7 +15,10 @@ pub(super) struct Application {
     allowed: Option<u32>,
     /// It has given outputs at least once: until then zeros are sent, so that SubDevices reach OP.
     begun: bool,
+    /// It has given outputs of this task since the last cycle.
     fresh: bool,
+    /// How often it had given those of all tasks when the last cycle began.
+    seen: u64,
     missed: u32,
     withheld: bool,
 }
@@ -53,28 +56,26 @@ impl Judged {
 
 impl Application {
     pub(super) const fn new(allowed: Option<u32>) -> Self {
-        Self { allowed, begun: false, fresh: false, missed: 0, withheld: false }
+        Self { allowed, begun: false, fresh: false, seen: 0, missed: 0, withheld: false }
     }
 
-    /// It gives outputs.
+    /// It gives the outputs of this task.
     #[inline]
     pub(super) const fn give(&mut self) {
-        self.begun = true;
         self.fresh = true;
     }
 
-    /// A cycle begins. `None`: the application is in time, as before, or is not watched.
+    /// A cycle begins; the outputs of all tasks were given `given` times so far. `None`: the
+    /// application is in time, as before, or is not watched.
     #[inline]
-    pub(super) fn begin_cycle(&mut self) -> Option<Judged> {
-        if self.fresh && self.missed == 0 {
-            self.fresh = false;
-            return None;
-        }
-        self.judge()
+    pub(super) fn begin_cycle(&mut self, given: u64) -> Option<Judged> {
+        let fresh = std::mem::replace(&mut self.fresh, false) | (self.seen != given);
+        self.seen = given;
+        self.begun |= fresh;
+        if fresh && self.missed == 0 { None } else { self.judge(fresh) }
     }
 
-    fn judge(&mut self) -> Option<Judged> {
-        let fresh = std::mem::replace(&mut self.fresh, false);
+    fn judge(&mut self, fresh: bool) -> Option<Judged> {
         let allowed = self.allowed.filter(|_| self.begun)?;
         self.missed = if fresh { 0 } else { self.missed.saturating_add(1) };
         let before = std::mem::replace(&mut self.withheld, self.missed > allowed);
@@ -95,13 +96,12 @@ mod tests {
     #[test]
     fn so_many_misses_are_allowed_and_no_more() {
         let mut application = Application::new(Some(2));
-        assert_eq!(application.begin_cycle(), None, "it has not begun");
+        assert_eq!(application.begin_cycle(0), None, "it has not begun");
         application.give();
-        let mut withheld = || application.begin_cycle().is_some_and(|judged| judged.withheld);
+        let mut withheld = || application.begin_cycle(0).is_some_and(|judged| judged.withheld);
         let withheld: Vec<bool> = (0..5).map(|_| withheld()).collect();
         assert_eq!(withheld, [false, false, false, true, true]);
-        application.give();
-        let back = application.begin_cycle();
+        let back = application.begin_cycle(1);
         assert_eq!(back, Some(Judged { missed: false, withheld: false, changed: true }));
         assert!(!application.is_withheld());
     }
@@ -110,7 +110,7 @@ mod tests {
     fn who_is_not_watched_may_be_late() {
         let mut application = Application::new(None);
         application.give();
-        assert!((0..100).all(|_| application.begin_cycle().is_none()));
+        assert!((0..100).all(|_| application.begin_cycle(0).is_none()));
         assert!(!application.is_withheld());
     }
 }

@@ -126,6 +126,12 @@ impl Datagram {
         self.expected[withheld as usize]
     }
 
+    /// Whether it carries process data and came back as it should, as the last time.
+    #[inline]
+    pub(super) fn is_usual(&self, withheld: bool, wkc: WorkingCounter) -> bool {
+        self.role == Role::ProcessData && self.told.is_none() && self.expected(withheld).fits(wkc)
+    }
+
     /// It came back as it should: its inputs are taken over.
     #[inline]
     pub(super) fn take(&mut self, now: Instant, frame: &[u8], inputs: &mut [u8]) {

@@ -20,7 +20,8 @@ pub(super) struct Departure {
     pub(super) cycle: Span,
     /// The cycle of the task begins with it.
     pub(super) begins: bool,
-    pub(super) frames: Vec<usize>,
+    /// Their indices among those of all tasks.
+    pub(super) frames: Vec<u32>,
 }
 
 #[derive(Debug)]
@@ -35,9 +36,16 @@ pub(super) struct TaskState {
 }
 
 impl Departure {
-    /// Cycles that were slept through are left out, not caught up: the grid stays. Gives how many.
+    /// It is due at `now`: the next time is a cycle later. Cycles that were slept through are left
+    /// out, not caught up: the grid stays. Gives how many.
+    #[inline]
+    pub(super) fn advance(&mut self, now: Instant) -> u64 {
+        self.next_at += self.cycle;
+        if self.next_at <= now { self.catch_up(now) } else { 0 }
+    }
+
     #[cold]
-    pub(super) fn catch_up(&mut self, now: Instant) -> u64 {
+    fn catch_up(&mut self, now: Instant) -> u64 {
         let behind = now.since(self.next_at).as_nanos() / self.cycle.as_nanos() + 1;
         self.next_at += self.cycle * behind;
         behind
@@ -60,12 +68,12 @@ impl TaskState {
         }
     }
 
-    /// One of its frames is on its way no longer.
+    /// One of its frames is on its way no longer; whether more leave in the same cycle.
     #[inline]
-    pub(super) fn came(&mut self, out: &mut bool) {
+    pub(super) fn came(&mut self, out: &mut bool, more: bool) {
         if std::mem::replace(out, false) {
             self.out = self.out.saturating_sub(1);
-            self.exchanged |= self.out == 0;
+            self.exchanged |= self.out == 0 && !more;
         }
     }
 }

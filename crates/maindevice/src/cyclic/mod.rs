@@ -6,7 +6,7 @@
 //! SyncManagers are on before it gives data. Until it has arrived the expectation is a range, so that
 //! one SubDevice that comes back, or is stuck, does not stop the inputs of all others.
 //!
-//! [`run`] copies, [`datagram`] judges, [`quality`] tells how good and how old data are,
+//! [`send`] sends, [`run`] copies, [`datagram`] judges, [`quality`] tells how good and how old data are,
 //! [`application`] sees to it that old outputs are not sent as fresh ones.
 
 mod application;
@@ -14,6 +14,7 @@ mod datagram;
 mod departure;
 mod quality;
 mod run;
+mod send;
 mod steer;
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -53,8 +54,9 @@ struct Frame {
     /// Where outputs go into it.
     outputs: Vec<Run>,
     datagrams: Vec<Datagram>,
-    /// Bits of the datagrams that carry outputs.
+    /// Bits of the datagrams that carry outputs, and of all.
     carries: u16,
+    all: u16,
     /// Which version of the line's state its expectations are made of.
     version: u64,
     /// It is on its way.
@@ -74,6 +76,13 @@ pub(crate) struct Cyclic {
     frames: Vec<Frame>,
     /// When the first departure is due.
     next_at: Instant,
+    /// The departure whose frames leave now, and how many of them are left.
+    leaving: usize,
+    left: usize,
+    /// When they are given up.
+    deadline: Instant,
+    /// How often the application has given the outputs of all tasks.
+    given: u64,
     /// Who surely serves process data, and who may.
     least: Presence,
     most: Presence,
@@ -106,13 +115,13 @@ impl Cyclic {
                 let next_at = now + earliest.saturating_sub(planned.ahead);
                 let same = |one: &&mut Departure| one.task == index && one.next_at == next_at;
                 match departures.iter_mut().find(same) {
-                    Some(departure) => departure.frames.push(frames.len()),
+                    Some(departure) => departure.frames.push(frames.len() as u32),
                     None => departures.push(Departure {
                         task: index,
                         next_at,
                         cycle: task.cycle.max(Span::ns(1)),
                         begins: planned.ahead == latest,
-                        frames: vec![frames.len()],
+                        frames: vec![frames.len() as u32],
                     }),
                 }
                 frames.push(Frame::new(&plan, index, number));
@@ -130,6 +139,10 @@ impl Cyclic {
             departures,
             frames,
             next_at: now,
+            leaving: 0,
+            left: 0,
+            deadline: now,
+            given: 0,
             least: Presence::none(plan.devices.len()),
             most: Presence::none(plan.devices.len()),
             version: u64::MAX,
@@ -181,7 +194,7 @@ impl Cyclic {
     pub(crate) fn give_outputs(&mut self, task: Option<usize>) {
         match task {
             Some(task) => self.tasks.get_mut(task).into_iter().for_each(|t| t.application.give()),
-            None => self.tasks.iter_mut().for_each(|task| task.application.give()),
+            None => self.given += 1,
         }
     }
 
@@ -197,69 +210,10 @@ impl Cyclic {
         self.departures.iter().find(begins).map(|one| one.next_at)
     }
 
-    /// Sends the frames of all tasks whose cycle has begun.
-    pub(crate) fn send_due(
-        &mut self,
-        now: Instant,
-        exchange: &mut Exchange,
-        statistics: &mut Statistics,
-        events: &mut impl FnMut(Event),
-    ) {
-        let mut earliest = Instant::MAX;
-        for at in 0..self.departures.len() {
-            let departure = &mut self.departures[at];
-            if departure.next_at <= now {
-                departure.next_at += departure.cycle;
-                let behind = if departure.next_at <= now { departure.catch_up(now) } else { 0 };
-                earliest = earliest.min(departure.next_at);
-                self.depart(at, now, behind, exchange, statistics, events);
-            } else {
-                earliest = earliest.min(departure.next_at);
-            }
-        }
-        self.next_at = earliest;
-    }
-
-    /// Frames leave that leave together; so many cycles before were slept through.
+    /// Whether a frame leaves at `now`.
     #[inline]
-    fn depart(
-        &mut self,
-        at: usize,
-        now: Instant,
-        behind: u64,
-        exchange: &mut Exchange,
-        statistics: &mut Statistics,
-        events: &mut impl FnMut(Event),
-    ) {
-        let Self { departures, tasks, frames, outputs, .. } = self;
-        let departure = &departures[at];
-        let Some(task) = tasks.get_mut(departure.task) else { return };
-        if departure.begins {
-            statistics.cycles += 1;
-            statistics.cycles_missed += behind;
-            if let Some(judged) = task.application.begin_cycle() {
-                judged.tell(departure.task, statistics, events);
-            }
-        }
-        let withheld = task.application.is_withheld();
-        let deadline = now + departure.cycle;
-        for index in &departure.frames {
-            let Some(frame) = frames.get_mut(*index) else { continue };
-            let sent = exchange.begin_cyclic(*index, deadline, frame.times, withheld);
-            let Some(prebuilt) = sent else {
-                frame.status.not_sent = FrameStatus::WHOLE;
-                statistics.cyclic_unsent += 1;
-                continue;
-            };
-            prebuilt.withhold(withheld);
-            if withheld {
-                run::clear_frame(&frame.outputs, prebuilt.bytes_mut());
-            } else {
-                run::fill(&frame.outputs, outputs, prebuilt.bytes_mut());
-            }
-            frame.status.not_sent = if withheld { frame.carries } else { 0 };
-            task.out += u32::from(!std::mem::replace(&mut frame.out, true));
-        }
+    pub(crate) fn is_due(&self, now: Instant) -> bool {
+        self.left > 0 || self.next_at <= now
     }
 
     /// A frame came back.
@@ -267,69 +221,106 @@ impl Cyclic {
     pub(crate) fn received(
         &mut self,
         now: Instant,
-        index: usize,
+        index: u32,
         withheld: bool,
         reply: &[u8],
         statistics: &mut Statistics,
         events: &mut impl FnMut(Event),
     ) {
         self.refresh();
-        let Self { plan, line, tasks, frames, inputs, least, most, .. } = self;
-        let Self { shares, mailboxes, version, responding, steer, .. } = self;
-        let Some(frame) = frames.get_mut(index) else { return };
-        let Some(state) = tasks.get_mut(frame.task) else { return };
-        state.came(&mut frame.out);
+        let more = self.left > 0 && self.is_leaving(index);
+        let Some(frame) = self.frames.get_mut(index as usize) else { return };
+        let Some(state) = self.tasks.get_mut(frame.task) else { return };
+        state.came(&mut frame.out, more);
         if state.lost > 0 {
-            state.found(frame.task, line, events);
+            state.found(frame.task, &self.line, events);
         }
-        if frame.version != *version {
-            frame.version = *version;
+        if frame.version != self.version {
+            frame.version = self.version;
+            let Self { plan, least, most, shares, inputs, .. } = self;
             frame.take_over(plan, index, least, most, shares, inputs);
         }
-        let (mut wrong, mut toggled, mut bit, mut moved) = (0, 0, 1_u16, 0);
         for (at, datagram) in frame.datagrams.iter_mut().enumerate() {
             let Some(wkc) = datagram.counter(reply) else { return };
-            if datagram.role != Role::ProcessData {
+            if !datagram.is_usual(withheld, wkc) {
+                return self
+                    .received_otherwise(now, index, at, withheld, reply, statistics, events);
+            }
+            datagram.take(now, reply, &mut self.inputs);
+        }
+        frame.status.wrong_counter = 0;
+        frame.status.input_toggle ^= frame.all;
+    }
+
+    /// The datagrams from `first` on: those before it were as they should be.
+    #[inline(never)]
+    #[allow(clippy::too_many_arguments, reason = "what is known of a frame that came back")]
+    fn received_otherwise(
+        &mut self,
+        now: Instant,
+        index: u32,
+        first: usize,
+        withheld: bool,
+        reply: &[u8],
+        statistics: &mut Statistics,
+        events: &mut impl FnMut(Event),
+    ) {
+        let Some(frame) = self.frames.get_mut(index as usize) else { return };
+        let mut toggled = FrameStatus::before(first);
+        let (mut wrong, mut moved) = (0, 0);
+        for (at, datagram) in frame.datagrams.iter_mut().enumerate().skip(first) {
+            let bit = FrameStatus::bit(at);
+            let Some(wkc) = datagram.counter(reply) else { return };
+            if datagram.is_usual(withheld, wkc) {
+                datagram.take(now, reply, &mut self.inputs);
+                toggled |= bit;
+            } else if datagram.role == Role::ProcessData {
+                let place = Place { task: frame.task, frame: frame.number, datagram: at };
+                if datagram.expected(withheld).fits(wkc) {
+                    datagram.take(now, reply, &mut self.inputs);
+                    toggled |= bit;
+                    datagram.tell_good(place, events);
+                } else {
+                    wrong |= bit;
+                    datagram.refuse(&mut self.inputs);
+                    statistics.working_counter_errors += 1;
+                    if datagram.told != Some(wkc) {
+                        datagram.tell_wrong(place, withheld, wkc, events);
+                        lock(&self.line).alert();
+                    }
+                }
+            } else {
                 datagram.good = true;
                 toggled |= bit;
                 let data = reply.get(datagram.data_at..).unwrap_or_default();
-                if datagram.role == Role::Presence {
-                    let seen = Some((wkc, data.first().copied().unwrap_or(0)));
-                    if *responding != seen {
-                        *responding = seen;
-                        watch_line(line, seen, events);
+                let seen = Some((wkc, data.first().copied().unwrap_or(0)));
+                let role = datagram.role;
+                if role == Role::Presence {
+                    if self.responding != seen {
+                        self.responding = seen;
+                        watch_line(&self.line, seen, events);
                     }
-                } else if datagram.role == Role::ReferenceClock && wkc.0 > 0 {
-                    let cycle = plan.tasks.get(frame.task).map_or(Span::ZERO, |task| task.cycle);
-                    moved += steer.correction(now, data, cycle);
-                } else if datagram.role == Role::MailboxStates && wkc.0 > 0 {
-                    mailboxes.take(index, at, data.get(..datagram.len).unwrap_or_default());
-                }
-            } else if datagram.expected(withheld).fits(wkc) {
-                datagram.take(now, reply, inputs);
-                toggled |= bit;
-                if datagram.told.is_some() {
-                    let place = Place { task: frame.task, frame: frame.number, datagram: at };
-                    datagram.tell_good(place, events);
-                }
-            } else {
-                wrong |= bit;
-                datagram.refuse(inputs);
-                statistics.working_counter_errors += 1;
-                if datagram.told != Some(wkc) {
-                    let place = Place { task: frame.task, frame: frame.number, datagram: at };
-                    datagram.tell_wrong(place, withheld, wkc, events);
-                    lock(line).alert();
+                } else if role == Role::ReferenceClock && wkc.0 > 0 {
+                    let cycle = self.plan.tasks.get(frame.task).map(|task| task.cycle);
+                    moved += self.steer.correction(now, data, cycle.unwrap_or_default());
+                } else if role == Role::MailboxStates && wkc.0 > 0 {
+                    let data = data.get(..datagram.len).unwrap_or_default();
+                    self.mailboxes.take(index as usize, at, data);
                 }
             }
-            // None for those behind the fifteenth.
-            bit = (bit << 1) & !FrameStatus::WHOLE;
         }
         frame.status.wrong_counter = wrong;
         frame.status.input_toggle ^= toggled;
         if moved != 0 {
             self.shift(moved);
         }
+    }
+
+    /// Whether frames of the same task leave after this one in the same cycle.
+    #[cold]
+    fn is_leaving(&self, index: u32) -> bool {
+        let task = self.frames.get(index as usize).map(|frame| frame.task);
+        self.departures.get(self.leaving).map(|departure| departure.task) == task
     }
 
     /// Moves all departures, by ns.
@@ -343,15 +334,16 @@ impl Cyclic {
     }
 
     /// A frame did not come back.
-    pub(crate) fn lost(&mut self, index: usize, events: &mut impl FnMut(Event)) {
-        let Some(frame) = self.frames.get_mut(index) else { return };
+    pub(crate) fn lost(&mut self, index: u32, events: &mut impl FnMut(Event)) {
+        let more = self.left > 0 && self.is_leaving(index);
+        let Some(frame) = self.frames.get_mut(index as usize) else { return };
         frame.status.wrong_counter = FrameStatus::WHOLE;
         for datagram in &mut frame.datagrams {
             datagram.refuse(&mut self.inputs);
         }
         let task = frame.task;
         let Some(state) = self.tasks.get_mut(task) else { return };
-        state.came(&mut frame.out);
+        state.came(&mut frame.out, more);
         state.lost += 1;
         if state.lost == LOST_IS_NEWS {
             events(Event::CyclicFramesLost { task });
@@ -360,8 +352,8 @@ impl Cyclic {
     }
 
     /// Whether the last answer of a frame was not as it should be.
-    pub(crate) fn is_bad(&self, index: usize) -> bool {
-        self.frames.get(index).is_some_and(|frame| frame.status.wrong_counter != 0)
+    pub(crate) fn is_bad(&self, index: u32) -> bool {
+        self.frames.get(index as usize).is_some_and(|frame| frame.status.wrong_counter != 0)
     }
 
     /// How many answered the last broadcast read of the cycle.
@@ -389,6 +381,7 @@ impl Frame {
             outputs,
             datagrams,
             carries,
+            all: FrameStatus::before(planned.datagrams.len()),
             version: u64::MAX,
             out: false,
             status: FrameStatus::default(),
@@ -400,7 +393,7 @@ impl Frame {
     fn take_over(
         &mut self,
         plan: &Plan,
-        index: usize,
+        index: u32,
         least: &Presence,
         most: &Presence,
         shares: &mut [Share],
@@ -414,7 +407,7 @@ impl Frame {
                 let Some(share) = shares.get_mut(owned.device.index()) else { continue };
                 // Who has inputs is told by the first datagram with some; who has none, by any.
                 let first = share.datagrams.iter().find(|one| one.2);
-                let mine = first.is_none_or(|one| (one.0, one.1) == (index, at));
+                let mine = first.is_none_or(|one| (one.0, one.1) == (index as usize, at));
                 let stopped = mine && share.serve(least.of(owned.device).inputs, last);
                 if stopped {
                     clear_lost(plan, one, owned.device, inputs);

@@ -48,6 +48,12 @@ impl FrameStatus {
     pub const fn bit(datagram: usize) -> u16 {
         if datagram < 15 { 1 << datagram } else { 0 }
     }
+
+    /// The bits of all datagrams before this one.
+    #[must_use]
+    pub const fn before(datagram: usize) -> u16 {
+        if datagram < 15 { (1 << datagram) - 1 } else { Self::WHOLE - 1 }
+    }
 }
 
 impl Cyclic {

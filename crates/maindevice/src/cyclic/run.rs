@@ -8,10 +8,10 @@ use linesman_config::plan::Ownership;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Run {
     /// Offset in the frame.
-    frame_at: usize,
+    frame_at: u32,
     /// Offset in the outputs or inputs of the process image.
-    image_at: usize,
-    len: usize,
+    image_at: u32,
+    len: u32,
     /// Which bits of a single byte are meant; all of a longer run.
     mask: u8,
 }
@@ -19,12 +19,16 @@ pub(super) struct Run {
 impl Run {
     const WHOLE: u8 = 0xFF;
 
+    #[inline]
     fn frame(&self) -> Range<usize> {
-        self.frame_at..self.frame_at + self.len
+        let at = self.frame_at as usize;
+        at..at + self.len as usize
     }
 
+    #[inline]
     fn image(&self) -> Range<usize> {
-        self.image_at..self.image_at + self.len
+        let at = self.image_at as usize;
+        at..at + self.len as usize
     }
 }
 
@@ -33,19 +37,19 @@ pub(super) fn push(runs: &mut Vec<Run>, owned: &Ownership, data_at: usize) {
     let len = owned.range.len();
     let mut add = |at: usize, len: usize, mask: u8| {
         let run = Run {
-            frame_at: data_at + owned.range.start + at,
-            image_at: owned.image_at + at,
-            len,
+            frame_at: (data_at + owned.range.start + at) as u32,
+            image_at: (owned.image_at + at) as u32,
+            len: len as u32,
             mask,
         };
         match runs.last_mut() {
             Some(last)
                 if last.mask == mask
                     && mask == Run::WHOLE
-                    && last.frame().end == run.frame_at
-                    && last.image().end == run.image_at =>
+                    && last.frame().end == run.frame().start
+                    && last.image().end == run.image().start =>
             {
-                last.len += len;
+                last.len += run.len;
             }
             Some(_) | None => runs.push(run),
         }
@@ -100,7 +104,9 @@ pub(super) fn clear_frame(runs: &[Run], frame: &mut [u8]) {
 #[inline]
 fn copy(from: &[u8], to: &mut [u8], mask: u8) {
     if mask == Run::WHOLE {
-        to.copy_from_slice(from);
+        // Both are as long as the run; saying so spares a comparison.
+        let len = from.len().min(to.len());
+        to[..len].copy_from_slice(&from[..len]);
     } else if let ([from], [to]) = (from, to) {
         *to = (*to & !mask) | (from & mask);
     }

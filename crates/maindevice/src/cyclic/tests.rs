@@ -58,10 +58,19 @@ impl Fixture {
     }
 
     fn of(devices: &[PlannedDevice; 2], allowed: Option<u32>) -> Self {
+        Self::with(devices, allowed, |_| {})
+    }
+
+    fn with(
+        devices: &[PlannedDevice; 2],
+        allowed: Option<u32>,
+        change: impl FnOnce(&mut Plan),
+    ) -> Self {
         let seen =
             [SeenController::open_at(&[Port::A, Port::B]), SeenController::open_at(&[Port::A])];
         let tree = derive(&seen).unwrap();
-        let plan = Plan::build(devices, tree, &PlanOptions::default()).unwrap();
+        let mut plan = Plan::build(devices, tree, &PlanOptions::default()).unwrap();
+        change(&mut plan);
         let plan = Arc::new(plan);
         let line = Arc::new(Mutex::new(Line::new(&plan)));
         let sources = [MacAddress([0, 0, 0, 0, 0, 1]), MacAddress([0, 0, 0, 0, 0, 2])];
@@ -86,7 +95,13 @@ impl Fixture {
     /// One cycle: the frame as it is sent, and what comes back with these inputs and this counter.
     fn cycle(&mut self, inputs: [u8; 2], wkc: u8) -> Vec<u8> {
         let sent = self.send();
-        let mut back = sent.clone();
+        self.answer(&sent, inputs, wkc);
+        sent
+    }
+
+    /// A frame comes back.
+    fn answer(&mut self, sent: &[u8], inputs: [u8; 2], wkc: u8) {
+        let mut back = sent.to_vec();
         back[6] |= SOURCE_MARK;
         // Two outputs from byte 26 on, two inputs behind them, then the counter.
         back[28..30].copy_from_slice(&inputs);
@@ -98,21 +113,27 @@ impl Fixture {
         let emit = &mut |event| events.push(event);
         let statistics = &mut self.statistics;
         self.cyclic.received(self.now, 0, withheld, &back, statistics, emit);
-        sent
     }
 
     /// A cycle begins; the frame as it is sent.
     fn send(&mut self) -> Vec<u8> {
+        assert!(self.cyclic.next_at() <= self.now);
+        let sent = self.send_one().unwrap();
+        assert_eq!(self.send_one(), None, "one frame a cycle");
+        self.now += Span::ms(1);
+        sent
+    }
+
+    /// A frame that is due, as it is sent.
+    fn send_one(&mut self) -> Option<Vec<u8>> {
         self.cyclic.refresh();
         let events = &mut self.events;
         let emit = &mut |event| events.push(event);
         let statistics = &mut self.statistics;
-        assert!(self.cyclic.next_at() <= self.now);
-        self.cyclic.send_due(self.now, &mut self.exchange, statistics, emit);
-        self.now += Span::ms(1);
         let mut buffer = vec![0; 1514];
-        let (transmit, _) = self.exchange.poll_transmit(self.now, &mut buffer).unwrap();
-        buffer[..transmit.len].to_vec()
+        let exchange = &mut self.exchange;
+        let len = self.cyclic.send_next(self.now, exchange, statistics, emit, &mut buffer)?;
+        Some(buffer[..len].to_vec())
     }
 
     /// The frame that is out does not come back.
@@ -259,6 +280,42 @@ fn each_frame_tells_how_it_went() {
     fixture.send();
     fixture.lose();
     assert_eq!(status(&fixture).wrong_counter, FrameStatus::WHOLE);
+}
+
+#[test]
+fn a_cycle_is_exchanged_when_its_last_frame_is_back() {
+    let mut fixture = Fixture::with(&[device(), device()], None, |plan| {
+        let frame = plan.tasks[0].frames[0].clone();
+        plan.tasks[0].frames.push(frame);
+    });
+    // The answer to the first one may be there before the second one leaves.
+    for last in [false, true] {
+        let sent = fixture.send_one().unwrap();
+        let mut back = sent.clone();
+        back[6] |= SOURCE_MARK;
+        let (index, withheld) = fixture.exchange.receive_usual(&back).unwrap();
+        assert_eq!(index, u32::from(last));
+        let (now, statistics) = (fixture.now, &mut fixture.statistics);
+        fixture.cyclic.received(now, index, withheld, &back, statistics, &mut |_| {});
+        assert_eq!(fixture.cyclic.take_exchanged(0), last);
+    }
+    assert_eq!(fixture.send_one(), None);
+}
+
+#[test]
+fn a_frame_for_which_all_slots_are_taken_is_left_out_and_counted() {
+    let mut fixture = Fixture::new();
+    for _ in 0..256 {
+        fixture.send();
+    }
+    assert_eq!((fixture.send_one(), fixture.statistics.cyclic_unsent), (None, 1));
+    assert_eq!(fixture.cyclic.frame_status(0, 0).unwrap().not_sent, FrameStatus::WHOLE);
+    assert!(fixture.cyclic.next_at() > fixture.now, "it is not tried again in this cycle");
+    fixture.now += Span::ms(1);
+    fixture.lose();
+    fixture.send();
+    assert_eq!(fixture.statistics.cyclic_unsent, 1);
+    assert_eq!(fixture.cyclic.frame_status(0, 0).unwrap().not_sent, 0);
 }
 
 #[test]

@@ -85,6 +85,12 @@ impl Event {
                     name(*id)
                 )]
             }
+            Self::AliasShared { id, alias, count } => vec![format!(
+                "{}: {count} SubDevices answer to its alias {} ({alias}): none of them is taken. Do: give \
+                 each an alias of its own (`linesman sii alias`)",
+                name(*id),
+                alias.0
+            )],
             Self::UnplannedDevice { position, found } => {
                 let found = linesman_config::identity::text(found);
                 vec![format!("position {position}: a device that is not planned ({found})")]

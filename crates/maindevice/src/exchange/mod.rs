@@ -51,6 +51,17 @@ pub struct Transmit {
     pub len: usize,
 }
 
+/// How a cyclic frame is to be sent.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Order {
+    /// When it is given up.
+    pub(crate) deadline: Instant,
+    /// How often each card sends it, once at least.
+    pub(crate) times: u8,
+    /// Its outputs are not to be taken for fresh.
+    pub(crate) withheld: bool,
+}
+
 /// The slots.
 #[derive(Debug)]
 pub(crate) struct Exchange {
@@ -145,8 +156,11 @@ impl Exchange {
         slot.sent.truncate(len);
         slot.cards.clear();
         slot.cards.extend(slot.requests.iter().map(|queued| queued.request.card));
+        let deadline = now + self.patience;
+        slot.unsent = slot.begin(Purpose::Acyclic, deadline, 1, self.ring);
+        self.outgoing.push(at);
         self.acyclic_out += 1;
-        self.go(at, Purpose::Acyclic, now + self.patience, 1);
+        self.wait_until(deadline);
     }
 
     /// Takes over the frames of a plan. Those of the last one must have been abandoned.
@@ -154,49 +168,44 @@ impl Exchange {
         self.cyclic = frames.map(|frame| Prebuilt::new(&frame, self.sources[0])).collect();
     }
 
-    /// Sends a prebuilt frame by all cards, `times` times each; the caller gives it its outputs before
-    /// the next [`Exchange::poll_transmit`]. `None`: all slots are taken, and it does not go.
+    /// Sends a prebuilt frame, with the outputs that `fill` puts into it, by all cards, `times` times
+    /// each. Its first copy is written into `buffer` and leaves at once; the others wait to be fetched
+    /// by [`Exchange::poll_transmit`], which must have given all it had. Gives the frame's length;
+    /// `None`: all slots are taken, and it does not go.
     #[inline]
-    pub(crate) fn begin_cyclic(
+    pub(crate) fn send_cyclic(
         &mut self,
-        frame: usize,
-        deadline: Instant,
-        times: u8,
-        withheld: bool,
-    ) -> Option<&mut Prebuilt> {
+        frame: u32,
+        order: Order,
+        fill: impl FnOnce(&mut [u8]),
+        buffer: &mut [u8],
+    ) -> Option<usize> {
         let (at, number) = self.free_slot()?;
-        let before = self.cyclic.get(frame)?.slot;
-        if self.slot(before).is_unsent(frame) {
-            // Nobody has fetched the last one: it is overtaken, and was never on the line.
-            self.outgoing.remove(before);
-            self.retire(before, SlotState::Free);
-        }
+        let prebuilt = self.cyclic.get_mut(frame as usize)?;
+        prebuilt.number(number);
+        prebuilt.withhold(order.withheld);
+        fill(prebuilt.bytes_mut());
+        let bytes = prebuilt.bytes();
+        let len = bytes.len();
+        buffer.get_mut(..len)?.copy_from_slice(bytes);
         let slot = &mut self.slots[usize::from(at)];
         slot.number = number;
-        slot.withheld = withheld;
-        self.go(at, Purpose::Cyclic { frame }, deadline, times);
-        let prebuilt = &mut self.cyclic[frame];
-        prebuilt.number(number);
-        prebuilt.slot = at;
-        Some(prebuilt)
+        slot.withheld = order.withheld;
+        let purpose = Purpose::Cyclic { frame };
+        let further = slot.begin(purpose, order.deadline, order.times, self.ring) - 1;
+        slot.unsent = further;
+        if further > 0 {
+            self.outgoing.push(at);
+        }
+        self.wait_until(order.deadline);
+        Some(len)
     }
 
-    /// A slot whose frame is ready goes out.
+    /// One more slot waits.
     #[inline]
-    fn go(&mut self, at: u8, purpose: Purpose, deadline: Instant, times: u8) {
-        let slot = &mut self.slots[usize::from(at)];
-        slot.state = SlotState::Waiting;
-        slot.purpose = purpose;
-        slot.deadline = deadline;
-        slot.outstanding = [true, self.ring];
-        slot.arrived = [false; 2];
-        slot.truncated = false;
-        slot.spares = [times.saturating_sub(1); 2];
-        slot.unsent = u16::from(times) << u16::from(self.ring);
-        slot.reply.clear();
+    fn wait_until(&mut self, deadline: Instant) {
         self.waiting += 1;
         self.earliest = self.earliest.min(deadline);
-        self.outgoing.push(at);
     }
 
     /// A slot that is free, and the number of the frame in it.
@@ -240,7 +249,7 @@ impl Exchange {
             }
             let purpose = slot.purpose;
             let bytes = match purpose {
-                Purpose::Cyclic { frame } => match self.cyclic.get(frame) {
+                Purpose::Cyclic { frame } => match self.cyclic.get(frame as usize) {
                     Some(prebuilt) => prebuilt.bytes(),
                     None => continue,
                 },
@@ -274,6 +283,12 @@ impl Exchange {
         if slot.purpose == Purpose::Acyclic {
             self.acyclic_out = self.acyclic_out.saturating_sub(1);
         }
+        self.waits_no_longer();
+    }
+
+    /// One slot less waits.
+    #[inline]
+    fn waits_no_longer(&mut self) {
         self.waiting -= 1;
         if self.waiting == 0 {
             self.earliest = Instant::MAX;

@@ -4,7 +4,7 @@ use linesman_proto::address::Path;
 use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, MAX_LEN, MacAddress, SOURCE_MARK};
 use linesman_proto::time::Instant;
 
-use super::prebuilt::Shaped;
+use super::prebuilt::{FIRST_INDEX, Shaped};
 use super::{Exchange, Purpose, SlotState, merge};
 
 /// Offset of the source address in a frame.
@@ -13,8 +13,6 @@ const SOURCE_AT: usize = 6;
 const TYPE_AT: usize = 15;
 /// That type: datagrams.
 const DATAGRAMS: u8 = 1;
-/// Offset of the index byte of the first datagram.
-const FIRST_INDEX: usize = 17;
 
 /// What a received frame was.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -49,8 +47,38 @@ pub(super) fn origin(source: MacAddress) -> Origin {
 }
 
 impl Exchange {
-    /// Takes a frame that arrived at card `path`.
+    /// Takes a frame if it is what comes back nearly always, without a ring: a cyclic frame that is
+    /// waited for, whole, and marked by the line. Gives which of the prebuilt ones it is, and whether
+    /// its outputs were withheld. For anything else `None`, and nothing has changed:
+    /// [`Exchange::receive`] tells what it is.
     #[inline]
+    pub(crate) fn receive_usual(&mut self, frame: &[u8]) -> Option<(u32, bool)> {
+        let head: &[u8; FIRST_INDEX + 1] = frame.first_chunk()?;
+        let at = head[FIRST_INDEX];
+        let slot = &mut self.slots[usize::from(at)];
+        let Purpose::Cyclic { frame: index } = slot.purpose else { return None };
+        let marked = self.origins[0] | u64::from(SOURCE_MARK);
+        let origin = head[SOURCE_AT..].first_chunk().map(|word| u64::from_le_bytes(*word));
+        if slot.state != SlotState::Waiting
+            || self.ring
+            || origin != Some(marked)
+            || head[TYPE_AT] >> 4 != DATAGRAMS
+            || frame.len() > MAX_LEN
+        {
+            return None;
+        }
+        let prebuilt = self.cyclic.get(index as usize)?;
+        if !prebuilt.is_like(frame, slot.number, slot.withheld) {
+            return None;
+        }
+        slot.arrived[0] = true;
+        slot.state = SlotState::Answered;
+        let withheld = slot.withheld;
+        self.waits_no_longer();
+        Some((index, withheld))
+    }
+
+    /// Takes a frame that arrived at card `path`.
     pub(crate) fn receive(&mut self, now: Instant, path: Path, frame: &[u8]) -> Received {
         let Some(head) = frame.first_chunk() else { return self.receive_stub(frame) };
         let Some(sender) = self.sender(head) else { return Received::Foreign };
@@ -60,7 +88,7 @@ impl Exchange {
             return Received::Stray;
         }
         let shaped = match slot.purpose {
-            Purpose::Cyclic { frame: prebuilt } => match self.cyclic.get(prebuilt) {
+            Purpose::Cyclic { frame: prebuilt } => match self.cyclic.get(prebuilt as usize) {
                 Some(prebuilt) => prebuilt.matches(frame, slot.number, slot.withheld),
                 None => Shaped::Otherwise,
             },
@@ -129,9 +157,8 @@ impl Exchange {
         let slot = self.slot(at);
         match slot.purpose {
             Purpose::Acyclic => frame.starts_with(&slot.sent),
-            Purpose::Cyclic { frame: index } => {
-                (self.cyclic.get(index)).is_some_and(|prebuilt| frame.starts_with(prebuilt.bytes()))
-            }
+            Purpose::Cyclic { frame: index } => (self.cyclic.get(index as usize))
+                .is_some_and(|prebuilt| frame.starts_with(prebuilt.bytes())),
         }
     }
 

@@ -122,6 +122,35 @@ impl Request {
         }
     }
 
+    /// The same for a SubDevice that has no station address, if it is of one that stands in this list: by
+    /// the place where it is.
+    pub(crate) fn placed(mut self, places: &[(StationAddress, Target)]) -> Self {
+        let DatagramAddress::Physical(adp, register) = self.address else { return self };
+        let command = |target: Target| match self.command {
+            Command::Fprd => Some(target.read_command()),
+            Command::Fpwr => Some(target.write_command()),
+            Command::Fprw => Some(target.exchange_command()),
+            Command::Frmw => Some(Command::Armw),
+            Command::Nop
+            | Command::Aprd
+            | Command::Apwr
+            | Command::Aprw
+            | Command::Brd
+            | Command::Bwr
+            | Command::Brw
+            | Command::Lrd
+            | Command::Lwr
+            | Command::Lrw
+            | Command::Armw => None,
+        };
+        let place = places.iter().find(|(station, _)| station.0 == adp).map(|(_, place)| *place);
+        if let Some((place, command)) = place.and_then(|place| Some((place, command(place)?))) {
+            (self.command, self.address) = (command, place.register(register));
+            self.card = place.card();
+        }
+        self
+    }
+
     /// Writes bytes from a register on.
     #[must_use]
     pub fn write(target: Target, address: RegisterAddress, data: &[u8]) -> Self {

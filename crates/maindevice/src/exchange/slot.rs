@@ -18,7 +18,7 @@ pub(crate) enum Purpose {
     /// A prebuilt frame of the plan.
     Cyclic {
         /// Its index among those of all tasks.
-        frame: usize,
+        frame: u32,
     },
 }
 
@@ -86,6 +86,26 @@ impl Slot {
         }
     }
 
+    /// It goes out, `times` times by each card; gives how many copies that are.
+    #[inline]
+    pub(super) fn begin(
+        &mut self,
+        purpose: Purpose,
+        deadline: Instant,
+        times: u8,
+        ring: bool,
+    ) -> u16 {
+        self.state = SlotState::Waiting;
+        self.purpose = purpose;
+        self.deadline = deadline;
+        self.outstanding = [true, ring];
+        self.arrived = [false; 2];
+        self.truncated = false;
+        self.spares = [times.saturating_sub(1); 2];
+        self.reply.clear();
+        u16::from(times) << u16::from(ring)
+    }
+
     /// Whether `reply` is a copy of this frame that card `sender` sent, come back from the line:
     /// the same datagrams with the same marks.
     pub(super) fn matches(&self, reply: &[u8], sender: Path) -> Shaped {
@@ -109,14 +129,6 @@ impl Slot {
             }
         }
         if came.next().is_none() { Shaped::AsSent } else { Shaped::Otherwise }
-    }
-
-    /// Whether it is on its way with a prebuilt frame of which nobody has fetched every copy.
-    #[inline]
-    pub(super) fn is_unsent(&self, frame: usize) -> bool {
-        self.unsent > 0
-            && self.state == SlotState::Waiting
-            && self.purpose == Purpose::Cyclic { frame }
     }
 
     /// What a copy is that came at `now` although the slot, number `at`, waits for none.

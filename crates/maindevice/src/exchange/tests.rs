@@ -1,7 +1,12 @@
 //! Slots against frames made by hand: an answering line of a few bytes.
 
-use linesman_proto::address::{RegisterAddress, StationAddress};
+use linesman_proto::address::{LogicalAddress, RegisterAddress, StationAddress};
 use linesman_proto::ethernet::SOURCE_MARK;
+
+use linesman_config::plan::{DatagramPlan, Role};
+use linesman_proto::command::Command;
+use linesman_proto::frame::builder::DatagramAddress;
+use proptest::prelude::*;
 
 use super::*;
 
@@ -201,4 +206,77 @@ fn in_a_broken_ring_each_card_has_positions_of_its_own() {
     let reply = &exchange.slot(0).reply;
     assert_eq!((reply[26], reply[28], reply[40], reply[42]), (2, 1, 4, 1));
     assert_eq!(exchange.ring_intact(), Some(false));
+}
+
+/// An exchange with one cyclic frame on its way, and that frame: an LRW and a broadcast read.
+fn with_cyclic(number: u32) -> (Exchange, Vec<u8>) {
+    let mut exchange = exchange(false);
+    exchange.number = number;
+    let datagram = |command, address, len, role| DatagramPlan {
+        command,
+        address,
+        len,
+        role,
+        sync_unit: None,
+        ownership: Vec::new(),
+    };
+    let logical = DatagramAddress::Logical(LogicalAddress(0x1_0000));
+    let status = DatagramAddress::Physical(0, RegisterAddress(0x0130));
+    let datagrams = vec![
+        datagram(Command::Lrw, logical, 12, Role::ProcessData),
+        datagram(Command::Brd, status, 2, Role::Presence),
+    ];
+    exchange.prebuild(std::iter::once(FramePlan::new(datagrams)));
+    let order = Order { deadline: NOW + Span::ms(1), times: 1, withheld: false };
+    let mut buffer = vec![0; MAX_LEN];
+    let fill = |bytes: &mut [u8]| bytes[26..30].copy_from_slice(&[1, 2, 3, 4]);
+    let len = exchange.send_cyclic(0, order, fill, &mut buffer).unwrap();
+    buffer.truncate(len);
+    (exchange, buffer)
+}
+
+proptest! {
+    /// What the short way takes the long way takes too, as the same; and what it does not take it
+    /// leaves as it was.
+    #[test]
+    fn the_short_way_takes_only_what_the_long_way_takes(
+        number: u32,
+        changes in prop::collection::vec((0_usize..62, any::<u8>()), 0..3),
+        marked in prop::bool::weighted(0.9),
+        len in prop_oneof![3 => Just(60_usize), 1 => 0_usize..1_600],
+    ) {
+        let (mut short, sent) = with_cyclic(number);
+        let (mut long, _) = with_cyclic(number);
+        let mut back = sent;
+        back[6] |= if marked { SOURCE_MARK } else { 0 };
+        back.resize(len, 0);
+        for (at, byte) in changes {
+            if let Some(place) = back.get_mut(at) {
+                *place = byte;
+            }
+        }
+        let usual = short.receive_usual(&back);
+        let told = long.receive(NOW, Path::A, &back);
+        let [at, ..] = number.to_le_bytes();
+        if usual.is_some() {
+            prop_assert_eq!((usual, told), (Some((0, false)), Received::Complete(at)));
+            prop_assert_eq!(short.slot(at).state, SlotState::Answered);
+            prop_assert_eq!(short.earliest(), Instant::MAX);
+            prop_assert_eq!(short.receive_usual(&back), None, "once only");
+            prop_assert_eq!(short.receive(NOW, Path::A, &back), Received::Duplicate);
+        } else {
+            prop_assert_eq!(short.slot(at).state, SlotState::Waiting);
+            prop_assert_eq!(short.receive(NOW, Path::A, &back), told);
+        }
+    }
+}
+
+#[test]
+fn an_answer_with_data_and_counters_goes_the_short_way() {
+    let (mut exchange, mut back) = with_cyclic(0x0305);
+    back[6] |= SOURCE_MARK;
+    back[32..40].copy_from_slice(&[0x55; 8]);
+    // Logical data end at 38; position counters of broadcasts and the round-trip bit change too.
+    back[42] = 7;
+    assert_eq!(exchange.receive_usual(&back), Some((0, false)));
 }

@@ -14,10 +14,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
+use linesman_proto::address::StationAddress;
 use linesman_proto::time::Instant;
 
 use crate::event::Event;
-use crate::exchange::{ExchangeError, Reply, Request, Ticket};
+use crate::exchange::{ExchangeError, Reply, Request, Target, Ticket};
 use task::Spawned;
 use timers::Timers;
 use waitlist::Waitlist;
@@ -82,6 +83,9 @@ impl Board {
 pub(crate) struct Shared {
     /// Whether what card A sends arrives at card B.
     pub(crate) ring_intact: Option<bool>,
+    /// SubDevices without a station address: what is asked of the one they would have is asked of the
+    /// place where they are.
+    pub(crate) places: Vec<(StationAddress, Target)>,
     pub(crate) submitted: VecDeque<(Ticket, Request)>,
     pub(crate) cancelled: Vec<Ticket>,
     pub(crate) answers: Waitlist<Answer>,
@@ -146,6 +150,7 @@ impl Executor {
     pub(crate) fn new() -> Self {
         let shared = Shared {
             ring_intact: None,
+            places: Vec::new(),
             submitted: VecDeque::new(),
             cancelled: Vec::new(),
             answers: Waitlist::default(),

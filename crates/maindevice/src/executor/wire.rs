@@ -5,7 +5,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
-use linesman_proto::address::{RegisterAddress, WorkingCounter};
+use linesman_proto::address::{RegisterAddress, StationAddress, WorkingCounter};
 use linesman_proto::time::{Instant, Span};
 
 use super::task::{Handle, Spawned, with_handle};
@@ -45,6 +45,10 @@ impl Wire {
     /// Queues a datagram at once; await the result for its answer. Dropping it gives the answer up.
     pub fn submit(&self, request: Request) -> Exchanging {
         let mut shared = self.shared.lock();
+        let request = match shared.places.as_slice() {
+            [] => request,
+            places => request.placed(places),
+        };
         let ticket = Ticket(shared.answers.insert(Answer::default()));
         shared.submitted.push_back((ticket, request));
         Exchanging { shared: Arc::clone(&self.shared), ticket }
@@ -109,6 +113,18 @@ impl Wire {
             received,
             frames: attempts,
         })
+    }
+
+    /// From now on, what is asked of this station address is asked of this place: who is there has none.
+    pub(crate) fn set_place(&self, station: StationAddress, place: Target) {
+        let mut shared = self.shared.lock();
+        shared.places.retain(|(known, _)| *known != station);
+        shared.places.push((station, place));
+    }
+
+    /// Every SubDevice is asked by its own station address again.
+    pub(crate) fn forget_places(&self) {
+        self.shared.lock().places.clear();
     }
 
     /// Sleeps.

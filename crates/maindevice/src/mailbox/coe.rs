@@ -205,6 +205,8 @@ impl Transfer<'_, '_> {
             Why::TooLong { .. } => SdoAbortCode::OUT_OF_MEMORY,
             Why::Protocol { .. } => SdoAbortCode::GENERAL_ERROR,
             Why::Aborted { .. }
+            | Why::Ethernet { .. }
+            | Why::Drive { .. }
             | Why::File { .. }
             | Why::Mailbox { .. }
             | Why::MailboxFull { .. }

@@ -6,7 +6,7 @@ use linesman_proto::time::{Instant, Span};
 use super::errand::MailboxRequest;
 use super::failure::{MailboxFailure, Step, Why};
 use super::multiplexer::Multiplexer;
-use super::{coe, foe, information};
+use super::{coe, foe, information, settings};
 
 /// A SubDevice that writes what it got into its flash memory answers late: a file takes more patience
 /// than an object.
@@ -70,6 +70,13 @@ impl Dialogue<'_> {
             MailboxRequest::DescribeObject { index } => information::object(self, *index).await,
             MailboxRequest::DescribeEntry { object, values } => {
                 information::entry(self, *object, *values).await
+            }
+            MailboxRequest::SetAddresses { port, parameters } => {
+                settings::set_addresses(self, *port, parameters).await.map(|()| Vec::new())
+            }
+            MailboxRequest::WriteIdn { drive, idn, elements, data } => {
+                let written = settings::write_idn(self, *drive, *elements, idn.0, data).await;
+                written.map(|()| Vec::new())
             }
             MailboxRequest::ReadFile { name, password } => foe::read(self, name, *password).await,
             MailboxRequest::WriteFile { name, password, data } => {

@@ -5,6 +5,7 @@ use std::fmt;
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::information::{ListKind, ValueInfo};
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::soe::Idn;
 
 /// Something to be asked. What each of them gives is said there, as bytes.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -45,6 +46,24 @@ pub enum MailboxRequest {
         /// What the answer is to tell beyond the rest.
         values: ValueInfo,
     },
+    /// Set the addresses of an Ethernet port by EoE: nothing comes back.
+    SetAddresses {
+        /// Which port of the SubDevice.
+        port: u8,
+        /// The addresses as the message carries them.
+        parameters: Vec<u8>,
+    },
+    /// Write an identification number by SoE: nothing comes back.
+    WriteIdn {
+        /// Which drive of the SubDevice.
+        drive: u8,
+        /// Which number.
+        idn: Idn,
+        /// Which of its elements.
+        elements: u8,
+        /// What is written.
+        data: Vec<u8>,
+    },
     /// Fetch a file: its bytes.
     ReadFile {
         /// As the SubDevice knows it.
@@ -77,6 +96,8 @@ impl MailboxRequest {
             Self::ObjectList { list } => Errand::List { list: *list },
             Self::DescribeObject { index } => Errand::DescribeObject { index: *index },
             Self::DescribeEntry { object, .. } => Errand::DescribeEntry { object: *object },
+            Self::SetAddresses { port, .. } => Errand::SetAddresses { port: *port },
+            Self::WriteIdn { drive, idn, .. } => Errand::WriteIdn { drive: *drive, idn: *idn },
             Self::ReadFile { name, .. } => Errand::ReadFile { name: name.clone() },
             Self::WriteFile { name, .. } => Errand::WriteFile { name: name.clone() },
         }
@@ -115,6 +136,18 @@ pub enum Errand {
         /// Which.
         object: ObjectAddress,
     },
+    /// Setting the addresses of an Ethernet port.
+    SetAddresses {
+        /// Which port.
+        port: u8,
+    },
+    /// Writing an identification number of a drive.
+    WriteIdn {
+        /// Which drive.
+        drive: u8,
+        /// Which number.
+        idn: Idn,
+    },
     /// Fetching a file.
     ReadFile {
         /// Which.
@@ -137,6 +170,8 @@ impl Errand {
             | Self::List { .. }
             | Self::DescribeObject { .. }
             | Self::DescribeEntry { .. } => MailboxType::Coe,
+            Self::SetAddresses { .. } => MailboxType::Eoe,
+            Self::WriteIdn { .. } => MailboxType::Soe,
             Self::ReadFile { .. } | Self::WriteFile { .. } => MailboxType::Foe,
         }
     }
@@ -155,6 +190,10 @@ impl fmt::Display for Errand {
             Self::List { list } => write!(f, "asking for object list {}", list.code()),
             Self::DescribeObject { index } => write!(f, "asking what object {index} is"),
             Self::DescribeEntry { object } => write!(f, "asking what entry {object} is"),
+            Self::SetAddresses { port } => {
+                write!(f, "setting the addresses of Ethernet port {port}")
+            }
+            Self::WriteIdn { drive, idn } => write!(f, "writing {idn} of drive {drive}"),
             Self::ReadFile { name } => write!(f, "reading file `{name}`"),
             Self::WriteFile { name } => write!(f, "writing file `{name}`"),
         }

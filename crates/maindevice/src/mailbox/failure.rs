@@ -4,8 +4,10 @@ use std::fmt;
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
+use linesman_proto::mailbox::eoe::EoeResult;
 use linesman_proto::mailbox::error_reply::ErrorReplyCode;
 use linesman_proto::mailbox::foe::FoeErrorCode;
+use linesman_proto::mailbox::soe::SoeError;
 use linesman_proto::mailbox::{BufferTooSmall, MailboxType};
 use linesman_proto::time::Span;
 
@@ -67,6 +69,16 @@ pub enum Why {
         code: FoeErrorCode,
         /// What it says about it; may be empty.
         text: String,
+    },
+    /// It refused addresses for an Ethernet port.
+    Ethernet {
+        /// Its reason.
+        result: EoeResult,
+    },
+    /// Its drive refused an identification number.
+    Drive {
+        /// Its reason.
+        code: SoeError,
     },
     /// It answers with an error of the mailbox itself.
     Mailbox {
@@ -134,6 +146,11 @@ impl Why {
         match self {
             Self::Aborted { code } => code.explain().action,
             Self::File { code, .. } => code.action(),
+            Self::Drive { code } => code.action(),
+            Self::Ethernet { .. } => {
+                "check that the SubDevice takes addresses by EoE, and these ones; else set them with its \
+                 maker's tool"
+            }
             Self::Mailbox { code: ErrorReplyCode::UnsupportedProtocol } => {
                 "ask the SubDevice for what it speaks: its SII says which protocols"
             }
@@ -162,7 +179,14 @@ impl Why {
     /// Whether the SubDevice itself has said no: its mailbox works, but what was asked does not suit.
     #[must_use]
     pub const fn is_refusal(&self) -> bool {
-        matches!(self, Self::Aborted { .. } | Self::File { .. } | Self::Mailbox { .. })
+        matches!(
+            self,
+            Self::Aborted { .. }
+                | Self::File { .. }
+                | Self::Ethernet { .. }
+                | Self::Drive { .. }
+                | Self::Mailbox { .. }
+        )
     }
 
     /// Whether an answer may still come, so that it must not be taken for that to another question.
@@ -185,6 +209,8 @@ impl fmt::Display for Why {
             Self::Aborted { code } => write!(f, "the SubDevice aborts, {code}"),
             Self::File { code, text } if text.is_empty() => write!(f, "{code}"),
             Self::File { code, text } => write!(f, "{code}; it says: {text}"),
+            Self::Ethernet { result } => write!(f, "the SubDevice refuses the addresses, {result}"),
+            Self::Drive { code } => write!(f, "the drive refuses, {code}"),
             Self::Mailbox { code } => write!(f, "the SubDevice refuses the message, {code}"),
             Self::NoAnswer { patience, rubbish } => {
                 write!(f, "no answer within {patience}, although its mailbox takes messages")?;

@@ -1,8 +1,8 @@
 //! Talking to the software of SubDevices.
 //!
 //! One multiplexer per SubDevice owns its mailbox: it counts messages, looks whether there is
-//! one to be fetched, fetches lost ones again, and hands them on by type. `coe`, `information` and
-//! `foe` are its clients; errands ([`MailboxRequest`]) wait in a queue and are done one after
+//! one to be fetched, fetches lost ones again, and hands them on by type. `coe`, `information`,
+//! `foe` and `settings` are its clients; errands ([`MailboxRequest`]) wait in a queue and are done one after
 //! another. Emergencies and messages that nobody asked for become events; what went wrong is kept
 //! ([`ProtocolErrors`]).
 
@@ -16,6 +16,7 @@ mod mapped;
 pub(crate) mod multiplexer;
 mod protocol_errors;
 pub(crate) mod queue;
+mod settings;
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;

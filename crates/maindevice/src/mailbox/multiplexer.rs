@@ -6,7 +6,7 @@
 use linesman_config::plan::DevicePlan;
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::mailbox::coe::Message as CoeMessage;
-use linesman_proto::mailbox::{self, Counter, Header, MailboxType, Message};
+use linesman_proto::mailbox::{self, Counter, Header, MailboxType, Message, eoe, soe};
 use linesman_proto::register::{SYNC_MANAGER, SmActivate, SmPdiControl, SmStatus};
 use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::time::{Instant, Span};
@@ -117,12 +117,11 @@ impl Multiplexer {
         let bit = match kind {
             MailboxType::Coe => Protocols::COE,
             MailboxType::Foe => Protocols::FOE,
-            MailboxType::Error
-            | MailboxType::Aoe
-            | MailboxType::Eoe
-            | MailboxType::Soe
-            | MailboxType::Voe
-            | MailboxType::Reserved(_) => return true,
+            MailboxType::Eoe => Protocols::EOE,
+            MailboxType::Soe => Protocols::SOE,
+            MailboxType::Error | MailboxType::Aoe | MailboxType::Voe | MailboxType::Reserved(_) => {
+                return true;
+            }
         };
         self.protocols == Protocols::default() || self.protocols.has(bit)
     }
@@ -340,6 +339,21 @@ impl Multiplexer {
                 Err(error) => self.found_rubbish(error.to_string()),
             },
             MailboxType::Foe if wanted == Some(kind) => return Ok(Some(message.data.to_vec())),
+            // Frames and time stamps come unasked at any time.
+            MailboxType::Eoe if wanted == Some(kind) => {
+                if let Ok(eoe::Message::Response { .. }) = eoe::Message::parse(message.data) {
+                    return Ok(Some(message.data.to_vec()));
+                }
+            }
+            MailboxType::Soe if wanted == Some(kind) => {
+                let operation = soe::Message::parse(message.data).map(|answer| answer.operation);
+                if matches!(
+                    operation,
+                    Some(soe::Operation::ReadResponse | soe::Operation::WriteResponse)
+                ) {
+                    return Ok(Some(message.data.to_vec()));
+                }
+            }
             MailboxType::Reserved(code) => {
                 self.found_rubbish(format!("a message of the reserved type {code}"));
             }

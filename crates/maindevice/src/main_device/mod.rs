@@ -1,6 +1,7 @@
 //! The engine: what comes in, what goes out. What its user can ask of it is in `command`.
 
 mod command;
+mod unusual;
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -15,8 +16,8 @@ use linesman_proto::time::Instant;
 use crate::cyclic::{Cyclic, FrameStatus, Quality};
 use crate::event::Event;
 use crate::exchange::{
-    DatagramData, Exchange, ExchangeError, Purpose, Queued, Received, Reply, Request, SlotState,
-    Ticket, Transmit,
+    DatagramData, Exchange, ExchangeError, Purpose, Queued, Reply, Request, SlotState, Ticket,
+    Transmit,
 };
 use crate::executor::{Executor, Wire, lock};
 use crate::mailbox::Queues;
@@ -96,22 +97,41 @@ impl MainDevice {
     /// The next frame to be sent, written into `buffer`, which must hold 1514 bytes.
     #[inline]
     pub fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
-        self.executor.advance(now);
-        let due = self.running.as_ref().is_some_and(|running| running.cyclic.next_at() <= now);
+        let due = self.running.as_ref().is_some_and(|running| running.cyclic.is_due(now));
         if due || self.executor.has_news() || self.exchange.has_any() {
             return self.transmit(now, due, buffer);
         }
         None
     }
 
-    /// The next frame, where there may be one; the cycle begins if it is `due`.
+    /// The next frame, where there may be one: a cyclic one if it is `due`.
     fn transmit(&mut self, now: Instant, due: bool, buffer: &mut [u8]) -> Option<Transmit> {
-        if due && let Some(running) = &mut self.running {
-            let (exchange, statistics) = (&mut self.exchange, &mut self.statistics);
-            let shared = &self.executor;
-            running.cyclic.send_due(now, exchange, statistics, &mut |event| shared.emit(event));
-            self.acyclic_left = self.options.frames_at_once;
+        self.executor.advance(now);
+        if due
+            && !self.exchange.has_outgoing()
+            && let Some(sent) = self.transmit_cyclic(now, buffer)
+        {
+            return Some(sent);
         }
+        self.transmit_other(now, buffer)
+    }
+
+    /// The next frame of those whose cycle has begun.
+    #[inline]
+    fn transmit_cyclic(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
+        let Self { running, exchange, statistics, executor, .. } = self;
+        let emit = &mut |event| executor.emit(event);
+        let cyclic = &mut running.as_mut()?.cyclic;
+        let len = cyclic.send_next(now, exchange, statistics, emit, buffer)?;
+        self.acyclic_left = self.options.frames_at_once;
+        self.statistics.frames_sent += 1;
+        self.statistics.cyclic_sent += 1;
+        Some(Transmit { at: now, path: Path::A, len })
+    }
+
+    /// A further copy of a cyclic frame, or a frame of procedures.
+    #[inline(never)]
+    fn transmit_other(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
         self.submit();
         if !self.exchange.has_outgoing() {
             if !self.exchange.has_queued() {
@@ -175,47 +195,14 @@ impl MainDevice {
     #[inline]
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.executor.advance(now);
-        let received = self.exchange.receive(now, path, frame);
-        if let Received::Complete(slot) = received {
-            self.statistics.frames_received += 1;
-            self.complete(now, slot, frame);
-        } else {
-            self.receive_other(now, received, frame);
-        }
-        if self.options.ring {
-            self.watch_ring();
+        match self.exchange.receive_usual(frame) {
+            Some((index, withheld)) => {
+                self.statistics.frames_received += 1;
+                self.take_cyclic(now, index, withheld, frame);
+            }
+            None => self.receive_unusual(now, path, frame),
         }
         self.work();
-    }
-
-    /// A frame with which no slot is complete.
-    fn receive_other(&mut self, now: Instant, received: Received, frame: &[u8]) {
-        match received {
-            Received::Spare(slot) => {
-                self.statistics.frames_spare += 1;
-                self.complete_spare(now, slot, frame);
-            }
-            Received::Stray => self.statistics.frames_stray += 1,
-            Received::Truncated => self.statistics.frames_truncated += 1,
-            Received::FirstCopy => self.statistics.frames_received += 1,
-            Received::Late => self.statistics.frames_late += 1,
-            Received::Duplicate => self.statistics.frames_duplicate += 1,
-            Received::Foreign => self.statistics.frames_foreign += 1,
-            Received::Echo | Received::Complete(_) => {}
-        }
-    }
-
-    fn watch_ring(&mut self) {
-        let ring_intact = self.exchange.ring_intact();
-        let mut shared = self.executor.shared();
-        if shared.ring_intact != ring_intact {
-            shared.ring_intact = ring_intact;
-            if let Some(intact) = ring_intact {
-                shared.events.push_back(Event::Ring { intact });
-                drop(shared);
-                self.executor.note_event();
-            }
-        }
     }
 
     /// Time has come to `now`. Hand over frames that have arrived first: whatever is overdue then is
@@ -257,8 +244,16 @@ impl MainDevice {
         }
     }
 
-    /// All that comes back of a frame is back; `last` is what came back last.
+    /// The whole answer of a cyclic frame.
     #[inline]
+    fn take_cyclic(&mut self, now: Instant, index: u32, withheld: bool, reply: &[u8]) {
+        let Some(running) = &mut self.running else { return };
+        let (executor, statistics) = (&self.executor, &mut self.statistics);
+        let emit = &mut |event| executor.emit(event);
+        running.cyclic.received(now, index, withheld, reply, statistics, emit);
+    }
+
+    /// All that comes back of a frame is back; `last` is what came back last.
     fn complete(&mut self, now: Instant, slot: u8, last: &[u8]) {
         match self.exchange.slot(slot).purpose {
             Purpose::Cyclic { frame } => {
@@ -284,14 +279,6 @@ impl MainDevice {
             }
         }
         self.exchange.give_back(slot, requests);
-    }
-
-    /// One more copy of a cyclic frame: taken only when the first was not good.
-    fn complete_spare(&mut self, now: Instant, slot: u8, last: &[u8]) {
-        let Purpose::Cyclic { frame } = self.exchange.slot(slot).purpose else { return };
-        if !self.options.ring && self.running.as_ref().is_some_and(|one| one.cyclic.is_bad(frame)) {
-            self.complete(now, slot, last);
-        }
     }
 
     fn give_up(&mut self, slot: u8) {

@@ -87,6 +87,10 @@ pub enum RefusalKind {
     SdoAbort,
     /// The code of an FoE error message.
     FoeError,
+    /// The result of an EoE request.
+    EoeResult,
+    /// The error code of a drive, of SoE.
+    SoeError,
     /// The code of a mailbox error reply.
     MailboxError,
     /// An AL status code.
@@ -95,7 +99,14 @@ pub enum RefusalKind {
 
 impl RefusalKind {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::SdoAbort, Self::FoeError, Self::MailboxError, Self::AlStatus];
+    pub const ALL: [Self; 6] = [
+        Self::SdoAbort,
+        Self::FoeError,
+        Self::EoeResult,
+        Self::SoeError,
+        Self::MailboxError,
+        Self::AlStatus,
+    ];
 
     /// The word for programs.
     #[must_use]
@@ -103,6 +114,8 @@ impl RefusalKind {
         match self {
             Self::SdoAbort => "sdo-abort",
             Self::FoeError => "foe-error",
+            Self::EoeResult => "eoe-result",
+            Self::SoeError => "soe-error",
             Self::MailboxError => "mailbox-error",
             Self::AlStatus => "al-status",
         }
@@ -118,6 +131,8 @@ impl ServiceFailure {
             Self::Mailbox(failure) => match &failure.why {
                 Why::Aborted { code } => Some((RefusalKind::SdoAbort, code.value())),
                 Why::File { code, .. } => Some((RefusalKind::FoeError, code.0)),
+                Why::Ethernet { result } => Some((RefusalKind::EoeResult, result.0.into())),
+                Why::Drive { code } => Some((RefusalKind::SoeError, code.0.into())),
                 Why::Mailbox { code } => Some((RefusalKind::MailboxError, code.code().into())),
                 _ => None,
             },

@@ -7,11 +7,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_config::identity::mismatch;
+use linesman_config::plan::{AddressingChoice, DevicePlan};
 use linesman_proto::address::{DeviceId, Position, StationAddress};
-use linesman_proto::register::STATION_ADDRESS;
+use linesman_proto::register::{AL_STATUS, AlStatus, STATION_ADDRESS};
 use linesman_proto::sii::Identity;
+use linesman_proto::state::AlState;
 
 use super::align::align;
+use super::by_alias;
 use super::times::Phase;
 use super::{Context, Found, find, lose};
 use crate::event::Event;
@@ -41,7 +44,9 @@ pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), 
         // Addresses of an earlier run must not meet those of the plan.
         let _ = wire.write(Target::All, STATION_ADDRESS.address, &[0; 2]).await;
     }
-    let stations = if from_scratch {
+    by_alias::locate(context).await;
+    let named = context.plan.devices.iter().any(|device| by_alias::alias_of(device).is_some());
+    let stations = if from_scratch && !named {
         vec![StationAddress(0); places.len()]
     } else {
         stations(wire, &places).await
@@ -54,14 +59,22 @@ pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), 
     }
     // Of several with one address the first is meant.
     let devices = context.plan.devices.iter().rev();
-    let planned: BTreeMap<StationAddress, DeviceId> =
-        devices.map(|device| (device.station, device.id)).collect();
+    let planned: BTreeMap<StationAddress, DeviceId> = devices
+        .filter(|device| device.settings.addressing == AddressingChoice::Auto)
+        .map(|device| (device.station, device.id))
+        .collect();
+    // Those that were found by their alias are no landmarks: they may be anywhere.
+    let anywhere: BTreeSet<StationAddress> = (context.plan.devices.iter())
+        .filter(|device| by_alias::alias_of(device).is_some())
+        .map(|device| device.station)
+        .collect();
     let known = |station: StationAddress| {
         let unique = uses.get(&station) == Some(&1);
         let planned = planned.get(&station).copied();
         planned.filter(|_| unique && station.0 != 0 && !from_scratch)
     };
     let seen: Vec<Seen> = (stations.iter().zip(places).zip(0..))
+        .filter(|((station, _), _)| !anywhere.contains(station))
         .map(|((station, place), at)| Seen {
             position: Position(at),
             place,
@@ -107,6 +120,7 @@ async fn stations(wire: &Wire, places: &[Target]) -> Vec<StationAddress> {
 /// Identifies unknown controllers, of which the plan has these.
 async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usize>) {
     let planned: Vec<DeviceId> = (context.plan.devices[planned].iter())
+        .filter(|device| by_alias::alias_of(device).is_none())
         .map(|device| device.id)
         .filter(|id| !matches!(lock(&context.line).found(*id), Found::There { .. }))
         .collect();
@@ -136,7 +150,9 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
     };
     let paired: BTreeSet<usize> = pairs.iter().map(|(at, _)| *at).collect();
     for (at, found) in identities.iter().enumerate() {
-        if !paired.contains(&at) && lock(&context.line).add_stranger(None, *found) {
+        let is_known =
+            paired.contains(&at) || by_alias::is_one(context, seen[at].place, found).await;
+        if !is_known && lock(&context.line).add_stranger(None, *found) {
             let (position, found) = (seen[at].position, *found);
             context.wire.emit(Event::UnplannedDevice { position, found });
         }
@@ -164,7 +180,16 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
 }
 
 async fn give_address(context: &Context, place: Target, id: DeviceId) {
-    let station = context.plan.devices[id.index()].station;
+    let DevicePlan { station, settings, .. } = &context.plan.devices[id.index()];
+    let station = *station;
+    if settings.addressing == AddressingChoice::Position {
+        // Only its place was sought: who runs goes on running, who began anew is set up.
+        let state = context.wire.read_one(place, AL_STATUS.address, AL_STATUS.len).await;
+        let state = state.ok().and_then(|reply| AlStatus(reply.word(0)).state().state());
+        context.wire.set_place(station, place);
+        find(context, id, state.is_none_or(|state| state == AlState::Init));
+        return;
+    }
     match address::assign(&context.wire, place, station).await {
         Ok(()) => find(context, id, true),
         Err(_) => lose(context, id),

@@ -5,6 +5,7 @@
 //! out; [`supervise`] starts them and looks for those that are lost. [`mod@line`] is what they know.
 
 mod align;
+mod by_alias;
 mod clocks;
 mod drive;
 pub(crate) mod keeper;
@@ -16,7 +17,7 @@ pub(crate) mod times;
 
 use std::sync::{Arc, Mutex};
 
-use linesman_config::plan::Plan;
+use linesman_config::plan::{AddressingChoice, DevicePlan, Plan};
 use linesman_proto::address::{DeviceId, Network};
 use linesman_proto::register;
 use linesman_proto::time::{Instant, Span};
@@ -68,6 +69,7 @@ pub(crate) const CALM: Span = Span::ms(5);
 /// Runs a network according to its plan; never ends.
 pub(crate) async fn supervise(context: Context) {
     lock(&context.line).begin_times(context.wire.now());
+    context.wire.forget_places();
     while locate::locate(&context, true).await.is_err() {
         // The whole line is silent.
         for device in &context.plan.devices {
@@ -89,15 +91,22 @@ pub(crate) async fn supervise(context: Context) {
         }
     }
     let mut thorough_at = context.wire.now() + THOROUGH_INTERVAL;
-    let mut located_at = None;
+    let (mut located_at, mut placed_at) = (None, None);
     loop {
         let seen = context.alerts();
         context.nap(seen, SEARCH_INTERVAL).await;
         context.wire.sleep(CALM).await;
+        let responding = lock(&context.line).responding();
+        if responding != placed_at && placed_at.is_some() {
+            // Places may have moved: who has nothing but its place is looked for anew.
+            for device in context.plan.devices.iter().filter(|device| is_by_place(device)) {
+                lose(&context, device.id);
+            }
+        }
+        placed_at = responding;
         if !search(&context).await {
             continue;
         }
-        let responding = lock(&context.line).responding();
         let now = context.wire.now();
         if responding != located_at || now >= thorough_at {
             thorough_at = now + THOROUGH_INTERVAL;
@@ -111,8 +120,10 @@ pub(crate) async fn supervise(context: Context) {
 
 /// Asks those that are lost at their addresses. Returns whether any is still lost.
 async fn search(context: &Context) -> bool {
+    by_alias::locate(context).await;
     let lost: Vec<_> = (context.plan.devices.iter())
         .filter(|device| lock(&context.line).found(device.id) == Found::Lost)
+        .filter(|device| !is_by_place(device))
         .collect();
     let asked: Vec<_> = (lost.iter())
         .map(|device| {
@@ -122,7 +133,8 @@ async fn search(context: &Context) -> bool {
             (device.id, context.wire.submit(request))
         })
         .collect();
-    let mut missing = false;
+    let is_lost = |device: &DevicePlan| lock(&context.line).found(device.id) == Found::Lost;
+    let mut missing = context.plan.devices.iter().any(|one| is_by_place(one) && is_lost(one));
     for (id, reply) in asked {
         match reply.await {
             Ok(reply) if reply.wkc.0 == 1 => find(context, id, false),
@@ -130,6 +142,11 @@ async fn search(context: &Context) -> bool {
         }
     }
     missing
+}
+
+/// Whether a SubDevice has nothing but its place to be reached by (FRM-28).
+fn is_by_place(device: &DevicePlan) -> bool {
+    device.settings.addressing == AddressingChoice::Position
 }
 
 /// A SubDevice does not answer.

@@ -51,15 +51,30 @@ pub(super) async fn execute(
 ) -> Result<(), StepError> {
     for command in device.start_up.iter().filter(|command| command.transition == transition) {
         let outcome = match &command.action {
-            StartUpAction::CoeDownload { .. } if due(transition) != moment => continue,
+            StartUpAction::CoeDownload { .. }
+            | StartUpAction::SetAddresses { .. }
+            | StartUpAction::WriteIdn { .. }
+                if due(transition) != moment =>
+            {
+                continue;
+            }
             StartUpAction::CoeDownload { object, complete_access, data } => {
                 let request = MailboxRequest::Download {
                     object: *object,
                     complete: *complete_access,
                     data: data.clone(),
                 };
-                let outcome = context.mailboxes.ask(device.id, request).await;
-                outcome.map(|_| ()).map_err(StartUpError::from)
+                asked(context, device, request).await
+            }
+            StartUpAction::SetAddresses { port, parameters } => {
+                let (port, parameters) = (*port, parameters.clone());
+                asked(context, device, MailboxRequest::SetAddresses { port, parameters }).await
+            }
+            StartUpAction::WriteIdn { drive, idn, elements, data } => {
+                let (drive, idn, elements) = (*drive, *idn, *elements);
+                let data = data.clone();
+                let request = MailboxRequest::WriteIdn { drive, idn, elements, data };
+                asked(context, device, request).await
             }
             StartUpAction::RegisterWrite { .. } if moment == Moment::After => continue,
             StartUpAction::RegisterWrite { address, data } => {
@@ -72,7 +87,16 @@ pub(super) async fn execute(
     Ok(())
 }
 
-/// When CoE commands of a transition are executed.
+async fn asked(
+    context: &Context,
+    device: &DevicePlan,
+    request: MailboxRequest,
+) -> Result<(), StartUpError> {
+    let outcome = context.mailboxes.ask(device.id, request).await;
+    outcome.map(|_| ()).map_err(StartUpError::from)
+}
+
+/// When mailbox commands of a transition are executed.
 fn due(transition: Transition) -> Moment {
     if transition.opens_mailbox() { Moment::After } else { Moment::Before }
 }

@@ -36,7 +36,7 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
         Event::TargetReached { id, .. } => {
             states(at, event, plan, Some(*id), Severity::Info, EntryKind::State)
         }
-        Event::WrongDevice { id, .. } => {
+        Event::WrongDevice { id, .. } | Event::AliasShared { id, .. } => {
             states(at, event, plan, Some(*id), Severity::Error, EntryKind::Identity)
         }
         Event::UnplannedDevice { .. } => {

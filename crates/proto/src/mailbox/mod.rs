@@ -1,4 +1,4 @@
-//! Mailbox messages: the header all protocols share, error replies, CoE, EoE, FoE, abort codes.
+//! Mailbox messages: the header all protocols share, error replies, CoE, EoE, FoE, SoE, abort codes.
 //!
 //! Messages are views on borrowed bytes: `parse` looks into a buffer, `write` fills one, neither
 //! allocates. Read first: ETG.1000.4 for the header, ETG.1000.6 for CoE and FoE.
@@ -9,6 +9,7 @@ pub mod eoe;
 pub mod error_reply;
 pub mod foe;
 pub mod header;
+pub mod soe;
 
 pub use error_reply::{ErrorReply, ErrorReplyCode};
 pub use header::{BufferTooSmall, Counter, HEADER_LEN, Header, MailboxError, MailboxType, Message};

@@ -1,5 +1,5 @@
-//! A folder of device descriptions (ESI): indexed by a look at the headers of its files, read when a
-//! device of a file is asked for.
+//! A folder of device descriptions (ESI): indexed by a look at the headers of its files, which is kept
+//! from run to run; of a file only the devices are read that are asked for.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use linesman_config::esi::Esi;
 use linesman_config::esi::header::{EsiHeader, headers};
 use linesman_config::project::{Described, ProjectDevice};
+
+use super::index::Index;
 
 /// Longest description that is read, in bytes; the largest of vendors have 50 MB.
 const MAX_LEN: u64 = 128 * 1024 * 1024;
@@ -19,7 +21,8 @@ pub struct Library {
     files: Vec<PathBuf>,
     /// Headers with the file they are in.
     index: Vec<(EsiHeader, usize)>,
-    read: BTreeMap<usize, Esi>,
+    /// What was read of files, and of which of their devices.
+    read: BTreeMap<usize, (Vec<usize>, Esi)>,
     notes: Vec<String>,
 }
 
@@ -32,12 +35,21 @@ impl Library {
         let mut files = Vec::new();
         collect(place, DEPTH, &mut files)?;
         files.sort();
-        for path in files {
-            let bytes = std::fs::read(&path)?;
+        let mut index = Index::of(place);
+        for path in &files {
+            let about = std::fs::metadata(path)?;
             let at = self.files.len();
-            self.index.extend(headers(&bytes).into_iter().map(|header| (header, at)));
-            self.files.push(path);
+            match index.known(path, &about) {
+                Some(known) => self.index.extend(known.iter().map(|header| (header.clone(), at))),
+                None => {
+                    let found = headers(&std::fs::read(path)?);
+                    index.learn(path, &about, &found);
+                    self.index.extend(found.into_iter().map(|header| (header, at)));
+                }
+            }
+            self.files.push(path.clone());
         }
+        index.save(&files);
         Ok(())
     }
 
@@ -83,18 +95,28 @@ impl Library {
                 device.name, header.revision
             ));
         }
-        let esi = self.esi(file)?;
+        let esi = self.esi(file, header.at)?;
         let found = esi.usable().find(|one| {
             (one.product_code, one.revision) == (header.product_code, header.revision)
                 && one.type_name == header.type_name
         });
         match found {
-            Some(found) => Described::from_esi(esi, found, device).map(Some),
+            Some(found) => {
+                let described = Described::from_esi(esi, found, device)?;
+                self.notes.extend(described.notes.iter().cloned());
+                Ok(Some(described))
+            }
             None => {
                 let broken = esi.devices.iter().filter_map(|one| one.as_ref().err());
-                let reasons: Vec<_> = broken.take(1).map(ToString::to_string).collect();
+                let reason = broken.take(1).map(ToString::to_string).next();
+                let reason = reason.unwrap_or_else(|| {
+                    let name = &header.type_name;
+                    format!(
+                        "there is no usable element Device for `{name}`; was it changed just now?"
+                    )
+                });
                 let path = self.files[file].display();
-                Err(format!("{path}: its description cannot be used: {}", reasons.join("")))
+                Err(format!("{path}: its description cannot be used: {reason}"))
             }
         }
     }
@@ -120,15 +142,21 @@ impl Library {
         best.map(|(header, file)| (header, *file))
     }
 
-    fn esi(&mut self, file: usize) -> Result<&Esi, String> {
-        if !self.read.contains_key(&file) {
+    /// A file, with the device at this place and those that were asked for before.
+    fn esi(&mut self, file: usize, device: usize) -> Result<&Esi, String> {
+        let mut devices = self.read.get(&file).map_or(Vec::new(), |(devices, _)| devices.clone());
+        if !devices.contains(&device) {
+            devices.push(device);
             let path = &self.files[file];
             let wrong = |error: String| format!("{}: {error}", path.display());
             let bytes = std::fs::read(path).map_err(|error| wrong(error.to_string()))?;
-            let esi = Esi::parse(&bytes).map_err(|error| wrong(error.to_string()))?;
-            self.read.insert(file, esi);
+            let esi = Esi::parse_only(&bytes, &devices);
+            self.read.insert(file, (devices, esi.map_err(|error| wrong(error.to_string()))?));
         }
-        self.read.get(&file).ok_or_else(|| "the description went away".to_owned())
+        self.read
+            .get(&file)
+            .map(|(_, esi)| esi)
+            .ok_or_else(|| "the description went away".to_owned())
     }
 }
 

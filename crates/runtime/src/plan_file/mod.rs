@@ -1,8 +1,10 @@
 //! The file that a line is planned with: a project (TOML), or a network configuration of another tool
 //! (ENI).
 
+mod index;
 pub mod library;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use linesman_config::eni::{Eni, EniError};
@@ -10,6 +12,7 @@ use linesman_config::plan::Plan;
 use linesman_config::project::{Project, ProjectError, ResolveError};
 
 use self::library::Library;
+use crate::named_files::read_at_most;
 
 /// Longest file that is read, in bytes; the largest configurations have some 20 MB.
 const MAX_LEN: u64 = 256 * 1024 * 1024;
@@ -60,7 +63,7 @@ pub enum PlanFileError {
         at: usize,
     },
     /// It is a network configuration that cannot be used.
-    #[error("{path}: {source}")]
+    #[error("{path}: {}", advised(.source, "export it again from the tool that wrote it, or correct it there"))]
     Eni {
         /// Which.
         path: String,
@@ -68,7 +71,7 @@ pub enum PlanFileError {
         source: EniError,
     },
     /// It is no project.
-    #[error("{path}: {source}")]
+    #[error("{path}: {}", advised(.source, "correct it there; `linesman schema project` lists all keys"))]
     Project {
         /// Which.
         path: String,
@@ -76,7 +79,7 @@ pub enum PlanFileError {
         source: Box<ProjectError>,
     },
     /// The project cannot be planned.
-    #[error("{path}: {source}")]
+    #[error("{path}: {}", advised(.source, "correct the project there"))]
     Resolve {
         /// Which.
         path: String,
@@ -97,6 +100,13 @@ pub enum PlanFileError {
     },
 }
 
+/// The words of an error, with advice where it has none of its own.
+fn advised(error: &dyn std::error::Error, advice: &str) -> String {
+    let words = error.to_string();
+    let words = words.trim_end();
+    if words.contains(". Do: ") { words.to_owned() } else { format!("{words}. Do: {advice}") }
+}
+
 impl PlanFile {
     /// Reads a file and makes its plan.
     ///
@@ -109,7 +119,7 @@ impl PlanFile {
         if len > MAX_LEN {
             return Err(PlanFileError::TooLong { path: shown, len });
         }
-        let bytes = std::fs::read(path).map_err(read)?;
+        let bytes = read_at_most(path, MAX_LEN).map_err(read)?;
         let is_xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
         if is_xml || Eni::is_one(&bytes) {
             let eni = Eni::parse(&bytes);
@@ -121,14 +131,24 @@ impl PlanFile {
             let at = error.utf8_error().valid_up_to();
             PlanFileError::NoText { path: shown.clone(), at }
         })?;
-        let project = Project::parse(&text).map_err(|source| PlanFileError::Project {
+        let mut project = Project::parse(&text).map_err(|source| PlanFileError::Project {
             path: shown.clone(),
             source: Box::new(source),
         })?;
         let mut library = library_of(&project, path, &shown)?;
+        let mut rules = BTreeMap::new();
         let plan = project
-            .plan(&mut |device| library.find(device))
+            .plan(&mut |device| {
+                let found = library.find(device)?;
+                let rule = found.as_ref().and_then(|found| found.revision_rule);
+                rules.extend(rule.map(|rule| (device.name.clone(), rule)));
+                Ok(found)
+            })
             .map_err(|source| PlanFileError::Resolve { path: shown, source: Box::new(source) })?;
+        // Whoever compares with the project compares as the makers want it.
+        for device in &mut project.devices {
+            device.revision_rule = device.revision_rule.or(rules.get(&device.name).copied());
+        }
         let notes = library.take_notes();
         Ok(Self { name: project.name.clone(), plan, project: Some(project), notes })
     }

@@ -21,16 +21,25 @@ pub enum Next {
 /// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
 /// sent.
 pub trait Application {
-    /// The line is about to be started: the process image has so many bytes of inputs and outputs.
+    /// The line is about to be started with this plan.
     ///
     /// # Errors
     /// Why it cannot be started.
-    fn begin(&mut self, _inputs: usize, _outputs: usize) -> Result<(), String> {
+    fn begin(&mut self, _plan: &Plan) -> Result<(), String> {
         Ok(())
     }
 
-    /// One cycle: inputs are those that have just come back, outputs leave with the next frames.
+    /// One cycle. Where the task exchanges at its begin ([`IoAt::TaskBegin`](linesman_config::plan::IoAt)),
+    /// it is called when the frames are back: inputs are fresh, outputs leave at the next begin, whenever
+    /// this returns. Where it exchanges at its end, it is called when the cycle begins: inputs are those of
+    /// the cycle before, outputs leave as soon as this returns (SYN-13).
     fn cycle(&mut self, io: &mut Io<'_>) -> Next;
+
+    /// A second program of a task that exchanges at its end: called when the outputs of
+    /// [`cycle`](Self::cycle) have gone out and the inputs are back, for what must not delay them (SYN-14).
+    /// Outputs that it sets leave with the next cycle, unless that sets them anew. Of a task that exchanges
+    /// at its begin it is never called: there `cycle` itself runs after the outputs went out.
+    fn after_outputs(&mut self, _io: &mut Io<'_>) {}
 
     /// Whether it gives outputs at all. One that does not is not watched for being late.
     fn is_idle(&self) -> bool {

@@ -3,13 +3,14 @@
 use std::sync::mpsc::SyncSender;
 use std::thread::{self, JoinHandle};
 
-use linesman_diagnosis::{Diagnosis, Engine, Setup};
+use linesman_diagnosis::{Diagnosis, Engine, Probe, Setup};
 use linesman_proto::time::Instant;
 
 use super::operator::Note;
 use super::tap::Listener;
 
-/// Begins to judge what comes by the tap; findings are told as notes.
+/// Begins to judge what comes by the tap; findings are told as notes, and what the diagnosis would like to
+/// have read goes to `probes`, as far as there is room.
 ///
 /// # Errors
 /// When the system has no more threads.
@@ -17,6 +18,7 @@ pub fn judge(
     setup: Setup,
     listener: Listener,
     notes: SyncSender<Note>,
+    probes: SyncSender<Probe>,
 ) -> std::io::Result<JoinHandle<Diagnosis>> {
     thread::Builder::new().name("judge".to_owned()).spawn(move || {
         let mut engine = Engine::new(setup);
@@ -35,8 +37,10 @@ pub fn judge(
             }
             host.for_each(|observation| engine.handle_host(observation));
             engine.handle_timeout(last);
-            // What it would like to know is known anyway: every SubDevice's keeper reads it.
-            while engine.poll_probe().is_some() {}
+            while let Some(probe) = engine.poll_probe() {
+                // What is not read now is asked for again.
+                let _ = probes.try_send(probe);
+            }
             while let Some(event) = engine.poll_event() {
                 let _ = notes.try_send(Note::Finding(Box::new(event)));
             }

@@ -2,13 +2,13 @@
 
 use std::cell::Cell;
 use std::sync::Arc;
-use std::sync::mpsc::{SyncSender, TrySendError};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use linesman_config::inventory::Inventory;
-use linesman_config::plan::{IoAt, Plan};
-use linesman_diagnosis::{Diagnosis, FrameSeen, HostObservation, Setup};
+use linesman_config::plan::{DevicePlan, IoAt, Plan};
+use linesman_diagnosis::{Asked, Diagnosis, FrameSeen, HostObservation, Probe, Setup};
 use linesman_link::error::LinkError;
-use linesman_maindevice::{Event, MainDevice, Options};
+use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest, Target};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
@@ -18,7 +18,7 @@ use super::judge::judge;
 use super::real_time::{Granted, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
 use super::scan;
-use super::tap::{Tap, tap};
+use super::tap::{Passed, Tap, tap};
 use crate::drive::{Audience, Driver};
 use crate::line::Line;
 use crate::serve::lateness::Lateness;
@@ -58,6 +58,9 @@ pub struct RunOptions {
     /// How the line is judged while it runs; `None`: it is not.
     pub diagnose: Option<Setup>,
 }
+
+/// Room for what the diagnosis would like to have read.
+const PROBES: usize = 64;
 
 /// Room for notes that are on their way to whoever listens.
 pub const NOTES: usize = 65_536;
@@ -104,6 +107,8 @@ pub struct Operator<A> {
     io_at: IoAt,
     notes: SyncSender<Note>,
     tap: Option<Tap>,
+    /// What the diagnosis would like to have read.
+    probes: Option<Receiver<Probe>>,
     plan: Option<Arc<Plan>>,
     begun: bool,
     reached_at: Option<Instant>,
@@ -124,7 +129,7 @@ pub struct Operator<A> {
 
 impl<A: Application> Operator<A> {
     fn start(&mut self, now: Instant, plan: Plan, main: &mut MainDevice) {
-        if let Err(why) = self.application.begin(plan.inputs_len, plan.outputs_len) {
+        if let Err(why) = self.application.begin(&plan) {
             self.failure = Some(RunError::Plan(why));
             return;
         }
@@ -186,17 +191,48 @@ impl<A: Application> Operator<A> {
         self.desk = Some(desk);
     }
 
+    /// Has read what the diagnosis would like to know; it sees the frames.
+    fn look_up(&mut self, now: Instant, main: &mut MainDevice) {
+        let (Some(plan), Some(probes)) = (&self.plan, &self.probes) else { return };
+        while let Ok(probe) = probes.try_recv() {
+            match probe.what {
+                Asked::Register { address, len } => {
+                    let target = Target::Station(probe.station);
+                    main.probe(now, ProbeRequest { target, register: address, len, write: None });
+                }
+                Asked::Written { address, data } => {
+                    let (target, write) = (Target::Station(probe.station), Some(data.to_vec()));
+                    main.probe(now, ProbeRequest { target, register: address, len: 2, write });
+                }
+                Asked::Object(object) => {
+                    let at = |device: &&DevicePlan| device.station == probe.station;
+                    if let Some(device) = plan.devices.iter().find(at) {
+                        main.sdo_upload(now, device.id, object, false);
+                    }
+                }
+            }
+        }
+    }
+
     /// Calls the application when it is its turn.
     fn call(&mut self, now: Instant, main: &mut MainDevice) {
         // The first task is that of the application; others exchange beside it.
+        let exchanged = main.take_exchanged(0);
+        let missed = main.statistics().cycles_missed;
         let due = match self.io_at {
-            IoAt::TaskBegin => main.take_exchanged(0),
-            IoAt::TaskEnd => main.next_cycle(0).is_some_and(|due| due <= now),
+            IoAt::TaskBegin => exchanged,
+            IoAt::TaskEnd => {
+                if exchanged {
+                    let withheld = self.withheld;
+                    let mut io = Io { main: &mut *main, now, missed, withheld, old: false };
+                    self.application.after_outputs(&mut io);
+                }
+                main.next_cycle(0).is_some_and(|due| due <= now)
+            }
         };
         if !due {
             return;
         }
-        let missed = main.statistics().cycles_missed;
         let mut io = Io { main, now, missed, withheld: self.withheld, old: false };
         if self.application.cycle(&mut io) == Next::Stop {
             self.ended = true;
@@ -212,6 +248,18 @@ impl<A: Application> Audience for Operator<A> {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         if let Some(tap) = &mut self.tap {
             tap.frame(frame);
+        }
+    }
+
+    #[inline]
+    fn room(&mut self, now: Instant) -> Option<&mut [u8]> {
+        self.tap.as_mut().map(|tap| tap.room(now).as_mut_slice())
+    }
+
+    #[inline]
+    fn keep(&mut self, sent: &Passed, len: usize) {
+        if let Some(tap) = &mut self.tap {
+            tap.keep(sent, len);
         }
     }
 
@@ -265,6 +313,9 @@ impl<A: Application> Audience for Operator<A> {
             self.failure = Some(RunError::Scan(words.to_owned()));
         }
         self.attend(now, main);
+        if !self.leaving {
+            self.look_up(now, main);
+        }
         if self.plan.is_some() && !self.leaving {
             self.call(now, main);
         }
@@ -316,11 +367,14 @@ pub fn run<L: Line, A: Application>(
 ) -> Result<Ended, RunError> {
     let Beside { stop, notes, desk } = beside;
     let is_virtual = options.real_time.is_none();
+    let (ask, probes) = sync_channel(PROBES);
     let (tap, judging) = match &options.diagnose {
         None => (None, None),
         Some(setup) => {
             let (tap, listener) = tap(is_virtual);
-            let thread = judge(setup.clone(), listener, notes.clone()).map_err(RunError::Thread)?;
+            // In virtual time the judge has no time of its own: when it asked would be chance.
+            let setup = Setup { probes: !is_virtual, ..setup.clone() };
+            let thread = judge(setup, listener, notes.clone(), ask).map_err(RunError::Thread)?;
             (Some(tap), Some(thread))
         }
     };
@@ -335,6 +389,7 @@ pub fn run<L: Line, A: Application>(
         application,
         io_at: IoAt::default(),
         notes,
+        probes: tap.is_some().then_some(probes),
         tap,
         plan: None,
         begun: false,

@@ -2,9 +2,14 @@
 
 use std::path::PathBuf;
 
+use linesman_config::plan::Plan;
 use linesman_link::shared_image::{ImageState, SharedImage};
 
 use super::io::{Application, Io, Next};
+use linesman_proto::address::DeviceId;
+
+/// States of so many SubDevices are brought up to date in a cycle, in turn.
+const STATES_A_CYCLE: usize = 64;
 
 /// Inputs for whoever wants to read them, outputs from the one program that gives them. The file is
 /// made in the first cycle and removed at the end.
@@ -14,19 +19,23 @@ pub struct Shared {
     /// Count of the outputs that were taken last.
     last: u64,
     state: ImageState,
+    /// The SubDevice whose state comes next.
+    next: usize,
 }
 
 impl Shared {
     /// An image in a file at `path`.
     #[must_use]
     pub fn at(path: PathBuf) -> Self {
-        Self { path, image: None, last: 0, state: ImageState::default() }
+        Self { path, image: None, last: 0, state: ImageState::default(), next: 0 }
     }
 }
 
 impl Application for Shared {
-    fn begin(&mut self, inputs: usize, outputs: usize) -> Result<(), String> {
-        let image = SharedImage::create(&self.path, inputs, outputs).map_err(|error| {
+    fn begin(&mut self, plan: &Plan) -> Result<(), String> {
+        let Plan { inputs_len, outputs_len, devices, .. } = plan;
+        let image = SharedImage::create(&self.path, *inputs_len, *outputs_len, devices.len());
+        let image = image.map_err(|error| {
             let path = self.path.display();
             format!("{path}: making the process image: {error}. Do: name a file in /dev/shm")
         })?;
@@ -42,8 +51,14 @@ impl Application for Shared {
             settled: io.is_settled(),
             withheld: io.is_withheld(),
             ended: false,
+            network: io.network_state().0,
         };
-        image.publish(io.inputs(), &self.state);
+        let count = image.devices();
+        let first = self.next;
+        self.next = (first + STATES_A_CYCLE) % count.max(1);
+        let indices = (first..first + STATES_A_CYCLE.min(count)).map(|at| at % count);
+        let states = indices.map(|at| (at, io.state(DeviceId(at as u32)).0));
+        image.publish(io.inputs(), &self.state, states);
         // Its first outputs count; what stays as it was is old.
         if !image.take_outputs(io.outputs_unchanged(), &mut self.last) {
             io.outputs_are_old();
@@ -58,7 +73,7 @@ impl Drop for Shared {
             let mut inputs = vec![0; image.inputs_len()];
             // Whoever looks on learns that nothing will change any more.
             if image.read_inputs(&mut inputs).is_some() {
-                image.publish(&inputs, &ImageState { ended: true, ..self.state });
+                image.publish(&inputs, &ImageState { ended: true, ..self.state }, []);
             }
         }
     }

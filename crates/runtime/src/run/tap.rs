@@ -1,7 +1,8 @@
 //! What the diagnosis sees of a running line, without holding up the cycle.
 //!
-//! Frames are copied into a log that was laid out beforehand; a full or old log is handed over as a
-//! whole to the thread that judges, and an empty one taken in return. When that thread does not keep
+//! Frames are kept in a log that was laid out beforehand, which has room for one more at any time: a
+//! frame that is sent is written there in the first place, one that was received is copied. A full or
+//! old log is handed over as a whole to the thread that judges, and an empty one taken in return. When that thread does not keep
 //! up, frames are left out and counted: the cycle never waits.
 
 use std::sync::mpsc::{self, Receiver, SyncSender, TrySendError};
@@ -12,6 +13,9 @@ use linesman_proto::time::{Instant, Span};
 
 /// Bytes of frames in one log.
 const ROOM: usize = 256 * 1024;
+/// Room for one frame, in bytes: the longest has 1,514, and what is longer than any may be has its
+/// end cut off.
+const FRAME_ROOM: usize = 1_536;
 /// Frames in one log.
 const FRAMES: usize = 2_048;
 /// Logs on their way: so far may the judging thread fall behind.
@@ -51,6 +55,8 @@ pub struct Log {
     len: usize,
     records: Box<[Record]>,
     count: usize,
+    /// There is no room for another frame.
+    full: bool,
     host: Vec<HostObservation>,
 }
 
@@ -61,35 +67,41 @@ impl Log {
             len: 0,
             records: vec![Record::NONE; frames].into(),
             count: 0,
+            full: false,
             host: Vec::new(),
         }
     }
 
     fn clear(&mut self) {
-        (self.len, self.count) = (0, 0);
+        (self.len, self.count, self.full) = (0, 0, false);
         self.host.clear();
     }
 
-    /// Copies a frame; false: there is no room for it.
+    /// Room for the next frame; `None`: the log is full.
     #[inline]
-    fn push(&mut self, frame: &FrameSeen<'_>) -> bool {
-        let end = self.len + frame.bytes.len();
-        let room = self.bytes.get_mut(self.len..end);
-        let (Some(room), Some(record)) = (room, self.records.get_mut(self.count)) else {
-            return false;
-        };
-        room.copy_from_slice(frame.bytes);
-        *record = Record {
-            time: frame.time,
-            number: frame.number,
-            end,
-            path: frame.path,
-            direction: frame.direction,
-            truncated: frame.truncated,
-        };
-        self.len = end;
-        self.count += 1;
-        true
+    fn room(&mut self) -> Option<&mut [u8; FRAME_ROOM]> {
+        if self.full {
+            return None;
+        }
+        self.bytes.get_mut(self.len..)?.first_chunk_mut()
+    }
+
+    /// The frame in [`Log::room`] is there.
+    #[inline]
+    fn keep(&mut self, passed: &Passed, len: usize) {
+        self.len += len;
+        if let Some(record) = self.records.get_mut(self.count) {
+            *record = Record {
+                time: passed.time,
+                number: passed.number,
+                end: self.len,
+                path: passed.path,
+                direction: passed.direction,
+                truncated: passed.truncated,
+            };
+            self.count += 1;
+        }
+        self.full = self.count >= self.records.len() || self.len + FRAME_ROOM > self.bytes.len();
     }
 
     /// The frames, oldest first.
@@ -118,6 +130,21 @@ impl Log {
     }
 }
 
+/// What is known of a frame that passed, without its bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Passed {
+    /// When, as [`FrameSeen::time`].
+    pub time: Instant,
+    /// Its number, as [`FrameSeen::number`].
+    pub number: u64,
+    /// The card.
+    pub path: Option<Path>,
+    /// Which way it went.
+    pub direction: Direction,
+    /// Its end is missing.
+    pub truncated: bool,
+}
+
 /// The end in the cycle.
 pub struct Tap {
     log: Log,
@@ -129,6 +156,8 @@ pub struct Tap {
     full_until: Instant,
     /// Frames that were left out.
     left_out: u64,
+    /// Where they go.
+    nowhere: Box<[u8; FRAME_ROOM]>,
     /// Wait for the other side rather than leave anything out.
     waits: bool,
 }
@@ -156,6 +185,7 @@ pub fn tap(waits: bool) -> (Tap, Listener) {
         full,
         empty,
         left_out: 0,
+        nowhere: Box::new([0; FRAME_ROOM]),
         waits,
     };
     (tap, Listener { full: from_cycle, empty: to_cycle })
@@ -165,27 +195,42 @@ impl Tap {
     /// A frame left a card or came back.
     #[inline]
     pub fn frame(&mut self, frame: &FrameSeen<'_>) {
-        if self.log.count == 0 {
-            self.due = frame.time + OLD;
+        let len = frame.bytes.len().min(FRAME_ROOM);
+        self.room(frame.time)[..len].copy_from_slice(&frame.bytes[..len]);
+        let FrameSeen { time, number, path, direction, .. } = *frame;
+        let truncated = frame.truncated || len < frame.bytes.len();
+        self.keep(&Passed { time, number, path, direction, truncated }, len);
+    }
+
+    /// Room for a frame that passes about `now`. [`Tap::keep`] says that it did, else it is as if
+    /// nothing had been written.
+    #[inline]
+    pub fn room(&mut self, now: Instant) -> &mut [u8; FRAME_ROOM] {
+        if self.log.full {
+            self.next_log(now);
         }
-        if !self.log.push(frame) {
-            self.push_into_next(frame);
+        self.log.room().unwrap_or(&mut self.nowhere)
+    }
+
+    /// The frame that was written into [`Tap::room`] has passed; it has so many bytes.
+    #[inline]
+    pub fn keep(&mut self, passed: &Passed, len: usize) {
+        if self.log.count == 0 {
+            self.due = passed.time + OLD;
+        }
+        match self.log.full {
+            false => self.log.keep(passed, len),
+            true => self.left_out += 1,
         }
     }
 
     /// The log is full: the next one takes the frame, if there is one.
     #[cold]
-    fn push_into_next(&mut self, frame: &FrameSeen<'_>) {
+    fn next_log(&mut self, now: Instant) {
         // Asking again and again costs more than the frames are worth.
-        if frame.time < self.full_until || !self.hand_over() {
-            if frame.time >= self.full_until {
-                self.full_until = frame.time + PAUSE;
-            }
-            self.left_out += 1;
-            return;
+        if now >= self.full_until && !self.hand_over() {
+            self.full_until = now + PAUSE;
         }
-        self.due = frame.time + OLD;
-        self.left_out += u64::from(!self.log.push(frame));
     }
 
     /// The host noticed something.

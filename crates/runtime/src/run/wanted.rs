@@ -2,8 +2,9 @@
 
 use linesman_config::identity::{mismatch, text};
 use linesman_config::inventory::Inventory;
-use linesman_config::plan::{Plan, PlanOptions};
-use linesman_config::project::Project;
+use linesman_config::plan::{Plan, PlanOptions, PlannedDevice};
+use linesman_config::profile::ClockMode;
+use linesman_config::project::{ClockChoice, Project};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
@@ -16,11 +17,13 @@ pub struct Choices {
     pub target: AlState,
     /// Cycle time; `None`: that of the plan.
     pub cycle: Option<Span>,
+    /// Distributed clocks for every SubDevice that has one and says how it is to be used.
+    pub clocks: bool,
 }
 
 impl Default for Choices {
     fn default() -> Self {
-        Self { target: AlState::Op, cycle: None }
+        Self { target: AlState::Op, cycle: None, clocks: false }
     }
 }
 
@@ -66,6 +69,10 @@ impl Choices {
         }
         let mut options = PlanOptions::default();
         options.cycle = self.cycle.unwrap_or(options.cycle);
+        if self.clocks {
+            clock(&mut planned, options.cycle)?;
+            options.clock_datagrams = true;
+        }
         Plan::build(&planned, inventory.tree().clone(), &options)
             .map_err(|error| format!("{error}. Do: see `linesman plan`"))
     }
@@ -91,6 +98,18 @@ impl Choices {
     pub fn plan_of(self, inventory: &Inventory) -> Result<Plan, String> {
         self.plan(inventory, None)
     }
+}
+
+/// Clocks each SubDevice by the first mode of its own description that has a SYNC0 (ETG.2000, `OpMode`).
+fn clock(planned: &mut [PlannedDevice], cycle: Span) -> Result<(), String> {
+    for device in planned {
+        let modes = &device.profile.clock_modes;
+        let with_sync0 = |mode: &&ClockMode| mode.assign_activate & 0x0200 != 0;
+        let Some(mode) = modes.iter().find(with_sync0) else { continue };
+        let choice = ClockChoice { mode: Some(mode.name.clone()), ..ClockChoice::default() };
+        device.settings.clock = Some(choice.settings(modes, cycle)?);
+    }
+    Ok(())
 }
 
 fn too_few(project: &Project, missing: &str, inventory: &Inventory) -> String {

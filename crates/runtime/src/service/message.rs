@@ -5,6 +5,7 @@ use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer};
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::coe::information::{ListKind, ValueInfo};
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::soe::Idn;
 use linesman_proto::register::AlStatus;
 use linesman_proto::sii::WordAddress;
 use linesman_proto::state::{AlState, AlStatusCode};
@@ -74,6 +75,10 @@ pub enum Asked {
     DescribeObject { index: u16 },
     /// What an entry is.
     DescribeEntry { index: u16, subindex: u8, values: u8 },
+    /// Set the addresses of an Ethernet port by EoE.
+    SetAddresses { port: u8, data: String },
+    /// Write an identification number by SoE.
+    WriteIdn { drive: u8, idn: u16, elements: u8, data: String },
     /// Fetch a file.
     ReadFile {
         name: String,
@@ -254,6 +259,13 @@ impl From<&MailboxRequest> for Asked {
                 let (index, subindex) = (object.index.0, object.subindex);
                 Self::DescribeEntry { index, subindex, values: values.0 }
             }
+            MailboxRequest::SetAddresses { port, parameters } => {
+                Self::SetAddresses { port: *port, data: to_hex(parameters) }
+            }
+            MailboxRequest::WriteIdn { drive, idn, elements, data } => {
+                let (drive, idn, elements) = (*drive, idn.0, *elements);
+                Self::WriteIdn { drive, idn, elements, data: to_hex(data) }
+            }
             MailboxRequest::ReadFile { name, password } => {
                 Self::ReadFile { name: name.clone(), password: *password }
             }
@@ -291,6 +303,14 @@ impl Asked {
             Self::DescribeEntry { index, subindex, values } => {
                 let (object, values) = (ObjectAddress::new(index, subindex), ValueInfo(values));
                 Service::Mailbox(MailboxRequest::DescribeEntry { object, values })
+            }
+            Self::SetAddresses { port, data } => {
+                let parameters = from_hex(&data)?;
+                Service::Mailbox(MailboxRequest::SetAddresses { port, parameters })
+            }
+            Self::WriteIdn { drive, idn, elements, data } => {
+                let (idn, data) = (Idn(idn), from_hex(&data)?);
+                Service::Mailbox(MailboxRequest::WriteIdn { drive, idn, elements, data })
             }
             Self::ReadFile { name, password } => {
                 Service::Mailbox(MailboxRequest::ReadFile { name, password })

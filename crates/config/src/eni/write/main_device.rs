@@ -3,8 +3,8 @@
 use linesman_proto::command::Command;
 
 use super::transition::{Init, Target, command};
-use crate::plan::Plan;
 use crate::plan::layout::MAILBOX_STATES;
+use crate::plan::{AddressingChoice, DevicePlan, Plan};
 use crate::xml_writer::Xml;
 
 pub(super) fn write(xml: &mut Xml, name: &str, plan: &Plan) {
@@ -36,6 +36,12 @@ pub(super) fn write(xml: &mut Xml, name: &str, plan: &Plan) {
             ] {
                 let init = Init::new(comment, &["IP"], Target::All, register);
                 command(xml, &Init { before: true, ..init }, Command::Bwr, data);
+            }
+            let by_alias = |one: &DevicePlan| one.settings.addressing == AddressingChoice::Alias;
+            if plan.devices.iter().any(by_alias) {
+                // Bit 24 of DL control (S2 2.4.1): controllers answer to their second address.
+                let init = Init::new("use second addresses", &["IP"], Target::All, 0x0103);
+                command(xml, &Init { before: true, ..init }, Command::Bwr, &[1]);
             }
         });
     });

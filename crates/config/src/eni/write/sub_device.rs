@@ -13,7 +13,7 @@ use super::transition::{Init, Target, command};
 use crate::eni::OWN;
 use crate::esi::device::letters;
 use crate::identity::RevisionRule;
-use crate::plan::{DevicePlan, Plan};
+use crate::plan::{AddressingChoice, DevicePlan, Plan};
 use crate::profile::Mailbox;
 use crate::start_up::StartUpAction;
 use crate::xml_writer::{Xml, hex};
@@ -141,12 +141,64 @@ fn write_mailbox(xml: &mut Xml, device: &DevicePlan, mailbox: &Mailbox) {
                 }
             });
         });
+        settings(xml, device);
     });
 }
 
+/// Start-up commands by EoE and SoE.
+fn settings(xml: &mut Xml, device: &DevicePlan) {
+    type Is = fn(&StartUpAction) -> bool;
+    let kinds: [(&str, Is); 2] = [
+        ("EoE", |action| matches!(action, StartUpAction::SetAddresses { .. })),
+        ("SoE", |action| matches!(action, StartUpAction::WriteIdn { .. })),
+    ];
+    for (protocol, is_one) in kinds {
+        let mut commands = device.start_up.iter().filter(|one| is_one(&one.action)).peekable();
+        if commands.peek().is_none() {
+            continue;
+        }
+        xml.element(protocol, &[], |xml| {
+            xml.element("InitCmds", &[], |xml| {
+                for command in commands {
+                    xml.element("InitCmd", &[], |xml| {
+                        xml.text("Transition", command.transition.letters());
+                        xml.text("Comment", &command.comment);
+                        xml.text("Timeout", 0);
+                        match &command.action {
+                            StartUpAction::SetAddresses { parameters, .. } => {
+                                xml.text("Type", 2);
+                                xml.text("Data", hex(parameters));
+                            }
+                            StartUpAction::WriteIdn { drive, idn, elements, data } => {
+                                xml.text("OpCode", 3);
+                                xml.text("DriveNo", drive);
+                                xml.text("IDN", idn.0);
+                                xml.text("Elements", elements);
+                                xml.text("Attribute", 0);
+                                xml.text("Data", hex(data));
+                            }
+                            StartUpAction::CoeDownload { .. }
+                            | StartUpAction::RegisterWrite { .. } => {}
+                        }
+                    });
+                }
+            });
+        });
+    }
+}
+
 fn init_commands(xml: &mut Xml, device: &DevicePlan, position: u16) {
-    let by_position = Target::Position(position);
-    let by_station = Target::Station(device.station.0);
+    // How it is reached before it has its station address, and from then on.
+    let first = match (device.settings.addressing, device.settings.alias) {
+        (AddressingChoice::Alias, Some(alias)) => Target::Station(alias.0),
+        (AddressingChoice::Alias | AddressingChoice::Auto | AddressingChoice::Position, _) => {
+            Target::Position(position)
+        }
+    };
+    let by_station = match device.settings.addressing {
+        AddressingChoice::Position => first,
+        AddressingChoice::Auto | AddressingChoice::Alias => Target::Station(device.station.0),
+    };
     // A device that only mirrors AL control must not see the acknowledge bit.
     let acknowledge = if device.device_emulation { 0x00 } else { 0x10 };
     let state = |xml: &mut Xml, name: &str, transitions: &[&str], target: Target, value: u8| {
@@ -162,11 +214,13 @@ fn init_commands(xml: &mut Xml, device: &DevicePlan, position: u16) {
         };
         command(xml, &check, read, &[0; 2]);
     };
-    state(xml, "INIT", &["IP", "PI", "SI", "OI"], by_position, 1);
-    identity(xml, device, by_position);
-    let station = Init::new("set station address", &["IP"], by_position, 0x0010);
-    let (write_position, _) = by_position.commands();
-    command(xml, &station, write_position, &device.station.0.to_le_bytes());
+    state(xml, "INIT", &["IP", "PI", "SI", "OI"], first, 1);
+    identity(xml, device, first);
+    if device.settings.addressing != AddressingChoice::Position {
+        let station = Init::new("set station address", &["IP"], first, 0x0010);
+        let (write_first, _) = first.commands();
+        command(xml, &station, write_first, &device.station.0.to_le_bytes());
+    }
     let (write, _) = by_station.commands();
     let mut set = |comment: &str, transition: &str, register: RegisterAddress, data: &[u8]| {
         let transitions = [transition];
@@ -283,6 +337,9 @@ fn ours(xml: &mut Xml, device: &DevicePlan, plan: &Plan) {
     }
     if let Some(current) = device.ebus_current_ma {
         attributes.push(("ebus-ma", current.to_string()));
+    }
+    if let Some(alias) = settings.alias {
+        attributes.push(("alias", alias.0.to_string()));
     }
     if let Some(task) = &settings.task {
         attributes.push(("task", task.clone()));

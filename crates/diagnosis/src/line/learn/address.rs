@@ -7,9 +7,10 @@
 use std::collections::BTreeMap;
 
 use linesman_proto::address::{DeviceId, Position, StationAddress};
+use linesman_proto::command::Addressing;
 
 use super::{Answer, word_at};
-use crate::line::Line;
+use crate::line::{Line, Seen, SharedBy};
 
 /// Most controllers that are learnt from frames.
 const MOST_DEVICES: usize = 4096;
@@ -165,9 +166,34 @@ impl Addresses {
 
     /// A controller's registers were read.
     pub(super) fn read(&mut self, line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
-        if let Some(station) = word_at(answer.reply.data(), answer.ado, STATION) {
-            self.give(line, id, StationAddress(station));
+        let Some(station) = word_at(answer.reply.data(), answer.ado, STATION) else { return };
+        let station = StationAddress(station);
+        if let Some(owner) = self.is_shared(line, id, station, answer) {
+            if let Some(owner) = line.device_mut(owner) {
+                let seen = Seen::new(SharedBy::Reading(id), answer.at, Some(answer.frame));
+                owner.shares_address(station, seen);
+            }
+            line.touch();
+            return;
         }
+        self.give(line, id, station);
+    }
+
+    /// Who has the station address that another controller, asked by its position, says is its own: only
+    /// while positions are certain, and where that one had another address before.
+    fn is_shared(
+        &self,
+        line: &Line,
+        id: DeviceId,
+        station: StationAddress,
+        answer: &Answer<'_>,
+    ) -> Option<DeviceId> {
+        let is_position = answer.effect.addressing == Addressing::Position;
+        let is_whole = self.present.map(usize::from) == Some(self.order.len());
+        let had_another = line.device(id)?.station.is_some_and(|own| own != station);
+        let owner = *self.stations.get(&station)?;
+        let has_it = line.device(owner)?.station == Some(station);
+        (is_position && is_whole && had_another && has_it && owner != id).then_some(owner)
     }
 
     /// A controller's registers were written.

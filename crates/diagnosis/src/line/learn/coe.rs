@@ -41,6 +41,10 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
                 }
                 news
             }
+            Ok(Message::Abort(abort)) if is_sync_object(abort.object.index) => {
+                // Who does not keep step with a clock has no such object, and may say so.
+                device.mailbox.answered(at, frame)
+            }
             Ok(Message::Abort(abort)) => {
                 device.mailbox.answered(at, frame);
                 let refusal = Refusal::Abort { object: abort.object, code: abort.code };
@@ -115,6 +119,15 @@ fn uploaded(
         };
         return device.mailbox.note(message, answer.at, answer.frame);
     }
+    if is_sync_object(object.index) {
+        // Event missed, cycle exceeded, shift too short: numbers of 16 bits.
+        let (Some(bytes), 0x0B..=0x0D) = (data.first_chunk(), object.subindex) else {
+            return false;
+        };
+        let seen = Seen::new(u16::from_le_bytes(*bytes), answer.at, Some(answer.frame));
+        device.sync_counts.insert((object.index.0, object.subindex), seen);
+        return true;
+    }
     let Some(bytes) = data.first_chunk() else { return false };
     if object.index != ObjectIndex::IDENTITY {
         return false;
@@ -132,6 +145,10 @@ fn uploaded(
         *field = seen;
     }
     is_new
+}
+
+const fn is_sync_object(index: ObjectIndex) -> bool {
+    index.0 == ObjectIndex::OUTPUT_SYNC.0 || index.0 == ObjectIndex::INPUT_SYNC.0
 }
 
 const HEADER_LEN: usize = 6;

@@ -5,6 +5,7 @@
 //! mean, [`registers`], [`sii`] and [`coe`].
 
 mod address;
+mod clock;
 mod coe;
 mod registers;
 mod sii;
@@ -16,7 +17,7 @@ use linesman_proto::time::Instant;
 
 pub use address::Addresses;
 
-use super::{Cyclic, Line, Seen};
+use super::{Cyclic, Line, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
 
 /// Registers from here on are optional: without so many FMMUs and SyncManagers, without distributed
@@ -115,6 +116,12 @@ impl Learner {
         reply: &FrameCopy<'_>,
     ) {
         let Ok(view) = FrameView::parse(reply.bytes) else { return };
+        if let Some(request) = request.filter(|_| exchange.is_last) {
+            let (sent, back, len) = (request.time, reply.time, reply.bytes.len());
+            if line.trips.record(sent, back, reply.number, len) {
+                line.touch();
+            }
+        }
         let mut requests =
             request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
         for (index, datagram) in view.datagrams().enumerate() {
@@ -272,6 +279,18 @@ impl Learner {
         let Some(id) = device else { return };
         let Some(device) = line.devices.get_mut(id.index()) else { return };
         if answer.effect.multiple_write {
+            clock::handed_round(line, id, answer);
+            return;
+        }
+        if !is_position && answer.sum > answer.command.increment(true, true) {
+            // Two controllers have answered: what they say is mixed, and nothing can be learnt of it.
+            device.answers(answer.at, Some(answer.frame));
+            if answer.is_last {
+                let shared = SharedBy::WorkingCounter(answer.sum);
+                let station = StationAddress(answer.reply.adp());
+                device.shares_address(station, Seen::new(shared, answer.at, Some(answer.frame)));
+                line.touch();
+            }
             return;
         }
         if answer.sum == 0 {

@@ -3,16 +3,18 @@
 use linesman_proto::address::{DeviceId, RegisterAddress, StationAlias};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
-    AlControl, AlStatus, ClearGroup, DlStatus, ErrorCounters, FmmuConfig, PortState,
+    AlControl, AlStatus, ClearGroup, DlControl, DlStatus, ErrorCounters, FmmuConfig, PortState,
     WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::DcTime32;
 
 use super::{Answer, part, word_at};
+use crate::line::clock::ClockDifference;
 use crate::line::{Device, Line, Seen};
 
 const ALIAS: u16 = 0x0012;
+const DL_CONTROL: u16 = 0x0100;
 const DL_STATUS: u16 = 0x0110;
 const AL_CONTROL: u16 = 0x0120;
 const AL_STATUS: u16 = 0x0130;
@@ -20,6 +22,9 @@ const AL_STATUS_CODE: u16 = 0x0134;
 const COUNTERS: std::ops::Range<u16> = 0x0300..0x0314;
 const FMMUS: std::ops::Range<u16> = 0x0600..0x0700;
 const RECEIVE_TIMES: u16 = 0x0900;
+const CLOCK_DIFFERENCE: u16 = 0x092C;
+/// System time offset, delay, and what steers the clock: whoever writes there sets it.
+const CLOCK_SETTING: std::ops::Range<u16> = 0x0920..0x0936;
 /// Activation of cyclic operation and SYNC signals; bit 0 switches them on, bits 1 and 2 choose them.
 const SYNC_ACTIVATION: u16 = 0x0981;
 /// Status of SyncManager 1, which holds the answers of the mailbox.
@@ -37,6 +42,11 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         if let Some(alias) = word_at(data, start, ALIAS) {
             device.alias = Some(StationAlias(alias));
         }
+        let control = part(data, start, DL_CONTROL, 4).and_then(|bytes| bytes.first_chunk());
+        if let Some(control) = control.map(|bytes| DlControl::from_bytes(*bytes)) {
+            // What holds for a moment is not how it stands.
+            device.dl_control = Some(control).filter(|now| !now.temporary()).or(device.dl_control);
+        }
         if let Some(status) = dl_status(device, data, start) {
             news |= device.dl.record(status, at, frame);
         }
@@ -53,7 +63,7 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         let Some(device) = line.device_mut(id) else { return };
         news |= device.counters.record(start, data, at, frame);
     } else if start.0 <= WATCHDOG_TIME {
-        watchdog(device, data, start);
+        news |= watchdog(device, data, start, Seen::new((), at, frame));
     } else if part(data, start, MAILBOX_IN_STATUS, 1).is_some() {
         device.mailbox.polled = Some(at);
     } else if start.0 == RECEIVE_TIMES
@@ -61,6 +71,11 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     {
         device.received = Some(receive_times(times));
         news = true;
+    } else if start.0 > RECEIVE_TIMES
+        && let Some(bytes) = part(data, start, CLOCK_DIFFERENCE, 4).and_then(|it| it.first_chunk())
+    {
+        let difference = ClockDifference(u32::from_le_bytes(*bytes));
+        news |= device.clock.record(Seen::new(difference.ns(), at, frame));
     }
     if news {
         line.touch();
@@ -71,6 +86,11 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
 pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     let Some(device) = line.devices.get_mut(id.index()) else { return };
     let is_news = write(device, answer);
+    if touches(answer.ado, answer.written(), CLOCK_SETTING) {
+        for reference in line.references.iter_mut().filter(|one| one.device == id) {
+            reference.set(answer.at);
+        }
+    }
     if touches(answer.ado, answer.written(), FMMUS) {
         write_fmmus(line, id, answer);
     }
@@ -105,6 +125,9 @@ pub(super) fn broadcast_read(line: &mut Line, answer: &Answer<'_>) {
 pub(super) fn broadcast_write(line: &mut Line, answer: &Answer<'_>) {
     let data = answer.written();
     let mut news = false;
+    if touches(answer.ado, data, CLOCK_SETTING) {
+        line.references.iter_mut().for_each(|reference| reference.set(answer.at));
+    }
     for device in &mut line.devices {
         news |= write(device, answer);
         if touches(answer.ado, data, FMMUS) {
@@ -133,7 +156,10 @@ fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
         device.sync_on = Some(Seen::new(is_on, answer.at, Some(answer.frame)));
         return true;
     }
-    watchdog(device, data, start);
+    if touches(start, data, CLOCK_SETTING) {
+        device.clock.set(answer.at);
+    }
+    let is_set = watchdog(device, data, start, Seen::new((), answer.at, Some(answer.frame)));
     if touches(start, data, COUNTERS) {
         for group in ClearGroup::ALL {
             let is_hit = (0..data.len() as u16).any(|offset| {
@@ -145,17 +171,14 @@ fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
             }
         }
     }
-    false
+    is_set
 }
 
-/// The watchdog's registers were read or written.
-fn watchdog(device: &mut Device, data: &[u8], start: RegisterAddress) {
-    if let Some(divider) = word_at(data, start, WATCHDOG_DIVIDER) {
-        device.watchdog.divider = WatchdogDivider(divider);
-    }
-    if let Some(time) = word_at(data, start, WATCHDOG_TIME) {
-        device.watchdog.time = WatchdogTime(time);
-    }
+/// The watchdog's registers were read or written. Says whether it is set otherwise than before.
+fn watchdog(device: &mut Device, data: &[u8], start: RegisterAddress, seen: Seen<()>) -> bool {
+    let divider = word_at(data, start, WATCHDOG_DIVIDER).map(WatchdogDivider);
+    let time = word_at(data, start, WATCHDOG_TIME).map(WatchdogTime);
+    (divider.is_some() || time.is_some()) && device.watchdog.record(divider, time, seen)
 }
 
 fn write_fmmus(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {

@@ -94,4 +94,8 @@ fn learn(device: &mut Device, answer: &Answer<'_>) {
     if device.type_name.is_none() {
         device.type_name = device.sii.type_name();
     }
+    if device.power.is_none() {
+        let seen = |value| Seen::new(value, answer.at, Some(answer.frame));
+        device.power = device.sii.power().map(seen);
+    }
 }

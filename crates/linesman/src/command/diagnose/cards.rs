@@ -1,8 +1,8 @@
 //! A line that nobody drives: reads again and again, and sees what changes.
 
-use linesman_diagnosis::{Engine, FrameSeen, HostObservation, Setup};
+use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, Setup};
 use linesman_link::clock::HostClock;
-use linesman_maindevice::{Event, MainDevice};
+use linesman_maindevice::{Event, MainDevice, ProbeRequest, Target};
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::drive::{Audience, Driver};
 use linesman_runtime::record::Recorder;
@@ -36,6 +36,8 @@ pub(super) fn run(
         host_counters: true,
         start: clock.started_at().rfc3339(),
         clock: "host, monotonic".to_owned(),
+        probes: active,
+        active,
         ..session.setup.clone()
     };
     let recorder = session.recorder(clock.started_at(), names)?;
@@ -112,6 +114,22 @@ impl Audience for Looking<'_> {
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
         self.engine.handle_timeout(now);
         self.session.follow(&mut self.engine, self.output);
+        while let Some(probe) = self.engine.poll_probe() {
+            let line = self.engine.line(probe.network);
+            let station = line.and_then(|line| line.device(probe.device)?.station);
+            // Who has no address yet cannot be asked.
+            let Some(station) = station else { continue };
+            let (register, len, write) = match probe.what {
+                Asked::Register { address, len } => (address, len, None),
+                Asked::Written { address, data } => (address, 2, Some(Vec::from(data))),
+                // Mailboxes of SubDevices that nobody drives are not asked.
+                Asked::Object(_) => continue,
+            };
+            main.probe(
+                now,
+                ProbeRequest { target: Target::Station(station), register, len, write },
+            );
+        }
         match self.next {
             Next::Scan => {
                 self.next = Next::Wait;

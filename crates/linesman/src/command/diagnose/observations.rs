@@ -16,13 +16,12 @@ use crate::text::names::Names;
 pub(super) fn run(path: &Path, session: Session, output: &mut Output) -> Result<Status, Failure> {
     let text = files::text(path, "observations")?;
     let file = ObservationFile::parse(&text).map_err(|error| {
-        let mut failure = files::in_file(path, &error);
-        if failure.next_step.is_empty() {
+        files::in_file_of(
+            path,
+            &error,
             "see `linesman schema observations`; for a virtual segment say `sim:` in front of the \
-             file's name"
-                .clone_into(&mut failure.next_step);
-        }
-        failure
+             file's name",
+        )
     })?;
     let mut setup = session.setup.clone();
     setup.clock = super::NO_CLOCK.to_owned();

@@ -30,6 +30,7 @@ const STEP: Span = Span::ms(20);
 pub(super) fn run(
     path: &Path,
     target: AlState,
+    active: bool,
     session: Session,
     output: &mut Output,
 ) -> Result<Status, Failure> {
@@ -37,7 +38,7 @@ pub(super) fn run(
     let until = session.until(seconds(&file))?;
     let stop = driven::stop()?;
     let source = session.setup.source.clone();
-    let options = LabOptions { target, source, ..LabOptions::default() };
+    let options = LabOptions { target, active, source, ..LabOptions::default() };
     let mut lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
     // A virtual run has no date: its recording begins in 1970.
     let recorder = session.recorder(UnixTime::EPOCH, &[])?;

@@ -1,13 +1,13 @@
 //! One page of explanation.
 
 use linesman_config::fault::{Class, FaultName};
-use linesman_diagnosis::finding::Severity;
 use linesman_diagnosis::rule::RulePage;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::register::{Description, Field, Form, Unit};
 use linesman_proto::state::{AlState, AlStatusCode};
 
 use crate::output::{Paint, wrapped};
+use crate::text::finding::severity_word;
 
 /// A title and its paragraphs.
 pub(super) struct Page {
@@ -91,11 +91,7 @@ impl Page {
 
 /// A page about a finding: the manual page of its rule.
 pub(super) fn finding(page: &RulePage) -> Page {
-    let severity = match page.severity {
-        Severity::Info => "info",
-        Severity::Warning => "warning",
-        Severity::Error => "error",
-    };
+    let severity = severity_word(page.severity);
     let class = class(page.class);
     let title = format!("Finding {} {} ({severity}, {class})", page.code, page.name);
     let mut result = Page::new(title);

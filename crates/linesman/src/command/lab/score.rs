@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use linesman_config::fault::FaultName;
 use linesman_lab::score::report::{GroupReport, SideReport};
-use linesman_lab::score::{Rate, ScoreOptions, ScoreReport, Tally, run_case};
+use linesman_lab::score::{Perturbation, Rate, ScoreOptions, ScoreReport, Tally, run_case};
 
 use super::{on_all_processors, seeds};
 use crate::exit::Status;
@@ -23,6 +23,13 @@ pub(crate) struct Arguments {
     /// Judge recordings alone, of lines that nobody asks for registers on account of a finding
     #[arg(long)]
     capture_only: bool,
+    /// Nothing is wrong in any case, but much is done that is no fault: whatever is said is a false alarm
+    #[arg(long, conflicts_with_all = ["fault", "perturb"])]
+    healthy: bool,
+    /// Make the plants other than the diagnosis expects: delays, rates, forwarded, lost-reads or
+    /// cleared-counters
+    #[arg(long, value_name = "NAME")]
+    perturb: Option<Perturbation>,
     /// Also each case that was judged wrongly, with what was said
     #[arg(long)]
     list: bool,
@@ -34,7 +41,12 @@ pub(crate) struct Arguments {
 /// Plays the cases on all processors and adds up in the order of seeds: the sum is the same for any
 /// number of them.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Status {
-    let options = ScoreOptions { fault: arguments.fault, capture_only: arguments.capture_only };
+    let options = ScoreOptions {
+        fault: arguments.fault,
+        capture_only: arguments.capture_only,
+        healthy: arguments.healthy,
+        perturb: arguments.perturb,
+    };
     let mut tally = Tally::new(options);
     let mut progress = Progress::new();
     let total = arguments.seeds.end - arguments.seeds.start;
@@ -61,9 +73,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Status {
 fn show(report: &ScoreReport, list: bool, output: &mut Output) {
     let (from, to) = report.seeds;
     output.line(&format!(
-        "Seeds {from}..{to}: {}, in {} a fault had an effect.",
+        "Seeds {from}..{to}: {}, in {} a fault had an effect{}.",
         count(report.cases, "case"),
-        report.effective_cases
+        report.effective_cases,
+        report.perturbed.as_ref().map_or_else(String::new, |name| format!("; perturbed: {name}"))
     ));
     output.line("");
     let mut table = Table::new(
@@ -122,6 +135,20 @@ fn show(report: &ScoreReport, list: bool, output: &mut Output) {
             bin.confidence * 100.0,
             share(right),
             count(right.of, "finding")
+        ));
+    }
+    output.line(&format!(
+        "  calibration error {:.1} % (how far the two are apart, on average)",
+        report.calibration_error * 100.0
+    ));
+    if !report.named_in_100_ms.is_empty() {
+        let fast = report.named_in_100_ms.iter();
+        let fast = fast.map(|(name, rate)| format!("{name} {} of {}", rate.right, rate.of));
+        let fast: Vec<String> = fast.collect();
+        output.line("");
+        output.line(&format!(
+            "Named within 100 ms of virtual time, at a cycle of 1 ms: {}.",
+            fast.join(", ")
         ));
     }
     for alarm in &report.healthy.alarms {

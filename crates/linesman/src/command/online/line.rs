@@ -87,11 +87,7 @@ fn look<L: Line>(
     }
     looker.report(driver.now()).ok_or_else(|| {
         let why = looker.failure().unwrap_or("nobody has answered yet");
-        let mut failure = Failure::new(format!("{place}: {why}"), "");
-        "check that the first SubDevice is on and wired to this card, and that the card has a link \
-         (`linesman interfaces`)"
-            .clone_into(&mut failure.next_step);
-        failure
+        driven::nobody_since(why).at(place)
     })
 }
 

@@ -25,6 +25,30 @@ pub(super) fn text(report: &OnlineReport, last: Option<&OnlineReport>, output: &
     text.push_str(&devices(report, last, paint));
     text.push('\n');
     text.push_str(&frames(report));
+    text.push_str(&log(report));
+    text
+}
+
+/// How many of the latest changes are shown.
+const LATEST: usize = 8;
+
+/// Who left a state by itself and when, the latest last.
+fn log(report: &OnlineReport) -> String {
+    let mut all: Vec<_> = (report.devices.iter())
+        .flat_map(|device| device.history.iter().map(move |change| (change, device)))
+        .collect();
+    all.sort_by_key(|(change, device)| (change.at_ns, device.no));
+    let mut text = if all.is_empty() { String::new() } else { "\nLatest:\n".to_owned() };
+    for (change, device) in all.split_off(all.len().saturating_sub(LATEST)) {
+        let code = change.al_code_text.as_ref();
+        let code = code.map(|text| format!(", 0x{:04X} {text}", change.al_code));
+        let (at, no, name) = (time(change.at_ns), device.no, &device.name);
+        let (from, to) = (&change.from, &change.to);
+        text.push_str(&format!(
+            "  {at}: {no} {name}, {from} to {to}{}\n",
+            code.unwrap_or_default()
+        ));
+    }
     text
 }
 

@@ -1,7 +1,6 @@
 //! A plan as JSON, `linesman.plan/1`.
 
 mod clock;
-mod ebus;
 
 use linesman_config::plan::{
     DatagramPlan, DevicePlan, Doubt, FramePlan, IoAt, PathView, Plan, Presence, Role, Severity,
@@ -15,7 +14,7 @@ use linesman_runtime::plan_file::PlanFile;
 use serde::Serialize;
 
 use self::clock::ClockReport;
-use self::ebus::EbusReport;
+use crate::command::ebus::{self, EbusReport};
 use crate::version;
 
 /// A plan.
@@ -233,7 +232,9 @@ pub(super) fn report(file: &PlanFile, doubts: &[Doubt]) -> PlanReport {
                 frames: frames(task),
             })
             .collect(),
-        ebus: ebus::of(plan),
+        ebus: ebus::of(plan.ebus_groups(), |id| {
+            plan.device(id).map_or_else(String::new, |device| device.name.clone())
+        }),
         clock: clock::of(plan),
         findings: doubts.iter().map(finding).collect(),
         notes: file.notes.clone(),

@@ -11,6 +11,7 @@ use linesman_runtime::online::Board;
 use linesman_runtime::run::Note;
 use linesman_runtime::run::bring_up::BringUpReport;
 use linesman_runtime::run::report::{Counts, RunReport};
+use linesman_runtime::system_log::SystemLog;
 
 use crate::command::diagnose::follow::Follower;
 use crate::output::{Output, Paint, Table};
@@ -25,18 +26,22 @@ pub(super) struct Teller {
     board: Board,
     /// When the run began, by the wall clock.
     began: UnixTime,
-    log: Option<EventLogWriter>,
+    logs: Logs,
+}
+
+/// Where what happens is kept.
+#[derive(Default)]
+pub(super) struct Logs {
+    /// A file of its own.
+    pub(super) file: Option<EventLogWriter>,
+    /// The log of the system.
+    pub(super) system: Option<SystemLog>,
 }
 
 impl Teller {
-    pub(super) fn new(
-        json: bool,
-        began: UnixTime,
-        log: Option<EventLogWriter>,
-        board: Board,
-    ) -> Self {
+    pub(super) fn new(json: bool, began: UnixTime, logs: Logs, board: Board) -> Self {
         let follower = Follower::new(false);
-        Self { json, names: Names::default(), follower, board, began, log }
+        Self { json, names: Names::default(), follower, board, began, logs }
     }
 
     /// Whether people are not to be told.
@@ -95,8 +100,11 @@ impl Teller {
             if !quiet {
                 self.said(entry.at, &entry.text, output);
             }
-            if let Some(log) = &self.log {
-                let name = entry.device.map(|id| self.names.plain(id.no()).to_owned());
+            let name = entry.device.map(|id| self.names.plain(id.no()).to_owned());
+            if let Some(log) = &mut self.logs.system {
+                log.write(&entry, name.as_deref());
+            }
+            if let Some(log) = &self.logs.file {
                 let at = self.began + entry.at.since(Instant::ZERO);
                 log.write(at, entry, name.as_deref());
             }
@@ -105,8 +113,14 @@ impl Teller {
 
     /// Ends the log; gives how the writing went.
     pub(super) fn finish(&mut self, ended: Span) -> Option<WriterReport> {
-        let log = self.log.take()?;
+        let log = self.logs.file.take()?;
         Some(log.finish(self.began + ended))
+    }
+
+    /// How many entries the system's log did not take, and why.
+    pub(super) fn lost(&self) -> Option<(u64, String)> {
+        let (lost, why) = self.logs.system.as_ref()?.lost()?;
+        Some((lost, why.to_string()))
     }
 
     fn said(&self, at: Instant, words: &str, output: &mut Output) {

@@ -8,6 +8,7 @@ use linesman_proto::topology::End;
 use serde::Serialize;
 
 use super::against::Against;
+use crate::command::ebus::{self, EbusReport};
 use crate::version;
 
 /// A scan.
@@ -24,6 +25,8 @@ pub(crate) struct Scan {
     networks: u32,
     /// The SubDevices, by number.
     devices: Vec<Device>,
+    /// Who is fed by whom on the E-bus, and how much is left, as the SII of each says.
+    ebus: Vec<EbusReport>,
     /// How that compares with what was planned; `null` without `--against`.
     against: Option<Against>,
 }
@@ -92,6 +95,7 @@ pub(super) fn report(
         start,
         networks: 1,
         devices: inventory.devices.iter().map(|found| device(inventory, found)).collect(),
+        ebus: ebus::of(inventory.ebus_groups(), |id| inventory.label(id)),
         against,
     }
 }
@@ -120,7 +124,7 @@ fn device(inventory: &Inventory, found: &FoundDevice) -> Device {
 }
 
 /// The state by name; of a value that is none, the number.
-pub(super) fn state_name(found: &FoundDevice) -> String {
+pub(crate) fn state_name(found: &FoundDevice) -> String {
     let value = found.al_status.state();
     value.state().map_or_else(|| format!("0x{:X}", value.bits()), |state| state.name().to_owned())
 }

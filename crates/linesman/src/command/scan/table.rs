@@ -2,6 +2,7 @@
 
 use linesman_config::inventory::{FoundDevice, Inventory};
 use linesman_lab::drawing::{self, Label};
+use linesman_proto::address::DeviceId;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::topology::derive::Doubt;
 
@@ -101,6 +102,9 @@ fn notes(inventory: &Inventory) -> Vec<String> {
             old.join("; ")
         ));
     }
+    let overloads = inventory.ebus_groups();
+    let overloads = overloads.iter().filter_map(|group| group.overload(|id| inventory.label(id)));
+    notes.extend(overloads.map(|overload| format!("{}; {}", overload.text, overload.advice)));
     notes.extend(inventory.wiring.errors.iter().map(|error| format!("wiring: {error}")));
     notes.extend(inventory.wiring.doubts.iter().map(|doubt| doubt_text(inventory, doubt)));
     notes
@@ -119,9 +123,7 @@ fn counters_text(found: &FoundDevice) -> Option<String> {
 }
 
 fn doubt_text(inventory: &Inventory, doubt: &Doubt) -> String {
-    let name = |node: &usize| {
-        inventory.devices.get(*node).map_or_else(|| (node + 1).to_string(), FoundDevice::label)
-    };
+    let name = |node: &usize| inventory.label(DeviceId(*node as u32));
     match doubt {
         Doubt::Entry { node, taken } => format!(
             "wiring: {} has no clocks that tell its entry port; port {taken} was taken",

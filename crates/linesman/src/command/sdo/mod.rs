@@ -3,8 +3,12 @@
 mod browse;
 pub(crate) mod dictionary;
 pub(crate) mod report;
+mod start_up;
 pub(crate) mod value;
 
+use std::path::PathBuf;
+
+use linesman_config::start_up::Transition;
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::Service;
 use linesman_proto::address::DeviceId;
@@ -58,6 +62,15 @@ enum Action {
         /// All entries in one transfer; the value is bytes in hex
         #[arg(long)]
         complete: bool,
+        /// Make it a start-up command of this project, too
+        #[arg(long, value_name = "PROJECT.toml")]
+        start_up: Option<PathBuf>,
+        /// Whose start-up command it is in the project; of who has this station address unless said
+        #[arg(long = "as", value_name = "NAME", requires = "start_up")]
+        name: Option<String>,
+        /// When the start-up command is due
+        #[arg(long, value_name = "TRANSITION", default_value = "PS", value_parser = transition, requires = "start_up")]
+        at: String,
     },
     /// List the objects that the SubDevice has
     List {
@@ -134,6 +147,14 @@ fn address(text: &str) -> Result<Wanted, String> {
     Ok(Wanted { index: ObjectIndex(index), subindex: subindex.transpose().map_err(|_| wrong())? })
 }
 
+fn transition(letters: &str) -> Result<String, String> {
+    let letters = letters.to_ascii_uppercase();
+    match Transition::from_letters(&letters) {
+        Some(_) => Ok(letters),
+        None => Err("expected two of the letters I, P, S, O, B, such as PS".to_owned()),
+    }
+}
+
 /// Does what was asked.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let mut session = Session::open(&arguments.place.line)?;
@@ -160,8 +181,8 @@ fn act(
             let read = read(session, id, *object, *data_type, *complete)?;
             if json { output.json(&read) } else { output.text(&read.text(output)) }
         }
-        Action::Write { object, value, data_type, complete } => {
-            let wrote = write(session, id, *object, value, *data_type, *complete)?;
+        Action::Write { object, value, data_type, complete, start_up, name, at } => {
+            let (wrote, data) = write(session, id, *object, value, *data_type, *complete)?;
             if session.is_passing() {
                 output.warn("this virtual segment ends with the command, and what was written too");
             }
@@ -169,6 +190,21 @@ fn act(
                 output.json(&wrote)
             } else {
                 output.line(&wrote.wrote_text(&session.label(id)))
+            }
+            if let Some(path) = start_up {
+                let command = start_up::Command {
+                    transition: at,
+                    object: object.entry(),
+                    complete: *complete,
+                    data: &data,
+                    comment: wrote.name().unwrap_or_default(),
+                };
+                let station = session.report(id).station;
+                let whose = start_up::add(path, name.as_deref(), station, &command)?;
+                if !json {
+                    let path = path.display();
+                    output.line(&format!("{path}: a start-up command of {whose}, at {at}."));
+                }
             }
         }
         Action::List { list, entries, values } => {
@@ -260,7 +296,7 @@ fn write(
     text: &str,
     data_type: Option<DataType>,
     complete: bool,
-) -> Result<ReadReport, Trouble> {
+) -> Result<(ReadReport, Vec<u8>), Trouble> {
     let (device, object) = (session.report(id), wanted.entry());
     let mut dictionary = Dictionary::new(session, id);
     let wrong = |reason: String| Failure::new(reason, "say its data type with --type");
@@ -275,7 +311,8 @@ fn write(
         }
     };
     download(session, id, object, complete, data.clone())?;
-    Ok(ReadReport::wrote(device, complete, ObjectReport::of(object, entry, data_type, &data)))
+    let wrote = ObjectReport::of(object, entry, data_type, &data);
+    Ok((ReadReport::wrote(device, complete, wrote), data))
 }
 
 #[cfg(test)]

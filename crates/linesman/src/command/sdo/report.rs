@@ -51,6 +51,13 @@ pub(crate) struct ObjectReport {
     abort_code: Option<u32>,
 }
 
+impl ReadReport {
+    /// The name of the entry, or of the first of them.
+    pub(super) fn name(&self) -> Option<&str> {
+        self.objects.first()?.name.as_deref()
+    }
+}
+
 impl ObjectReport {
     pub(super) fn of(
         object: ObjectAddress,

@@ -28,7 +28,8 @@ pub(crate) use socket::{is_one as is_socket, silent};
 /// Where the line is, and whom the service is for.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Place {
-    /// Where the line is: eth0, eth0+eth1 (a ring), sim:plant.toml, or the socket of `run --control`
+    /// Where the line is: eth0, eth0+eth1 (a ring), sim:plant.toml, or the socket of `run --control`; or
+    /// esi:FILE.xml#TYPE for a device as its maker describes it, without the device (DEVICE: offline)
     #[arg(value_name = "WHERE")]
     pub(crate) line: String,
     /// The SubDevice: its number (3), station address (0x1003), alias (alias:7), or name
@@ -132,6 +133,18 @@ impl Session {
             let line = Box::new(line);
             let (place, kind) = (place.to_owned(), Kind::Driven);
             return Ok(Self { line, devices, place, kind, inventory: None });
+        }
+        if place.starts_with("esi:") {
+            let (line, inventory, names) = segment::open_described(place)?;
+            let devices = known::all(&inventory, &names);
+            let (line, inventory) = (Box::new(line), Some(inventory));
+            return Ok(Self {
+                line,
+                devices,
+                place: place.to_owned(),
+                kind: Kind::Passing,
+                inventory,
+            });
         }
         let selector: Selector = place.parse()?;
         let (line, devices, kind, inventory): (Box<dyn Line>, _, _, _) = match &selector {

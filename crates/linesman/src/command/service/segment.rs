@@ -9,6 +9,7 @@ use linesman_maindevice::Event;
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
+use linesman_sim::segment_file::SegmentFile;
 
 use super::{Line, NotDone};
 use crate::command::driven;
@@ -33,9 +34,38 @@ pub(super) struct Virtual {
 
 /// Builds and scans the segment.
 pub(super) fn open(path: &Path) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
-    let file = files::segment_file(path)?;
+    serve(&files::segment_file(path)?, path)
+}
+
+/// Builds and scans a segment of one device that is as its maker describes it: its dictionary, without the
+/// device (SW-13). `device` is `esi:FILE#TYPE`, relative to the working directory.
+pub(super) fn open_described(device: &str) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
+    let path = Path::new(device);
+    let own = |on: &str| {
+        format!("[[device]]\nname = \"offline\"\ntype = {}\non = \"{on}\"\n", toml_string(device))
+    };
+    let parse = |text: &str| {
+        let file = SegmentFile::parse_with(text, &files::NamedFiles::of(Path::new("")));
+        file.map_err(|error| Failure::from_error(&error))
+    };
+    // A terminal needs a coupler before it.
+    let coupler = "[[device]]\nname = \"coupler\"\ntype = \"EK1100\"\non = \"maindevice\"\n";
+    let alone = parse(&own("maindevice"));
+    let file = match alone {
+        Ok(file) => file,
+        Err(reason) => parse(&format!("{coupler}{}", own("coupler.B"))).map_err(|_| reason)?,
+    };
+    serve(&file, path)
+}
+
+/// A word as a string of TOML.
+fn toml_string(word: &str) -> String {
+    format!("\"{}\"", word.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+fn serve(file: &SegmentFile, path: &Path) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
     let options = LabOptions { begin: Begin::Idle, ..LabOptions::default() };
-    let lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;
+    let lab = Lab::new(file, options).map_err(|error| files::in_file(path, &error))?;
     let mut segment = Virtual { lab, path: path.to_owned(), seen: 0, told: 0 };
     let now = segment.lab.now();
     segment.lab.main_mut().scan(now);

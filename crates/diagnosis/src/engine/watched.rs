@@ -1,0 +1,122 @@
+//! One network of the diagnosis: what is known of it, and when its rules have something to do.
+
+use linesman_proto::time::{Instant, Span};
+
+use super::Probe;
+use super::bisect::{self, Bisect};
+use super::survey::Survey;
+use crate::finding::Condition;
+use crate::line::{Learner, Line};
+use crate::observe::Pairing;
+
+/// For so long after its last rise a counter is watched in this way.
+const WATCHED_AFTER_RISE: Span = Span::s(15);
+
+/// So long after a frame was lost the counters are awaited that tell where, or where not.
+const WATCHED_AFTER_LOSS: Span = Span::s(2);
+
+/// Between two questions how DL control stands, to those of whom it is not known.
+const CONTROLS_EVERY: Span = Span::ms(500);
+
+/// So many frames lost one after the other are no accident.
+const FEW_LOST: u64 = 3;
+
+/// One network.
+#[derive(Clone, Debug)]
+pub(super) struct Watched {
+    pub(super) line: Line,
+    pub(super) learner: Learner,
+    pub(super) pairing: Pairing,
+    pub(super) judged: u64,
+    /// When to ask the rules again, though nothing new was learnt.
+    pub(super) again: Option<Instant>,
+    pub(super) conditions: Vec<Condition>,
+    pub(super) probed: Option<Instant>,
+    pub(super) probed_for: (u64, u64),
+    /// A search for where frames vanish, while it goes on.
+    pub(super) bisect: Option<Bisect>,
+    /// When controllers were last asked how DL control stands.
+    pub(super) controls_asked: Option<Instant>,
+    pub(super) survey: Survey,
+}
+
+impl Watched {
+    pub(super) fn new(line: Line) -> Self {
+        let learner = Learner::new(&line);
+        Self {
+            line,
+            learner,
+            pairing: Pairing::default(),
+            judged: 0,
+            again: None,
+            conditions: Vec::new(),
+            probed: None,
+            probed_for: (0, 0),
+            bisect: None,
+            controls_asked: None,
+            survey: Survey::default(),
+        }
+    }
+
+    /// Whether the rules have something to do at `now`.
+    pub(super) fn is_due(&self, now: Instant) -> bool {
+        self.line.revision() != self.judged || self.again.is_some_and(|again| again <= now)
+    }
+
+    /// Whether time alone can change what the rules say.
+    pub(super) fn is_watched(&self, now: Instant) -> bool {
+        let is_open = self.conditions.iter().any(|condition| condition.ended.is_none());
+        // Counters that are read after a frame was lost tell by standing still.
+        let is_recent = |at: Option<Instant>| at.is_some_and(|at| now < at + WATCHED_AFTER_LOSS);
+        is_open
+            || self.line.devices.iter().any(|device| device.mailbox.is_open())
+            || is_recent(self.line.traffic.lost.last)
+            || self.line.devices.iter().any(|device| {
+                device.counters.last_rise().is_some_and(|at| now < at + WATCHED_AFTER_RISE)
+            })
+    }
+
+    /// Whether nothing comes back at the moment.
+    pub(super) fn is_silent(&self) -> bool {
+        let latest = self.line.traffic.silences.back();
+        latest.is_some_and(|silence| silence.ended.is_none() && silence.frames >= FEW_LOST)
+            || self.bisect.is_some()
+    }
+
+    /// Whether it is not known of all that answer how DL control stands.
+    pub(super) fn lacks_controls(&self) -> bool {
+        let mut devices = self.line.devices.iter();
+        devices.any(|device| device.answered.is_some() && device.dl_control.is_none())
+    }
+
+    /// Looks for the place where frames vanish, where that is allowed. Gives what to write or read next.
+    pub(super) fn search(&mut self, now: Instant) -> Vec<Probe> {
+        let line = &mut self.line;
+        if self.bisect.is_none() {
+            self.bisect = Bisect::begin(line, now);
+        }
+        if let Some(bisect) = &mut self.bisect {
+            let probe = bisect.go_on(line, now);
+            if line.hole.is_none_or(|hole| hole.ended.is_some()) {
+                self.bisect = None;
+            }
+            return probe.into_iter().collect();
+        }
+        let is_due = self.controls_asked.is_none_or(|at| now >= at + CONTROLS_EVERY);
+        if self.is_silent() || !is_due {
+            return Vec::new();
+        }
+        let line = &self.line;
+        self.controls_asked = Some(now);
+        let unknown = line.devices.iter().filter(|device| {
+            device.dl_control.is_none() && device.answered.is_some() && device.silent.is_none()
+        });
+        unknown.filter_map(|device| bisect::ask(line.network, device, now)).collect()
+    }
+
+    /// What makes it worth asking: frames lost, and working counters that fell.
+    pub(super) fn alarms(&self) -> (u64, u64) {
+        let deficits = self.line.cyclic.iter().map(|cyclic| cyclic.deficits.len() as u64).sum();
+        (self.line.traffic.lost.times, deficits)
+    }
+}

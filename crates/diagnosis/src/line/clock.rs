@@ -1,0 +1,359 @@
+//! Distributed clocks: the time that the reference clock gives, and how far the others are off it.
+
+use std::collections::VecDeque;
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::time::{Instant, Span};
+
+use super::Seen;
+
+/// A clock that is nearer than this follows, in ns.
+const NEAR: u64 = 5_000;
+/// A clock that was near and is this far off does not follow any more, in ns: no SubDevice needs it closer
+/// than its SYNC signals are apart, and steered clocks stay within a microsecond.
+const FAR: u64 = 20_000;
+/// Readings of 0x092C that are kept.
+const KEPT: usize = 16;
+/// Readings that are closer together say nothing of the speed.
+const SPEED_FROM: Span = Span::ms(50);
+
+/// Register 0x092C: the magnitude, and the sign in the highest bit (S1 9.1.3).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ClockDifference(pub u32);
+
+impl ClockDifference {
+    /// In ns; positive while the clock is ahead.
+    #[must_use]
+    pub const fn ns(self) -> i64 {
+        let magnitude = (self.0 & 0x7FFF_FFFF) as i64;
+        if self.0 >> 31 == 1 { magnitude } else { -magnitude }
+    }
+}
+
+/// How far a clock is off the reference clock, over time.
+#[derive(Clone, Default, Debug)]
+pub struct ClockHistory {
+    /// Readings of 0x092C in ns since it was set, oldest first.
+    pub differences: VecDeque<Seen<i64>>,
+    /// When it last was near the reference, since it was set.
+    pub near: Option<Seen<i64>>,
+    /// The latest time in which it did not follow.
+    pub astray: Option<Astray>,
+}
+
+/// A stretch of time in which a clock that had followed did not.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Astray {
+    /// When it was last near.
+    pub near: Seen<i64>,
+    /// The first reading that was far.
+    pub far: Seen<i64>,
+    /// The farthest.
+    pub worst: Seen<i64>,
+    /// How fast it went away at most, in parts per million; positive while it is too fast.
+    pub ppm: i64,
+    /// When it was near again, or set anew.
+    pub ended: Option<Instant>,
+}
+
+impl ClockHistory {
+    /// A reading of 0x092C, in ns. Says whether it is news.
+    pub fn record(&mut self, seen: Seen<i64>) -> bool {
+        if self.differences.len() == KEPT {
+            self.differences.pop_front();
+        }
+        let ppm = self.ppm(&seen);
+        self.differences.push_back(seen);
+        let off = seen.value.unsigned_abs();
+        let open = self.astray.as_mut().filter(|astray| astray.ended.is_none());
+        if off < NEAR {
+            self.near = Some(seen);
+            let was_astray = open.map(|astray| astray.ended = Some(seen.at)).is_some();
+            return was_astray;
+        }
+        if let Some(astray) = open {
+            if off > astray.worst.value.unsigned_abs() {
+                astray.worst = seen;
+            }
+            if let Some(ppm) = ppm.filter(|ppm| ppm.abs() > astray.ppm.abs()) {
+                astray.ppm = ppm;
+            }
+            return true;
+        }
+        let Some(near) = self.near.filter(|_| off >= FAR) else { return false };
+        let ppm = ppm.unwrap_or(0);
+        self.astray = Some(Astray { near, far: seen, worst: seen, ppm, ended: None });
+        true
+    }
+
+    /// It was set anew at `at`: what it was off before says nothing of it now.
+    pub fn set(&mut self, at: Instant) {
+        self.differences.clear();
+        self.near = None;
+        if let Some(astray) = &mut self.astray {
+            astray.ended.get_or_insert(at);
+        }
+    }
+
+    /// How fast it went since the earliest reading that is kept.
+    fn ppm(&self, seen: &Seen<i64>) -> Option<i64> {
+        // The latest one that is far enough away: a fault that has just begun shows at once.
+        let mut earlier = self.differences.iter().rev();
+        let before = earlier.find(|one| one.at + SPEED_FROM <= seen.at)?;
+        let passed = seen.at.since(before.at).as_nanos();
+        let gained = i128::from(seen.value - before.value) * 1_000_000;
+        i64::try_from(gained / i128::from(passed.max(1))).ok()
+    }
+}
+
+/// The time that a frame took along from the reference clock.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Passed {
+    /// When the frame was sent.
+    pub sent: Instant,
+    /// What the reference clock showed when the frame passed it, in ns.
+    pub time: u64,
+    /// Whether only the low 32 bits of that were taken along.
+    pub is_short: bool,
+}
+
+impl Passed {
+    /// What the reference clock went on by since an earlier frame, in ns.
+    const fn since(&self, earlier: &Self) -> i64 {
+        let passed = self.time.wrapping_sub(earlier.time);
+        if self.is_short || earlier.is_short { passed as u32 as i32 as i64 } else { passed as i64 }
+    }
+}
+
+/// The reference clock, as each frame shows it that hands its time round.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Whose it is.
+    pub device: DeviceId,
+    /// The latest frame that took its time along, since it was set.
+    last: Option<Seen<Passed>>,
+    /// When it was set anew, since it stood or went backwards.
+    pub mended: Option<Instant>,
+    /// When it stood: from the first frame to the last that found it so; the latest time only.
+    pub stood: Option<Stood>,
+    /// When it went backwards, and to where by its own time, in ns.
+    pub went_back: Option<Seen<i64>>,
+    /// Its frames that found it standing, in a row.
+    standing: u32,
+    /// How much faster it went than the clock of whoever sends when it was worst, if no sound quartz does
+    /// so, in parts per million.
+    pub wrong_speed: Option<i64>,
+    /// The frame of the present stretch that was on its way for the shortest time, by both clocks.
+    best: Option<Passed>,
+    /// When that stretch began.
+    begun: Instant,
+    /// The best of each of the latest stretches.
+    marks: VecDeque<Passed>,
+}
+
+/// A time in which the reference clock stood.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Stood {
+    /// The last frame that saw it go.
+    pub since: Seen<u64>,
+    /// The latest frame that found it so.
+    pub last: Instant,
+    /// Whether it goes on again.
+    pub is_over: bool,
+}
+
+impl Reference {
+    /// Two frames pass a controller at least the shortest frame apart; times are taken with some ns of
+    /// noise. In ns.
+    const NOISE: i64 = 1_000;
+    /// Who goes back by less was read on another way, such as by the other card of a ring. In ns.
+    const BACK: i64 = 10_000_000;
+    /// Frames that are sent closer together than this say nothing.
+    const APART: Span = Span::us(50);
+    /// So many frames in a row that found it standing are no accident.
+    const SURE: u32 = 3;
+    /// Its speed is taken between marks: of each stretch of this length the frame that was least late.
+    const STRETCH: Span = Span::ms(200);
+    const MARKS: usize = 10;
+    /// Two sound quartzes, of the computer and of a SubDevice, do not differ by more, in parts per million.
+    const SOUND: i64 = 300;
+
+    /// The first frame that hands its time round.
+    #[must_use]
+    pub fn new(device: DeviceId, seen: Seen<Passed>) -> Self {
+        Self {
+            device,
+            last: Some(seen),
+            mended: None,
+            stood: None,
+            went_back: None,
+            standing: 0,
+            wrong_speed: None,
+            best: None,
+            begun: Instant::ZERO,
+            marks: VecDeque::new(),
+        }
+    }
+
+    /// Another frame took its time along. Says whether it is news.
+    pub fn record(&mut self, seen: Seen<Passed>) -> bool {
+        if self.last.is_some_and(|last| seen.value.sent < last.value.sent + Self::APART) {
+            return false;
+        }
+        let Some(before) = self.last.replace(seen) else { return false };
+        let went = seen.value.since(&before.value);
+        if went < -Self::BACK {
+            self.went_back = Some(Seen::new(went, seen.at, seen.frame));
+            self.mended = None;
+            self.standing = 0;
+            (self.best, self.marks) = (None, VecDeque::new());
+            return true;
+        }
+        if went.abs() < Self::NOISE {
+            self.standing += 1;
+            if self.standing < Self::SURE {
+                return false;
+            }
+            match self.stood.as_mut().filter(|stood| !stood.is_over) {
+                Some(stood) => stood.last = seen.at,
+                None => {
+                    let since = Seen::new(seen.value.time, before.at, before.frame);
+                    self.stood = Some(Stood { since, last: seen.at, is_over: false });
+                    self.mended = None;
+                    return true;
+                }
+            }
+            return false;
+        }
+        self.standing = 0;
+        if let Some(stood) = self.stood.as_mut().filter(|stood| !stood.is_over) {
+            stood.is_over = true;
+            (self.best, self.marks) = (None, VecDeque::new());
+            return true;
+        }
+        self.mark(seen.value);
+        false
+    }
+
+    /// It was set at `at`: that its time jumps then means nothing.
+    pub fn set(&mut self, at: Instant) {
+        self.last = None;
+        self.standing = 0;
+        (self.best, self.marks) = (None, VecDeque::new());
+        if self.stood.is_some() || self.went_back.is_some() {
+            self.mended.get_or_insert(at);
+        }
+    }
+
+    fn mark(&mut self, passed: Passed) {
+        let Some(best) = self.best else {
+            (self.best, self.begun) = (Some(passed), passed.sent);
+            return;
+        };
+        if passed.sent >= self.begun + Self::STRETCH {
+            if self.marks.len() == Self::MARKS {
+                self.marks.pop_front();
+            }
+            self.marks.push_back(best);
+            (self.best, self.begun) = (Some(passed), passed.sent);
+            let worst = self.wrong_speed.map_or(Self::SOUND, i64::abs);
+            self.wrong_speed = self.ppm().filter(|ppm| ppm.abs() >= worst).or(self.wrong_speed);
+            return;
+        }
+        // Earlier by its own clock than by the sender's: it was less late.
+        let sooner = passed.since(&best) < passed.sent.since(best.sent).as_nanos() as i64;
+        if sooner {
+            self.best = Some(passed);
+        }
+    }
+
+    /// How much faster it goes than the clock of whoever sends, in parts per million, over the latest
+    /// second or two; `None` as long as that is not known.
+    #[must_use]
+    pub fn ppm(&self) -> Option<i64> {
+        let (first, last) = (self.marks.front()?, self.marks.back()?);
+        let sent = last.sent.since(first.sent);
+        if sent < Self::STRETCH * 3 {
+            return None;
+        }
+        let sent = sent.as_nanos() as i64;
+        let gained = i128::from(last.since(first) - sent) * 1_000_000;
+        i64::try_from(gained / i128::from(sent)).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(ms: u64) -> Instant {
+        Instant::from_nanos(ms * 1_000_000)
+    }
+
+    fn read(clock: &mut ClockHistory, ms: u64, ns: i64) -> bool {
+        clock.record(Seen::new(ns, at(ms), None))
+    }
+
+    #[test]
+    fn the_sign_is_the_highest_bit() {
+        assert_eq!(ClockDifference(0x8000_0078).ns(), 120);
+        assert_eq!(ClockDifference(0x0000_0078).ns(), -120);
+    }
+
+    #[test]
+    fn a_clock_goes_astray_only_from_near_and_until_it_is_set() {
+        let mut clock = ClockHistory::default();
+        assert!(!read(&mut clock, 0, 900_000), "it was never near");
+        read(&mut clock, 100, 800);
+        assert!(!read(&mut clock, 200, 15_000), "not far yet");
+        assert!(read(&mut clock, 300, 115_000));
+        read(&mut clock, 400, 215_000);
+        let astray = clock.astray.unwrap();
+        assert_eq!((astray.near.at, astray.far.at, astray.ended), (at(100), at(300), None));
+        assert_eq!((astray.worst.value, astray.ppm), (215_000, 1_000));
+        clock.set(at(500));
+        assert_eq!(clock.astray.unwrap().ended, Some(at(500)));
+        assert!(!read(&mut clock, 600, 900_000));
+    }
+
+    fn pass(reference: &mut Reference, ms: u64, time: u64) -> bool {
+        let passed = Passed { sent: at(ms), time, is_short: false };
+        reference.record(Seen::new(passed, at(ms), Some(ms)))
+    }
+
+    fn running_at(ns_per_ms: u64) -> Reference {
+        let first = Passed { sent: at(0), time: 7_000_000_000, is_short: false };
+        let mut reference = Reference::new(DeviceId(0), Seen::new(first, at(0), None));
+        for ms in 1..=1_000 {
+            // Every seventh frame is late by 0.3 ms.
+            let late = if ms % 7 == 0 { 300_000 } else { 0 };
+            assert!(!pass(&mut reference, ms, 7_000_000_000 + ms * ns_per_ms + late));
+        }
+        reference
+    }
+
+    fn running() -> Reference {
+        running_at(1_001_000)
+    }
+
+    #[test]
+    fn the_speed_of_the_reference_is_told_against_the_senders_clock() {
+        assert_eq!(running().wrong_speed, Some(1_000));
+        assert_eq!(running_at(999_000).wrong_speed, Some(-1_000));
+        assert_eq!(running_at(1_000_100).wrong_speed, None);
+    }
+
+    #[test]
+    fn a_reference_that_stands_or_goes_back_is_noticed() {
+        let mut stands = running();
+        let time = 7_000_000_000 + 1_000 * 1_001_000;
+        let noticed: Vec<u64> = (1_001..1_010).filter(|ms| pass(&mut stands, *ms, time)).collect();
+        assert_eq!(noticed, [1_003]);
+        assert_eq!(stands.stood.map(|stood| stood.is_over), Some(false));
+        assert!(pass(&mut stands, 1_010, time + 1_000_000));
+        assert_eq!(stands.stood.map(|stood| stood.is_over), Some(true));
+        let mut back = running();
+        assert!(pass(&mut back, 1_001, 5_000));
+        assert!(back.went_back.is_some_and(|seen| seen.value < 0));
+    }
+}

@@ -1,0 +1,218 @@
+//! How long frames are on their way, and which came back later than the line can make them.
+//!
+//! A line takes the same time for the same frame, to some ns: what a frame waits for is the frame before it on
+//! the card, and that is known. What comes back later was kept back by a computer, a card or a queue, on its
+//! way out or in.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use linesman_proto::time::{Instant, Span};
+
+/// Lengths of frames that are followed.
+const LENGTHS: usize = 128;
+/// Frames of a length after which its usual time is known.
+const KNOWN: u32 = 48;
+/// The shortest time is that of the latest one or two times so many frames: lines change.
+const BUCKET: u32 = 64;
+/// Nothing is late by less: a queue of a few frames, a clock that is read late.
+const LEAST: u64 = 60_000;
+/// A host whose frames wander anyway is late when it is this many times worse than usual.
+const WORSE: u64 = 8;
+/// From so many frames in the beginning it is learnt what this host does anyway.
+const LEARNT_FROM: u64 = 500;
+/// Nothing is late by less than this many times the worst of them.
+const WORST: u64 = 2;
+/// How slowly the usual is learnt: by this part of each frame.
+const SLOWLY: u64 = 256;
+/// So many in a row that took the same longer time took another way: a link was opened, or closed.
+const OTHER_WAY: usize = 8;
+/// How alike they are then, in ns.
+const ALIKE: u64 = 5_000;
+/// When so many frames of a hundred are late, it is a queue …
+const MOST: u64 = 30;
+/// … if there were so many at all.
+const SEVERAL: u64 = 8;
+/// Late frames that are kept.
+const KEPT: usize = 64;
+/// On 100 Mbit/s, in ns.
+const BYTE: u64 = 80;
+/// Preamble, check sequence and the gap to the next frame, in bytes.
+const AROUND: u64 = 8 + 4 + 12;
+/// The shortest frame, without its check sequence, in bytes.
+const SHORTEST: u64 = 60;
+
+/// A frame that came back late.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LateFrame {
+    /// When it was sent.
+    pub sent: Instant,
+    /// Its number when it came back.
+    pub frame: u64,
+    /// How much later than usual it came back.
+    pub by: Span,
+}
+
+/// How long frames are on their way.
+#[derive(Clone, Default, Debug)]
+pub struct Trips {
+    /// By length in bytes.
+    usual: BTreeMap<usize, Usual>,
+    /// Until when the frames before are on their way out of the card.
+    busy_until: Instant,
+    /// Frames that came back.
+    frames: u64,
+    /// The latest of the first ones, in ns.
+    worst_learnt: u64,
+    /// Late ones in a row, as long as they may be on another way.
+    alike: Vec<LateFrame>,
+    /// The latest late ones, oldest first.
+    pub late: VecDeque<LateFrame>,
+    /// All late ones.
+    pub late_count: u64,
+    /// Frames that were compared from the first late one to the latest.
+    pub compared: u64,
+    /// Frames that were compared since the first late one.
+    since_first: u64,
+}
+
+/// Frames of one length.
+#[derive(Clone, Copy, Default, Debug)]
+struct Usual {
+    count: u32,
+    shortest: u64,
+    next_shortest: u64,
+    /// How much longer than the shortest they usually are.
+    wanders: u64,
+}
+
+impl Usual {
+    /// A frame took so long: by how much it is late, if it is.
+    fn take(&mut self, took: u64, least: u64) -> Option<u64> {
+        self.count += 1;
+        if self.count == 1 {
+            (self.shortest, self.next_shortest) = (took, took);
+        }
+        self.shortest = self.shortest.min(took);
+        self.next_shortest = self.next_shortest.min(took);
+        if self.count.is_multiple_of(BUCKET) {
+            (self.shortest, self.next_shortest) = (self.next_shortest, u64::MAX);
+        }
+        let longer = took - self.shortest.min(took);
+        let limit = (self.wanders * WORSE).max(least);
+        let is_late = self.count > KNOWN && longer > limit;
+        if !is_late {
+            self.wanders = (self.wanders * (SLOWLY - 1) + longer) / SLOWLY;
+        }
+        is_late.then_some(longer)
+    }
+}
+
+impl Trips {
+    /// A frame of `len` bytes came back. Says whether it is news.
+    pub fn record(&mut self, sent: Instant, back: Instant, frame: u64, len: usize) -> bool {
+        let duration = Span::ns((len as u64).max(SHORTEST).saturating_add(AROUND) * BYTE);
+        let leaves = sent.max(self.busy_until.min(back));
+        self.busy_until = leaves + duration;
+        let took = back.since(leaves).as_nanos();
+        if self.usual.len() >= LENGTHS && !self.usual.contains_key(&len) {
+            return false;
+        }
+        let least = LEAST.max(self.worst_learnt * WORST);
+        let late = self.usual.entry(len).or_default().take(took, least);
+        self.frames += 1;
+        if self.frames <= LEARNT_FROM {
+            self.worst_learnt = self.worst_learnt.max(late.unwrap_or(0));
+            return false;
+        }
+        self.since_first += u64::from(self.late_count > 0);
+        let Some(by) = late else {
+            let was_late = !self.alike.is_empty();
+            self.settle();
+            return was_late;
+        };
+        let late = LateFrame { sent, frame, by: Span::ns(by) };
+        let is_alike = |other: &LateFrame| other.by.as_nanos().abs_diff(by) <= ALIKE;
+        if !self.alike.last().is_some_and(is_alike) {
+            self.settle();
+        }
+        self.alike.push(late);
+        if self.alike.len() >= OTHER_WAY {
+            self.alike.clear();
+            self.usual.clear();
+        }
+        true
+    }
+
+    /// How many of a hundred frames were late while any were.
+    #[must_use]
+    pub fn share(&self) -> u64 {
+        self.late_count * 100 / self.compared.max(1)
+    }
+
+    /// Whether so many were late that they wait in a queue.
+    #[must_use]
+    pub fn is_queue(&self) -> bool {
+        self.late_count >= SEVERAL && self.share() >= MOST
+    }
+
+    /// What was late, was.
+    fn settle(&mut self) {
+        for late in self.alike.drain(..) {
+            if self.late.len() == KEPT {
+                self.late.pop_front();
+            }
+            self.late.push_back(late);
+            self.late_count += 1;
+            self.compared = self.since_first.max(self.late_count);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame a millisecond, of 64 bytes; each takes so many µs.
+    fn play(trips: &mut Trips, from: u64, took_us: &[u64]) {
+        for (ms, us) in (from..).zip(took_us) {
+            let sent = Instant::from_nanos(ms * 1_000_000);
+            trips.record(sent, sent + Span::us(*us), ms, 64);
+        }
+    }
+
+    #[test]
+    fn a_frame_that_takes_longer_than_the_line_does_is_late() {
+        let mut trips = Trips::default();
+        play(&mut trips, 0, &[20; 600]);
+        play(&mut trips, 600, &[20, 150, 20]);
+        assert_eq!(trips.late_count, 1);
+        assert_eq!(trips.late[0].by, Span::us(130));
+        assert_eq!(trips.late[0].frame, 601);
+    }
+
+    #[test]
+    fn a_longer_way_and_a_host_that_always_wanders_are_not_late() {
+        let mut trips = Trips::default();
+        play(&mut trips, 0, &[20; 600]);
+        play(&mut trips, 600, &[120; 300]);
+        assert_eq!(trips.late_count, 0, "another way");
+        let mut trips = Trips::default();
+        let wandering: Vec<u64> = (0..900).map(|nth| 20 + nth * 37 % 50).collect();
+        play(&mut trips, 0, &wandering);
+        assert_eq!(trips.late_count, 0);
+    }
+
+    #[test]
+    fn whoever_waits_for_the_frame_before_is_not_late() {
+        let mut trips = Trips::default();
+        for burst in 0..300_u64 {
+            let sent = Instant::from_nanos(burst * 1_000_000);
+            for nth in 0..4_u64 {
+                // 1514 bytes and what is around them take 123.04 µs.
+                let back = sent + Span::ns(200_000 + nth * 123_040);
+                trips.record(sent, back, burst, 1514);
+            }
+        }
+        assert_eq!(trips.late_count, 0);
+    }
+}

@@ -1,0 +1,164 @@
+//! # A clock drifts
+//!
+//! The clock of a SubDevice does not follow the reference clock any more.
+//!
+//! **How it is found.** Each controller shows how far its clock is off the reference clock (0x092C), as an
+//! average of what the frames bring. A clock that had been near, within 5 µs, and is 20 µs off or more has
+//! gone astray; two readings tell how fast it goes. One clock that goes astray runs wrong itself. When all of
+//! them do at once, in the same direction, it is the reference that runs wrong; so it is when the time that it
+//! gives goes faster or slower than the clock of the computer by more than any sound quartz.
+//!
+//! Nobody reads these registers all the time: live, the diagnosis asks for them by turns.
+//!
+//! **What it means.** Control in the controller follows quartzes that are off by some hundreds of parts per
+//! million, and sound ones are off by fifty at most. Heat and damage make it more. The SYNC signals of the
+//! SubDevice come earlier and earlier, or later and later, within the cycle; when they meet the frames, it
+//! misses outputs and leaves OP (0x001A, 0x002C), again and again. That is listed beneath.
+//!
+//! **What to do.** Measure the temperature in the cabinet, then exchange the SubDevice. Where the reference
+//! runs wrong, choose another one meanwhile.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::{DeviceId, RegisterAddress};
+
+use super::{Rule, RulePage, View, reference_clock};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::clock::Astray;
+use crate::line::{Device, Line};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "T420",
+    name: "clock-drift",
+    severity: Severity::Error,
+    class: Class::Timing,
+    source: include_str!("clock_drift.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+const DIFFERENCE: RegisterAddress = RegisterAddress(0x092C);
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    // Whoever follows a clock that stands goes astray with it.
+    if reference_clock::is_lost(line) {
+        return;
+    }
+    let astray: Vec<(&Device, Astray)> = (line.devices.iter())
+        .filter_map(|device| Some((device, device.clock.astray?)))
+        .filter(|(device, astray)| !was_gone(device, astray))
+        .collect();
+    if astray.is_empty() {
+        conditions.extend(alone(line));
+        return;
+    }
+    if let Some(reference) = wrong_reference(line, &astray) {
+        conditions.push(of_reference(line, reference, &astray));
+        return;
+    }
+    for (device, astray) in &astray {
+        let condition = begin(line, device.id, std::slice::from_ref(astray));
+        let evidence = evidence(line, device.id, astray);
+        conditions.push(condition.shown_by(evidence).explaining(follows(device.id)));
+    }
+}
+
+/// Whether the SubDevice was gone, or started anew, meanwhile: then its clock had to be set again.
+fn was_gone(device: &Device, astray: &Astray) -> bool {
+    let is_within = |at| at >= astray.near.at && at <= astray.far.at;
+    device.absences.iter().any(|absence| is_within(absence.since.at))
+        || device.al.changes.iter().any(|change| change.is_own_fall() && is_within(change.at))
+}
+
+/// The reference clock, if it is that which runs wrong.
+fn wrong_reference(line: &Line, astray: &[(&Device, Astray)]) -> Option<DeviceId> {
+    let [reference] = line.references.as_slice() else { return None };
+    if reference.wrong_speed.is_some() {
+        return Some(reference.device);
+    }
+    // Most of those whose difference was read since, in one direction.
+    let began = astray.iter().map(|(_, astray)| astray.far.at).min()?;
+    let read = line.devices.iter().filter(|device| {
+        let latest = device.clock.differences.back();
+        device.id != reference.device && latest.is_some_and(|latest| latest.at >= began)
+    });
+    let ahead = astray.iter().filter(|(_, astray)| astray.worst.value > 0).count();
+    let is_one_way = ahead == 0 || ahead == astray.len();
+    (astray.len() >= 3 && is_one_way && astray.len() == read.count()).then_some(reference.device)
+}
+
+/// A reference clock that nobody is known to follow, against the clock of the computer: one of the two is
+/// wrong. With readings of others, that are near, it is the computer.
+fn alone(line: &Line) -> Option<Condition> {
+    let [reference] = line.references.as_slice() else { return None };
+    reference.wrong_speed?;
+    let id = reference.device;
+    let others = line.devices.iter().filter(|device| device.id != id);
+    if others.into_iter().any(|device| device.clock.near.is_some()) {
+        return None;
+    }
+    let condition = of_reference(line, id, &[]);
+    Some(condition.confidence(0.6).or_at(FaultName::ClockDrift, Place::Host, 0.3))
+}
+
+fn of_reference(line: &Line, id: DeviceId, astray: &[(&Device, Astray)]) -> Condition {
+    let spans: Vec<Astray> = astray.iter().map(|(_, astray)| *astray).collect();
+    let mut condition = begin(line, id, &spans);
+    let reference = line.references.iter().find(|one| one.device == id);
+    if let Some(ppm) = reference.and_then(|reference| reference.wrong_speed) {
+        let text = format!(
+            "the time of reference clock {} goes {} than that of the computer, by {} parts per million",
+            line.label(id),
+            if ppm > 0 { "faster" } else { "slower" },
+            ppm.abs()
+        );
+        condition = condition.shown_by(Evidence::host(Some(line.now), text));
+    }
+    for (device, astray) in astray.iter().take(3) {
+        condition = condition.shown_by(evidence(line, device.id, astray));
+    }
+    condition.explaining(line.devices.iter().flat_map(|device| follows(device.id)))
+}
+
+fn begin(line: &Line, id: DeviceId, astray: &[Astray]) -> Condition {
+    let since = astray.iter().map(|one| one.far.at).min().unwrap_or(line.now);
+    let condition = Condition::new(
+        &PAGE,
+        Place::device(line.network, id),
+        FaultName::ClockDrift,
+        since,
+    )
+    .confidence(0.85)
+    .confirmed(since)
+    .advise("Measure the temperature in the cabinet: quartzes go wrong with heat.")
+    .advise("Exchange this SubDevice; if it is the reference clock, choose another one meanwhile.");
+    if astray.is_empty() {
+        return condition;
+    }
+    let ended = astray.iter().map(|one| one.ended).collect::<Option<Vec<_>>>();
+    match ended.and_then(|ended| ended.into_iter().max()) {
+        Some(ended) => condition.ended(ended),
+        None => condition,
+    }
+}
+
+fn evidence(line: &Line, id: DeviceId, astray: &Astray) -> Evidence {
+    let us = |ns: i64| ns as f64 / 1e3;
+    let text = format!(
+        "clock of SubDevice {}: {:+.3} µs off the reference, then {:+.3} µs, at most {:+.3} µs; up to {} parts \
+         per million",
+        line.label(id),
+        us(astray.near.value),
+        us(astray.far.value),
+        us(astray.worst.value),
+        astray.ppm
+    );
+    Evidence::register(id, DIFFERENCE, &astray.far, text)
+        .values(Some(astray.near.value.unsigned_abs()), Some(astray.far.value.unsigned_abs()))
+}
+
+fn follows(id: DeviceId) -> [Symptom; 3] {
+    [Symptom::StateLost(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)]
+}

@@ -1,0 +1,135 @@
+//! # A link is up before it carries frames
+//!
+//! After a link came back, all frames vanished for a while.
+//!
+//! **How it is found.** A link was lost, once, and is back (0x0110, 0x0310 to 0x0313). While it was down the rest of
+//! the line answered; with the link up again nothing came back at all, from nobody, for several frames, and then
+//! everything did. On the cable of the card itself it shows when the card had its link back and frames still
+//! went missing for a tenth of a second or more.
+//!
+//! **What it means.** Ports open their loops as soon as they have a link. A switch, a media converter or a slow
+//! device in between that shows its link before it forwards swallows every frame of the line meanwhile, not
+//! only those for what is behind it. Watchdogs expire everywhere.
+//!
+//! **What to do.** Take the device in between out of the line, or switch off its power saving and its
+//! spanning-tree waiting time. Where that cannot be, open the loops by hand (0x0100) after a while.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::state::AlState;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::{End, Tree};
+
+use super::{Rule, RulePage, View, link_lost};
+use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
+use crate::line::{Line, Silence};
+use crate::locate::Drops;
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "H103",
+    name: "link-up-too-early",
+    severity: Severity::Error,
+    class: Class::Hardware,
+    source: include_str!("early_link.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// Fewer frames that vanish were on their way when the link changed.
+const SEVERAL: u64 = 3;
+/// So long nothing came back.
+const BLIND: Span = Span::ms(5);
+/// The loss of a link is read so long after it at most, or before it is counted.
+const AROUND: Span = Span::s(1);
+/// The state of the card's link is looked at from time to time.
+const CARRIER: Span = Span::ms(120);
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    let Some(tree) = &line.tree else { return };
+    let all = Drops::all(line);
+    let is_first = |drops: &&Drops| matches!(tree.links()[drops.link].upstream, End::MainDevice(_));
+    // Without the first link nobody answers in any case.
+    let suspects: Vec<&Drops> = match all.iter().find(is_first) {
+        Some(first) => vec![first],
+        None => all.iter().collect(),
+    };
+    // A link that comes and goes is another trouble.
+    for drops in suspects.into_iter().filter(|drops| !drops.is_down && drops.count == 1) {
+        let silence = match tree.links()[drops.link].upstream {
+            End::MainDevice(card) => behind_card(line, card),
+            End::Controller(..) => behind_link(line, drops),
+        };
+        if let Some((silence, ended)) = silence {
+            conditions.push(condition(line, tree, drops, (silence, ended)));
+        }
+    }
+}
+
+/// Silences that are over, long enough to be no accident.
+fn silences(line: &Line) -> impl Iterator<Item = (&Silence, Instant)> {
+    let over = line.traffic.silences.iter().rev().filter_map(|one| Some((one, one.ended?)));
+    over.filter(|(one, ended)| one.frames >= SEVERAL && ended.since(one.since.at) >= BLIND)
+}
+
+/// With another link than the first one lost, the rest of the line answers; unless all vanishes.
+fn behind_link<'a>(line: &'a Line, drops: &Drops) -> Option<(&'a Silence, Instant)> {
+    let (from, to) = (drops.first.before(AROUND), drops.ended()? + AROUND);
+    let is_then = |at: Instant| at >= from && at <= to;
+    // Who starts anew at the begin of a line takes all the others with it.
+    let fell = line.devices.iter().any(|device| {
+        let mut falls = device.al.changes.iter().filter(|change| change.is_own_fall());
+        falls.any(|change| change.to.state().state() == Some(AlState::Init) && is_then(change.at))
+    });
+    if fell {
+        return None;
+    }
+    silences(line).find(|(silence, _)| is_then(silence.since.at))
+}
+
+/// The card had its link again, and still nothing came back.
+fn behind_card(line: &Line, card: Path) -> Option<(&Silence, Instant)> {
+    let history = line.host.card(card);
+    let up = history.carrier.filter(|carrier| carrier.value && history.carrier_changes > 0)?;
+    silences(line).find(|(silence, ended)| silence.since.at <= up.at && *ended >= up.at + CARRIER)
+}
+
+fn condition(
+    line: &Line,
+    tree: &Tree,
+    drops: &Drops,
+    (silence, ended): (&Silence, Instant),
+) -> Condition {
+    let link = tree.links()[drops.link].map(|node| DeviceId(node as u32));
+    let place = Place::link(line.network, link, Some(LinkDirection::Both));
+    let since = silence.since;
+    let text = format!(
+        "nothing came back for {:.1} ms, {} frames, about when this link came up again; then everything did",
+        ended.since(since.at).as_secs_f64() * 1e3,
+        silence.frames
+    );
+    let all = line.devices.iter().flat_map(|device| {
+        let id = device.id;
+        [
+            Symptom::Silent(id),
+            Symptom::StateLost(id),
+            Symptom::WorkingCounter(id),
+            Symptom::Emergency(id),
+        ]
+    });
+    Condition::new(&PAGE, place, FaultName::EarlyLink, since.at.min(drops.first))
+        .confidence(0.7)
+        .or(FaultName::LinkFlapping, 0.15)
+        .confirmed(ended)
+        .ended(ended.max(drops.ended().unwrap_or(ended)))
+        .shown_by(Evidence::frame(since.at, since.frame.unwrap_or(0), text))
+        .explaining(link_lost::follows(line, tree, drops.link))
+        .explaining([Symptom::FramesLost, Symptom::NobodyAnswers, Symptom::NoCarrier])
+        .explaining(all)
+        .advise(
+            "Look what is between the two ends of this link: a switch, a converter, a slow device.",
+        )
+        .advise("Connect both ends with a cable, and unplug and plug it: all else must go on.")
+}

@@ -1,0 +1,126 @@
+//! # Frames that are not EtherCAT
+//!
+//! Other computers' frames travel on the line.
+//!
+//! **How it is found.** A frame with another EtherType comes in by the card, or stands in the recording. Or
+//! the processing unit of a controller counts errors (0x030C) while no port of any controller counts a
+//! damaged frame: as long as bit 0 of DL control (0x0100) is set, as after power-on, a controller destroys
+//! what is not EtherCAT and counts it there, and only the first one on the way sees any.
+//!
+//! **What it means.** A switch, an office computer or the operating system's own services share the cable.
+//! Single frames do no harm. Many take time on the line, so that process data come late; and whoever can
+//! reach the line by a switch can disturb it.
+//!
+//! **What to do.** Connect the card to the first SubDevice directly, and take other protocols off this
+//! interface.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity};
+use crate::line::{Device, Line, Rise};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "C333",
+    name: "foreign-frames",
+    severity: Severity::Warning,
+    class: Class::Configuration,
+    source: include_str!("foreign_frames.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// What did not come again for this long is over.
+const QUIET: Span = Span::s(5);
+/// Links that come and go, and rings that close, leave frames that are destroyed, too.
+const AROUND: Span = Span::s(2);
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    let traffic = &line.traffic;
+    let destroyed = destroyed(line);
+    let counted =
+        |rises: &[&Rise]| -> u64 { rises.iter().map(|rise| u64::from(rise.difference.rise)).sum() };
+    let seen = traffic.first_foreign;
+    let firsts =
+        destroyed.iter().filter_map(|(_, rises)| rises.first().map(|rise| rise.after_time));
+    let lasts = destroyed.iter().filter_map(|(_, rises)| rises.last().map(|rise| rise.at));
+    let Some(first) = firsts.chain(seen.map(|seen| seen.at)).min() else { return };
+    let last = lasts.chain(traffic.latest_foreign).max().unwrap_or(first);
+    let place = Place::Network { network: line.network };
+    let mut condition = Condition::new(&PAGE, place, FaultName::ForeignFrames, first)
+        .confidence(if seen.is_some() { 0.9 } else { 0.7 })
+        .confirmed(seen.map_or(last, |seen| seen.at));
+    if seen.is_none() {
+        condition = condition.or(FaultName::SecondMainDevice, 0.1);
+    }
+    if let Some(seen) = seen {
+        let (count, kind) = (traffic.foreign, name(seen.value));
+        let text = format!("{count} frames that are not EtherCAT, the first of them {kind}");
+        condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
+    }
+    for (device, rises) in &destroyed {
+        let Some(rise) = rises.last() else { continue };
+        let text = format!(
+            "SubDevice {} destroyed {} frames in its processing unit, and no port counted a damaged one",
+            line.label(device.id),
+            counted(rises)
+        );
+        let address = ErrorCounter::ProcessingUnit.address();
+        condition = condition.shown_by(Evidence::rise(device.id, address, None, rise, text));
+    }
+    if destroyed.is_empty() && traffic.foreign_received == 0 {
+        // Recorded beside the line, or sent by this computer itself: nobody says that it came in.
+        condition.severity = Severity::Info;
+    }
+    if last + QUIET < view.now {
+        condition = condition.ended(last);
+    }
+    conditions.push(
+        condition
+            .advise("Connect the card to the first SubDevice directly, without a switch.")
+            .advise("Take IP addresses and services such as LLDP off this network interface."),
+    );
+}
+
+/// Who destroyed frames that were not damaged, with the rises that show it.
+fn destroyed(line: &Line) -> Vec<(&Device, Vec<&Rise>)> {
+    let clean = line.devices.iter().map(|device| {
+        let track = device.counters.track(ErrorCounter::ProcessingUnit);
+        let rises = track.into_iter().flat_map(|track| &track.rises);
+        (device, rises.filter(|rise| is_clean(line, rise)).collect::<Vec<_>>())
+    });
+    clean.filter(|(_, rises)| !rises.is_empty()).collect()
+}
+
+/// Whether nothing else explains that a processing unit found errors between two readings: damage at a
+/// port anywhere, or a link that came or went.
+fn is_clean(line: &Line, rise: &Rise) -> bool {
+    let (from, to) = (rise.after_time.before(AROUND), rise.at + AROUND);
+    let overlaps = |since: Instant, until: Instant| since <= to && until >= from;
+    line.devices.iter().all(|device| {
+        let tracks = device.counters.tracks().filter(|(counter, _)| {
+            !matches!(counter, ErrorCounter::ProcessingUnit | ErrorCounter::Pdi)
+        });
+        let mut rises = tracks.flat_map(|(_, track)| &track.rises);
+        let mut links = device.dl.changes.iter().map(|change| change.at);
+        !rises.any(|other| overlaps(other.after_time, other.at))
+            && !links.any(|at| overlaps(at, at))
+    })
+}
+
+fn name(kind: u16) -> String {
+    match kind {
+        0x0800 => "IPv4".to_owned(),
+        0x0806 => "ARP".to_owned(),
+        0x86DD => "IPv6".to_owned(),
+        0x88CC => "LLDP".to_owned(),
+        0x8100 => "with a VLAN tag".to_owned(),
+        0..=0x05DC => "of the kind that gives its length, such as STP".to_owned(),
+        other => format!("with EtherType 0x{other:04X}"),
+    }
+}

@@ -1,0 +1,116 @@
+//! # Frames come back late
+//!
+//! Frames come back later than the line can make them.
+//!
+//! **How it is found.** A line takes the same time for the same frame, to some nanoseconds; what a frame waits
+//! for on its card is the frame before it. One that takes 60 µs more than the shortest of its length, and far
+//! more than this computer usually wanders, was kept back. Many in a row that take the same longer time took
+//! another way: no finding; nor is it one as long as no process data are exchanged in a cycle, or in a recording
+//! where nobody keeps step with SYNC signals.
+//!
+//! **What it means.** The line is well: no controller counts anything. The computer, its card, a switch or a
+//! converter in between kept the frame back. Single frames now and then are the computer's: interrupts, another
+//! program, power saving. When most frames are late by more and less, they wait in a queue. SubDevices that work
+//! in step with a SYNC signal miss outputs that come behind it, and leave OP; that is listed beneath. For all
+//! others it is worth knowing, no more.
+//!
+//! **What to do.** `linesman host --measure 10` tells how late this computer is, and what mends it. Take switches
+//! and converters out of the way.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::state::status_code::Class as CodeClass;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::{Device, Line};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "T411",
+    name: "frames-late",
+    severity: Severity::Info,
+    class: Class::Timing,
+    source: include_str!("late.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// What did not come again for this long is over.
+const QUIET: Span = Span::s(2);
+/// What lies closer together belongs together.
+const TOGETHER: Span = Span::s(10);
+/// A state that was lost is read so long after the frame that was late.
+const READ_WITHIN: Span = Span::s(2);
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    let trips = &line.trips;
+    let Some(last) = trips.late.back() else { return };
+    // Nobody waits for a frame that is sent when its sender likes; and what a recorder on another
+    // computer saw late does no harm where nobody keeps step.
+    let keeps_step = line.devices.iter().any(|device| device.sync_on.is_some_and(|on| on.value));
+    if shortest_cycle(line).is_none() || !(keeps_step || line.traffic.direction_known) {
+        return;
+    }
+    let mut first = last;
+    for late in trips.late.iter().rev() {
+        if first.sent.since(late.sent) > TOGETHER {
+            break;
+        }
+        first = late;
+    }
+    let of_spell = || trips.late.iter().filter(|late| late.sent >= first.sent);
+    let worst = of_spell().map(|late| late.by).max().unwrap_or(Span::ZERO);
+    let share = trips.share();
+    let (cause, other) = if trips.is_queue() {
+        (FaultName::LateFrames, FaultName::HostJitter)
+    } else {
+        (FaultName::HostJitter, FaultName::LateFrames)
+    };
+    let text = format!(
+        "{} frames came back late, {share} % of those between the first and the last: up to {:.3} ms later than the line takes",
+        trips.late_count,
+        worst.as_secs_f64() * 1e3
+    );
+    let mut condition = Condition::new(&PAGE, Place::Host, cause, first.sent)
+        .confidence(0.6)
+        .or(other, 0.3)
+        .confirmed(first.sent + first.by)
+        .about([Symptom::FramesLate])
+        .shown_by(Evidence::frame(last.sent + last.by, last.frame, text))
+        .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
+        .advise("Take switches and media converters out of the way between card and first SubDevice.");
+    let in_step = line.devices.iter().filter(|device| device.sync_on.is_some_and(|on| on.value));
+    let hurt: Vec<&Device> =
+        in_step.filter(|device| was_hurt(device, first.sent, last.sent + last.by)).collect();
+    if !hurt.is_empty() {
+        condition.severity = Severity::Error;
+        condition = condition.explaining(hurt.iter().map(|device| Symptom::StateLost(device.id)));
+        condition =
+            condition.explaining(hurt.iter().map(|device| Symptom::WorkingCounter(device.id)));
+    } else if keeps_step && worst >= shortest_cycle(line).unwrap_or(Span::s(1)) {
+        // Where nobody keeps step, a late frame costs a cycle; every computer has some.
+        condition.severity = Severity::Warning;
+    }
+    if last.sent + QUIET < view.now {
+        condition = condition.ended(last.sent + last.by);
+    }
+    conditions.push(condition);
+}
+
+/// Whether it lost its step meanwhile.
+fn was_hurt(device: &Device, from: Instant, to: Instant) -> bool {
+    device.al.errors.iter().any(|error| {
+        let class = error.code.map(|code| code.value.explain().class);
+        class == Some(CodeClass::Timing)
+            && error.status.at >= from
+            && error.status.at <= to + READ_WITHIN
+    })
+}
+
+/// The shortest cycle of process data.
+fn shortest_cycle(line: &Line) -> Option<Span> {
+    line.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min()
+}

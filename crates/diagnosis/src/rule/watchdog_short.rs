@@ -1,0 +1,102 @@
+//! # A watchdog is shorter than the cycle
+//!
+//! The process data watchdog of a SubDevice is set so short that it expires though all is well.
+//!
+//! **How it is found.** Divider and time of the watchdog (0x0400, 0x0420) are seen being written, or read: live,
+//! the diagnosis reads them by turns. Their product is less than four cycles of the process data. Shorter
+//! than one it expires in each cycle; up to four, whenever a few frames are lost or late.
+//!
+//! **What it means.** The SubDevice leaves OP with 0x001B, or will. No frame has to be lost for that. Settings
+//! of a machine with a shorter cycle were taken over, or somebody wrote the register with a tool.
+//!
+//! **What to do.** Set the watchdog to several cycles, at least to what the machine may safely go on for
+//! without control; 100 ms is usual. Look who writes 0x0400 and 0x0420: start-up commands, a tool.
+
+use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::device::WatchdogSetting;
+use crate::line::{Device, Line};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "S203",
+    name: "watchdog-too-short",
+    severity: Severity::Warning,
+    class: Class::Software,
+    source: include_str!("watchdog_short.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+const WATCHDOG_TIME: RegisterAddress = RegisterAddress(0x0420);
+/// A watchdog that holds for fewer cycles does not outlive a few lost frames.
+const CYCLES: u64 = 4;
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    let Some(usual) = line.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min() else {
+        return;
+    };
+    for device in &line.devices {
+        if device.al.highest < Some(AlState::SafeOp) {
+            continue;
+        }
+        let cycle = own_cycle(line, device).unwrap_or(usual);
+        let is_short =
+            |setting: &WatchdogSetting| setting.span.is_some_and(|span| span < cycle * CYCLES);
+        // The present one, else the one before: it is history then.
+        let (present, former) = (device.watchdog.setting, device.watchdog.former);
+        let (setting, ended) = match (present.filter(is_short), former.filter(is_short)) {
+            (Some(setting), _) => (setting, None),
+            (None, Some(former)) => (former, present.map(|present| present.seen.at)),
+            (None, None) => continue,
+        };
+        let Some(span) = setting.span else { continue };
+        conditions.push(condition(line, device, &setting, (span, cycle)));
+        if let (Some(ended), Some(condition)) = (ended, conditions.last_mut()) {
+            condition.ended = Some(ended);
+        }
+    }
+}
+
+/// The cycle of the datagram that brings its outputs.
+fn own_cycle(line: &Line, device: &Device) -> Option<Span> {
+    let brings = line.cyclic.iter().filter(|cyclic| {
+        line.owners(cyclic).any(|owner| owner.device == device.id && owner.writes)
+    });
+    brings.filter_map(|cyclic| cyclic.sent.cycle()).min()
+}
+
+fn condition(
+    line: &Line,
+    device: &Device,
+    setting: &WatchdogSetting,
+    (span, cycle): (Span, Span),
+) -> Condition {
+    let ms = |span: Span| span.as_nanos() as f64 / 1e6;
+    let text = format!(
+        "the process data watchdog of SubDevice {} holds for {:.3} ms, and a cycle takes {:.3} ms",
+        line.label(device.id),
+        ms(span),
+        ms(cycle)
+    );
+    let place = Place::device(line.network, device.id);
+    let at = setting.seen.at;
+    let mut condition = Condition::new(&PAGE, place, FaultName::WatchdogStarved, at)
+        .confidence(0.9)
+        .confirmed(at)
+        .shown_by(Evidence::register(device.id, WATCHDOG_TIME, &setting.seen, text))
+        .explaining([Symptom::StateLost(device.id), Symptom::WorkingCounter(device.id)])
+        .advise("Set the watchdog to several cycles; 100 ms is usual.")
+        .advise("Look who writes 0x0400 and 0x0420: start-up commands, or a tool.");
+    if span <= cycle {
+        condition.severity = Severity::Error;
+    }
+    condition
+}

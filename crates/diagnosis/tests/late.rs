@@ -1,0 +1,154 @@
+//! Frames that come late or stay away for a while, watchdogs that are too short, links that are up too early:
+//! what is told of them, and what looks alike.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+mod support;
+
+use linesman_config::fault::FaultName;
+use linesman_diagnosis::report::{FindingReport, Severity};
+use support::plant::{Plant, codes, plant};
+use support::script::fpwr;
+use support::text;
+
+// fires: T411
+#[test]
+fn one_frame_that_comes_back_late_is_told_without_alarm() {
+    let mut plant = plant();
+    plant.late_cycles(&[300]);
+    plant.cycles(50);
+    let report = plant.report();
+    assert_eq!(codes(&report), ["T411"], "{}", text(&report));
+    let finding = &report.findings[0];
+    assert_eq!((finding.severity, finding.cause), (Severity::Info, FaultName::HostJitter));
+    assert!(finding.evidence[0].text.contains("0.300 ms"), "{}", finding.evidence[0].text);
+}
+
+/// Whether a finding with this code hangs beneath another, at whatever remove.
+fn hangs(root: &FindingReport, code: &str) -> bool {
+    root.consequences.iter().any(|beneath| beneath.code == code || hangs(beneath, code))
+}
+
+// fires: T411
+#[test]
+fn when_most_frames_are_late_they_wait_in_a_queue_and_a_lost_step_hangs_beneath() {
+    let mut plant = plant();
+    let late: Vec<u64> = (0..60).map(|nth| 70 + nth * 53 % 500).collect();
+    plant.late_cycles(&late);
+    plant.left_op(0x1002, 0x1A);
+    plant.cycles(50);
+    let report = plant.report();
+    let finding = report.findings.iter().find(|finding| finding.code == "T411");
+    assert!(report.findings.iter().any(|root| hangs(root, "T400")), "{}", text(&report));
+    // Beside the finding of uneven process data it is what that consists of.
+    match finding {
+        Some(finding) => assert_eq!(finding.cause, FaultName::LateFrames, "{}", text(&report)),
+        None => assert!(hangs(&report.findings[0], "T411"), "{}", text(&report)),
+    }
+}
+
+// silent: T411
+#[test]
+fn a_way_that_is_longer_from_now_on_is_not_late() {
+    let mut plant = plant();
+    plant.late_cycles(&[100; 200]);
+    let report = plant.report();
+    assert_eq!(codes(&report), <[&str; 0]>::default(), "{}", text(&report));
+}
+
+fn watchdog(plant: &mut Plant, ticks: u16) {
+    plant.script.exchange(&[fpwr(0x1002, 0x0420, &ticks.to_le_bytes())]);
+    plant.cycles(50);
+}
+
+// fires: S203
+#[test]
+fn a_watchdog_of_two_cycles_is_too_short() {
+    let mut plant = plant();
+    watchdog(&mut plant, 20);
+    let report = plant.report();
+    assert_eq!(codes(&report), ["S203"], "{}", text(&report));
+    assert_eq!(report.findings[0].severity, Severity::Warning);
+    watchdog(&mut plant, 3);
+    let report = plant.report();
+    assert_eq!(report.findings[0].severity, Severity::Error, "{}", text(&report));
+}
+
+// silent: S203
+#[test]
+fn a_watchdog_of_many_cycles_or_none_is_not() {
+    for ticks in [0, 50, 1_000] {
+        let mut plant = plant();
+        watchdog(&mut plant, ticks);
+        let report = plant.report();
+        assert_eq!(codes(&report), <[&str; 0]>::default(), "{ticks}: {}", text(&report));
+    }
+}
+
+/// Counters of all: the first port of the second SubDevice lost its link so often.
+fn counters(plant: &mut Plant, links_lost: u8) {
+    for station in 0x1001..=0x1003 {
+        let mut data = [0; 20];
+        data[16] = if station == 0x1002 { links_lost } else { 0 };
+        plant.read(station, 0x0300, &data);
+        plant.cycles(10);
+    }
+}
+
+// fires: X513
+#[test]
+fn frames_that_all_stay_away_while_nothing_moves_on_the_line_did_not_leave() {
+    let mut plant = plant();
+    counters(&mut plant, 0);
+    plant.lost_cycles(40);
+    plant.cycles(50);
+    counters(&mut plant, 0);
+    let report = plant.report();
+    assert_eq!(codes(&report), ["X513"], "{}", text(&report));
+    assert_eq!(report.findings[0].cause, FaultName::WatchdogStarved);
+}
+
+// silent: X513
+#[test]
+fn with_a_link_that_was_lost_meanwhile_it_is_not_the_computer() {
+    let mut plant = plant();
+    counters(&mut plant, 0);
+    plant.lost_cycles(40);
+    plant.cycles(50);
+    counters(&mut plant, 1);
+    let report = plant.report();
+    assert!(!codes(&report).contains(&"X513"), "{}", text(&report));
+}
+
+/// The link between the second and the third SubDevice is lost for a while; so many frames vanish when it is
+/// back.
+fn link_lost_and_back(vanish: usize) -> Plant {
+    let mut plant = plant();
+    let status = |plant: &mut Plant, value: u16| plant.read(0x1002, 0x0110, &value.to_le_bytes());
+    status(&mut plant, 0x5617);
+    plant.cycles(30);
+    plant.lost_cycles(vanish);
+    plant.cycles(10);
+    status(&mut plant, 0x5A37);
+    plant.cycles(100);
+    plant
+}
+
+// fires: H103
+#[test]
+fn a_link_that_swallows_all_frames_when_it_is_back_was_up_too_early() {
+    let mut plant = link_lost_and_back(20);
+    let report = plant.report();
+    assert_eq!(codes(&report), ["H103"], "{}", text(&report));
+    let finding = &report.findings[0];
+    assert_eq!(finding.cause, FaultName::EarlyLink);
+    assert!(finding.consequences.iter().any(|one| one.code == "H101"), "{}", text(&report));
+}
+
+// silent: H103
+#[test]
+fn a_link_that_is_lost_and_carries_frames_at_once_is_just_lost() {
+    let mut plant = link_lost_and_back(1);
+    let report = plant.report();
+    assert_eq!(codes(&report), ["H101"], "{}", text(&report));
+}

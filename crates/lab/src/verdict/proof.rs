@@ -1,0 +1,253 @@
+//! Proofs of admitted sets: one line, played once with each cause of a set.
+//!
+//! What the MainDevice sends and gets, and what its computer notices, is written down with its times; of
+//! a set all that must be the same. Two controls keep the proof from being empty: each fault must have
+//! acted by the truth log, and what it leaves must differ from a line on which nothing is wrong. What
+//! parts the causes ([`Parted`]) must part them here, too.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use linesman_diagnosis::observe::{Direction, HostObservation};
+use linesman_diagnosis::report::Diagnosis;
+use linesman_proto::address::Path;
+use linesman_proto::time::Instant;
+use linesman_sim::segment_file::SegmentFile;
+
+use super::sets::{AdmittedSet, Parted, Play};
+use crate::lab::Lab;
+use crate::options::LabOptions;
+
+/// The line on which all sets are played: two couplers, terminals of two types, two of them twins.
+pub const LINE: &str = r#"
+name = "proof"
+seed = 3
+
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+cable_m = 5.0
+
+[[device]]
+name = "T1"
+type = "EL1008"
+on = "K1.B"
+
+[[device]]
+name = "T2"
+type = "EL2008"
+on = "T1.B"
+
+[[device]]
+name = "K2"
+type = "EK1100"
+on = "K1.C"
+cable_m = 20.0
+
+[[device]]
+name = "T4"
+type = "EL2004"
+on = "K2.B"
+serial = 104
+
+[[device]]
+name = "T5"
+type = "EL2004"
+on = "T4.B"
+serial = 105
+"#;
+
+/// When the fault of a play begins, in ms.
+const BEGIN_MS: u64 = 3_000;
+/// How long is watched what parts the causes, in ms.
+const PARTED_MS: u64 = 3_000;
+
+/// What was seen from the MainDevice's side.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Observed {
+    /// A frame, sent or received.
+    Frame {
+        /// When.
+        at: Instant,
+        /// Which way.
+        direction: Direction,
+        /// Through which card.
+        path: Path,
+        /// Its bytes.
+        bytes: Vec<u8>,
+    },
+    /// Something the host noticed.
+    Host(HostObservation),
+}
+
+/// What came of a play.
+#[derive(Clone, Debug)]
+pub struct Played {
+    /// All that was seen, in order.
+    pub seen: Vec<Observed>,
+    /// What is said of it.
+    pub diagnosis: Diagnosis,
+    /// Whether a fault has acted.
+    pub acted: bool,
+}
+
+/// How a play is made other than the proof has it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Twist {
+    /// By this, if anything.
+    pub by: Option<Parted>,
+}
+
+/// Plays a line with one cause of a set.
+///
+/// # Errors
+/// What is wrong with the line or the fault, in words.
+pub fn play(set: &AdmittedSet, play: &Play, twist: Twist) -> Result<Played, String> {
+    let mut until_ms = set.proof.until_ms;
+    let mut text = LINE.to_owned();
+    if play.cause.is_none() {
+        // Of two equal devices the other one was built in at each place.
+        for (one, other) in [("T4", "T5"), ("104", "105")] {
+            text = text.replace(one, "#").replace(other, one).replace('#', other);
+        }
+    }
+    if !play.file.is_empty() {
+        text += &format!("\n[[fault]]\nfrom_ms = {BEGIN_MS}\n");
+        if play.file.contains("hits") && !play.file.contains("at_ms") {
+            // All at once, one frame after the other: the rhythm is the same for all.
+            text += &format!("to_ms = {BEGIN_MS}.001\n");
+        } else if twist.by == Some(Parted::ByHealing) {
+            text += &format!("to_ms = {until_ms}\n");
+        }
+        text += play.file;
+    }
+    if twist.by == Some(Parted::ByHealing) {
+        until_ms += PARTED_MS;
+    }
+    let mut file = SegmentFile::parse(&text).map_err(|error| error.to_string())?;
+    let twins = file.devices.len() - 2;
+    if twist.by == Some(Parted::ByAlias) {
+        for (device, alias) in file.devices[twins..].iter_mut().zip(11..) {
+            device.alias = Some(alias);
+        }
+    }
+    let host_counters = set.proof.host_counters || twist.by == Some(Parted::ByHostCounters);
+    run(&file, LabOptions { host_counters, ..LabOptions::default() }, until_ms)
+}
+
+fn run(file: &SegmentFile, options: LabOptions, until_ms: u64) -> Result<Played, String> {
+    let mut lab = Lab::new(file, options).map_err(|error| error.to_string())?;
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let note = |seen: &Arc<Mutex<Vec<Observed>>>, observed| {
+        seen.lock().unwrap_or_else(PoisonError::into_inner).push(observed);
+    };
+    let frames = Arc::clone(&seen);
+    lab.set_tap(Box::new(move |frame| {
+        note(
+            &frames,
+            Observed::Frame {
+                at: frame.time,
+                direction: frame.direction,
+                path: frame.path.unwrap_or(Path::A),
+                bytes: frame.bytes.to_vec(),
+            },
+        );
+    }));
+    let host = Arc::clone(&seen);
+    lab.set_host_tap(Box::new(move |observation| note(&host, Observed::Host(*observation))));
+    lab.run_until(Instant::from_nanos(until_ms * 1_000_000)).map_err(|error| error.to_string())?;
+    let acted = lab.truth().faults().iter().any(|fault| fault.first_effect.is_some());
+    let diagnosis = lab.diagnosis();
+    let seen = std::mem::take(&mut *seen.lock().unwrap_or_else(PoisonError::into_inner));
+    Ok(Played { seen, diagnosis, acted })
+}
+
+/// The first thing in which two plays differ, in words; `None` if they are the same.
+#[must_use]
+pub fn difference(one: &Played, other: &Played) -> Option<String> {
+    let pairs = one.seen.iter().zip(&other.seen);
+    let differs = pairs.enumerate().find(|(_, (one, other))| one != other);
+    match differs {
+        Some((at, (one, other))) => Some(format!("number {at}: {one:?} and {other:?}")),
+        None if one.seen.len() == other.seen.len() => None,
+        None => Some(format!("{} things and {}", one.seen.len(), other.seen.len())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use linesman_diagnosis::report::Severity;
+
+    use super::super::sets;
+    use super::*;
+
+    fn plays(set: &AdmittedSet, twist: Twist) -> Vec<Played> {
+        set.proof.plays.iter().map(|one| play(set, one, twist).unwrap()).collect()
+    }
+
+    const QUIET: Play =
+        Play { cause: Some(linesman_config::fault::FaultName::TwinsSwapped), file: "" };
+
+    #[test]
+    fn every_cause_of_every_set_leaves_the_same_frames_and_observations() {
+        for set in sets::ALL {
+            let all = plays(set, Twist::default());
+            for (index, played) in all.iter().enumerate() {
+                let at = format!("{} {}", set.name, set.proof.plays[index].file);
+                assert!(played.seen.len() > 1_000, "{at}: the line ran");
+                assert_eq!(played.acted, !set.proof.plays[index].file.is_empty(), "{at}");
+                assert_eq!(difference(&all[0], played), None, "{at}");
+            }
+            for cause in set.causes {
+                let has = |play: &&Play| play.cause == Some(*cause);
+                assert_eq!(set.proof.plays.iter().filter(has).count(), 1, "{}: {cause}", set.name);
+            }
+            if !std::ptr::eq(*set, &raw const sets::TWINS) {
+                let quiet = play(set, &QUIET, Twist::default()).unwrap();
+                assert!(difference(&all[0], &quiet).is_some(), "{}: nothing is seen", set.name);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_said_to_part_them_parts_them() {
+        for set in sets::ALL {
+            let by = set.proof.parted;
+            let least = match by {
+                Parted::ByHealing | Parted::ByAlias => set.proof.plays.len(),
+                // What the computer drops is parted from the rest.
+                Parted::ByHostCounters => 2,
+                Parted::ByExchange => continue,
+            };
+            let all = plays(set, Twist { by: Some(by) });
+            let mut kinds: Vec<&Played> = Vec::new();
+            for played in &all {
+                if kinds.iter().all(|known| difference(known, played).is_some()) {
+                    kinds.push(played);
+                }
+            }
+            assert!(kinds.len() >= least, "{}: {} of {least}", set.name, kinds.len());
+        }
+    }
+
+    #[test]
+    fn a_finding_names_the_others_of_its_set_and_says_what_would_tell_them_apart() {
+        for set in sets::ALL {
+            for one in set.proof.plays {
+                let diagnosis = play(set, one, Twist::default()).unwrap().diagnosis;
+                let warned = diagnosis.findings.iter().find(|f| f.severity != Severity::Info);
+                let at = format!("{} {}", set.name, one.file);
+                let Some(finding) = warned else {
+                    assert_eq!(set.causes.len(), 1, "{at}: nothing was said");
+                    continue;
+                };
+                assert!(set.has(finding.cause), "{at}: {}", finding.cause);
+                for cause in set.causes.iter().filter(|cause| **cause != finding.cause) {
+                    let other = finding.alternatives.iter().find(|other| other.cause == *cause);
+                    let other = other.unwrap_or_else(|| panic!("{at}: {cause} is not named"));
+                    assert!(other.told_apart_by.is_some(), "{at}: {cause}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Where frames vanish is found by closing ports for a moment, and nothing of it stays.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
+
+use linesman_config::fault::FaultName;
+use linesman_lab::lab::Lab;
+use linesman_lab::options::LabOptions;
+use linesman_lab::verdict::{Claim, Site};
+use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::port::Port;
+use linesman_proto::time::Span;
+use linesman_proto::topology::End;
+use linesman_sim::segment_file::{FaultEntry, SegmentFile};
+
+const PLANT: &str = r#"
+name = "press"
+device = [
+    { name = "K1", type = "EK1100", on = "maindevice", cable_m = 5.0 },
+    { name = "T1", type = "EL2008", on = "K1.B" },
+    { name = "T2", type = "EL1008", on = "T1.B" },
+    { name = "K2", type = "EK1100", on = "K1.C", cable_m = 20.0 },
+    { name = "T3", type = "EL1008", on = "K2.B" },
+    { name = "K3", type = "EK1100", on = "K2.C", cable_m = 9.0 },
+    { name = "T4", type = "EL2004", on = "K3.B" },
+]
+"#;
+const K1: u32 = 0;
+const K2: u32 = 3;
+
+fn up() -> Lab {
+    let file: SegmentFile = toml::from_str(PLANT).unwrap();
+    let mut lab = Lab::new(&file, LabOptions { active: true, ..LabOptions::default() }).unwrap();
+    lab.wait_up(Span::s(10)).unwrap();
+    run(&mut lab, 1_500);
+    lab
+}
+
+fn run(lab: &mut Lab, ms: u64) {
+    lab.run_until(lab.now() + Span::ms(ms)).unwrap();
+}
+
+/// DL control and what is about it of every controller, and who is closed though it has a link.
+fn registers(lab: &Lab) -> (Vec<Vec<u8>>, usize) {
+    let controllers = || lab.segment().devices().filter_map(|id| lab.segment().controller(id));
+    let bytes = |start: u16| (start..start + 4).map(RegisterAddress);
+    let control =
+        controllers().map(|one| bytes(0x0100).map(|address| one.register(address)).collect());
+    let closed = controllers().flat_map(|one| {
+        let status = one.dl_status();
+        Port::ALL.map(|port| status.port_state(port))
+    });
+    let closed = closed.filter(|state| state.link && !state.is_active()).count();
+    (control.collect(), closed)
+}
+
+fn hole(from: u32, to: u32) -> Site {
+    Site::Link {
+        a: End::Controller(DeviceId(from), Port::C),
+        b: Some(End::Controller(DeviceId(to), Port::A)),
+        way: None,
+    }
+}
+
+// proves: JCT-07 partial: on a virtual segment
+#[test]
+fn a_false_link_is_found_by_closing_ports_and_all_registers_are_as_before() {
+    let mut lab = up();
+    let before = registers(&lab);
+    let false_link = FaultEntry::new(FaultName::FalseLink).at("K1.C-K2.A".to_owned());
+    let fault = lab.inject(&false_link).unwrap();
+    run(&mut lab, 2_500);
+    let said = lab.diagnosis();
+    let claim = Claim::of(&said.findings[0]);
+    assert_eq!((claim.cause, claim.site), (FaultName::FalseLink, hole(K1, K2)));
+    assert!(said.findings[0].evidence.iter().any(|one| one.text.contains("closed for a moment")));
+    lab.heal(fault);
+    run(&mut lab, 3_000);
+    assert_eq!(registers(&lab), before);
+}
+
+#[test]
+fn a_search_that_is_cut_off_in_the_middle_leaves_nothing_either() {
+    let mut lab = up();
+    let before = registers(&lab);
+    let false_link = FaultEntry::new(FaultName::FalseLink).at("K2.C>K3.A".to_owned());
+    let fault = lab.inject(&false_link).unwrap();
+    let began = lab.run_while(Span::s(2), Span::ms(1), |lab| registers(lab).1 > before.1).unwrap();
+    assert!(began, "no port was closed");
+    // Whoever closed it does not reach it any more.
+    let pulled = FaultEntry::new(FaultName::LinkOpen).at("maindevice-K1.A".to_owned());
+    let pulled = lab.inject(&pulled).unwrap();
+    run(&mut lab, 1_200);
+    let (control, _) = registers(&lab);
+    assert_eq!(control, before.0);
+    lab.heal(pulled);
+    lab.heal(fault);
+    run(&mut lab, 4_000);
+    assert_eq!(registers(&lab), before);
+}
+
+#[test]
+fn nothing_is_closed_unless_it_was_allowed_nor_while_frames_come_back() {
+    let file: SegmentFile = toml::from_str(PLANT).unwrap();
+    for (active, kind, at) in [
+        (false, FaultName::FalseLink, "K1.C-K2.A"),
+        (true, FaultName::LinkOpen, "K1.C-K2.A"),
+        (true, FaultName::LinkOpen, "maindevice-K1.A"),
+    ] {
+        let mut lab = Lab::new(&file, LabOptions { active, ..LabOptions::default() }).unwrap();
+        lab.wait_up(Span::s(10)).unwrap();
+        run(&mut lab, 1_500);
+        let closed = registers(&lab).1;
+        lab.inject(&FaultEntry::new(kind).at(at.to_owned())).unwrap();
+        let is_closed = |lab: &Lab| registers(lab).1 > closed;
+        assert!(!lab.run_while(Span::s(2), Span::ms(1), is_closed).unwrap(), "{kind} at {at}");
+    }
+}

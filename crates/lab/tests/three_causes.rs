@@ -1,0 +1,78 @@
+//! One symptom, three causes: what is told apart although it looks the same at first.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use linesman_config::fault::FaultName;
+use linesman_diagnosis::report::{Diagnosis, Severity};
+use linesman_lab::lab::Lab;
+use linesman_lab::options::LabOptions;
+use linesman_proto::time::Span;
+use linesman_sim::segment_file::SegmentFile;
+
+const LINE: &str = r#"
+name = "press"
+seed = 5
+
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+cable_m = 5.0
+
+[[device]]
+name = "T1"
+type = "EL3102"
+on = "K1.B"
+
+[[device]]
+name = "T2"
+type = "EL4102"
+on = "T1.B"
+
+[[device]]
+name = "K2"
+type = "EK1100"
+on = "K1.C"
+cable_m = 20.0
+
+[[device]]
+name = "T3"
+type = "EL2008"
+on = "K2.B"
+"#;
+
+/// What is said of a fault that lasts for a second and a half.
+fn said(text: &str, clocks: bool) -> Diagnosis {
+    let file = SegmentFile::parse(&format!("{LINE}\n[[fault]]\n{text}")).unwrap();
+    let fault = file.faults[0].clone();
+    let file = SegmentFile { faults: Vec::new(), ..file };
+    let options = LabOptions { clocks, ..LabOptions::default() };
+    let mut lab = Lab::new(&file, options).unwrap();
+    lab.wait_up(Span::s(30)).unwrap();
+    lab.run_until(lab.now() + Span::s(1)).unwrap();
+    let id = lab.inject(&fault).unwrap();
+    lab.run_until(lab.now() + Span::ms(1_500)).unwrap();
+    assert!(lab.truth().fault(id).unwrap().first_effect.is_some(), "{text}");
+    lab.diagnosis()
+}
+
+fn first_cause(diagnosis: &Diagnosis) -> Option<FaultName> {
+    let warned = diagnosis.findings.iter().find(|f| f.severity != Severity::Info);
+    warned.map(|finding| finding.cause)
+}
+
+// S3 L4-8: interference from outside, a device that spoils frames, firmware that fails.
+// proves: DIA-03 partial: that it is known within the cycle is shown in fast.rs
+#[test]
+fn interference_device_and_firmware_are_told_apart() {
+    for (text, cause) in [
+        (
+            "kind = 'emc-noise'\nat = ['maindevice-K1.A', 'K1.C-K2.A']\nhits_per_s = 400",
+            FaultName::EmcNoise,
+        ),
+        ("kind = 'device-internal'\ndevice = 'K2'\nhits_per_s = 40", FaultName::DeviceInternal),
+        ("kind = 'firmware-fault'\ndevice = 'T2'\nhow = 'restarts'", FaultName::FirmwareFault),
+    ] {
+        assert_eq!(first_cause(&said(text, false)), Some(cause), "{text}");
+    }
+}

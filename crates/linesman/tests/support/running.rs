@@ -1,0 +1,73 @@
+//! A run in a process of its own, and its control socket.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::{PROGRAM, linesman};
+
+/// A coupler, outputs, and a terminal with a mailbox.
+pub(crate) const PLANT: &str = "\
+[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+[[device]]\nname = \"T2\"\ntype = \"EL2008\"\non = \"K1.B\"\n\
+[[device]]\nname = \"T3\"\ntype = \"EL3104\"\non = \"T2.B\"\n";
+
+/// Ended with the test.
+pub(crate) struct Running {
+    child: Child,
+    folder: TempDir,
+}
+
+impl Running {
+    /// Runs a plant of three SubDevices, and waits until all are in OP.
+    #[track_caller]
+    pub(crate) fn start(plant: &str) -> Self {
+        let folder = TempDir::new().unwrap();
+        let file = folder.path().join("plant.toml");
+        std::fs::write(&file, plant).unwrap();
+        let child = Command::new(PROGRAM)
+            .args(["run", "--on", &format!("sim:{}", file.display()), "--control"])
+            .arg(folder.path().join("socket"))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let running = Self { child, folder };
+        running.until("comes up", |report| {
+            let devices = report["devices"].as_array().unwrap();
+            devices.len() == 3 && devices.iter().all(|one| one["al_state"] == "OP")
+        });
+        running
+    }
+
+    /// Its socket.
+    pub(crate) fn socket(&self) -> String {
+        self.folder.path().join("socket").display().to_string()
+    }
+
+    /// What `linesman online` reports of it, once that is as expected; on a busy computer that takes a while.
+    #[track_caller]
+    pub(crate) fn until(&self, what: &str, done: impl Fn(&Value) -> bool) -> Value {
+        let mut last = String::new();
+        for _ in 0..600 {
+            let run = linesman(["online", &self.socket(), "--json"]);
+            if run.status < 2 && done(&run.json()) {
+                return run.json();
+            }
+            last = run.all();
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        panic!("it never {what}: {last}");
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,71 @@
+//! Settings that are brought by other protocols than CoE: addresses of an Ethernet port (EoE), identification
+//! numbers of a drive (SoE).
+//!
+//! Reference: ETG.1000.6, EoE (set IP parameter) and SoE (write request).
+
+use linesman_proto::mailbox::MailboxType;
+use linesman_proto::mailbox::eoe::{self, EoeResult, Setting};
+use linesman_proto::mailbox::soe::{self, Operation, SOE_HEADER_LEN};
+
+use super::dialogue::Dialogue;
+use super::failure::{Step, Why};
+
+/// Sets the addresses of a port.
+pub(crate) async fn set_addresses(
+    dialogue: &mut Dialogue<'_>,
+    port: u8,
+    parameters: &[u8],
+) -> Result<(), Why> {
+    let request = eoe::Message::Request { port, about: Setting::SetIp, parameters };
+    dialogue.say(MailboxType::Eoe, |body| request.write(body)).await?;
+    let answer = dialogue.hear(MailboxType::Eoe).await?;
+    match eoe::Message::parse(&answer) {
+        Ok(eoe::Message::Response { about: Setting::SetIp, result, .. }) => match result {
+            EoeResult::SUCCESS => Ok(()),
+            result => Err(Why::Ethernet { result }),
+        },
+        other => {
+            let found = format!("{other:?}");
+            Err(Why::Protocol { expected: "the answer to new addresses", found })
+        }
+    }
+}
+
+/// Writes elements of an IDN, in as many messages as it takes.
+pub(crate) async fn write_idn(
+    dialogue: &mut Dialogue<'_>,
+    drive: u8,
+    elements: u8,
+    idn: u16,
+    data: &[u8],
+) -> Result<(), Why> {
+    let header = linesman_proto::mailbox::HEADER_LEN + SOE_HEADER_LEN;
+    let room = dialogue.multiplexer.out_size().saturating_sub(header).max(1);
+    let pieces = data.len().div_ceil(room).max(1);
+    for at in 0..pieces {
+        let left = pieces - at - 1;
+        let piece = data.get(at * room..data.len().min((at + 1) * room)).unwrap_or_default();
+        let message = soe::Message {
+            operation: Operation::WriteRequest,
+            incomplete: left > 0,
+            error: false,
+            drive,
+            elements,
+            number: if left > 0 { u16::try_from(left).unwrap_or(u16::MAX) } else { idn },
+            data: piece,
+        };
+        dialogue.say(MailboxType::Soe, |body| message.write(body)).await?;
+        if pieces > 1 {
+            dialogue.step = Step::Fragment(at as u32 + 1);
+        }
+    }
+    let answer = dialogue.hear(MailboxType::Soe).await?;
+    let expected = "the answer to a write request";
+    match soe::Message::parse(&answer) {
+        Some(answer) if answer.operation == Operation::WriteResponse && answer.drive == drive => {
+            answer.refusal().map_or(Ok(()), |code| Err(Why::Drive { code }))
+        }
+        Some(other) => Err(Why::Protocol { expected, found: format!("{:?}", other.operation) }),
+        None => Err(Why::Protocol { expected, found: format!("{} bytes", answer.len()) }),
+    }
+}
