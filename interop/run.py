@@ -8,7 +8,7 @@ the exit status is 1 when one failed.
 Checks stand in `check_*.py` and `dc_*.py`. Each has namespaces of its own, so several run at once:
 as many as LINESMAN_INTEROP_JOBS says, else one more than there are processors, as most of them wait
 most of the time. What went over the cable while a check ran must be readable: tshark looks at each
-packet.
+packet. A check that fails while the host stood still (`stalls.py`) has shown nothing and is tried again, which its line tells.
 """
 
 import concurrent.futures
@@ -22,7 +22,9 @@ import traceback
 from bench import HERE, Bench, Capture
 from harness import CHECKS, Skip
 from skipped import SKIPPED
+from stalls import Stalls
 
+ATTEMPTS = 3
 HAS_TSHARK = all(shutil.which(program) for program in ("tcpdump", "tshark"))
 
 
@@ -50,12 +52,27 @@ def captured(function, line):
     return f"{count} packets, none malformed" if count >= passed else f"{count} of {passed} packets captured, none malformed"
 
 
-def tried(function):
+def tried(function, stalls):
     """The line that tells how a check went."""
+    before = []
+    while True:
+        start = time.monotonic()
+        told = once(function, before)
+        if not told.startswith("FAIL") or len(before) + 1 == ATTEMPTS:
+            return told
+        stood = stalls.longest_ms(start)
+        if stood == 0:
+            return told
+        why = told.splitlines()[0].removeprefix(f"FAIL {function.__name__}: ")
+        before.append(f"tried again, as the host stood still for {stood:.0f} ms: {why}")
+
+
+def once(function, before):
+    """The line that tells how one attempt went, and why those before it did not count."""
     name, start = function.__name__, time.monotonic()
     try:
         with Bench() as line:
-            note = "; ".join([captured(function, line), *line.notes])
+            note = "; ".join([captured(function, line), *line.notes, *before])
         return f"ok {name}: {note}, {time.monotonic() - start:.1f} s"
     except Skip as why:
         return f"skip {name}: {why}"
@@ -74,8 +91,9 @@ def main():
     checks = [one for one in CHECKS if not wanted or any(word in one.__name__ for word in wanted)]
     jobs = int(os.environ.get("LINESMAN_INTEROP_JOBS") or (os.cpu_count() or 1) + 1)
     failed = 0
+    stalls = Stalls()
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        running = [pool.submit(tried, one) for one in checks]
+        running = [pool.submit(tried, one, stalls) for one in checks]
         try:
             for done in concurrent.futures.as_completed(running):
                 failed += done.result().startswith("FAIL")
@@ -83,6 +101,8 @@ def main():
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+        finally:
+            stalls.end()
     if not wanted:
         for client, feature, why in SKIPPED:
             print(f"skip {client}, {feature}: {why}", flush=True)
