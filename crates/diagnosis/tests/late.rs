@@ -44,21 +44,6 @@ fn a_recording_tells_late_frames_too_where_nobody_keeps_step() {
     assert_eq!(report.findings[0].severity, Severity::Info);
 }
 
-// fires: S201
-#[test]
-fn what_did_no_harm_hides_no_trouble() {
-    let mut plant = plant();
-    counters(&mut plant, 0);
-    plant.lost_cycles(40);
-    plant.cycles(50);
-    plant.left_op(0x1002, 0x11);
-    counters(&mut plant, 0);
-    let report = plant.report();
-    let stalled = report.findings.iter().find(|finding| finding.code == "X513");
-    assert_eq!(stalled.map(|one| one.severity), Some(Severity::Info), "{}", text(&report));
-    assert!(codes(&report).contains(&"S201"), "{}", text(&report));
-}
-
 /// Whether a finding with this code hangs beneath another, at whatever remove.
 fn hangs(root: &FindingReport, code: &str) -> bool {
     root.consequences.iter().any(|beneath| beneath.code == code || hangs(beneath, code))

@@ -259,10 +259,12 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
         )
     };
     let after = if symptoms.iter().all(counted) { AFTER_COUNTED } else { AFTER };
-    // What is only worth knowing has done no harm: trouble must have another cause.
-    let is_harmless = |finding: &Finding| finding.condition.severity == Severity::Info;
+    // What is only worth knowing has hurt nobody: who left its state did so for another reason.
+    let is_hurt =
+        |symptom: &Symptom| matches!(symptom, Symptom::StateLost(_) | Symptom::Emergency(_));
+    let is_harmless = cause.condition.severity == Severity::Info;
     !symptoms.is_empty()
-        && (is_harmless(effect) || !is_harmless(cause))
+        && !(is_harmless && symptoms.iter().any(is_hurt))
         && !was_over(cause, effect, after)
         && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))
 }
