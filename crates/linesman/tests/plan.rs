@@ -198,3 +198,105 @@ fn what_cannot_be_planned_is_refused_with_its_place() {
     }
     assert_eq!(linesman(["plan", &path("none.toml")]).status, 2);
 }
+
+#[test]
+fn a_project_without_subdevices_is_no_plan() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("empty.toml");
+    for text in ["", "name = \"to do\"\n", "[[task]]\nname = \"fast\"\ncycle_us = 500\n"] {
+        std::fs::write(&file, text).unwrap();
+        let run = linesman(["plan", file.to_str().unwrap()]);
+        assert_eq!(run.status, 2, "{text:?}: {}", run.all());
+        assert!(run.stdout.is_empty(), "{}", run.stdout);
+        for words in ["empty.toml", "no [[device]]", "linesman scan WHERE --save"] {
+            assert!(run.stderr.contains(words), "{words}: {}", run.stderr);
+        }
+    }
+}
+
+/// A description of an analogue output with a mode by SYNC0.
+const CLOCKED: &str = "<EtherCATInfo><Vendor><Id>2</Id><Name>x</Name></Vendor><Descriptions><Devices>\
+    <Device Physics=\"KK\"><Type ProductCode=\"#x10063052\" RevisionNo=\"#x00140000\">EL4102</Type>\
+    <Name>EL4102</Name><Fmmu>Outputs</Fmmu>\
+    <Sm StartAddress=\"#x1000\" ControlByte=\"#x24\" Enable=\"1\" DefaultSize=\"2\">Outputs</Sm>\
+    <RxPdo Sm=\"0\" Fixed=\"1\"><Index>#x1600</Index><Name>Channel 1</Name><Entry><Index>#x7000</Index>\
+    <SubIndex>1</SubIndex><BitLen>16</BitLen><Name>Output</Name><DataType>INT</DataType></Entry></RxPdo>\
+    <Dc><OpMode><Name>DcSync</Name><AssignActivate>#x0300</AssignActivate>\
+    <CycleTimeSync0 Factor=\"1\">0</CycleTimeSync0><ShiftTimeSync0>25000</ShiftTimeSync0></OpMode></Dc>\
+    <Eeprom><ByteSize>256</ByteSize><ConfigData>040c010000000000</ConfigData></Eeprom></Device>\
+    </Devices></Descriptions></EtherCATInfo>";
+
+/// What `plan` says of one such device in a task of 2 ms, with this choice of its clock.
+fn clocked(choice: &str) -> support::Run {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("one.xml"), CLOCKED).unwrap();
+    let file = folder.path().join("project.toml");
+    let text = format!(
+        "esi = [\"one.xml\"]\n[[task]]\nname = \"fast\"\ncycle_us = 2000\n\
+         [[device]]\nname = \"Out\"\ntype = \"EL4102\"\non = \"maindevice\"\nclock = {choice}\n"
+    );
+    std::fs::write(&file, text).unwrap();
+    linesman(["plan", file.to_str().unwrap(), "--json"])
+}
+
+// S0 L300-310.
+// proves: SYN-12
+#[test]
+fn clocks_are_set_as_their_maker_describes_them_and_a_change_gives_a_warning() {
+    let run = clocked("{ mode = \"DcSync\" }");
+    assert!(run.status <= 1, "{}", run.all());
+    let report = run.json();
+    let device = &report["clock"]["devices"][0];
+    assert_eq!(device["assign_activate"], 0x0300, "{report}");
+    assert_eq!(device["sync0_cycle_ns"], 2_000_000, "{report}");
+    assert_eq!(device["sync0_shift_ns"], 25_000, "{report}");
+    assert!(!run.all().contains("otherwise than its maker"), "{}", run.all());
+    // The same values said again are no change.
+    let same = clocked("{ mode = \"DcSync\", sync0_cycle_us = 2000, sync0_shift_ns = 25000 }");
+    assert!(!same.all().contains("otherwise than its maker"), "{}", same.all());
+    let changed = clocked("{ mode = \"DcSync\", sync0_cycle_us = 1000, sync0_shift_ns = -5 }");
+    assert!(changed.status <= 1, "{}", changed.all());
+    let words = changed.all();
+    for part in [
+        "Out: its clock is set otherwise than its maker describes mode `DcSync`",
+        "cycle of SYNC0 1000000 ns instead of 2000000 ns",
+        "shift of SYNC0 -5 ns instead of 25000 ns",
+    ] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+}
+
+// S0 L735-757.
+// proves: DC-05 partial: ten of the twelve types
+#[test]
+fn a_coupler_too_old_for_the_reference_clock_is_told() {
+    let told = |kind: &str, revision: u32, first: &str, second: &str| {
+        let folder = TempDir::new().unwrap();
+        let file = folder.path().join("project.toml");
+        let text = format!(
+            "[[device]]\nname = \"K\"\ntype = \"{kind}\"\non = \"maindevice\"\nvendor_id = 2\n\
+             product_code = 1\nrevision = {revision}\n{first}\n[device.description]\n\
+             [[device]]\nname = \"Out\"\ntype = \"EL4102\"\non = \"K.B\"\n{second}\n[device.description]\n"
+        );
+        std::fs::write(&file, text).unwrap();
+        let run = linesman(["plan", file.to_str().unwrap(), "--json"]);
+        assert!(run.status <= 1, "{}", run.all());
+        let report = run.json();
+        let findings = report["findings"].as_array().unwrap();
+        let mut its = findings.iter().filter(|one| one["name"] == "reference-clock");
+        its.next().map(|one| one["text"].as_str().unwrap().to_owned())
+    };
+    let clock = "clock = { assign_activate = 0x0300 }";
+    for (kind, since) in [("EK1100", 17), ("EK1122", 17), ("EK1521-0010", 18), ("BK1150", 16)] {
+        let words = told(kind, (since - 1) << 16, clock, "").expect(kind);
+        assert!(words.contains(&format!("from revision {since:04} on")), "{words}");
+        assert_eq!(told(kind, since << 16, clock, ""), None, "{kind}");
+    }
+    // Another one is the reference, or nothing is said of the type.
+    assert_eq!(told("EK1100", 16 << 16, "", clock), None);
+    assert_eq!(
+        told("EK1100", 16 << 16, clock, "clock = { assign_activate = 0x0300, reference = true }"),
+        None
+    );
+    assert_eq!(told("EL3104", 1 << 16, clock, ""), None);
+}

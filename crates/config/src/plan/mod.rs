@@ -9,6 +9,7 @@
 pub mod expect;
 pub mod layout;
 pub mod lint;
+pub mod reference;
 pub mod settings;
 pub mod task;
 pub mod variable;

@@ -157,6 +157,35 @@ impl ClockChoice {
             reference: self.reference,
         })
     }
+
+    /// What is set otherwise than the named mode of the description has it, for a task of this cycle; nothing
+    /// where no mode is named, or the description does not have it.
+    #[must_use]
+    pub fn changes(&self, modes: &[ClockMode], cycle: Span) -> Vec<String> {
+        let as_described = Self { mode: self.mode.clone(), ..Self::default() };
+        let named = self.mode.is_some();
+        let settings = |choice: &Self| choice.settings(modes, cycle).ok().filter(|_| named);
+        let (Some(described), Some(chosen)) = (settings(&as_described), settings(self)) else {
+            return Vec::new();
+        };
+        let hex = |value: u16| format!("0x{value:04X}");
+        let pairs = [
+            ("assign_activate", hex(chosen.assign_activate), hex(described.assign_activate)),
+            ("cycle of SYNC0", of(chosen.sync0_cycle), of(described.sync0_cycle)),
+            ("shift of SYNC0", ns(chosen.sync0_shift_ns), ns(described.sync0_shift_ns)),
+            ("cycle of SYNC1", of(chosen.sync1_cycle), of(described.sync1_cycle)),
+        ];
+        let differs = pairs.into_iter().filter(|(_, chosen, described)| chosen != described);
+        differs.map(|(what, chosen, own)| format!("{what} {chosen} instead of {own}")).collect()
+    }
+}
+
+fn of(span: Span) -> String {
+    format!("{} ns", span.as_nanos())
+}
+
+fn ns(value: i64) -> String {
+    format!("{value} ns")
 }
 
 /// Watchdogs of a device: `watchdog = { … }`; what is not said stays as the device has it.
