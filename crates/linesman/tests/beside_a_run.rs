@@ -38,41 +38,6 @@ fn subdevices_are_asked_while_the_line_runs() {
     assert_eq!(up.status, 0, "{}", up.all());
 }
 
-// S1 L882: the memory editor, with the bytes of the source's size and beyond a register's end.
-// proves: ESC-16
-#[test]
-fn any_register_is_read_and_written_while_the_line_runs() {
-    let running = Running::start(PLANT);
-    let socket = running.socket();
-    let reg = |words: &[&str]| {
-        let run = linesman([&["reg", &socket, "2"], words, &["--json"]].concat());
-        assert_eq!(run.status, 0, "{words:?}: {}", run.all());
-        let report = run.json();
-        assert_valid(&report, "registers");
-        report["bytes"].as_str().unwrap().to_owned()
-    };
-    // User RAM: bytes, a number, and a part of it.
-    let before = reg(&["read", "0x0F80", "--len", "4"]);
-    assert_ne!(before, "12 34 56 78");
-    reg(&["write", "0x0F80", "12 34 56 78"]);
-    assert_eq!(reg(&["read", "0x0F80", "--len", "4"]), "12 34 56 78");
-    reg(&["write", "0x0F81", "0xABCD", "--len", "2"]);
-    assert_eq!(reg(&["read", "0x0F80", "--len", "4"]), "12 CD AB 78");
-    // A register by its name, as long as it is.
-    let time = reg(&["read", "0x0420"]);
-    reg(&["write", "0x0420", "1234"]);
-    assert_eq!(reg(&["read", "0x0420"]), "D2 04");
-    assert_ne!(time, "D2 04");
-    // One that cannot be written keeps its value.
-    let kind = reg(&["read", "0x0000", "--len", "4"]);
-    let write = linesman(["reg", &socket, "2", "write", "0x0000", "255", "--len", "1", "--json"]);
-    assert!(write.status < 2, "{}", write.all());
-    assert_eq!(reg(&["read", "0x0000", "--len", "4"]), kind);
-    // Only this SubDevice was meant.
-    let other = linesman(["reg", &socket, "3", "read", "0x0F80", "--len", "4", "--json"]).json();
-    assert_ne!(other["bytes"], "12 CD AB 78");
-}
-
 // S0 L1568, L2431-2440: "clear error".
 // proves: DIA-08
 #[test]

@@ -72,36 +72,6 @@ fn a_log_is_read_filtered_and_exported() {
     assert!(runs.stdout.contains("2016-11-17 10:00:00.000"), "{}", runs.stdout);
 }
 
-// S0 L1346, L2240-2245.
-// proves: SW-03
-#[test]
-fn a_subdevice_that_falls_from_op_is_in_the_log_with_its_code() {
-    let folder = TempDir::new().unwrap();
-    let (plant, file) = (folder.path().join("plant.toml"), folder.path().join("log.sqlite"));
-    let text = "[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
-                [[device]]\nname = \"T2\"\ntype = \"EL2008\"\non = \"K1.B\"\n\
-                [[device]]\nname = \"T3\"\ntype = \"EL1008\"\non = \"T2.B\"\n\
-                [[fault]]\nkind = \"watchdog-starved\"\nat = \"maindevice\"\npause_ms = 300\nfrom_ms = 2000\n";
-    std::fs::write(&plant, text).unwrap();
-    let on = format!("sim:{}", plant.display());
-    let log = file.to_str().unwrap();
-    let run = linesman(["run", "--on", &on, "--seconds", "6", "--log", log]);
-    assert!(run.status <= 1, "{}", run.all());
-    let told = linesman(["log", log, "--json", "--kind", "abnormal-state"]).json();
-    assert_valid(&told, "log");
-    let entries = told["entries"].as_array().unwrap();
-    let fell = "abnormal state change (from OP to SAFEOP)";
-    let of_t2 = |entry: &&serde_json::Value| entry["device_no"] == 2;
-    let entry = entries.iter().find(|entry| entry["text"].as_str().unwrap().contains(fell));
-    let entry = entry.filter(of_t2).unwrap_or_else(|| panic!("{told:#}\n{}", run.all()));
-    assert_eq!(entry["severity"], "error", "{entry}");
-    assert!(entry["text"].as_str().unwrap().contains("0x001B"), "{entry}");
-    // Whoever has no outputs has no watchdog that could starve.
-    assert!(entries.iter().all(|entry| entry["device_no"] != 3), "{told:#}");
-    let back = linesman(["log", log, "--kind", "state"]);
-    assert!(back.stdout.contains("OP"), "{}", back.stdout);
-}
-
 #[test]
 fn what_is_no_log_or_no_time_is_refused_with_the_next_step() {
     let folder = TempDir::new().unwrap();

@@ -129,30 +129,6 @@ fn objects_are_read_written_and_explained() {
     assert_eq!(entry["maximum"], "5000 (0x1388)", "{info}");
 }
 
-// The two values of the source are told in the same words (proto, `sync_types`).
-// proves: SYN-22
-#[test]
-fn what_a_subdevice_can_keep_step_with_is_told_in_words() {
-    let plant = Plant::new();
-    let read = plant.json("sdo", &["M1", "read", "0x1C32:04"], "sdo", 0);
-    let object = &read["objects"][0];
-    let value = object["value"].as_u64().unwrap();
-    let text = object["text"].as_str().unwrap();
-    let bits = [
-        (0, "free run"),
-        (1, "in step with frames"),
-        (2, "with SYNC0"),
-        (11, "its delay is fixed"),
-    ];
-    for (bit, words) in bits {
-        assert_eq!(text.contains(words), value >> bit & 1 != 0, "{words}: {read}");
-    }
-    assert!(text.contains("free run"), "{read}");
-    // Other entries of that object are plain numbers.
-    let cycle = plant.json("sdo", &["M1", "read", "0x1C32:05"], "sdo", 0);
-    assert!(!cycle["objects"][0]["text"].as_str().unwrap().contains("free run"), "{cycle}");
-}
-
 // proves: SW-13 partial: the dictionary online, with flags; not offline, and nothing is added to a start-up list
 #[test]
 fn a_dictionary_is_browsed_with_its_flags() {
