@@ -87,6 +87,7 @@ impl Teller {
                 }
             }
             Note::Event(at, event) => {
+                self.follower.tell_until(*at, &self.names, output);
                 let entries = self.board.event(*at, event);
                 self.entries(entries, output);
             }
@@ -106,6 +107,7 @@ impl Teller {
 
     /// Nothing has come for a while, or nothing more will: what was waited with is told.
     pub(super) fn flush(&mut self, output: &mut Output) {
+        self.follower.flush(&self.names, output);
         let entries = self.board.flush();
         self.entries(entries, output);
     }
