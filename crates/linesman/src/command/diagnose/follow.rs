@@ -129,7 +129,7 @@ impl Follower {
         let Event { at, kind, finding, follows_from } = event;
         // What follows from another finding stands beneath it in the report.
         let is_known = self.told.contains(&finding.id);
-        if follows_from.is_some() && !is_known || *kind == EventKind::Withdrawn && !is_known {
+        if !is_known && (follows_from.is_some() || *kind == EventKind::Withdrawn) {
             return;
         }
         self.told.insert(finding.id.clone());

@@ -150,7 +150,18 @@ impl Teller {
                 };
                 self.said(entry.at, &format!("{}{more}", entry.text), output);
             }
-            _ => self.said(entry.at, &entry.text, output),
+            EntryKind::AbnormalState
+            | EntryKind::StateAborted
+            | EntryKind::Communication
+            | EntryKind::Identity
+            | EntryKind::Link
+            | EntryKind::WorkingCounter
+            | EntryKind::Frames
+            | EntryKind::Ring
+            | EntryKind::Emergency
+            | EntryKind::Mailbox
+            | EntryKind::Host
+            | EntryKind::Clock => self.said(entry.at, &entry.text, output),
         }
     }
 
