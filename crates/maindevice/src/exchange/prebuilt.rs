@@ -271,7 +271,7 @@ fn joined(ranges: impl Iterator<Item = Range<usize>>) -> Vec<Range<usize>> {
 fn gaps(all: Range<usize>, taken: Vec<Range<usize>>) -> Vec<Range<usize>> {
     let mut at = all.start;
     let mut gaps = Vec::new();
-    for range in taken.into_iter().chain([all.end..all.end]) {
+    for range in taken.into_iter().chain(std::iter::once(all.end..all.end)) {
         if range.start > at {
             gaps.push(at..range.start.min(all.end));
         }
