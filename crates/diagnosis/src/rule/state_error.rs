@@ -9,7 +9,8 @@
 //!
 //! **What it means.** A refusal is about settings in most cases: process data, SyncManagers, mailbox,
 //! start-up commands that do not fit the device. With 0x0018, 0x0019 and 0x002B its application has no values
-//! to exchange; where its outputs are sent, it is the application that stands still. Leaving a state is about what happens while it runs:
+//! to exchange; where its outputs are sent, it is the application that stands still.
+//! Leaving a state is about what happens while it runs:
 //! outputs that stop (watchdog), clocks and frames that come at the wrong time, or an error of the
 //! device itself. If there is trouble with cables at the same moment, that comes first: the code is then
 //! what follows.
