@@ -33,7 +33,7 @@ pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
 pub use lint::{Doubt, Severity};
 pub use settings::{
-    AddressingChoice, ClockSettings, DeviceSettings, OnWrongCounter, ProcessAccess,
+    AddressingChoice, ClockSettings, DeviceSettings, Keeping, OnWrongCounter, ProcessAccess,
     WatchdogSettings,
 };
 pub use task::{DatagramPlan, FramePlan, IoAt, Ownership, Role, SyncUnit, Task};

@@ -26,6 +26,14 @@ pub struct Network {
     /// The unit of `pre_ticks`, in µs.
     #[schemars(range(min = 1))]
     pub base_time_us: u32,
+    /// A SubDevice that left its state is brought back, unless it says otherwise; else it stays there until somebody asks for
+    /// a state.
+    pub restore_state: bool,
+    /// A SubDevice that was lost and answers again is set up anew, unless it says otherwise; else it stays in INIT until
+    /// somebody asks for a state.
+    pub reinitialise: bool,
+    /// Error counters are cleared before they stop at 255, unless a SubDevice says otherwise; else they are only read.
+    pub clear_counters: bool,
 }
 
 impl Default for Network {
@@ -37,6 +45,9 @@ impl Default for Network {
             on_wrong_counter: OnWrongCounter::Keep,
             mailbox_states: true,
             base_time_us: 1_000,
+            restore_state: true,
+            reinitialise: true,
+            clear_counters: true,
         }
     }
 }

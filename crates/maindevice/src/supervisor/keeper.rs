@@ -102,7 +102,8 @@ impl Keeper<'_> {
         let line = lock(&self.context.line);
         let lost_before = line.losses(self.device.id) > 0;
         let asked = line.requests(self.device.id) > self.requests_at_loss;
-        !lost_before || asked || self.context.options.reinitialise
+        let may = self.context.options.reinitialise && self.device.settings.keeping.reinitialise;
+        !lost_before || asked || may
     }
 
     /// Drives and watches until the SubDevice is lost.
@@ -132,7 +133,9 @@ impl Keeper<'_> {
                     let Some((status, code)) = self.known.al else { return };
                     let (id, from) = (self.device.id, reached);
                     self.context.wire.emit(Event::AbnormalState { id, from, status, code });
-                    if !self.context.options.restore_states && !self.wait_for_request().await {
+                    let keeping = self.device.settings.keeping;
+                    let may = self.context.options.restore_states && keeping.restore_state;
+                    if !may && !self.wait_for_request().await {
                         return;
                     }
                 }
@@ -310,7 +313,9 @@ impl Keeper<'_> {
 
     /// Clears the counters before one of them stops counting. If the answer gets lost, the next reading tells.
     async fn clear_when_full(&mut self, counters: ErrorCounters) {
-        let Some(limit) = self.context.options.clear_counters_at else { return };
+        let limit = self.context.options.clear_counters_at;
+        let limit = limit.filter(|_| self.device.settings.keeping.clear_counters);
+        let Some(limit) = limit else { return };
         if counters.iter().all(|(_, value)| value < limit) {
             self.known.vain_clears = 0;
         } else if self.known.vain_clears < MOST_VAIN_CLEARS {
