@@ -26,6 +26,9 @@ pub struct Network {
     /// The unit of `pre_ticks`, in µs.
     #[schemars(range(min = 1))]
     pub base_time_us: u32,
+    /// From the frames to SYNC0, in µs; 30 % of the cycle unless said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outputs_shift_us: Option<u32>,
 }
 
 impl Default for Network {
@@ -37,6 +40,7 @@ impl Default for Network {
             on_wrong_counter: OnWrongCounter::Keep,
             mailbox_states: true,
             base_time_us: 1_000,
+            outputs_shift_us: None,
         }
     }
 }
@@ -91,6 +95,7 @@ impl Network {
             pack_bits: self.pack_bits,
             clock_datagrams: true,
             mailbox_states: self.mailbox_states,
+            outputs_shift: self.outputs_shift_us.map(|us| Span::us(u64::from(us))),
             ..PlanOptions::default()
         }
     }
@@ -109,7 +114,7 @@ pub struct ClockChoice {
     /// Cycle of SYNC0 in µs; that of its task unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync0_cycle_us: Option<u32>,
-    /// Shift of SYNC0 in ns.
+    /// Shift of SYNC0 in ns, on top of the shift of the outputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync0_shift_ns: Option<i64>,
     /// Cycle of SYNC1 in µs.
