@@ -244,12 +244,18 @@ impl Engine {
             watched.again = is_watched.then_some(now + JUDGE_AGAIN);
         }
         let all = self.networks.iter().flat_map(|watched| watched.conditions.iter().cloned());
-        let events = &mut self.events;
+        let room = Self::MOST_WAITING.saturating_sub(self.events.len());
+        let mut news = Vec::new();
         self.book.update(all.collect(), now, |kind, finding: &Finding| {
-            if events.len() < Self::MOST_WAITING {
-                events.push_back(Event { at: now, kind, finding: report::build::alone(finding) });
+            if news.len() < room {
+                news.push((finding.id, kind, report::build::alone(finding)));
             }
         });
+        // What follows from what is known when all is known.
+        for (id, kind, finding) in news {
+            let follows_from = self.book.cause_of(id).map(report::build::name);
+            self.events.push_back(Event { at: now, kind, finding, follows_from });
+        }
         self.ask();
     }
 

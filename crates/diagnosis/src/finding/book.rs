@@ -153,6 +153,12 @@ impl Book {
         self.sorted(Some(id))
     }
 
+    /// The finding that explains this one.
+    #[must_use]
+    pub fn cause_of(&self, id: u32) -> Option<u32> {
+        self.findings.iter().find(|finding| finding.id == id)?.parent
+    }
+
     /// The worst that there is, or was.
     #[must_use]
     pub fn worst(&self) -> Option<Severity> {

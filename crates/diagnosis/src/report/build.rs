@@ -24,6 +24,12 @@ pub fn finding(book: &Book, finding: &Finding) -> FindingReport {
     report
 }
 
+/// What a finding is called in this run.
+#[must_use]
+pub fn name(id: u32) -> String {
+    format!("F{id}")
+}
+
 /// A finding without what follows from it.
 #[must_use]
 pub fn alone(finding: &Finding) -> FindingReport {
@@ -35,7 +41,7 @@ pub fn alone(finding: &Finding) -> FindingReport {
         (None, None) => FindingState::Opened,
     };
     FindingReport {
-        id: format!("F{}", finding.id),
+        id: name(finding.id),
         code: page.code.to_owned(),
         name: page.name.to_owned(),
         severity: condition.severity,

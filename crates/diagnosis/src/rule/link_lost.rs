@@ -168,10 +168,15 @@ fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
         End::Controller(node, _) => format!("SubDevice {}", line.label(DeviceId(node as u32))),
         End::MainDevice(_) => "the MainDevice's second card".to_owned(),
     };
-    condition
-        .advise(format!("Look at {far}: if no lamp is lit, measure its supply first."))
-        .advise(format!("Seat the plugs at both ends of {place}; then exchange the cable."))
-        .advise("On the terminal bus, press the terminals together and look at the contacts.")
+    condition =
+        condition.advise(format!("Look at {far}: if no lamp is lit, measure its supply first."));
+    // Only a terminal says for sure that no cable leads to it; a coupler or junction may have either before it.
+    let is_terminal = behind.is_some_and(|node| is_on_terminal_bus(line, node));
+    if !is_terminal {
+        let text = format!("Seat the plugs at both ends of {place}; then exchange the cable.");
+        condition = condition.advise(text);
+    }
+    condition.advise("On the terminal bus, press the terminals together and look at the contacts.")
 }
 
 /// Puts the first alternative, which is likelier, in front.

@@ -21,6 +21,8 @@ pub(super) struct Known {
     al: Option<(AlStatus, AlStatusCode)>,
     dl: Option<DlStatus>,
     counters: Option<ErrorCounters>,
+    /// How often in a row its counters stood as high after a clear as before.
+    vain_clears: u8,
     /// Its controller: which counters it has.
     information: Option<EscInformation>,
 }
@@ -32,6 +34,9 @@ enum Trouble {
     /// Another state is wanted than before.
     Redirected,
 }
+
+/// A controller whose counters do not let themselves be cleared is left alone after so many attempts.
+const MOST_VAIN_CLEARS: u8 = 3;
 
 /// A SubDevice that stayed well for so long starts with short waits again.
 const FORGIVEN_AFTER: Span = Span::s(10);
@@ -298,8 +303,23 @@ impl Keeper<'_> {
             if self.known.counters.replace(counters) != Some(counters) {
                 self.context.wire.emit(Event::Counters { id, counters });
             }
+            self.clear_when_full(counters).await;
         }
         true
+    }
+
+    /// Clears the counters before one of them stops counting. If the answer gets lost, the next reading tells.
+    async fn clear_when_full(&mut self, counters: ErrorCounters) {
+        let Some(limit) = self.context.options.clear_counters_at else { return };
+        if counters.iter().all(|(_, value)| value < limit) {
+            self.known.vain_clears = 0;
+        } else if self.known.vain_clears < MOST_VAIN_CLEARS {
+            self.known.vain_clears += 1;
+            let Context { wire, line, .. } = self.context;
+            // It fails or not: the next reading tells.
+            let _ = super::counters::clear(wire, line, self.device.id, self.target()).await;
+            self.known.counters = None;
+        }
     }
 
     pub(super) fn learn_state(&mut self, status: AlStatus, code: AlStatusCode) {

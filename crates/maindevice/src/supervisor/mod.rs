@@ -7,6 +7,7 @@
 mod align;
 mod by_alias;
 mod clocks;
+pub(crate) mod counters;
 mod drive;
 pub(crate) mod keeper;
 pub(crate) mod line;
