@@ -12,8 +12,8 @@ use linesman_lab::lab::Lab;
 use linesman_lab::options::LabOptions;
 use linesman_lab::verdict::proof::LINE;
 use linesman_lab::verdict::{Claim, Scene, matches};
-use linesman_proto::address::Path;
-use linesman_proto::command::Addressing;
+use linesman_proto::address::{LogicalAddress, Path};
+use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment_file::{FaultEntry, SegmentFile};
@@ -27,8 +27,8 @@ fn entry(text: &str) -> FaultEntry {
     file.faults[0].clone()
 }
 
-/// When frames with process data came back, and with which working counter.
-type Returns = Arc<Mutex<Vec<(Instant, u16)>>>;
+/// When which process data came back, and with which working counter.
+type Returns = Arc<Mutex<Vec<(Instant, LogicalAddress, u16)>>>;
 
 /// Puts a fault into a line that runs; gives its first effect, and what was said from then on.
 fn broken(text: &str, offset: Span) -> (Lab, Instant, Vec<Event>) {
@@ -43,19 +43,19 @@ fn watched(text: &str, offset: Span, news: bool) -> (Lab, Instant, Vec<Event>, R
     let options = LabOptions { cycle: CYCLE, ..LabOptions::default() };
     let mut lab = Lab::new(&file, options).unwrap();
     lab.wait_up(Span::s(20)).unwrap();
-    lab.run_until(lab.now() + Span::s(1) + offset).unwrap();
-    while lab.poll_finding_event().is_some() {}
     let returns = Returns::default();
     let seen = Arc::clone(&returns);
     lab.set_tap(Box::new(move |frame| {
         let view = FrameView::parse(frame.bytes).unwrap();
-        let logical = view.datagrams().map_while(Result::ok).find(|datagram| {
-            datagram.command().is_some_and(|one| one.addressing() == Addressing::Logical)
-        });
-        if let Some(datagram) = logical.filter(|_| frame.direction == Direction::Received) {
-            seen.lock().unwrap().push((frame.time, datagram.wkc().0));
+        for datagram in view.datagrams().map_while(Result::ok) {
+            let addressing = datagram.command().map(Command::addressing);
+            if frame.direction == Direction::Received && addressing == Some(Addressing::Logical) {
+                seen.lock().unwrap().push((frame.time, datagram.logical(), datagram.wkc().0));
+            }
         }
     }));
+    lab.run_until(lab.now() + Span::s(1) + offset).unwrap();
+    while lab.poll_finding_event().is_some() {}
     if news {
         lab.observe_host(Path::B, HostEvent::Carrier(false));
     }
@@ -85,10 +85,14 @@ fn something_is_flagged_when_the_first_frame_that_shows_it_is_back() {
                 let first = events.iter().find(|event| event.finding.severity != Severity::Info);
                 let first = first.map(|event| event.at);
                 let returns = returns.lock().unwrap();
-                let full = returns.iter().map(|(_, wkc)| *wkc).max();
-                let mut short =
-                    returns.iter().filter(|(at, wkc)| *at >= began && Some(*wkc) < full);
-                let shown = short.next().map(|(at, _)| *at);
+                let full = |start| {
+                    let same = returns.iter().filter(|(_, other, _)| *other == start);
+                    same.map(|(.., wkc)| *wkc).max()
+                };
+                let is_short = |start, wkc| Some(wkc) < full(start);
+                let mut after = returns.iter().filter(|(at, ..)| *at >= began);
+                let shown = after.find(|(_, start, wkc)| is_short(*start, *wkc));
+                let shown = shown.map(|(at, ..)| *at);
                 // A frame that is under way may vanish, and ports take their time to close.
                 let after = first.map(|at| at.since(began));
                 assert!(
