@@ -135,6 +135,12 @@ impl Book {
         &self.findings
     }
 
+    /// Whether anything is wrong at present.
+    #[must_use]
+    pub fn has_open(&self) -> bool {
+        self.findings.iter().any(|finding| finding.closed.is_none())
+    }
+
     /// Findings that follow from no other one, worst first, then in order of time.
     #[must_use]
     pub fn roots(&self) -> Vec<&Finding> {
