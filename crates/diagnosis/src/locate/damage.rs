@@ -354,7 +354,9 @@ impl Walk<'_, '_> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
         let line = self.survey.line();
-        let lost = line.traffic.lost;
+        // In a ring one of the two copies is lost at a time.
+        let copies = line.traffic.copies_lost[card.index()];
+        let lost = if line.traffic.lost.of_spell() == 0 { copies } else { line.traffic.lost };
         let (first, last) = (lost.first_of_spell?, lost.last?);
         let is_silent = self.carried.frames == 0 && !line.host.is_watched;
         // Counters that were read before the frame was missed say nothing of it.
