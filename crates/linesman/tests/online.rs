@@ -93,6 +93,72 @@ fn errors_are_shown_at_their_port_and_cleared_without_loss() {
     running.until("counts on", |report| errors(report, 3) > errors(&after, 3));
 }
 
+/// The machine of the sources: couplers, a junction with two branches, 28 SubDevices. One cable is cut and one disturbed.
+fn machine() -> String {
+    let device = |no: u32, kind: &str, on: &str| {
+        format!("[[device]]\nname = \"Term {no}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    };
+    let mut plant = device(1, "EK1100", "maindevice");
+    let behind = |no: u32| format!("Term {no}.B");
+    for no in 2..=28 {
+        plant += &match no {
+            6 => device(no, "EK1122", &behind(5)),
+            7 => device(no, "EL2008", "Term 6.C"),
+            14 => device(no, "EK1100", "Term 6.D"),
+            22 => device(no, "EK1100", "Term 6.B"),
+            _ => device(no, if no % 2 == 0 { "EL1008" } else { "EL2008" }, &behind(no - 1)),
+        };
+    }
+    plant
+        + "[[fault]]\nkind = \"emc-noise\"\nat = \"Term 6.D>Term 14.A\"\nhits_per_s = 40\nfrom_ms = 500\n\
+           [[fault]]\nkind = \"link-open\"\nat = \"Term 6.B-Term 22.A\"\nfrom_ms = 3000\n"
+}
+
+// S0 L1535-1577: 28 SubDevices, number, address, name, state and errors by port.
+// proves: DIA-07
+#[test]
+fn the_table_has_a_row_for_each_of_twenty_eight_with_its_errors_by_port() {
+    let running = Running::start(&machine());
+    let report = running.until("is cut and disturbed", |report| {
+        let devices = report["devices"].as_array().unwrap();
+        let texts = devices.iter().filter_map(|one| one["state"]["text"].as_str());
+        let gone = texts.filter(|text| text.contains("NO_COMM")).count();
+        gone == 7 && devices.iter().any(|one| number(&one["errors"]) > 0)
+    });
+    let disturbed: Vec<&Value> = report["devices"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|one| number(&one["errors"]) > 0)
+        .collect();
+    assert_eq!(disturbed.len(), 1, "where it happens and nowhere else: {disturbed:?}");
+    let folder = TempDir::new().unwrap();
+    let kept = folder.path().join("kept.json");
+    std::fs::write(&kept, report.to_string()).unwrap();
+    let table = linesman(["online", kept.to_str().unwrap()]).stdout;
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .map(|line| line.split_whitespace().collect::<Vec<_>>())
+        .filter(|words| words.len() > 8 && words[0].parse::<u32>().is_ok())
+        .collect();
+    assert_eq!(rows.len(), 28, "{table}");
+    for (index, row) in rows.iter().enumerate() {
+        let device = &report["devices"][index];
+        let no = index + 1;
+        assert_eq!(row[0], no.to_string(), "{table}");
+        let line = row.join(" ");
+        let station = format!("0x{:04X}", 0x1000 + no);
+        let state = device["state"]["text"].as_str().unwrap();
+        let kind = device["type"].as_str().unwrap_or_default();
+        assert!(line.contains(&station) && line.contains(state) && line.contains(kind), "{line}");
+        let errors = device["ports"].as_array().unwrap().iter().map(|port| {
+            number(&port["invalid_frames"]["total"]) + number(&port["physical_layer"]["total"])
+        });
+        let errors = errors.map(|count| count.to_string()).collect::<Vec<_>>().join("/");
+        assert!(row.contains(&errors.as_str()), "{errors} in {line}");
+    }
+}
+
 // proves: DIA-10
 #[test]
 fn a_report_is_kept_and_shown_again_without_the_line() {

@@ -218,6 +218,52 @@ fn the_report_marks_both_faults_of_a_plant_where_they_are() {
     assert!(page.contains("35.B – 36.A"));
 }
 
+// S0 L2184-2192, S4 L39-46: the tree as it was planned and as it is, ports by their places, states by colour, a red border
+// for who does not answer, errors at their port; taken over by other software.
+// proves: DIA-12
+#[test]
+fn the_tree_is_drawn_of_a_scan_and_of_a_running_line_and_given_to_other_programs() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("plant.toml");
+    let faults = "[[fault]]\nkind = \"emc-noise\"\nat = \"K1.C>K2.A\"\nfrom_ms = 1000\nhits_per_s = 60.0\n\
+                  [[fault]]\nkind = \"link-open\"\nat = \"K2.C-K3.A\"\nfrom_ms = 4000\n";
+    fs::write(&file, format!("seed = 7\n{}{faults}", tree(3, 3))).unwrap();
+    let place = format!("sim:{}", file.display());
+    // At rest: all are in INIT, and nothing is marked.
+    let (rest, run) = (folder.path().join("rest.svg"), folder.path().join("run.svg"));
+    let scan = linesman(["scan", &place, "--svg", rest.to_str().unwrap(), "--json"]);
+    assert_eq!(scan.status, 0, "{}", scan.all());
+    let rest = elements(&fs::read_to_string(&rest).unwrap());
+    let boxes = |all: &[Element], class: &str| {
+        all.iter().filter(|one| one.has_class("box") && one.has_class(class)).count()
+    };
+    assert_eq!((boxes(&rest, "init"), boxes(&rest, "gone")), (12, 0));
+    // The same tree for a program: who hangs on which port of whom.
+    let scan = scan.json();
+    let devices = scan["devices"].as_array().unwrap();
+    let links = devices.iter().filter_map(|device| {
+        let entry = device["ports"].as_array().unwrap().iter().find(|port| port["port"] == "A")?;
+        let to = &entry["to"];
+        (to["no"] != 0).then(|| {
+            let (no, port) = (&to["no"], to["port"].as_str().unwrap());
+            format!("{no}.{port} – {}.A", device["no"])
+        })
+    });
+    for title in links {
+        let drawn = |one: &Element| one.has_class("link") && one.title.starts_with(&title);
+        assert!(rest.iter().any(drawn), "{title}");
+    }
+    // At work: those in OP are blue, those behind the cut have a red border, errors stand at their port.
+    let told = linesman(["diagnose", &place, "--svg", run.to_str().unwrap()]);
+    assert_eq!(told.status, 1, "{}", told.all());
+    let text = fs::read_to_string(&run).unwrap();
+    let run = elements(&text);
+    assert_eq!((boxes(&run, "op"), boxes(&run, "gone")), (8, 4));
+    assert!(text.contains(">A +"), "errors at port A");
+    let marked = run.iter().filter(|one| one.has_class("rises")).count();
+    assert_eq!(marked, 1, "at one port");
+}
+
 #[test]
 fn files_are_not_overwritten_and_need_a_folder() {
     let folder = TempDir::new().unwrap();

@@ -31,6 +31,7 @@ fn drive(kind: &str, commands: &str) -> Run {
     linesman(words)
 }
 
+// proves: SW-12
 #[test]
 fn addresses_of_an_ethernet_port_are_set_at_start_up() {
     let command =
@@ -38,7 +39,7 @@ fn addresses_of_an_ethernet_port_are_set_at_start_up() {
     let run = drive("EL6601", &command("ip = \"192.168.1.11\", mask = \"255.255.255.0\""));
     assert_eq!(run.status, 0, "{}", run.all());
     assert!(run.stdout.contains("all 2 SubDevices have reached their states"), "{}", run.all());
-    // SW-12: the mistake is told before anything is switched on.
+    // The mistake is told before anything is switched on.
     let run = drive("EL6601", &command("ip = \"192.168.1.0\""));
     assert_eq!(run.status, 2, "{}", run.all());
     assert!(run.stderr.contains("192.168.1.0 ends in .0"), "{}", run.stderr);

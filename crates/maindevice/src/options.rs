@@ -24,6 +24,9 @@ pub struct Options {
     pub allowed_misses: Option<u32>,
     /// How often each SubDevice's error counters, DL status and AL status are read while running.
     pub watch_interval: Span,
+    /// Counter registers stop at 255. When one has reached this, all error counters of the SubDevice are read
+    /// and cleared in one frame, and the totals go on; `None`: never, as where somebody else clears them.
+    pub clear_counters_at: Option<u8>,
     /// How often mailboxes are looked into, when nothing is expected.
     pub mailbox_interval: Span,
     /// How long a SubDevice may take to answer a mailbox request.
@@ -81,6 +84,7 @@ impl Default for Options {
             frames_at_once: 4,
             allowed_misses: None,
             watch_interval: Span::ms(100),
+            clear_counters_at: Some(128),
             mailbox_interval: Span::ms(50),
             mailbox_patience: Span::s(2),
             state_timeouts: StateTimeouts::DEFAULT,

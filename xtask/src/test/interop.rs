@@ -77,7 +77,10 @@ fn latency(context: &Context<'_>) -> Result<()> {
         println!("    {line}");
     }
     if !ran.success() {
-        println!("    the latency is not what it should be, or was not measured: {}", ran.status_line());
+        println!(
+            "    the latency is not what it should be, or was not measured: {}",
+            ran.status_line()
+        );
     }
     Ok(())
 }

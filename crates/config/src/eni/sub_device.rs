@@ -14,7 +14,9 @@ use crate::esi::device::physics;
 use crate::esi::setting;
 use crate::esi::xml::Element;
 use crate::identity::RevisionRule;
-use crate::plan::{AddressingChoice, ClockSettings, DevicePlan, OnWrongCounter, ProcessAccess};
+use crate::plan::{
+    AddressingChoice, ClockSettings, DevicePlan, Keeping, OnWrongCounter, ProcessAccess,
+};
 use crate::profile::Mailbox;
 use crate::start_up::{StartUpCommand, left_out};
 
@@ -335,6 +337,16 @@ fn ours(own: &Element, file: &mut FileDevice) -> Result<(), EsiError> {
     device.settings.alias = alias.map(StationAlias).or(device.settings.alias);
     device.settings.on_wrong_counter =
         known::<OnWrongCounter>(choice("on-wrong-counter")).unwrap_or_default();
+    // Files of earlier versions say nothing of it.
+    let unless_said = |name: &str| match own.attribute(name) {
+        Some(_) => own.flag(name),
+        None => Ok(true),
+    };
+    device.settings.keeping = Keeping {
+        restore_state: unless_said("restore-state")?,
+        reinitialise: unless_said("reinitialise")?,
+        clear_counters: unless_said("clear-counters")?,
+    };
     device.settings.task = own.attribute("task").map(str::to_owned);
     device.settings.sync_unit = own.attribute("sync-unit").map(str::to_owned);
     device.settings.modules =

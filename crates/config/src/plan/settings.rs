@@ -28,9 +28,28 @@ pub struct DeviceSettings {
     pub clock: Option<ClockSettings>,
     /// What becomes of its inputs when the working counter of their datagram is wrong.
     pub on_wrong_counter: OnWrongCounter,
+    /// What the MainDevice does for it by itself.
+    pub keeping: Keeping,
     /// Modules that must sit in its slots, as object 0xF050 counts them from 1; 0 is an empty slot.
     /// No entries: not compared.
     pub modules: Vec<u32>,
+}
+
+/// What the MainDevice does for a SubDevice by itself while the network runs (SW-15).
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Keeping {
+    /// When it left its state it is brought back; else it stays there until somebody asks for a state.
+    pub restore_state: bool,
+    /// When it was lost and answers again it is set up anew; else it stays in INIT until somebody asks for a state.
+    pub reinitialise: bool,
+    /// Its error counters are cleared before they stop at 255; else they are only read, as where another tool clears them.
+    pub clear_counters: bool,
+}
+
+impl Default for Keeping {
+    fn default() -> Self {
+        Self { restore_state: true, reinitialise: true, clear_counters: true }
+    }
 }
 
 /// Which commands carry the process data of a SubDevice (FRM-26).
@@ -81,7 +100,7 @@ pub struct ClockSettings {
     pub assign_activate: u16,
     /// Cycle of SYNC0.
     pub sync0_cycle: Span,
-    /// Where SYNC0 falls within the cycle, in ns after its begin.
+    /// How much later SYNC0 falls than the shift of the outputs says, in ns.
     pub sync0_shift_ns: i64,
     /// Cycle of SYNC1, register 0x09A4; 0 with a SYNC1 that follows SYNC0.
     pub sync1_cycle: Span,

@@ -79,6 +79,15 @@ pub struct ProjectDevice {
     /// What becomes of its inputs when a working counter is wrong; as in the network unless said.
     #[serde(default)]
     pub on_wrong_counter: Option<OnWrongCounter>,
+    /// It is brought back when it left its state; as in the network unless said.
+    #[serde(default)]
+    pub restore_state: Option<bool>,
+    /// It is set up anew when it was lost and answers again; as in the network unless said.
+    #[serde(default)]
+    pub reinitialise: Option<bool>,
+    /// Its error counters are cleared before they stop at 255; as in the network unless said.
+    #[serde(default)]
+    pub clear_counters: Option<bool>,
     /// Its watchdogs.
     #[serde(default)]
     pub watchdog: WatchdogChoice,
@@ -129,6 +138,9 @@ impl ProjectDevice {
             frame_repeat: None,
             addressing: AddressingChoice::Auto,
             on_wrong_counter: None,
+            restore_state: None,
+            reinitialise: None,
+            clear_counters: None,
             watchdog: WatchdogChoice::default(),
             clock: None,
             pdos: None,
@@ -226,6 +238,9 @@ impl ProjectDevice {
         let addressing = &self.addressing;
         choice("addressing", (*addressing != AddressingChoice::Auto).then(|| inline(addressing)));
         choice("on_wrong_counter", self.on_wrong_counter.as_ref().map(inline));
+        choice("restore_state", self.restore_state.as_ref().map(inline));
+        choice("reinitialise", self.reinitialise.as_ref().map(inline));
+        choice("clear_counters", self.clear_counters.as_ref().map(inline));
         let watchdog = &self.watchdog;
         choice("watchdog", (*watchdog != WatchdogChoice::default()).then(|| inline(watchdog)));
         choice("clock", self.clock.as_ref().map(inline));

@@ -36,6 +36,8 @@ pub struct Event {
     pub kind: EventKind,
     /// The finding, without what follows from it.
     pub finding: FindingReport,
+    /// The finding that explains it, by its id, as far as that is known by now.
+    pub follows_from: Option<String>,
 }
 
 /// What happened to a finding.

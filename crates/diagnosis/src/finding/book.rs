@@ -135,6 +135,12 @@ impl Book {
         &self.findings
     }
 
+    /// Whether anything is wrong at present.
+    #[must_use]
+    pub fn has_open(&self) -> bool {
+        self.findings.iter().any(|finding| finding.closed.is_none())
+    }
+
     /// Findings that follow from no other one, worst first, then in order of time.
     #[must_use]
     pub fn roots(&self) -> Vec<&Finding> {
@@ -145,6 +151,12 @@ impl Book {
     #[must_use]
     pub fn consequences(&self, id: u32) -> Vec<&Finding> {
         self.sorted(Some(id))
+    }
+
+    /// The finding that explains this one.
+    #[must_use]
+    pub fn cause_of(&self, id: u32) -> Option<u32> {
+        self.findings.iter().find(|finding| finding.id == id)?.parent
     }
 
     /// The worst that there is, or was.

@@ -200,16 +200,23 @@ impl Session {
     }
 
     /// Tells what happened to findings, where that was asked for.
-    fn follow(&self, engine: &mut Engine, output: &mut Output) {
-        let Some(follower) = &self.follower else { return };
+    fn follow(&mut self, engine: &mut Engine, output: &mut Output) {
+        let Some(follower) = &mut self.follower else { return };
         while let Some(event) = engine.poll_event() {
             follower.tell(event, &names(engine), output);
         }
     }
 
+    /// Tells all that was held back.
+    fn flush(&mut self, names: &Names, output: &mut Output) {
+        if let Some(follower) = &mut self.follower {
+            follower.flush(names, output);
+        }
+    }
+
     /// Ends the input and gives the answer. `complete` is whether all of it could be read.
     fn conclude(
-        &self,
+        &mut self,
         mut engine: Engine,
         at: Instant,
         complete: bool,
@@ -217,7 +224,9 @@ impl Session {
     ) -> Status {
         engine.finish(at, complete);
         self.follow(&mut engine, output);
-        self.answer(&engine, &names(&engine), at, output)
+        let names = names(&engine);
+        self.flush(&names, output);
+        self.answer(&engine, &names, at, output)
     }
 
     /// Gives the answer.

@@ -23,7 +23,7 @@ pub(crate) struct Running {
 }
 
 impl Running {
-    /// Runs a plant of three SubDevices, and waits until all are in OP.
+    /// Runs a plant, and waits until all SubDevices are in OP.
     #[track_caller]
     pub(crate) fn start(plant: &str) -> Self {
         let folder = TempDir::new().unwrap();
@@ -36,10 +36,11 @@ impl Running {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
+        let planned = plant.matches("[[device]]").count();
         let running = Self { child, folder };
         running.until("comes up", |report| {
             let devices = report["devices"].as_array().unwrap();
-            devices.len() == 3 && devices.iter().all(|one| one["al_state"] == "OP")
+            devices.len() == planned && devices.iter().all(|one| one["al_state"] == "OP")
         });
         running
     }

@@ -7,12 +7,11 @@ use linesman_proto::address::DeviceId;
 
 use super::failure::ServiceFailure;
 use super::{Service, ServiceAnswer, state};
-use crate::event::Event;
 use crate::exchange::Target;
-use crate::executor::{Wire, lock};
+use crate::executor::Wire;
 use crate::mailbox::Queues;
 use crate::procedure;
-use crate::supervisor::Line;
+use crate::supervisor::{self, Line};
 
 /// Whoever does services.
 #[derive(Clone)]
@@ -69,11 +68,8 @@ async fn clear_counters(
     id: DeviceId,
     target: Target,
 ) -> Result<ServiceAnswer, ServiceFailure> {
-    lock(&servant.line).note_clear(id);
-    let result = procedure::counters::read_and_clear(&servant.wire, target).await;
-    lock(&servant.line).note_clear(id);
+    let result = supervisor::counters::clear(&servant.wire, &servant.line, id, target).await;
     let counters = result.map_err(|error| register(id, error))?;
-    servant.wire.emit(Event::CountersCleared { id, counters });
     Ok(ServiceAnswer::Data(counters.to_bytes().to_vec()))
 }
 

@@ -21,6 +21,8 @@ pub(super) struct Known {
     al: Option<(AlStatus, AlStatusCode)>,
     dl: Option<DlStatus>,
     counters: Option<ErrorCounters>,
+    /// How often in a row its counters stood as high after a clear as before.
+    vain_clears: u8,
     /// Its controller: which counters it has.
     information: Option<EscInformation>,
 }
@@ -32,6 +34,9 @@ enum Trouble {
     /// Another state is wanted than before.
     Redirected,
 }
+
+/// A controller whose counters do not let themselves be cleared is left alone after so many attempts.
+const MOST_VAIN_CLEARS: u8 = 3;
 
 /// A SubDevice that stayed well for so long starts with short waits again.
 const FORGIVEN_AFTER: Span = Span::s(10);
@@ -97,7 +102,8 @@ impl Keeper<'_> {
         let line = lock(&self.context.line);
         let lost_before = line.losses(self.device.id) > 0;
         let asked = line.requests(self.device.id) > self.requests_at_loss;
-        !lost_before || asked || self.context.options.reinitialise
+        let may = self.context.options.reinitialise && self.device.settings.keeping.reinitialise;
+        !lost_before || asked || may
     }
 
     /// Drives and watches until the SubDevice is lost.
@@ -127,7 +133,9 @@ impl Keeper<'_> {
                     let Some((status, code)) = self.known.al else { return };
                     let (id, from) = (self.device.id, reached);
                     self.context.wire.emit(Event::AbnormalState { id, from, status, code });
-                    if !self.context.options.restore_states && !self.wait_for_request().await {
+                    let keeping = self.device.settings.keeping;
+                    let may = self.context.options.restore_states && keeping.restore_state;
+                    if !may && !self.wait_for_request().await {
                         return;
                     }
                 }
@@ -170,6 +178,11 @@ impl Keeper<'_> {
             StepError::Module { slot, expected, found } => {
                 let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
                 wire.emit(Event::WrongModule { id, to, status, slot, expected, found });
+                Some(status)
+            }
+            StepError::CycleTooShort { cycle, shortest, object } => {
+                let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
+                wire.emit(Event::CycleTooShort { id, to, status, cycle, shortest, object });
                 Some(status)
             }
             StepError::Unread(error) => {
@@ -298,8 +311,25 @@ impl Keeper<'_> {
             if self.known.counters.replace(counters) != Some(counters) {
                 self.context.wire.emit(Event::Counters { id, counters });
             }
+            self.clear_when_full(counters).await;
         }
         true
+    }
+
+    /// Clears the counters before one of them stops counting. If the answer gets lost, the next reading tells.
+    async fn clear_when_full(&mut self, counters: ErrorCounters) {
+        let limit = self.context.options.clear_counters_at;
+        let limit = limit.filter(|_| self.device.settings.keeping.clear_counters);
+        let Some(limit) = limit else { return };
+        if counters.iter().all(|(_, value)| value < limit) {
+            self.known.vain_clears = 0;
+        } else if self.known.vain_clears < MOST_VAIN_CLEARS {
+            self.known.vain_clears += 1;
+            let Context { wire, line, .. } = self.context;
+            // It fails or not: the next reading tells.
+            let _ = super::counters::clear(wire, line, self.device.id, self.target()).await;
+            self.known.counters = None;
+        }
     }
 
     pub(super) fn learn_state(&mut self, status: AlStatus, code: AlStatusCode) {

@@ -7,18 +7,20 @@
 mod align;
 mod by_alias;
 mod clocks;
+pub(crate) mod counters;
 mod drive;
 pub(crate) mod keeper;
 pub(crate) mod line;
 mod locate;
 mod modules;
+mod shortest_cycle;
 mod start_up;
 pub(crate) mod times;
 
 use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::{AddressingChoice, DevicePlan, Plan};
-use linesman_proto::address::{DeviceId, Network};
+use linesman_proto::address::{DeviceId, Network, WorkingCounter};
 use linesman_proto::register;
 use linesman_proto::time::{Instant, Span};
 
@@ -27,6 +29,7 @@ use crate::exchange::Target;
 use crate::executor::{Wire, lock};
 use crate::options::Options;
 use crate::procedure::look::AL_LEN;
+use crate::procedure::scan::Identified;
 
 pub(crate) use line::{Found, Line, Nap};
 pub use start_up::StartUpError;
@@ -66,11 +69,12 @@ const THOROUGH_INTERVAL: Span = Span::s(2);
 /// Alerts are acted upon no more often than this.
 pub(crate) const CALM: Span = Span::ms(5);
 
-/// Runs a network according to its plan; never ends.
-pub(crate) async fn supervise(context: Context) {
+/// Runs a network according to its plan; never ends. Who a scan has just identified need not be asked
+/// again.
+pub(crate) async fn supervise(context: Context, identified: Option<Identified>) {
     lock(&context.line).begin_times(context.wire.now());
     context.wire.forget_places();
-    while locate::locate(&context, true).await.is_err() {
+    while locate::from_scratch(&context, identified.as_ref()).await.is_err() {
         // The whole line is silent.
         for device in &context.plan.devices {
             lose(&context, device.id);
@@ -95,6 +99,9 @@ pub(crate) async fn supervise(context: Context) {
     loop {
         let seen = context.alerts();
         context.nap(seen, SEARCH_INTERVAL).await;
+        if context.alerts() == seen && is_calm(&context, placed_at) {
+            continue;
+        }
         context.wire.sleep(CALM).await;
         let responding = lock(&context.line).responding();
         if responding != placed_at && placed_at.is_some() {
@@ -111,15 +118,24 @@ pub(crate) async fn supervise(context: Context) {
         if responding != located_at || now >= thorough_at {
             thorough_at = now + THOROUGH_INTERVAL;
             // A silent line is found out by the keepers; the next round tries again.
-            if locate::locate(&context, false).await.is_ok() {
+            if locate::again(&context).await.is_ok() {
                 located_at = responding;
             }
         }
     }
 }
 
+/// Whether all are there, and as many answer as the last time.
+fn is_calm(context: &Context, answered: Option<WorkingCounter>) -> bool {
+    let line = lock(&context.line);
+    line.responding() == answered && line.are_all_there()
+}
+
 /// Asks those that are lost at their addresses. Returns whether any is still lost.
 async fn search(context: &Context) -> bool {
+    if lock(&context.line).are_all_there() {
+        return false;
+    }
     by_alias::locate(context).await;
     let lost: Vec<_> = (context.plan.devices.iter())
         .filter(|device| lock(&context.line).found(device.id) == Found::Lost)

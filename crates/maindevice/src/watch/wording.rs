@@ -30,6 +30,7 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
         | Event::StepTimedOut { id, .. }
         | Event::StartUpFailed { id, .. }
         | Event::WrongModule { id, .. }
+        | Event::CycleTooShort { id, .. }
         | Event::ModulesUnread { id, .. } => {
             states(at, event, plan, Some(*id), Severity::Error, EntryKind::StateAborted)
         }
@@ -96,7 +97,10 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
                 return Vec::new();
             }
             let text = format!(": error counters rose: {}", texts.join("; "));
-            vec![about(*id, Severity::Warning, EntryKind::Counter, text)]
+            // Whoever only saw marks of another one has no trouble of its own.
+            let is_own = rises.iter().any(|(counter, _)| counter.counts_own());
+            let severity = if is_own { Severity::Warning } else { Severity::Info };
+            vec![about(*id, severity, EntryKind::Counter, text)]
         }
         Event::WorkingCounter { task, frame, datagram, expected, received } => vec![line(
             Severity::Warning,

@@ -79,6 +79,16 @@ impl ErrorCounter {
         }
     }
 
+    /// Whether it counts what happened at this controller or on the way into it, rather than frames that an earlier one
+    /// has found damaged and marked.
+    #[must_use]
+    pub const fn counts_own(self) -> bool {
+        match self {
+            Self::InvalidFrame(_) | Self::PhysicalLayer(_) | Self::LostLink(_) | Self::Pdi => true,
+            Self::Forwarded(_) | Self::ProcessingUnit => false,
+        }
+    }
+
     /// Where its byte is.
     #[must_use]
     pub const fn address(self) -> RegisterAddress {

@@ -330,6 +330,9 @@ fn ours(xml: &mut Xml, device: &DevicePlan, plan: &Plan) {
         ("access", Word(&settings.access).to_string()),
         ("addressing", Word(&settings.addressing).to_string()),
         ("on-wrong-counter", Word(&settings.on_wrong_counter).to_string()),
+        ("restore-state", u8::from(settings.keeping.restore_state).to_string()),
+        ("reinitialise", u8::from(settings.keeping.reinitialise).to_string()),
+        ("clear-counters", u8::from(settings.keeping.clear_counters).to_string()),
         ("entry", plan.tree.entry(device.id.index()).to_string()),
     ];
     if let Some(mailbox) = &device.mailbox {

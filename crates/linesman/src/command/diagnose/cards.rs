@@ -43,7 +43,7 @@ pub(super) fn run(
     let recorder = session.recorder(clock.started_at(), names)?;
     let mut looking = Looking {
         engine: Engine::new(setup),
-        session: &session,
+        session,
         recorder,
         output,
         progress: Progress::new(),
@@ -51,7 +51,7 @@ pub(super) fn run(
         frames: 0,
     };
     let result = driver.run(until, &stop, &mut looking);
-    let Looking { engine, recorder, frames, mut progress, output, .. } = looking;
+    let Looking { engine, mut session, recorder, frames, mut progress, output, .. } = looking;
     progress.clear();
     session.end_recording(recorder, output);
     let complete = match result {
@@ -69,7 +69,7 @@ pub(super) fn run(
 /// Looks again and again.
 struct Looking<'a> {
     engine: Engine,
-    session: &'a Session,
+    session: Session,
     recorder: Option<Recorder>,
     output: &'a mut Output,
     progress: Progress,

@@ -1,8 +1,10 @@
 //! Findings as they happen.
 
+use std::collections::BTreeSet;
+
 use linesman_diagnosis::report::{Diagnosis, FindingReport, Number};
 use linesman_diagnosis::{Event, EventKind};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use serde::Serialize;
 
 use crate::output::Output;
@@ -21,6 +23,8 @@ pub(crate) struct EventReport<'a> {
     event: EventName,
     /// The finding, without what follows from it; `null` at the end.
     finding: Option<FindingReport>,
+    /// The finding that explains it, by its id; `null` for one that stands for itself.
+    follows_from: Option<String>,
     /// The whole answer, at the end.
     diagnosis: Option<&'a Diagnosis>,
 }
@@ -62,29 +66,77 @@ impl EventName {
     }
 }
 
+/// For so long people are not told of a finding: what is explained or taken back by then has told nobody anything.
+const HELD: Span = Span::ms(50);
+
 /// Tells what happens to findings.
 pub(crate) struct Follower {
     json: bool,
+    /// What people have not been told yet, oldest first.
+    held: Vec<Event>,
+    /// Findings that people were told of, by their ids.
+    told: BTreeSet<String>,
 }
 
 impl Follower {
     /// One that writes text or JSON lines.
     pub(crate) const fn new(json: bool) -> Self {
-        Self { json }
+        Self { json, held: Vec::new(), told: BTreeSet::new() }
     }
 
-    /// Tells what happened to a finding.
-    pub(crate) fn tell(&self, event: Event, names: &Names, output: &mut Output) {
-        let Event { at, kind, finding } = event;
-        let event = EventName::of(kind);
+    /// Tells what happened to a finding: a program at once, people a moment later.
+    pub(crate) fn tell(&mut self, event: Event, names: &Names, output: &mut Output) {
+        let at = event.at;
         if self.json {
-            self.write(at, event, Some(finding), None, output);
+            let Event { at, kind, finding, follows_from } = event;
+            self.write(at, EventName::of(kind), Some((finding, follows_from)), None, output);
             return;
         }
+        self.held.push(event);
+        self.tell_until(at, names, output);
+    }
+
+    /// Tells people all that is held.
+    pub(crate) fn flush(&mut self, names: &Names, output: &mut Output) {
+        for event in std::mem::take(&mut self.held) {
+            self.tell_people(&event, names, output);
+        }
+    }
+
+    /// Tells people what has been held for long enough.
+    pub(crate) fn tell_until(&mut self, now: Instant, names: &Names, output: &mut Output) {
+        while let Some(first) = self.held.first().filter(|first| first.at + HELD <= now) {
+            let (id, opened) = (first.finding.id.clone(), first.kind == EventKind::Opened);
+            let first = self.held.remove(0);
+            let mut news = first;
+            if opened {
+                let (mine, others) = self.held.drain(..).partition(|event| event.finding.id == id);
+                self.held = others;
+                let mine: Vec<Event> = mine;
+                if mine.iter().any(|event| event.kind == EventKind::Withdrawn) {
+                    continue;
+                }
+                // It opened, it was certain, it was over: the last of it says the most.
+                if let Some(last) = mine.into_iter().next_back() {
+                    news = Event { at: news.at, ..last };
+                }
+            }
+            self.tell_people(&news, names, output);
+        }
+    }
+
+    fn tell_people(&mut self, event: &Event, names: &Names, output: &mut Output) {
+        let Event { at, kind, finding, follows_from } = event;
+        // What follows from another finding stands beneath it in the report.
+        let is_known = self.told.contains(&finding.id);
+        if !is_known && (follows_from.is_some() || *kind == EventKind::Withdrawn) {
+            return;
+        }
+        self.told.insert(finding.id.clone());
         let line = format!(
             "{:>12}  {:<9}  {} {} at {}: {}",
             time(at.as_nanos()),
-            event.word(),
+            EventName::of(*kind).word(),
             finding.code,
             finding.name,
             names.place(&finding.place),
@@ -102,12 +154,14 @@ impl Follower {
         &self,
         at: Instant,
         event: EventName,
-        finding: Option<FindingReport>,
+        finding: Option<(FindingReport, Option<String>)>,
         diagnosis: Option<&Diagnosis>,
         output: &mut Output,
     ) {
         let at_ns = Number(at.as_nanos());
         let schema = "linesman.event/1";
-        output.json_line(&EventReport { schema, at_ns, event, finding, diagnosis });
+        let (finding, follows_from) = finding.unzip();
+        let follows_from = follows_from.flatten();
+        output.json_line(&EventReport { schema, at_ns, event, finding, follows_from, diagnosis });
     }
 }

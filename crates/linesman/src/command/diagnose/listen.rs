@@ -43,7 +43,7 @@ pub(super) fn run(
     }
     progress.clear();
     let heard_for = clock.now();
-    let Listening { session, engine, recorder, .. } = listening;
+    let Listening { mut session, engine, recorder, .. } = listening;
     session.end_recording(recorder, output);
     let Some(engine) = engine else {
         return Err(lost.map_or_else(|| silence(names, heard_for), Failure::from));

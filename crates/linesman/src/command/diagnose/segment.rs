@@ -31,7 +31,7 @@ pub(super) fn run(
     path: &Path,
     target: AlState,
     active: bool,
-    session: Session,
+    mut session: Session,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     let file = files::segment_file(path)?;
@@ -56,7 +56,7 @@ pub(super) fn run(
     while lab.now() < until && !stop.is_set() && !output.is_closed() {
         let next = until.min(lab.now() + STEP);
         lab.run_until(next).map_err(|error| files::in_file(path, &error))?;
-        follow(&mut lab, &names, &session, output);
+        follow(&mut lab, &names, &mut session, output);
         let (now, frames) = (lab.now(), lab.frames());
         progress.show(|| format!("{} of {}, {}", text(now), text(until), count(frames, "frame")));
     }
@@ -67,13 +67,14 @@ pub(super) fn run(
         output.warn(&format!("the line was not brought up: {failure}"));
     }
     lab.finish();
-    follow(&mut lab, &names, &session, output);
+    follow(&mut lab, &names, &mut session, output);
+    session.flush(&names, output);
     Ok(session.answer(lab.engine(), &names, lab.now(), output))
 }
 
-fn follow(lab: &mut Lab, names: &Names, session: &Session, output: &mut Output) {
+fn follow(lab: &mut Lab, names: &Names, session: &mut Session, output: &mut Output) {
     while let Some(event) = lab.poll_finding_event() {
-        if let Some(follower) = &session.follower {
+        if let Some(follower) = &mut session.follower {
             follower.tell(event, names, output);
         }
     }

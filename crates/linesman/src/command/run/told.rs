@@ -1,10 +1,12 @@
 //! What a run tells while it lasts, and at its end.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use linesman_diagnosis::report::Severity;
 use linesman_link::unix_time::UnixTime;
-use linesman_maindevice::watch::{EntryKind, LogEntry};
+use linesman_maindevice::watch::{EntryKind, LogEntry, Severity as EntrySeverity};
+use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::event_log::{EventLogWriter, WriterReport};
 use linesman_runtime::online::Board;
@@ -27,6 +29,20 @@ pub(super) struct Teller {
     /// When the run began, by the wall clock.
     began: UnixTime,
     logs: Logs,
+    /// Whose error counters people were told of.
+    counted: HashMap<DeviceId, Counted>,
+}
+
+/// Rising error counters of a SubDevice are told no more often than this: under steady noise they rise with every reading.
+const COUNTERS_EVERY: Span = Span::s(10);
+
+/// What people were told of the error counters of a SubDevice.
+#[derive(Default)]
+struct Counted {
+    /// Nothing more before that.
+    until: Option<Instant>,
+    /// How often they rose and it was not told.
+    left_out: u32,
 }
 
 /// Where what happens is kept.
@@ -41,7 +57,8 @@ pub(super) struct Logs {
 impl Teller {
     pub(super) fn new(json: bool, began: UnixTime, logs: Logs, board: Board) -> Self {
         let follower = Follower::new(false);
-        Self { json, names: Names::default(), follower, board, began, logs }
+        let counted = HashMap::new();
+        Self { json, names: Names::default(), follower, board, began, logs, counted }
     }
 
     /// Whether people are not to be told.
@@ -70,6 +87,7 @@ impl Teller {
                 }
             }
             Note::Event(at, event) => {
+                self.follower.tell_until(*at, &self.names, output);
                 let entries = self.board.event(*at, event);
                 self.entries(entries, output);
             }
@@ -89,17 +107,14 @@ impl Teller {
 
     /// Nothing has come for a while, or nothing more will: what was waited with is told.
     pub(super) fn flush(&mut self, output: &mut Output) {
+        self.follower.flush(&self.names, output);
         let entries = self.board.flush();
         self.entries(entries, output);
     }
 
     fn entries(&mut self, entries: Vec<LogEntry>, output: &mut Output) {
         for entry in entries {
-            // That each is there is told once, of all; the log has each.
-            let quiet = entry.kind == EntryKind::State && entry.device.is_some();
-            if !quiet {
-                self.said(entry.at, &entry.text, output);
-            }
+            self.tell(&entry, output);
             let name = entry.device.map(|id| self.names.plain(id.no()).to_owned());
             if let Some(log) = &mut self.logs.system {
                 log.write(&entry, name.as_deref());
@@ -108,6 +123,45 @@ impl Teller {
                 let at = self.began + entry.at.since(Instant::ZERO);
                 log.write(at, entry, name.as_deref());
             }
+        }
+    }
+
+    /// Tells people of an entry, unless it says too little to stand between the others; the log has each.
+    fn tell(&mut self, entry: &LogEntry, output: &mut Output) {
+        let Some(id) = entry.device else { return self.said(entry.at, &entry.text, output) };
+        match entry.kind {
+            // That each is there is told once, of all.
+            EntryKind::State => {}
+            EntryKind::Counter => {
+                // Counters that pass on what another one has counted.
+                if entry.severity == EntrySeverity::Info {
+                    return;
+                }
+                let told = self.counted.entry(id).or_default();
+                if told.until.is_some_and(|until| entry.at < until) {
+                    told.left_out += 1;
+                    return;
+                }
+                let left_out = std::mem::take(&mut told.left_out);
+                told.until = Some(entry.at + COUNTERS_EVERY);
+                let more = match left_out {
+                    0 => String::new(),
+                    left_out => format!(" (and {left_out} times since it was told last)"),
+                };
+                self.said(entry.at, &format!("{}{more}", entry.text), output);
+            }
+            EntryKind::AbnormalState
+            | EntryKind::StateAborted
+            | EntryKind::Communication
+            | EntryKind::Identity
+            | EntryKind::Link
+            | EntryKind::WorkingCounter
+            | EntryKind::Frames
+            | EntryKind::Ring
+            | EntryKind::Emergency
+            | EntryKind::Mailbox
+            | EntryKind::Host
+            | EntryKind::Clock => self.said(entry.at, &entry.text, output),
         }
     }
 

@@ -1,0 +1,146 @@
+//! What happens to SubDevices, in the words of the sources: in the log, with times, and exported.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+mod support;
+
+use serde_json::Value;
+use support::{assert_valid, linesman};
+use tempfile::TempDir;
+
+const PLANT: &str = r#"
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "I1"
+type = "EL3102"
+on = "K1.B"
+[[device]]
+name = "K2"
+type = "EK1100"
+on = "K1.C"
+[[device]]
+name = "O1"
+type = "EL2008"
+on = "K2.B"
+"#;
+
+/// Runs the plant with faults and keeps a log; gives the folder with it, and its entries.
+fn logged(faults: &str, seconds: &str) -> (TempDir, Vec<Value>) {
+    let folder = TempDir::new().unwrap();
+    let plant = folder.path().join("plant.toml");
+    let log = folder.path().join("log.sqlite");
+    std::fs::write(&plant, format!("{PLANT}{faults}")).unwrap();
+    let on = format!("sim:{}", plant.display());
+    let ran = linesman([
+        "run",
+        "--on",
+        &on,
+        "--seconds",
+        seconds,
+        "--no-diagnosis",
+        "--log",
+        log.to_str().unwrap(),
+    ]);
+    assert!(ran.status < 2, "{}", ran.all());
+    let told = linesman(["log", log.to_str().unwrap(), "--json"]).json();
+    assert_valid(&told, "log");
+    let entries = told["entries"].as_array().unwrap().clone();
+    (folder, entries)
+}
+
+fn texts(entries: &[Value]) -> Vec<&str> {
+    entries.iter().map(|entry| entry["text"].as_str().unwrap()).collect()
+}
+
+// S0 L2230-2233: a state that is refused is a pair of entries.
+// proves: SW-02
+#[test]
+fn an_aborted_state_change_is_logged_with_what_was_asked_and_what_was_read() {
+    let refused = "[[fault]]\nkind = \"init-refused\"\ndevice = \"I1\"\nto = \"PREOP\"\ncode = 0x14\nrefusals = 1\n";
+    let (folder, entries) = logged(refused, "4");
+    let texts = texts(&entries);
+    let at = texts.iter().position(|text| text.contains("state change aborted"));
+    let at = at.unwrap_or_else(|| panic!("{texts:#?}"));
+    assert_eq!(
+        texts[at],
+        "'2 (EL3102)' (1002): state change aborted (requested PREOP, back to INIT)"
+    );
+    assert!(
+        texts[at + 1].starts_with(
+            "'2 (EL3102)' (1002): INIT to PREOP failed, read 0x0011, expected 0x0002, AL 0x0014 no valid firmware"
+        ),
+        "{texts:#?}"
+    );
+    assert_eq!(entries[at]["kind"], "state-aborted");
+    assert_eq!(entries[at]["severity"], "error");
+    // Found again by its kind.
+    let log = folder.path().join("log.sqlite");
+    let found = linesman(["log", log.to_str().unwrap(), "--kind", "state-aborted"]);
+    assert!(found.stdout.contains("read 0x0011, expected 0x0002"), "{}", found.all());
+}
+
+// S0 L1345-1346, S1 L412-422: interrupted, then restored, each with its time; exported.
+// proves: DIA-13
+#[test]
+fn a_line_that_is_cut_and_mended_is_logged_with_times_and_exported() {
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"K1.C-K2.A\"\nfrom_ms = 2000\nto_ms = 4000\n";
+    let (folder, entries) = logged(cut, "7");
+    let when = |part: &str| {
+        let found: Vec<&Value> =
+            entries.iter().filter(|entry| entry["text"].as_str().unwrap().contains(part)).collect();
+        assert!(!found.is_empty(), "{part}: {:#?}", texts(&entries));
+        found
+    };
+    let lost = when("'3 (EK1100)' (1003) - '4 (EL2008)' (1004) Communication interrupted");
+    let back = when("Communication re-established");
+    let time = |entry: &Value| entry["time"].as_str().unwrap().to_owned();
+    assert!(time(lost[0]) < time(back[0]), "{} {}", time(lost[0]), time(back[0]));
+    assert_eq!(lost[0]["severity"], "error");
+    assert!(back.iter().any(|entry| entry["no"] == 3), "{back:#?}");
+    // All of the entries are in the table for a spreadsheet.
+    let log = folder.path().join("log.sqlite");
+    let csv = linesman(["log", log.to_str().unwrap(), "--csv"]);
+    assert_eq!(csv.stdout.lines().count(), entries.len() + 1, "{}", csv.all());
+    for text in texts(&entries) {
+        assert!(csv.stdout.contains(text.split(',').next().unwrap()), "{text}: {}", csv.stdout);
+    }
+}
+
+/// Steady noise moves counters with every reading, and those of everybody behind.
+#[test]
+fn steady_noise_is_told_to_people_once_in_a_while_and_logged_each_time() {
+    let noise =
+        "[[fault]]\nkind = \"emc-noise\"\nat = \"K1.B>I1.A\"\nhits_per_s = 400\nfrom_ms = 500\n";
+    let folder = TempDir::new().unwrap();
+    let plant = folder.path().join("plant.toml");
+    let log = folder.path().join("log.sqlite");
+    std::fs::write(&plant, format!("{PLANT}{noise}")).unwrap();
+    let on = format!("sim:{}", plant.display());
+    let log = log.to_str().unwrap();
+    let ran = linesman(["run", "--on", &on, "--seconds", "8", "--log", log]);
+    let told = ran.stdout.lines().filter(|line| line.contains("error counters rose")).count();
+    assert!((1..=3).contains(&told), "{}", ran.all());
+    let kept = linesman(["log", log, "--json", "--kind", "counter"]).json();
+    let kept = kept["entries"].as_array().unwrap();
+    assert!(kept.len() > 30, "{}", kept.len());
+    // Who only passes on what another one has marked is no warning.
+    let severities = |no: u64| {
+        kept.iter()
+            .filter(|entry| entry["no"] == no)
+            .map(|entry| entry["severity"].as_str().unwrap())
+            .collect::<std::collections::BTreeSet<_>>()
+    };
+    assert!(severities(2).contains("warning"), "{kept:#?}");
+    assert!(!severities(4).contains("warning"), "{kept:#?}");
+    // Registers stop at 255; what is counted does not.
+    let symbols: u64 = kept
+        .iter()
+        .filter_map(|entry| entry["text"].as_str()?.split("physical-layer errors, port A +").nth(1))
+        .map(|rest| rest.chars().take_while(char::is_ascii_digit).collect::<String>())
+        .map(|digits| digits.parse::<u64>().unwrap())
+        .sum();
+    assert!(symbols > 1_000, "{symbols}");
+}
