@@ -59,7 +59,7 @@ def ours(line, file):
         return None, cpu
     if told["error"] or told["reached_ns"] is None:
         return None, told["error"] or "OP is not reached"
-    # Each is read from its SII twice: to plan, and again when it is set up.
+    # Each is read from its SII by the scan, and known by its station address from then on.
     types = [device["name"].split("(")[-1].rstrip(")") for device in told["devices"]]
     found = [[KINDS[name].vendor, KINDS[name].products[0]] for name in types]
     assert found == identities(file), types

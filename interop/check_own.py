@@ -67,6 +67,19 @@ def linesman_serves_subdevices_that_nobody_drives(line):
         assert before["bytes"] == "00 00", before
 
 
+@check
+def of_two_maindevices_that_begin_at_once_one_is_refused(line):
+    with Segment(line, LINESMAN, LINE.file):
+        for _ in range(3):
+            both = [line.start(line.near, LINESMAN, "run", "--on", NEAR, "--seconds", 3, "--json") for _ in range(2)]
+            ended = [line.finish(one) for one in both]
+            refused = [out for status, out, _ in ended if status == 2]
+            assert len(refused) == 1 and "another MainDevice drives this line" in refused[0], ended
+            # The one that was heard first runs as if it were alone.
+            report = next(parse(out, err) for status, out, err in ended if status != 2)
+            assert report["settled"] and report["reached_ns"], report["counts"]
+
+
 def serve(line, where, command, *arguments):
     """A service command on the near end: the object it prints. A command that does not do it ends the check."""
     status, out, err = line.run(line.near, LINESMAN, command, where, *arguments, "--json")

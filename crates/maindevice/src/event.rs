@@ -102,6 +102,22 @@ pub enum Event {
         /// The one that is there; 0: none.
         found: u32,
     },
+    /// A SubDevice cannot work as fast as its SyncSignals are planned to come, so that it is not taken
+    /// further. It will be asked again later.
+    CycleTooShort {
+        /// Which SubDevice.
+        id: DeviceId,
+        /// The state it was to enter.
+        to: AlState,
+        /// The state it is in.
+        status: AlStatus,
+        /// The planned cycle of SYNC0.
+        cycle: Span,
+        /// The shortest that it says it can bear.
+        shortest: Span,
+        /// Where it says so.
+        object: ObjectAddress,
+    },
     /// A SubDevice does not say which modules it has, so that it is not taken further. It will be asked
     /// again later.
     ModulesUnread {

@@ -1,5 +1,7 @@
 //! Listening on cards without ever sending: beside another MainDevice, and before becoming one.
 
+use std::hash::BuildHasher;
+
 use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
 use linesman_link::clock::HostClock;
 use linesman_link::direction::FrameDirection;
@@ -15,6 +17,9 @@ use crate::host_watch::HostWatch;
 const BATCH: usize = 256;
 /// How long a line is listened to before it is driven: a MainDevice at work sends more often.
 const BEFORE_DRIVING: Span = Span::ms(300);
+/// And so much longer at most, by chance: of two that begin at the same instant one is still listening when
+/// the other sends.
+const LONGER: Span = Span::ms(200);
 
 /// One card, or the two at the ends of a ring, that are listened on.
 pub struct Ears {
@@ -129,16 +134,25 @@ pub struct Driven {
     pub source: Option<MacAddress>,
 }
 
-/// Listens on a line that is about to be driven, for 0.3 s; `None` when nobody else drives it.
+/// How long to listen, by a number that nobody else has drawn.
+fn listening(chance: u64) -> Span {
+    BEFORE_DRIVING + Span::ns(chance % LONGER.as_nanos())
+}
+
+/// Listens on a line that is about to be driven, for 0.3 to 0.5 s; `None` when nobody else drives it. It ends
+/// as soon as somebody is heard for 0.3 s or longer.
 ///
 /// # Errors
 /// When an interface cannot be used.
 pub fn is_driven(names: &[String]) -> Result<Option<Driven>, LinkError> {
     let clock = HostClock::start();
     let mut ears = Ears::open(names, clock)?;
-    let until = clock.now() + BEFORE_DRIVING;
-    let mut driven = Driven { frames: 0, within: BEFORE_DRIVING, source: None };
-    while clock.now() < until {
+    // No seed: two hosts must not draw the same. The standard library asks the system.
+    let chance = std::hash::RandomState::new().hash_one(names);
+    let began = clock.now();
+    let until = began + listening(chance);
+    let mut driven = Driven { frames: 0, within: Span::ZERO, source: None };
+    while clock.now() < until && (driven.frames == 0 || clock.now() < began + BEFORE_DRIVING) {
         ears.hear(until, |heard| {
             let Heard::Frame(frame) = heard else { return };
             driven.frames += 1;
@@ -146,5 +160,23 @@ pub fn is_driven(names: &[String]) -> Result<Option<Driven>, LinkError> {
             driven.source = driven.source.or(source.map(|bytes| MacAddress(*bytes)));
         })?;
     }
+    driven.within = clock.now().since(began);
     Ok((driven.frames > 0).then_some(driven))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn how_long_is_listened_is_left_to_chance_but_never_short() {
+        let drawn: Vec<Span> =
+            (0..100_u64).map(|n| listening(n.wrapping_mul(0x9E37_79B9_7F4A_7C15))).collect();
+        assert!(
+            drawn.iter().all(|span| (Span::ms(300)..Span::ms(500)).contains(span)),
+            "{drawn:?}"
+        );
+        let alike = drawn.iter().filter(|span| **span == drawn[0]).count();
+        assert_eq!(alike, 1, "{drawn:?}");
+    }
 }

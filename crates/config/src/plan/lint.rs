@@ -82,6 +82,7 @@ impl Plan {
             self.watchdog(device, &mut doubts);
             self.clock(device, &mut doubts);
         }
+        self.reference(&mut doubts);
         self.units(&mut doubts);
         doubts.sort_by_key(|doubt| std::cmp::Reverse(doubt.severity));
         doubts
@@ -218,6 +219,31 @@ impl Plan {
                 advice: "send at the begin of the task (`io_at = \"task-begin\"`)".to_owned(),
             });
         }
+    }
+
+    /// Of couplers only newer ones have a clock that others can follow.
+    fn reference(&self, doubts: &mut Vec<Doubt>) {
+        let reference = self.reference_clock().and_then(|id| self.device(id));
+        let Some(device) = reference else { return };
+        let Some(since) = super::reference::since(&device.type_name) else { return };
+        let revision = device.identity.revision >> 16;
+        // Without a revision in the plan any may be there.
+        if device.identity.revision == 0 || revision >= u32::from(since) {
+            return;
+        }
+        doubts.push(Doubt {
+            severity: Severity::Warning,
+            name: "reference-clock",
+            device: Some(device.id),
+            text: format!(
+                "{} is the reference clock, and is planned with revision {revision:04}: an {} can be that from \
+                 revision {since:04} on",
+                device.name, device.type_name
+            ),
+            advice: "take a newer one, or let another SubDevice near the MainDevice be the reference clock \
+                     (`clock = { reference = true }`)"
+                .to_owned(),
+        });
     }
 
     fn units(&self, doubts: &mut Vec<Doubt>) {

@@ -34,6 +34,9 @@ pub struct Network {
     pub reinitialise: bool,
     /// Error counters are cleared before they stop at 255, unless a SubDevice says otherwise; else they are only read.
     pub clear_counters: bool,
+    /// From the frames to SYNC0, in µs; 30 % of the cycle unless said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outputs_shift_us: Option<u32>,
 }
 
 impl Default for Network {
@@ -48,6 +51,7 @@ impl Default for Network {
             restore_state: true,
             reinitialise: true,
             clear_counters: true,
+            outputs_shift_us: None,
         }
     }
 }
@@ -102,6 +106,7 @@ impl Network {
             pack_bits: self.pack_bits,
             clock_datagrams: true,
             mailbox_states: self.mailbox_states,
+            outputs_shift: self.outputs_shift_us.map(|us| Span::us(u64::from(us))),
             ..PlanOptions::default()
         }
     }
@@ -120,7 +125,7 @@ pub struct ClockChoice {
     /// Cycle of SYNC0 in µs; that of its task unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync0_cycle_us: Option<u32>,
-    /// Shift of SYNC0 in ns.
+    /// Shift of SYNC0 in ns, on top of the shift of the outputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync0_shift_ns: Option<i64>,
     /// Cycle of SYNC1 in µs.
@@ -168,6 +173,35 @@ impl ClockChoice {
             reference: self.reference,
         })
     }
+
+    /// What is set otherwise than the named mode of the description has it, for a task of this cycle; nothing
+    /// where no mode is named, or the description does not have it.
+    #[must_use]
+    pub fn changes(&self, modes: &[ClockMode], cycle: Span) -> Vec<String> {
+        let as_described = Self { mode: self.mode.clone(), ..Self::default() };
+        let named = self.mode.is_some();
+        let settings = |choice: &Self| choice.settings(modes, cycle).ok().filter(|_| named);
+        let (Some(described), Some(chosen)) = (settings(&as_described), settings(self)) else {
+            return Vec::new();
+        };
+        let hex = |value: u16| format!("0x{value:04X}");
+        let pairs = [
+            ("assign_activate", hex(chosen.assign_activate), hex(described.assign_activate)),
+            ("cycle of SYNC0", of(chosen.sync0_cycle), of(described.sync0_cycle)),
+            ("shift of SYNC0", ns(chosen.sync0_shift_ns), ns(described.sync0_shift_ns)),
+            ("cycle of SYNC1", of(chosen.sync1_cycle), of(described.sync1_cycle)),
+        ];
+        let differs = pairs.into_iter().filter(|(_, chosen, described)| chosen != described);
+        differs.map(|(what, chosen, own)| format!("{what} {chosen} instead of {own}")).collect()
+    }
+}
+
+fn of(span: Span) -> String {
+    format!("{} ns", span.as_nanos())
+}
+
+fn ns(value: i64) -> String {
+    format!("{value} ns")
 }
 
 /// Watchdogs of a device: `watchdog = { … }`; what is not said stays as the device has it.

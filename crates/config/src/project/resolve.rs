@@ -55,6 +55,12 @@ pub enum ResolveError {
     /// The project contradicts itself.
     #[error(transparent)]
     Project(#[from] ProjectError),
+    /// It names no SubDevice.
+    #[error(
+        "there is no [[device]] in it, and a plan needs one at least. Do: write down what is there with `linesman \
+         scan WHERE --save FILE`, or add a [[device]]; `linesman schema project` lists all keys"
+    )]
+    Empty,
     /// Nothing is known of a device.
     #[error(
         "device `{device}`: nothing says what it needs. Do: name a folder of device descriptions (`esi = \
@@ -96,6 +102,9 @@ impl Project {
     /// # Errors
     /// [`ResolveError`] names the device.
     pub fn resolve(&self, lookup: &mut Lookup<'_>) -> Result<Resolved, ResolveError> {
+        if self.devices.is_empty() {
+            return Err(ResolveError::Empty);
+        }
         let tree = self.tree()?;
         let mut devices = Vec::with_capacity(self.devices.len());
         let mut places = vec![0; self.devices.len()];
@@ -123,7 +132,9 @@ impl Project {
         Ok(Resolved { devices, tree: tree.in_processing_order(), options, places })
     }
 
-    fn cycle_of(&self, device: &ProjectDevice) -> Span {
+    /// The cycle of the task that has a device.
+    #[must_use]
+    pub fn cycle_of(&self, device: &ProjectDevice) -> Span {
         let task = match &device.task {
             None => self.tasks.first(),
             Some(name) => self.tasks.iter().find(|task| task.name == *name),

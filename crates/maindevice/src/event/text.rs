@@ -54,6 +54,18 @@ impl Event {
                     ),
                 ]
             }
+            Self::CycleTooShort { id, to, status, cycle, shortest, object } => {
+                let name = name(*id);
+                vec![
+                    format!("{name}: {}", aborted(*to, *status)),
+                    format!(
+                        "{name}: its SYNC0 is planned every {cycle}, and it needs {shortest} for a cycle ({object}); give \
+                         it a slower task of its own (`[[task]]` with `cycle_us = {}` or longer, and `task` at the \
+                         device), or a SYNC0 that comes only every few cycles (`sync0_cycle_us`)",
+                        shortest.as_nanos().div_ceil(1_000)
+                    ),
+                ]
+            }
             Self::ModulesUnread { id, to, status, error } => vec![
                 format!("{}: {}", name(*id), aborted(*to, *status)),
                 format!("{}: asking for its modules: {error}", name(*id)),

@@ -15,6 +15,7 @@ use crate::exchange::Target;
 use crate::executor::{Handle, Wire, lock};
 use crate::mailbox::queue::Pending;
 use crate::mailbox::{MailboxRequest, ProtocolError, ProtocolErrors, Queues};
+use crate::procedure::scan::Identified;
 use crate::procedure::{look, scan, state};
 use crate::service::{self, Attended, Servant, Service, ServiceFailure, ServiceTicket};
 use crate::supervisor::{self, Context, Line};
@@ -51,9 +52,13 @@ impl MainDevice {
     /// [`Event::Scanned`] or [`Event::ScanFailed`]. Another command that is going on is ended.
     pub fn scan(&mut self, now: Instant) {
         let (wire, network) = (self.command(), self.network);
+        let identified = Arc::clone(&self.identified);
         wire.clone().spawn(async move {
             wire.emit(match scan::scan(wire.clone(), network).await {
-                Ok(inventory) => Event::Scanned(Box::new(inventory)),
+                Ok(inventory) => {
+                    *lock(&identified) = Some(Identified::of(&inventory, wire.now()));
+                    Event::Scanned(Box::new(inventory))
+                }
                 Err(error) => Event::ScanFailed(error),
             });
         });
@@ -66,6 +71,7 @@ impl MainDevice {
     /// It begins with clearing the station addresses of all SubDevices, then gives those of the plan.
     /// A SubDevice that is not who the plan says, or that the plan does not have, is left alone.
     pub fn start(&mut self, now: Instant, plan: Plan) {
+        let identified = lock(&self.identified).take();
         let wire = self.command();
         let plan = Arc::new(plan);
         let mut line = Line::new(&plan);
@@ -81,7 +87,7 @@ impl MainDevice {
             options: Arc::clone(&self.options),
             mailboxes: mailboxes.clone(),
         };
-        wire.spawn(supervisor::supervise(context));
+        wire.spawn(supervisor::supervise(context, identified));
         let allowed = self.options.allowed_misses;
         let (shared, known) = (Arc::clone(&plan), Arc::clone(&line));
         let mut cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
@@ -152,6 +158,7 @@ impl MainDevice {
         }
         self.running = None;
         self.attended = None;
+        *lock(&self.identified) = None;
         self.exchange.abandon_cyclic();
         let wire = self.executor.group(self.options.repeats);
         self.control = Some(wire.clone());

@@ -22,6 +22,7 @@ use crate::exchange::{
 use crate::executor::{Executor, Wire, lock};
 use crate::mailbox::Queues;
 use crate::options::Options;
+use crate::procedure::scan::Identified;
 use crate::service::Attended;
 use crate::statistics::Statistics;
 use crate::supervisor::{BringUpTimes, Line};
@@ -48,6 +49,8 @@ pub struct MainDevice {
     running: Option<Running>,
     /// SubDevices that are served without being driven.
     attended: Option<Attended>,
+    /// Who the last scan has found: a plan that starts right behind it need not ask again.
+    identified: Arc<Mutex<Option<Identified>>>,
     next_service: u64,
     /// Requests on their way from procedures to the exchange.
     submitted: VecDeque<(Ticket, Request)>,
@@ -80,6 +83,7 @@ impl MainDevice {
             aside,
             running: None,
             attended: None,
+            identified: Arc::default(),
             next_service: 0,
             submitted: VecDeque::new(),
             acyclic_left: 0,

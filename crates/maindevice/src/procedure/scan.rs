@@ -11,9 +11,9 @@ use linesman_config::profile::DeviceProfile;
 use linesman_proto::address::{DeviceId, Network, Path, Position, StationAddress};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{self, AlStatus, DlStatus};
-use linesman_proto::sii::Image;
+use linesman_proto::sii::{Identity, Image};
 use linesman_proto::state::AlStatusCode;
-use linesman_proto::time::DcTime32;
+use linesman_proto::time::{DcTime32, Instant, Span};
 use linesman_proto::topology::derive::Doubt;
 use linesman_proto::topology::{Reconstruction, SeenController, Tree, Wired};
 
@@ -50,6 +50,33 @@ pub enum ScanError {
         /// After.
         after: u16,
     },
+}
+
+/// Who a scan has found at which station address. A SubDevice that loses its supply loses that address; so
+/// whoever still has it, and has it alone, is the one that was found.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Identified {
+    at: Instant,
+    devices: BTreeMap<StationAddress, Identity>,
+}
+
+impl Identified {
+    /// So long it is relied upon.
+    const FRESH: Span = Span::s(1);
+
+    /// Those of an inventory. A scan leaves no address to two.
+    #[must_use]
+    pub fn of(inventory: &Inventory, at: Instant) -> Self {
+        let known = |device: &FoundDevice| Some((device.station, device.identity?));
+        Self { at, devices: inventory.devices.iter().filter_map(known).collect() }
+    }
+
+    /// Who has this address, as long as that is fresh.
+    #[must_use]
+    pub fn who(&self, station: StationAddress, now: Instant) -> Option<Identity> {
+        let is_fresh = now.since(self.at) <= Self::FRESH;
+        self.devices.get(&station).copied().filter(|_| is_fresh)
+    }
 }
 
 /// How often a scan begins anew when SubDevices come or go meanwhile.

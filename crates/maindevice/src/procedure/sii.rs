@@ -9,10 +9,11 @@ use linesman_proto::register::{
     SII_ACCESS_ECAT, SII_ADDRESS, SII_CONTROL_STATUS, SII_DATA, SiiCommand, SiiControl,
 };
 use linesman_proto::sii::word::{
-    CHECKSUM, PRODUCT_CODE, SERIAL_NUMBER, SIZE, STATION_ALIAS, VENDOR_ID,
+    BOOTSTRAP_MAILBOX, CHECKSUM, LEGACY_DELAYS, PRODUCT_CODE, SERIAL_NUMBER, SIZE, STATION_ALIAS,
+    VENDOR_ID,
 };
 use linesman_proto::sii::{Identity, Image, Reader, SiiError, Size, WordAddress};
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 
 use crate::exchange::{ExchangeError, Reply, Target};
 use crate::executor::Wire;
@@ -107,6 +108,9 @@ pub struct Head {
 }
 
 const HEAD_WORDS: u32 = 16;
+/// Both mailboxes and the protocols, 0x14 to 0x1F: of what lies between the two parts of the head nothing
+/// else means anything to a MainDevice.
+const MAILBOX_WORDS: u32 = 12;
 /// Of those four words of 16 bits, size is the third.
 const SIZE_GROUP: WordAddress = WordAddress(SIZE.0 - 2);
 
@@ -156,7 +160,9 @@ pub async fn read_head(wire: &Wire, target: Target) -> Result<Head, SiiAccessErr
     outcome
 }
 
-/// Reads the used part of an EEPROM behind its head; gives all of it.
+/// Reads of an EEPROM behind its head what a plan is made of; gives all of it. What is reserved or its
+/// maker's own among the fixed words is left out, and given as zeros: each read takes a controller some
+/// 0.7 ms, and a whole line waits for the last.
 ///
 /// The right to the EEPROM is taken from the SubDevice's processor if it has it, and given back.
 ///
@@ -170,7 +176,12 @@ pub async fn read_rest(
     let mut session = Session::open(wire, target).await?;
     let mut reader = Reader::new();
     reader.supply(&head.first);
+    reader.supply(&[0; BOOTSTRAP_MAILBOX.byte() - LEGACY_DELAYS.byte()]);
     let read = async {
+        reader.supply(&session.words(BOOTSTRAP_MAILBOX, MAILBOX_WORDS).await?);
+        let has = reader.bytes().len();
+        reader.supply(&vec![0; SIZE_GROUP.byte().saturating_sub(has)]);
+        reader.supply(&head.size);
         while let Some(words) = reader.needs() {
             let chunk = session.read(words.start).await?;
             reader.supply(&chunk);
@@ -228,8 +239,8 @@ pub(super) struct Session<'a> {
     pub(super) target: Target,
     /// It was the SubDevice's before and is to be given back.
     give_back: bool,
-    /// How long the last command took: the next one is not asked for before.
-    took: Span,
+    /// So long a command surely takes, by the one before: it is not asked for earlier.
+    sure: Span,
     /// The last command is known to be done, without error.
     pub(super) idle: bool,
 }
@@ -243,7 +254,7 @@ impl<'a> Session<'a> {
         let failed = |error| SiiAccessError::Exchange { target, error };
         let owner = wire.read_one(target, access, 2).await.map_err(failed)?;
         let give_back = owner.bytes::<2>(0)[0] & 1 != 0;
-        let session = Self { wire, target, give_back, took: Span::ZERO, idle: false };
+        let session = Self { wire, target, give_back, sure: Span::ZERO, idle: false };
         if give_back {
             wire.write_one(target, access, &[0]).await.map_err(failed)?;
         }
@@ -304,23 +315,25 @@ impl<'a> Session<'a> {
                 self.wire.sleep(RETRY_AFTER).await;
             }
             if !std::mem::take(&mut self.idle) {
-                let before = self.idle(word).await?;
+                let (before, _) = self.idle(word).await?;
                 if SiiControl(before.word(0)).command_failed() {
                     self.command(SiiCommand::None, word).await?;
                 }
             }
             self.command(SiiCommand::Read, word).await?;
             let began = self.wire.now();
-            // Most of what the one before took is surely not enough.
-            let sure = Span::ns(self.took.as_nanos() / 8 * 7);
-            if sure >= POLL_AFTER {
-                self.wire.sleep(sure).await;
+            if self.sure >= POLL_AFTER {
+                self.wire.sleep(self.sure).await;
             }
-            let reply = self.idle(word).await?;
+            let (reply, busy_at) = self.idle(word).await?;
             status = SiiControl(reply.word(0));
             let answered = u32::from_le_bytes(reply.bytes(ADDRESS_AT)) == word.value();
             if answered && !status.command_failed() {
-                self.took = self.wire.now().since(began).min(SLOWEST_POLL);
+                self.sure = match busy_at {
+                    Some(at) => at.since(began).min(SLOWEST_POLL),
+                    // It was done at the first look: how long ago is not known.
+                    None => Span::ns(self.sure.as_nanos() / 8 * 7),
+                };
                 self.idle = true;
                 let end = DATA_AT + status.read_len();
                 return Ok(reply.data.get(DATA_AT..end).unwrap_or_default().to_vec());
@@ -347,12 +360,18 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Control, address and data once the controller is no longer busy.
-    pub(super) async fn idle(&self, word: WordAddress) -> Result<Reply, SiiAccessError> {
+    /// Control, address and data once the controller is no longer busy, and when it was last asked while it
+    /// still was.
+    pub(super) async fn idle(
+        &self,
+        word: WordAddress,
+    ) -> Result<(Reply, Option<Instant>), SiiAccessError> {
         let target = self.target;
         let limit = self.wire.now() + BUSY_LIMIT;
         let mut pause = POLL_AFTER;
+        let mut busy_at = None;
         loop {
+            let asked_at = self.wire.now();
             let reply = self
                 .wire
                 .read_one(target, SII_CONTROL_STATUS.address, ALL_LEN)
@@ -360,8 +379,9 @@ impl<'a> Session<'a> {
                 .map_err(|error| SiiAccessError::Exchange { target, error })?;
             let status = SiiControl(reply.word(0));
             if !status.busy() {
-                return Ok(reply);
+                return Ok((reply, busy_at));
             }
+            busy_at = Some(asked_at);
             if self.wire.now() >= limit {
                 return Err(SiiAccessError::Busy { target, word, status: status.0 });
             }

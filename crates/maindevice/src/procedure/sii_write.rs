@@ -61,7 +61,7 @@ impl Session<'_> {
                 self.wire.sleep(RETRY_AFTER).await;
             }
             if !std::mem::take(&mut self.idle) {
-                let before = self.idle(word).await?;
+                let (before, _) = self.idle(word).await?;
                 if SiiControl(before.word(0)).command_failed() {
                     self.command(SiiCommand::None, word).await?;
                 }
@@ -72,7 +72,7 @@ impl Session<'_> {
                 .await
                 .map_err(|error| SiiAccessError::Exchange { target, error })?;
             self.command(SiiCommand::Write, word).await?;
-            let after = self.idle(word).await?;
+            let (after, _) = self.idle(word).await?;
             status = SiiControl(after.word(0));
             if !status.command_failed() && self.read(word).await?.first_chunk() == Some(&value) {
                 return Ok(());

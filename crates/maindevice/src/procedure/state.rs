@@ -5,6 +5,7 @@
 //! nothing although the first one is being worked on. The AL status alone tells.
 
 use linesman_config::start_up::StartUpCommand;
+use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::register::{self, AlControl, AlStatus};
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::Span;
@@ -60,6 +61,16 @@ pub enum StepError {
         expected: u32,
         /// The one that is there.
         found: u32,
+    },
+    /// It cannot work as fast as its SyncSignals come.
+    #[error("its cycle of {cycle} is shorter than it can bear, {shortest} ({object})")]
+    CycleTooShort {
+        /// The planned cycle of SYNC0.
+        cycle: Span,
+        /// The shortest that it says it can bear.
+        shortest: Span,
+        /// Where it says so.
+        object: ObjectAddress,
     },
     /// It does not say which modules it has.
     #[error("asking for its modules: {0}")]

@@ -8,6 +8,7 @@ use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use super::clocks;
 use super::keeper::Keeper;
 use super::modules;
+use super::shortest_cycle;
 use super::start_up::{Moment, execute};
 use super::times::Phase;
 use crate::executor::lock;
@@ -79,12 +80,14 @@ impl Keeper<'_> {
             }
             (Some(AlState::PreOp), AlState::SafeOp) => {
                 modules::compare(context, device).await?;
+                shortest_cycle::compare(context, device).await?;
                 self.commands(current, next, Moment::Before).await?;
                 let began = wire.now();
                 clocks::ready(context).await;
                 clocks::set_one(context, device.id).await;
                 if let Some(settings) = &device.settings.clock {
-                    sync_signal::set(wire, device.station, settings).await?;
+                    let shift_ns = context.plan.sync0_shift_ns(device);
+                    sync_signal::set(wire, device.station, settings, shift_ns).await?;
                 }
                 if wire.now() > began {
                     self.note(Phase::Clocks, began);

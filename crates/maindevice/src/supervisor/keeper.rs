@@ -180,6 +180,11 @@ impl Keeper<'_> {
                 wire.emit(Event::WrongModule { id, to, status, slot, expected, found });
                 Some(status)
             }
+            StepError::CycleTooShort { cycle, shortest, object } => {
+                let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
+                wire.emit(Event::CycleTooShort { id, to, status, cycle, shortest, object });
+                Some(status)
+            }
             StepError::Unread(error) => {
                 let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
                 wire.emit(Event::ModulesUnread { id, to, status, error });

@@ -21,25 +21,58 @@ use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::{Wire, lock};
 use crate::procedure::look::{self, LookError};
+use crate::procedure::scan::Identified;
 use crate::procedure::{address, sii};
 
 /// One controller on the line.
+#[derive(Clone, Copy)]
 struct Seen {
     position: Position,
     /// How it is addressed as long as it has no station address.
     place: Target,
     /// Which of the plan, if its address tells.
     known: Option<DeviceId>,
+    /// Who it is, where a scan has asked it a moment ago.
+    identity: Option<Identity>,
 }
 
-/// Looks for those that are not there; `from_scratch`: for all, whatever addresses they have.
+/// Looks for all, whatever addresses they have. Who a scan has identified a moment ago is known by the
+/// address that it still has.
 ///
 /// # Errors
 /// [`LookError`] when the line is silent.
-pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), LookError> {
+pub(super) async fn from_scratch(
+    context: &Context,
+    identified: Option<&Identified>,
+) -> Result<(), LookError> {
+    locate(context, true, identified).await
+}
+
+/// Looks for those that are not there.
+///
+/// # Errors
+/// [`LookError`] when the line is silent.
+pub(super) async fn again(context: &Context) -> Result<(), LookError> {
+    locate(context, false, None).await
+}
+
+async fn locate(
+    context: &Context,
+    from_scratch: bool,
+    identified: Option<&Identified>,
+) -> Result<(), LookError> {
     let wire = &context.wire;
     let began = wire.now();
     let (places, _) = look::places(wire, context.network).await?;
+    let mut who = vec![None; places.len()];
+    if let Some(identified) = identified {
+        let now = wire.now();
+        let stations = stations(wire, &places).await;
+        let uses = uses(&stations);
+        let alone = |station: &StationAddress| uses.get(station) == Some(&1);
+        let asked = |station: &StationAddress| identified.who(*station, now);
+        who = stations.iter().map(|one| asked(one).filter(|_| alone(one))).collect();
+    }
     if from_scratch {
         // Addresses of an earlier run must not meet those of the plan.
         let _ = wire.write(Target::All, STATION_ADDRESS.address, &[0; 2]).await;
@@ -53,10 +86,7 @@ pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), 
     };
     context.note(Phase::Count, began);
     let began = wire.now();
-    let mut uses: BTreeMap<StationAddress, u32> = BTreeMap::new();
-    for station in &stations {
-        *uses.entry(*station).or_default() += 1;
-    }
+    let uses = uses(&stations);
     // Of several with one address the first is meant.
     let devices = context.plan.devices.iter().rev();
     let planned: BTreeMap<StationAddress, DeviceId> = devices
@@ -73,12 +103,13 @@ pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), 
         let planned = planned.get(&station).copied();
         planned.filter(|_| unique && station.0 != 0 && !from_scratch)
     };
-    let seen: Vec<Seen> = (stations.iter().zip(places).zip(0..))
-        .filter(|((station, _), _)| !anywhere.contains(station))
-        .map(|((station, place), at)| Seen {
+    let seen: Vec<Seen> = (stations.iter().zip(places).zip(who).zip(0..))
+        .filter(|(((station, _), _), _)| !anywhere.contains(station))
+        .map(|(((station, place), identity), at)| Seen {
             position: Position(at),
             place,
             known: known(*station),
+            identity,
         })
         .collect();
     // Stretches between landmarks.
@@ -105,6 +136,15 @@ pub(super) async fn locate(context: &Context, from_scratch: bool) -> Result<(), 
     Ok(())
 }
 
+/// How often each address is there.
+fn uses(stations: &[StationAddress]) -> BTreeMap<StationAddress, u32> {
+    let mut uses = BTreeMap::new();
+    for station in stations {
+        *uses.entry(*station).or_default() += 1;
+    }
+    uses
+}
+
 /// The station addresses that controllers have; 0 for one that does not answer.
 async fn stations(wire: &Wire, places: &[Target]) -> Vec<StationAddress> {
     let reads: Vec<_> = (places.iter())
@@ -129,8 +169,13 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
     }
     let reading: Vec<_> = (seen.iter())
         .map(|seen| {
-            let (wire, target) = (context.wire.clone(), seen.place);
-            context.wire.spawn(async move { sii::read_identity(&wire, target).await })
+            let (wire, Seen { place, identity, .. }) = (context.wire.clone(), *seen);
+            context.wire.spawn(async move {
+                match identity {
+                    Some(identity) => Ok(identity),
+                    None => sii::read_identity(&wire, place).await,
+                }
+            })
         })
         .collect();
     let mut identities = Vec::with_capacity(reading.len());

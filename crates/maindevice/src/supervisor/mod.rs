@@ -13,6 +13,7 @@ pub(crate) mod keeper;
 pub(crate) mod line;
 mod locate;
 mod modules;
+mod shortest_cycle;
 mod start_up;
 pub(crate) mod times;
 
@@ -28,6 +29,7 @@ use crate::exchange::Target;
 use crate::executor::{Wire, lock};
 use crate::options::Options;
 use crate::procedure::look::AL_LEN;
+use crate::procedure::scan::Identified;
 
 pub(crate) use line::{Found, Line, Nap};
 pub use start_up::StartUpError;
@@ -67,11 +69,12 @@ const THOROUGH_INTERVAL: Span = Span::s(2);
 /// Alerts are acted upon no more often than this.
 pub(crate) const CALM: Span = Span::ms(5);
 
-/// Runs a network according to its plan; never ends.
-pub(crate) async fn supervise(context: Context) {
+/// Runs a network according to its plan; never ends. Who a scan has just identified need not be asked
+/// again.
+pub(crate) async fn supervise(context: Context, identified: Option<Identified>) {
     lock(&context.line).begin_times(context.wire.now());
     context.wire.forget_places();
-    while locate::locate(&context, true).await.is_err() {
+    while locate::from_scratch(&context, identified.as_ref()).await.is_err() {
         // The whole line is silent.
         for device in &context.plan.devices {
             lose(&context, device.id);
@@ -115,7 +118,7 @@ pub(crate) async fn supervise(context: Context) {
         if responding != located_at || now >= thorough_at {
             thorough_at = now + THOROUGH_INTERVAL;
             // A silent line is found out by the keepers; the next round tries again.
-            if locate::locate(&context, false).await.is_ok() {
+            if locate::again(&context).await.is_ok() {
                 located_at = responding;
             }
         }

@@ -207,6 +207,7 @@ impl WatchedDevice {
             Event::StepTimedOut { status, .. }
             | Event::StartUpFailed { status, .. }
             | Event::WrongModule { status, .. }
+            | Event::CycleTooShort { status, .. }
             | Event::ModulesUnread { status, .. } => {
                 self.init_error = true;
                 self.status = Some(*status);
@@ -265,6 +266,7 @@ pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
         | Event::StepTimedOut { id, .. }
         | Event::StartUpFailed { id, .. }
         | Event::WrongModule { id, .. }
+        | Event::CycleTooShort { id, .. }
         | Event::ModulesUnread { id, .. }
         | Event::AbnormalState { id, .. }
         | Event::DeviceLost { id }

@@ -30,6 +30,7 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
         | Event::StepTimedOut { id, .. }
         | Event::StartUpFailed { id, .. }
         | Event::WrongModule { id, .. }
+        | Event::CycleTooShort { id, .. }
         | Event::ModulesUnread { id, .. } => {
             states(at, event, plan, Some(*id), Severity::Error, EntryKind::StateAborted)
         }

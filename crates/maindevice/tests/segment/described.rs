@@ -1,6 +1,6 @@
 //! Devices made from a device description: what their makers describe is what a MainDevice meets.
 
-use linesman_config::plan::{Plan, PlanOptions};
+use linesman_config::plan::{ClockSettings, Plan, PlanOptions};
 use linesman_maindevice::{Event, Options};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
@@ -210,4 +210,81 @@ fn a_described_drive_moves() {
     let position = i32::from_le_bytes([position[0], position[1], position[2], position[3]]);
     assert!((position - 10_000).abs() <= 100, "{position}");
     assert_eq!(statusword(&bench) & 0x6F, 0x27);
+}
+
+/// An output that works in step with SYNC0 and knows how fast it can: 0x1C32:05 is 250 µs.
+const STEADY: &str = r##"<EtherCATInfo><Vendor><Id>#x815</Id></Vendor><Descriptions><Devices>
+<Device Physics="YY"><Type ProductCode="#x43" RevisionNo="1">STEADY</Type><Name>Steady</Name>
+ <Profile><ProfileNo>5001</ProfileNo><Dictionary><DataTypes>
+  <DataType><Name>DT1C32</Name><BitSize>144</BitSize>
+   <SubItem><SubIdx>0</SubIdx><Name>Count</Name><Type>USINT</Type><BitSize>8</BitSize><Flags><Access>ro</Access></Flags></SubItem>
+   <SubItem><SubIdx>1</SubIdx><Name>Mode</Name><Type>UINT</Type><BitSize>16</BitSize><Flags><Access>rw</Access></Flags></SubItem>
+   <SubItem><SubIdx>2</SubIdx><Name>Cycle</Name><Type>UDINT</Type><BitSize>32</BitSize><Flags><Access>rw</Access></Flags></SubItem>
+   <SubItem><SubIdx>3</SubIdx><Name>Shift</Name><Type>UDINT</Type><BitSize>32</BitSize><Flags><Access>ro</Access></Flags></SubItem>
+   <SubItem><SubIdx>4</SubIdx><Name>Modes</Name><Type>UINT</Type><BitSize>16</BitSize><Flags><Access>ro</Access></Flags></SubItem>
+   <SubItem><SubIdx>5</SubIdx><Name>Least</Name><Type>UDINT</Type><BitSize>32</BitSize><Flags><Access>ro</Access></Flags></SubItem>
+  </DataType></DataTypes><Objects>
+  <Object><Index>#x1C32</Index><Name>Sync</Name><Type>DT1C32</Type><BitSize>144</BitSize><Info>
+   <SubItem><Name>Count</Name><Info><DefaultValue>5</DefaultValue></Info></SubItem>
+   <SubItem><Name>Mode</Name><Info><DefaultValue>2</DefaultValue></Info></SubItem>
+   <SubItem><Name>Cycle</Name><Info><DefaultValue>0</DefaultValue></Info></SubItem>
+   <SubItem><Name>Shift</Name><Info><DefaultValue>0</DefaultValue></Info></SubItem>
+   <SubItem><Name>Modes</Name><Info><DefaultValue>7</DefaultValue></Info></SubItem>
+   <SubItem><Name>Least</Name><Info><DefaultValue>250000</DefaultValue></Info></SubItem></Info></Object>
+ </Objects></Dictionary></Profile>
+ <Fmmu>Outputs</Fmmu>
+ <Sm DefaultSize="128" StartAddress="#x1000" ControlByte="#x26" Enable="1">MBoxOut</Sm>
+ <Sm DefaultSize="128" StartAddress="#x1080" ControlByte="#x22" Enable="1">MBoxIn</Sm>
+ <Sm StartAddress="#x1100" ControlByte="#x64" Enable="1">Outputs</Sm>
+ <RxPdo Fixed="1" Sm="2"><Index>#x1600</Index><Name>Out</Name>
+  <Entry><Index>#x7000</Index><SubIndex>1</SubIndex><BitLen>16</BitLen><Name>Value</Name><DataType>INT</DataType></Entry></RxPdo>
+ <Mailbox><CoE SdoInfo="1"/></Mailbox>
+ <Dc><OpMode><Name>DC</Name><AssignActivate>#x300</AssignActivate></OpMode></Dc>
+ <Eeprom><ByteSize>2048</ByteSize><ConfigData>0500</ConfigData></Eeprom></Device>
+</Devices></Descriptions></EtherCATInfo>"##;
+
+struct Steady;
+
+impl DescriptionFiles for Steady {
+    fn read(&self, _name: &str) -> Result<Vec<u8>, String> {
+        Ok(STEADY.as_bytes().to_vec())
+    }
+}
+
+// S0 L536-542.
+// proves: SYN-25 partial: where the SubDevice says it; one that measures its times refuses by itself
+#[test]
+fn a_cycle_shorter_than_a_subdevice_can_bear_is_refused_with_a_slower_task_as_advice() {
+    let text = "[[device]]\nname = \"S\"\ntype = \"esi:s.xml#STEADY\"\non = \"maindevice\"\n";
+    let file = SegmentFile::parse_with(text, &Steady).expect("a segment file");
+    let mut bench = Bench::of(&file, Options::default());
+    let inventory = bench.scan();
+    let start = |bench: &mut Bench, cycle: Span| {
+        let mut planned = inventory.planned(AlState::Op);
+        planned[0].settings.clock = Some(ClockSettings {
+            assign_activate: 0x0300,
+            sync0_cycle: cycle,
+            ..ClockSettings::default()
+        });
+        let tree = inventory.tree().clone();
+        let plan = Plan::build(&planned, tree, &PlanOptions::default()).expect("a plan");
+        bench.events.clear();
+        bench.device.start(bench.now, plan);
+    };
+    let guarded = |event: &Event| matches!(event, Event::CycleTooShort { .. });
+    start(&mut bench, Span::us(125));
+    assert!(bench.run_until(Span::s(5), guarded), "{:#?}", bench.events);
+    let (_, event) = bench.events.iter().find(|(_, event)| guarded(event)).unwrap();
+    let lines = event.state_lines(|_| "S".to_owned());
+    assert_eq!(lines[0], "S: state change aborted (requested SAFEOP, back to PREOP)");
+    for words in ["0x1C32:05", "slower task", "cycle_us = 250"] {
+        assert!(lines[1].contains(words), "{words}: {lines:?}");
+    }
+    bench.run_for(Span::ms(500));
+    assert_eq!(bench.state("S"), "PREOP", "it is not taken further");
+    // Just as short as it can bear.
+    start(&mut bench, Span::us(250));
+    bench.run_for(Span::s(3));
+    assert!(!bench.events.iter().any(|(_, event)| guarded(event)), "{:#?}", bench.events);
+    assert_ne!(bench.state("S"), "PREOP", "it goes on: {:#?}", bench.events);
 }

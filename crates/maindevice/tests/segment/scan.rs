@@ -1,11 +1,16 @@
 //! Looking and scanning, over a virtual segment.
 
 use crate::bench::{Bench, Fate};
-use linesman_maindevice::Event;
+use linesman_config::fault::FaultName;
+use linesman_config::plan::{Plan, PlanOptions};
+use linesman_maindevice::{Event, Phase};
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
+use linesman_proto::sii::Image;
+use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_proto::topology::End;
+use linesman_sim::segment_file::FaultEntry;
 
 /// A coupler with four terminals, a box on its second Ethernet port, and a coupler behind that.
 const PLANT: &str = r#"
@@ -119,4 +124,66 @@ fn a_silent_line_is_an_error_that_says_what_to_check() {
     let Some((_, Event::ScanFailed(error))) = bench.events.pop() else { panic!() };
     let text = error.to_string();
     assert!(text.contains("BRD 0x0130") && text.contains("check carrier"), "{text}");
+}
+
+/// How long identifying takes when the plan of a scan starts after `pause`, during which this device is
+/// without power if one is named.
+fn identifying(pause: Span, without_power: Option<&str>) -> Span {
+    let mut bench = Bench::new(PLANT);
+    let inventory = bench.scan();
+    let tree = inventory.tree().clone();
+    let plan = Plan::build(&inventory.planned(AlState::Op), tree, &PlanOptions::default()).unwrap();
+    if let Some(name) = without_power {
+        let entry = FaultEntry::new(FaultName::BrownOut).device(name);
+        bench.segment.inject(bench.now, &entry).unwrap();
+    }
+    bench.run_for(pause);
+    bench.events.clear();
+    bench.device.start(bench.now, plan);
+    let all = bench.run_until(Span::s(20), |event| matches!(event, Event::AllReached));
+    assert!(all, "{:?}", bench.events);
+    let known = |(_, event): &&(_, Event)| matches!(event, Event::Identified { .. });
+    assert_eq!(bench.events.iter().filter(known).count(), 6, "each is told");
+    let times = bench.device.bring_up_times().unwrap();
+    let its = times.network.iter().filter(|(phase, _)| *phase == Phase::Identify);
+    its.map(|(_, span)| *span).max().unwrap()
+}
+
+/// Two reads of an EEPROM by its controller, one after the other, are not done sooner.
+const ASKED: Span = Span::us(1_360);
+
+#[test]
+fn who_was_scanned_a_moment_ago_is_not_asked_again() {
+    let at_once = identifying(Span::ms(1), None);
+    assert!(at_once < ASKED, "{at_once}");
+}
+
+#[test]
+fn who_was_scanned_long_ago_or_has_lost_its_address_is_asked_again() {
+    let later = identifying(Span::s(2), None);
+    assert!(later >= ASKED, "{later}");
+    let without_power = identifying(Span::ms(800), Some("T3"));
+    assert!(without_power >= ASKED, "{without_power}");
+}
+
+#[test]
+fn a_scan_reads_of_an_eeprom_what_a_plan_needs() {
+    let behind = PLANT.find("[[device]]\nname = \"T2\"").unwrap();
+    let mut bench = Bench::new(&PLANT[..behind]);
+    let began = bench.now;
+    let inventory = bench.scan();
+    let took = bench.now.since(began);
+    // What the longest EEPROM of the plant takes to be read from its begin to its end, at 0.68 ms for each
+    // eight bytes, and some for getting there.
+    let longest = (inventory.devices.iter())
+        .map(|device| {
+            let id = bench.segment.devices().nth(device.id.index()).unwrap();
+            let image = Image::parse(bench.segment.controller(id).unwrap().sii()).unwrap();
+            image.build().unwrap().len()
+        })
+        .max()
+        .unwrap();
+    let whole = Span::us(680) * (longest as u64).div_ceil(8);
+    assert!(took < whole, "{took} for {longest} bytes, expected less than {whole}");
+    assert!(inventory.devices.iter().all(|device| device.sii_trouble.is_none()));
 }

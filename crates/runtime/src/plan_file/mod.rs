@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use linesman_config::eni::{Eni, EniError};
 use linesman_config::plan::Plan;
-use linesman_config::project::{Project, ProjectError, ResolveError};
+use linesman_config::profile::ClockMode;
+use linesman_config::project::{Project, ProjectDevice, ProjectError, ResolveError};
 
 use self::library::Library;
 use crate::named_files::read_at_most;
@@ -136,12 +137,14 @@ impl PlanFile {
             source: Box::new(source),
         })?;
         let mut library = library_of(&project, path, &shown)?;
-        let mut rules = BTreeMap::new();
+        let (mut rules, mut changed) = (BTreeMap::new(), Vec::new());
         let plan = project
             .plan(&mut |device| {
                 let found = library.find(device)?;
                 let rule = found.as_ref().and_then(|found| found.revision_rule);
                 rules.extend(rule.map(|rule| (device.name.clone(), rule)));
+                let modes = found.as_ref().map_or(&[][..], |found| &found.profile.clock_modes);
+                changed.extend(clock_changed(&project, device, modes));
                 Ok(found)
             })
             .map_err(|source| PlanFileError::Resolve { path: shown, source: Box::new(source) })?;
@@ -149,9 +152,23 @@ impl PlanFile {
         for device in &mut project.devices {
             device.revision_rule = device.revision_rule.or(rules.get(&device.name).copied());
         }
-        let notes = library.take_notes();
+        let mut notes = library.take_notes();
+        notes.extend(changed);
         Ok(Self { name: project.name.clone(), plan, project: Some(project), notes })
     }
+}
+
+/// What a person should know who has set a clock otherwise than its maker did.
+fn clock_changed(project: &Project, device: &ProjectDevice, modes: &[ClockMode]) -> Option<String> {
+    let choice = device.clock.as_ref()?;
+    let changes = choice.changes(modes, project.cycle_of(device));
+    let mode = choice.mode.as_deref().filter(|_| !changes.is_empty())?;
+    Some(format!(
+        "{}: its clock is set otherwise than its maker describes mode `{mode}`: {}; leave these keys of `clock` out \
+         unless that is meant",
+        device.name,
+        changes.join(", ")
+    ))
 }
 
 /// The descriptions that a project names, relative to where it is.

@@ -1,7 +1,7 @@
 //! Objects as JSON and as text.
 
 use linesman_proto::mailbox::coe::information::{Access, ObjectCode};
-use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex, SyncTypes};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -68,6 +68,10 @@ impl ObjectReport {
         let told = entry.as_ref().map(|entry| entry.data_type);
         let data_type = data_type.or(told.filter(|told| told.name().is_some()));
         let (text, value) = show(data, data_type);
+        let text = match sync_types(object, data) {
+            Some(types) => format!("{text}: {types}"),
+            None => text,
+        };
         Self {
             index: object.index.0,
             subindex: object.subindex,
@@ -100,6 +104,14 @@ impl ObjectReport {
     fn address(&self) -> String {
         ObjectAddress::new(self.index, self.subindex).to_string()
     }
+}
+
+/// What a SubDevice can keep step with, where that was read.
+fn sync_types(object: ObjectAddress, data: &[u8]) -> Option<SyncTypes> {
+    let index = matches!(object.index, ObjectIndex::OUTPUT_SYNC | ObjectIndex::INPUT_SYNC);
+    let data: &[u8; 2] = data.try_into().ok()?;
+    let is_it = index && object.subindex == SyncTypes::SUBINDEX;
+    is_it.then_some(SyncTypes(u16::from_le_bytes(*data)))
 }
 
 impl ReadReport {

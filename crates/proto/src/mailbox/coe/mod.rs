@@ -11,9 +11,11 @@ pub mod information;
 pub mod message;
 pub mod object;
 pub mod sdo;
+pub mod sync_types;
 
 pub use data_type::DataType;
 pub use diagnosis::{DiagnosisMessage, Severity};
 pub use emergency::{Emergency, EmergencyClass, ErrorRegister};
 pub use message::{COE_HEADER_LEN, CoeError, Header, Message, Service};
 pub use object::{ObjectAddress, ObjectIndex};
+pub use sync_types::SyncTypes;
