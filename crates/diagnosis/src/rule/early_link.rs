@@ -57,7 +57,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         None => all.iter().collect(),
     };
     // A link that comes and goes is another trouble.
-    for drops in suspects.into_iter().filter(|drops| !drops.is_down && drops.count == 1) {
+    // So is one of which one end never knew: what is in between takes the link from both.
+    let is_one = |drops: &&Drops| {
+        !drops.is_down && drops.count == 1 && !link_lost::is_one_sided(line, tree, drops)
+    };
+    for drops in suspects.into_iter().filter(is_one) {
         let silence = match tree.links()[drops.link].upstream {
             End::MainDevice(card) => behind_card(line, card),
             End::Controller(..) => behind_link(line, drops),

@@ -73,6 +73,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         }
         if let Some(node) = dead_on_ring(view.line, tree, &all, drops) {
             blame(view.line, tree, node, &mut condition);
+        } else if let Some(with) = share_supply(tree, &all, drops) {
+            blame_supply(view.line, tree, drops, &with, &mut condition);
         }
         conditions.push(condition);
     }
@@ -126,6 +128,63 @@ fn blame(line: &Line, tree: &Tree, node: usize, condition: &mut Condition) {
             condition.explains.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
         }
     }
+}
+
+/// Links, side by side, that were lost at the same moment as this one, this one included, and are down since: two cables
+/// do not break at one moment, but what hangs on them may have one supply.
+fn share_supply<'a>(tree: &Tree, all: &'a [Drops], drops: &'a Drops) -> Option<Vec<&'a Drops>> {
+    // What is behind another lost link went with it.
+    let is_one = |one: &&Drops| {
+        let way = |node: usize| tree.path_to(node).into_iter().filter(move |on| *on != node);
+        let lost_above = |node: usize| {
+            way(node)
+                .filter_map(|on| tree.link_above(on))
+                .any(|link| all.iter().any(|other| other.link == link && other.is_down))
+        };
+        let behind = tree.links()[one.link].downstream.node();
+        one.is_down
+            && one.count == 1
+            && !tree.is_on_ring(one.link)
+            && one.falls_with(drops)
+            && behind.is_some_and(|node| !lost_above(node))
+    };
+    let with: Vec<&Drops> = all.iter().filter(is_one).collect();
+    let is_among = with.iter().any(|one| one.link == drops.link);
+    (is_among && with.len() > 1).then_some(with)
+}
+
+/// Lays a lost link to the supply of the device behind it; those that fell with it follow from the first.
+fn blame_supply(
+    line: &Line,
+    tree: &Tree,
+    drops: &Drops,
+    with: &[&Drops],
+    condition: &mut Condition,
+) {
+    let Some(node) = tree.links()[drops.link].downstream.node() else { return };
+    let link = condition.place;
+    let place = Place::device(line.network, DeviceId(node as u32));
+    condition.place = place;
+    (condition.cause, condition.confidence) = (FaultName::SupplyOff, 0.6);
+    let other = |cause, place, confidence| Alternative { cause, place, confidence };
+    condition.alternatives =
+        vec![other(FaultName::LinkOpen, Some(link), 0.15), other(FaultName::DeviceOff, None, 0.15)];
+    if with.first().is_some_and(|first| first.link == drops.link) {
+        let follows = with.iter().flat_map(|one| follows(line, tree, one.link));
+        condition.explains.extend(follows);
+    }
+    let names: Vec<String> = with
+        .iter()
+        .filter_map(|one| tree.links()[one.link].downstream.node())
+        .map(|node| line.label(DeviceId(node as u32)))
+        .collect();
+    condition.actions.insert(
+        0,
+        format!(
+            "SubDevices {} fell silent at the same moment: look for the supply that they share.",
+            names.join(", ")
+        ),
+    );
 }
 
 fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
@@ -196,7 +255,11 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
         RingOpen, SupplyOff,
     };
     if drops.count < OFTEN && is_one_sided(line, tree, drops) {
-        return (FalseLink, 0.5, vec![(LinkOpen, None, 0.35)]);
+        // Nothing that shows a link by itself can be between two terminals.
+        return match behind.is_some_and(|node| is_on_terminal_bus(line, node)) {
+            true => (LinkOpen, 0.5, vec![(FalseLink, None, 0.35)]),
+            false => (FalseLink, 0.5, vec![(LinkOpen, None, 0.35)]),
+        };
     }
     if let Some(node) = behind.filter(|node| never_was_there(line, tree, drops, *node)) {
         let device = Some(node);
@@ -245,7 +308,7 @@ fn never_was_there(line: &Line, tree: &Tree, drops: &Drops, node: usize) -> bool
 
 /// Whether one end has lost the link while the other one had it all the time: one pair of wires, or
 /// something between that shows a link by itself. Only where both were read afterwards.
-fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
+pub(super) fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
     let link = tree.links()[drops.link];
     let saw = |end: End| -> Option<bool> {
         let seen = drops.seen.iter().any(|drop| drop.end == end);
@@ -271,11 +334,19 @@ fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
     matches!((saw(link.upstream), saw(link.downstream)), (Some(one), Some(other)) if one != other)
 }
 
-/// Whether a device hangs on the terminal bus, as far as its type tells: there a contact and the device
+/// Whether a device hangs on the terminal bus, as far as its type and the one before it tell: there a contact and the device
 /// behind it fail alike.
 pub(super) fn is_on_terminal_bus(line: &Line, node: usize) -> bool {
-    let name = line.devices[node].type_name.as_deref().unwrap_or_default();
-    ["EL", "ES", "EJ", "EM", "KM"].iter().any(|family| name.starts_with(family))
+    let type_of = |node: usize| line.devices[node].type_name.as_deref().unwrap_or_default();
+    let is_of = |node: usize, families: &[&str]| {
+        families.iter().any(|family| type_of(node).starts_with(family))
+    };
+    // Junctions and extensions are called like couplers; but port B of a coupler is the bus, whoever is there.
+    let above =
+        line.tree.as_ref().filter(|tree| node < tree.len()).and_then(|tree| tree.upstream(node));
+    let is_behind_coupler =
+        matches!(above, Some(End::Controller(near, Port::B)) if is_of(near, &["EK"]));
+    is_of(node, &["EL", "ES", "EJ", "EM", "KM"]) || is_behind_coupler
 }
 
 /// What the loss is about: both ends, and the card's link if it is one of them.

@@ -252,9 +252,16 @@ fn placed(line: &Line, at: Instant, found: Seen<usize>) -> Condition {
     };
     let text = "with the port before this link closed for a moment frames came back, with any port behind \
                 it closed they did not";
-    Condition::new(&PAGE, place, FaultName::FalseLink, at)
-        .confidence(0.8)
-        .or(FaultName::LinkOpen, 0.1)
+    let behind = line.links().nth(found.value).and_then(|link| link.downstream.node());
+    // Nothing that shows a link by itself can be between two terminals: one of two pairs of contacts is open.
+    let (cause, sure, other, less) =
+        match behind.is_some_and(|id| is_on_terminal_bus(line, id.index())) {
+            true => (FaultName::LinkOpen, 0.6, FaultName::FalseLink, 0.3),
+            false => (FaultName::FalseLink, 0.8, FaultName::LinkOpen, 0.1),
+        };
+    Condition::new(&PAGE, place, cause, at)
+        .confidence(sure)
+        .or(other, less)
         .shown_by(Evidence::host(Some(found.at), text))
         .advise(
             "Look at what is between the two ports, such as a media converter or a switch, and at the \

@@ -148,9 +148,14 @@ fn outage(line: &Line, device: &Device, change: &AlChange) -> Option<(Instant, I
             return latest;
         }
     }
+    // The first SubDevice has no neighbour before it: without it nothing at all comes back. It misses no
+    // request of its own then, but those that it has no address for after its start.
+    let silences = line.traffic.silences.iter().rev();
+    let silences = silences.map(|one| (one.since.at, one.ended.unwrap_or(change.at)));
     let absences = device.absences.iter().rev();
-    let mut spans = absences.map(|absence| (absence.since.at, absence.ended.unwrap_or(change.at)));
-    spans.find(|(since, until)| is_recent(*since, *until))
+    let absences = absences.map(|absence| (absence.since.at, absence.ended.unwrap_or(change.at)));
+    let latest = |(since, until): &(Instant, Instant)| is_recent(*since, *until);
+    silences.into_iter().find(latest).or_else(|| absences.into_iter().find(latest))
 }
 
 fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {

@@ -8,7 +8,9 @@
 //! synchronisation `T400`).
 //!
 //! **What it means.** A refusal is about settings in most cases: process data, SyncManagers, mailbox,
-//! start-up commands that do not fit the device. Leaving a state is about what happens while it runs:
+//! start-up commands that do not fit the device. With 0x0018, 0x0019 and 0x002B its application has no values
+//! to exchange; where its outputs are sent, it is the application that stands still.
+//! Leaving a state is about what happens while it runs:
 //! outputs that stop (watchdog), clocks and frames that come at the wrong time, or an error of the
 //! device itself. If there is trouble with cables at the same moment, that comes first: the code is then
 //! what follows.
@@ -28,7 +30,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{AlError, Device};
+use crate::line::{AlError, Device, Line};
 
 /// It refused a change.
 pub const REFUSED: RulePage = RulePage {
@@ -128,6 +130,7 @@ fn condition(
         "S200" if meaning.is_some_and(|meaning| meaning.class == CodeClass::Configuration) => {
             FaultName::ConfigMismatch
         }
+        "S200" if has_no_values(line, device, error) => FaultName::FirmwareFault,
         "S200" => FaultName::InitRefused,
         "S202" => FaultName::WatchdogStarved,
         "T400" => out_of_step(device, error),
@@ -140,6 +143,9 @@ fn condition(
         .explaining([Symptom::WorkingCounter(device.id), Symptom::Emergency(device.id)]);
     condition = match (cause, meaning.map(|meaning| meaning.class)) {
         (FaultName::ConfigMismatch, _) => condition.or(FaultName::InitRefused, 0.15),
+        (FaultName::FirmwareFault, _) if page.code == "S200" => {
+            condition.confidence(0.6).or(FaultName::InitRefused, 0.25)
+        }
         (FaultName::InitRefused, Some(CodeClass::Timing)) => {
             condition.or(FaultName::SyncLost, 0.15)
         }
@@ -185,6 +191,23 @@ fn condition(
         }
     }
     condition
+}
+
+/// Whether a SubDevice refuses because its own application gives no values, or takes none though they are sent.
+fn has_no_values(line: &Line, device: &Device, error: &AlError) -> bool {
+    let has_outputs = || {
+        line.cyclic.iter().any(|cyclic| {
+            let mut owners = line.owners(cyclic);
+            owners.any(|owner| owner.device == device.id && owner.writes)
+        })
+    };
+    match error.code.map(|code| code.value) {
+        Some(AlStatusCode::NO_VALID_INPUTS) => true,
+        Some(AlStatusCode::NO_VALID_OUTPUTS | AlStatusCode::NO_VALID_INPUTS_AND_OUTPUTS) => {
+            has_outputs()
+        }
+        Some(_) | None => false,
+    }
 }
 
 /// Why a SubDevice that keeps step lost it: by its own code its SYNC signals do not come, or it is not done

@@ -11,6 +11,7 @@ pub mod built_in;
 pub mod case;
 pub mod disturb;
 pub mod draw;
+mod effect;
 pub mod judge;
 pub mod perturb;
 pub mod play;

@@ -11,13 +11,14 @@ use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 use linesman_sim::seed::Stream;
-use linesman_sim::truth::{FaultId, FaultRecord};
+use linesman_sim::truth::FaultId;
 
 use super::baseline;
 use super::built_in::{Stop, with_built_in};
 use super::case::{Case, CaseKind, ScoreOptions};
 use super::disturb::disturb;
 use super::draw::{Drawn, Ends, Offer, When, draw};
+use super::effect::effects;
 use super::judge::{Judged, alarms, claim, judge};
 use crate::choice::{Ground, are_apart, text};
 use crate::lab::{Lab, LabError};
@@ -438,26 +439,10 @@ impl<'a> Play<'a> {
         Some(FaultOutcome {
             name: truth.name,
             entry: text(&active.drawn.choice.entry),
-            effects: effects(record),
+            effects: effects(&self.lab, record),
             live,
             capture,
             baseline: baseline.is_some_and(|site| baseline::is_right(site, &truth, tree)),
         })
     }
-}
-
-/// How often a fault has acted.
-fn effects(record: &FaultRecord) -> u64 {
-    if record.first_effect.is_none() {
-        return 0;
-    }
-    // A symbol that was hit inside a frame is one hit, though it spoils the frame, too.
-    let hits = record.symbol_errors.max(record.frames_spoiled);
-    let outages = record.links_lost.div_ceil(2).max(record.supplies_lost);
-    // What is lost behind an open link is no hit of its own.
-    let lost = if hits + outages == 0 { record.frames_lost } else { 0 };
-    [hits, outages, lost, record.frames_sent, record.frames_delayed, 1]
-        .into_iter()
-        .max()
-        .unwrap_or(1)
 }

@@ -136,6 +136,7 @@ impl List<'_> {
                 self.exact(name, Site::link(tree, one, other));
                 match name {
                     LinkOpen => self.open(truth, one, other),
+                    FalseLink => self.one_end(truth, one, other),
                     CableDegraded | EmcNoise if truth.hit_both_ways(one, other) => {
                         for cause in sets::BOTH_WAYS.causes {
                             self.add(*cause, Site::link(tree, one, other), &sets::BOTH_WAYS);
@@ -174,8 +175,12 @@ impl List<'_> {
                 self.symbols(truth, (from, to));
             }
             DeviceInternal => self.exact(name, end_site(from)),
-            // On copper the other direction goes with it.
-            LinkOpen | LinkFlapping => self.exact(name, Site::link(tree, from, to)),
+            LinkOpen | FalseLink => {
+                // On copper the other direction goes with it.
+                self.exact(name, Site::link(tree, from, to));
+                self.one_end(truth, from, to);
+            }
+            LinkFlapping => self.exact(name, Site::link(tree, from, to)),
             // Who else sends is not at a place of the line; its frames are everywhere on it.
             SecondMainDevice | ForeignFrames => self.exact(name, Site::Network),
             _ => {}
@@ -195,6 +200,15 @@ impl List<'_> {
         self.silent(link, behind);
     }
 
+    /// A link that one of its ends has lost, and the other one has not.
+    fn one_end(&mut self, truth: &Truth, one: End<DeviceId>, other: End<DeviceId>) {
+        if truth.signals_lost == 1 {
+            for cause in sets::ONE_END.causes {
+                self.add(*cause, Site::link(self.scene.tree, one, other), &sets::ONE_END);
+            }
+        }
+    }
+
     /// Silence of a device and all behind it.
     fn silent(&mut self, above: Site, id: DeviceId) {
         self.add(LinkOpen, above, &sets::SILENT);
@@ -206,7 +220,13 @@ impl List<'_> {
     fn symbols(&mut self, truth: &Truth, (from, to): Hop) {
         let set = match (from, to) {
             (End::MainDevice(_), _) => &sets::FIRST_HOP,
-            (_, End::MainDevice(_)) if self.scene.host_counters => &sets::LAST_HOP,
+            // Without counters there are drops, too, for causes that could be taken for them; a damaged
+            // output is of the set of the counted hop all the same.
+            (_, End::MainDevice(_))
+                if self.scene.host_counters || !sets::UNCOUNTED.has(truth.name) =>
+            {
+                &sets::LAST_HOP
+            }
             (_, End::MainDevice(_)) => &sets::UNCOUNTED,
             (End::Controller(..), End::Controller(..)) => &sets::SYMBOLS,
         };
@@ -379,6 +399,31 @@ mod tests {
         assert!(matches!(cable, Grade::Admitted(_)));
         assert_eq!(grade(&noise, true, DeviceInternal, site(Some(Way::BToA))), Grade::Wrong);
         assert_eq!(grade(&noise, true, NicDamaged, Site::Host), Grade::Wrong);
+    }
+
+    #[test]
+    fn a_damaged_output_before_the_card_may_be_four_things_counted_or_not() {
+        let hop = (end(0, A), End::MainDevice(Path::A));
+        let output = truth(TransmitterDamaged, TruthPlace::Hop(hop.0, hop.1));
+        let link = Site::Link { a: hop.1, b: Some(hop.0), way: Some(Way::BToA) };
+        for counted in [true, false] {
+            assert!(grade(&output, counted, CableDegraded, link).is_right());
+            assert!(!grade(&output, counted, HostDrops, Site::Host).is_right());
+        }
+    }
+
+    #[test]
+    fn a_link_lost_at_one_end_may_be_open_or_false() {
+        let place = TruthPlace::Hop(end(0, B), end(1, A));
+        let link = Site::Link { a: end(0, B), b: Some(end(1, A)), way: None };
+        for (name, other) in [(LinkOpen, FalseLink), (FalseLink, LinkOpen)] {
+            let one = Truth { signals_lost: 1, ..truth(name, place) };
+            assert!(grade(&one, true, other, link).is_right(), "{name}");
+            let none = Truth { signals_lost: 0, ..one.clone() };
+            assert!(!grade(&none, true, other, link).is_right(), "{name}: nobody lost it");
+            let both = Truth { signals_lost: 2, ..one };
+            assert!(!grade(&both, true, other, link).is_right(), "{name}: both lost it");
+        }
     }
 
     #[test]

@@ -1,0 +1,95 @@
+//! How often a fault has acted: what the truth log says of it, less what no observer could ever see.
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::topology::End;
+use linesman_sim::device::Trouble;
+use linesman_sim::truth::{Effect, Entry, FaultRecord, Place};
+
+use crate::lab::Lab;
+
+/// How often a fault has acted; 0 where it left no trace.
+pub(super) fn effects(lab: &Lab, record: &FaultRecord) -> u64 {
+    if record.first_effect.is_none() || is_traceless(lab, record) {
+        return 0;
+    }
+    // A symbol that was hit inside a frame is one hit, though it spoils the frame, too.
+    let hits = record.symbol_errors.max(record.frames_spoiled);
+    let outages = record.links_lost.div_ceil(2).max(record.supplies_lost);
+    // What is lost behind an open link is no hit of its own.
+    let lost = if hits + outages == 0 { record.frames_lost } else { 0 };
+    [hits, outages, lost, record.frames_sent, record.frames_delayed, 1]
+        .into_iter()
+        .max()
+        .unwrap_or(1)
+}
+
+/// Whether nothing that it did could be seen by anybody.
+///
+/// A symbol that is hit between two frames on the way into a card is counted nowhere: cards count damaged
+/// frames, and there is none. And that a device *would* refuse a step, or *would* go by wrong settings, is no
+/// effect: it is one when the device is on its way up and does not get there.
+fn is_traceless(lab: &Lab, record: &FaultRecord) -> bool {
+    // What went beyond the log counts in any case.
+    if record.frames_spoiled + record.frames_lost > 0 {
+        return false;
+    }
+    let mut of_fault = lab
+        .truth()
+        .entries()
+        .iter()
+        .filter_map(|entry| match entry {
+            Entry::Effect { fault: Some(id), place, effect, .. } if *id == record.id => {
+                Some((place, effect))
+            }
+            Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
+        })
+        .peekable();
+    let is_up = |id: DeviceId| !lab.not_up().any(|other| other == id);
+    of_fault.peek().is_some()
+        && of_fault.all(|(place, effect)| match (effect, place) {
+            (Effect::SymbolError, Place::Direction(_, End::MainDevice(_))) => true,
+            (
+                Effect::Misbehaves(
+                    Trouble::Mismatch(_) | Trouble::FrozenApplication | Trouble::DeafToRequests,
+                ),
+                Place::Device(id),
+            ) => record.is_active() && is_up(*id),
+            (_, _) => false,
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use linesman_config::fault::FaultName;
+    use linesman_proto::time::Instant;
+    use linesman_sim::segment_file::{FaultEntry, SegmentFile};
+
+    use super::*;
+    use crate::options::LabOptions;
+    use crate::verdict::proof::LINE;
+
+    fn played(entry: &FaultEntry) -> (Lab, FaultRecord) {
+        let file = SegmentFile::parse(LINE).unwrap();
+        let mut lab = Lab::new(&file, LabOptions::default()).unwrap();
+        lab.run_until(Instant::from_nanos(3_000_000_000)).unwrap();
+        let id = lab.inject(entry).unwrap();
+        lab.run_until(Instant::from_nanos(3_300_000_000)).unwrap();
+        let record = lab.truth().fault(id).unwrap().clone();
+        (lab, record)
+    }
+
+    #[test]
+    fn hits_between_frames_count_unless_nobody_counts_them() {
+        let card = FaultEntry::new(FaultName::NicDamaged).at("maindevice");
+        let card = |part: &str| card.clone().with("part", part).with("hits_per_s", 10.0);
+        let (lab, record) = played(&card("receiver"));
+        assert!(
+            record.symbol_errors > 0 && record.frames_spoiled == 0,
+            "between frames: {record:?}"
+        );
+        assert_eq!(effects(&lab, &record), 0, "no card counts them");
+        let (lab, record) = played(&card("transmitter"));
+        assert_eq!(effects(&lab, &record), record.symbol_errors, "the first SubDevice does");
+        assert!(record.symbol_errors > 0);
+    }
+}
