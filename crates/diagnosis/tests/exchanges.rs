@@ -8,9 +8,10 @@ mod support;
 use linesman_diagnosis::report::{FindingState, Verdict};
 use linesman_diagnosis::{Direction, Engine, FrameSeen, Setup};
 use linesman_proto::address::{Network, Path};
+use linesman_proto::command::Command;
 use linesman_proto::time::Instant;
 use proptest::prelude::*;
-use support::script::{Script, brd, fprd, fpwr, frame, lrw};
+use support::script::{Datagram, Script, brd, fprd, fpwr, frame, lrw};
 use support::text;
 
 #[test]
@@ -321,6 +322,85 @@ fn both_cards_of_a_ring_make_one_exchange() {
     assert_eq!((report.network.datagrams.0, report.network.unanswered.0), (400, 0));
     assert_eq!(report.network.devices.0, 5);
     assert_eq!(report.findings.len(), 0, "{}", text(&report));
+}
+
+#[test]
+fn a_long_frame_that_is_noted_late_is_not_lost() {
+    for (each_ns, lost) in [(5_000, 0), (100_000, 1)] {
+        let mut script = Script::scanned(2);
+        let long = [lrw(0x0100_0000, 1400, 3)];
+        let index = script.index;
+        script.vanish(&long);
+        for _ in 0..20 {
+            script.exchange(&[fprd(0x1001, 0x0130, &[2, 0])]);
+            script.now -= 100_000 - each_ns;
+        }
+        script.feed(&frame(&long, index, true), Direction::Unknown, 5_000);
+        script.finish();
+        let network = script.engine.diagnosis().network;
+        assert_eq!(network.lost.0, lost, "{each_ns} ns from one to the next");
+    }
+}
+
+/// What the second card sends of a request that is for the first one alone.
+fn void(datagram: &Datagram) -> Datagram {
+    Datagram { command: Command::Nop, ..datagram.clone() }
+}
+
+// silent: H100
+#[test]
+fn copies_that_carry_nothing_may_vanish() {
+    let mut script = Script::new();
+    script.is_live = true;
+    for _ in 0..100 {
+        // The ring is opened at the second card: what that one sends never comes back.
+        let asked = brd(0x0130, &[8, 0], 5);
+        let first = script.index;
+        for _ in 0..5 {
+            for (path, datagram) in [(Path::A, asked.clone()), (Path::B, void(&asked))] {
+                script.path = Some(path);
+                script.send(&[datagram]);
+                script.now -= 79_999;
+            }
+            script.index = script.index.wrapping_add(1);
+        }
+        let next = std::mem::replace(&mut script.index, first);
+        script.path = Some(Path::A);
+        while script.index != next {
+            script.give_back(std::slice::from_ref(&asked));
+            script.index = script.index.wrapping_add(1);
+        }
+    }
+    script.finish();
+    let report = script.engine.diagnosis();
+    assert_eq!(report.findings.len(), 0, "{}", text(&report));
+    assert_eq!((report.network.lost.0, report.network.unanswered.0), (0, 0));
+}
+
+#[test]
+fn a_single_copy_that_is_lost_in_a_whole_ring_is_counted_at_its_card() {
+    let mut script = Script::new();
+    script.is_live = true;
+    for cycle in 0..200 {
+        let processed = [lrw(0x0100_0000, 8, 6)];
+        let untouched = [lrw(0x0100_0000, 8, 0)];
+        for (path, back) in [(Path::A, 80_000), (Path::B, 79_999)] {
+            script.path = Some(path);
+            script.now -= 80_000 - back;
+            script.send(&processed);
+        }
+        script.path = Some(Path::B);
+        script.give_back(&processed);
+        script.path = Some(Path::A);
+        // From cycle 150 on the ring is open: copies are lost, but no single ones.
+        if cycle != 100 && cycle < 150 {
+            script.give_back(&untouched);
+        }
+        script.index = script.index.wrapping_add(1);
+    }
+    let line = script.engine.line(Network(0)).unwrap();
+    let lost = line.traffic.copies_lost.map(|tally| tally.sum);
+    assert_eq!(lost, [1, 0]);
 }
 
 #[test]

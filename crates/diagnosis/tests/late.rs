@@ -8,7 +8,7 @@ mod support;
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::{FindingReport, Severity};
 use support::plant::{Plant, codes, plant};
-use support::script::fpwr;
+use support::script::{Script, fpwr, lrw};
 use support::text;
 
 // fires: T411
@@ -22,6 +22,41 @@ fn one_frame_that_comes_back_late_is_told_without_alarm() {
     let finding = &report.findings[0];
     assert_eq!((finding.severity, finding.cause), (Severity::Info, FaultName::HostJitter));
     assert!(finding.evidence[0].text.contains("0.300 ms"), "{}", finding.evidence[0].text);
+}
+
+// fires: T411
+#[test]
+fn a_recording_tells_late_frames_too_where_nobody_keeps_step() {
+    let mut script = Script::scanned(2);
+    let data = [lrw(0x0100_0000, 8, 3)];
+    let mut next = script.now;
+    for cycle in 0..700 {
+        next += 1_000_000;
+        script.now = next;
+        script.send(&data);
+        script.now += if cycle == 650 { 300_000 } else { 0 };
+        script.give_back(&data);
+        script.index = script.index.wrapping_add(1);
+    }
+    script.finish();
+    let report = script.engine.diagnosis();
+    assert_eq!(codes(&report), ["T411"], "{}", text(&report));
+    assert_eq!(report.findings[0].severity, Severity::Info);
+}
+
+// fires: S201
+#[test]
+fn what_did_no_harm_hides_no_trouble() {
+    let mut plant = plant();
+    counters(&mut plant, 0);
+    plant.lost_cycles(40);
+    plant.cycles(50);
+    plant.left_op(0x1002, 0x11);
+    counters(&mut plant, 0);
+    let report = plant.report();
+    let stalled = report.findings.iter().find(|finding| finding.code == "X513");
+    assert_eq!(stalled.map(|one| one.severity), Some(Severity::Info), "{}", text(&report));
+    assert!(codes(&report).contains(&"S201"), "{}", text(&report));
 }
 
 /// Whether a finding with this code hangs beneath another, at whatever remove.

@@ -6,6 +6,7 @@ use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::{Diagnosis, Severity};
 use linesman_lab::lab::Lab;
 use linesman_lab::options::LabOptions;
+use linesman_proto::address::Network;
 use linesman_proto::time::Span;
 use linesman_sim::segment_file::SegmentFile;
 
@@ -41,8 +42,8 @@ type = "EL2008"
 on = "K2.B"
 "#;
 
-/// What is said of a fault that lasts for a second and a half.
-fn said(text: &str, clocks: bool) -> Diagnosis {
+/// A line with a fault that has lasted for three seconds: whether two places go together takes ten readings.
+fn broken(text: &str, clocks: bool) -> Lab {
     let file = SegmentFile::parse(&format!("{LINE}\n[[fault]]\n{text}")).unwrap();
     let fault = file.faults[0].clone();
     let file = SegmentFile { faults: Vec::new(), ..file };
@@ -51,9 +52,14 @@ fn said(text: &str, clocks: bool) -> Diagnosis {
     lab.wait_up(Span::s(30)).unwrap();
     lab.run_until(lab.now() + Span::s(1)).unwrap();
     let id = lab.inject(&fault).unwrap();
-    lab.run_until(lab.now() + Span::ms(1_500)).unwrap();
+    lab.run_until(lab.now() + Span::s(3)).unwrap();
     assert!(lab.truth().fault(id).unwrap().first_effect.is_some(), "{text}");
-    lab.diagnosis()
+    lab
+}
+
+/// What is said of it.
+fn said(text: &str, clocks: bool) -> Diagnosis {
+    broken(text, clocks).diagnosis()
 }
 
 fn first_cause(diagnosis: &Diagnosis) -> Option<FaultName> {
@@ -74,5 +80,28 @@ fn interference_device_and_firmware_are_told_apart() {
         ("kind = 'firmware-fault'\ndevice = 'T2'\nhow = 'restarts'", FaultName::FirmwareFault),
     ] {
         assert_eq!(first_cause(&said(text, false)), Some(cause), "{text}");
+    }
+}
+
+// S3 L76: off or disconnected, firmware that fails, a cycle that firmware cannot follow.
+// proves: FRM-20 partial: firmware that hangs keeps its working counter in the segment, and is known by other signs
+#[test]
+fn who_is_gone_whose_firmware_fails_and_whose_cycle_is_too_fast_are_told_apart() {
+    use FaultName::{CycleTooFast, DeviceOff, FirmwareFault, LinkOpen, SupplyOff};
+    for (text, causes, lowers) in [
+        // Nobody can tell these apart as long as it is gone.
+        ("kind = 'device-off'\ndevice = 'T2'", &[DeviceOff, LinkOpen, SupplyOff][..], true),
+        ("kind = 'firmware-fault'\ndevice = 'T2'\nhow = 'hangs'", &[FirmwareFault], false),
+        ("kind = 'cycle-too-fast'\ndevice = 'T2'\nneeds_us = 9000.0", &[CycleTooFast], true),
+    ] {
+        let lab = broken(text, true);
+        let line = lab.engine().line(Network(0)).unwrap();
+        let is_low = line.cyclic.iter().any(|cyclic| !cyclic.deficits.is_empty());
+        let diagnosis = lab.diagnosis();
+        let said: Vec<_> =
+            diagnosis.findings.iter().map(|f| (&f.code, f.cause, &f.place)).collect();
+        assert_eq!(is_low, lowers, "{text}: {said:?}");
+        let first = first_cause(&diagnosis);
+        assert!(first.is_some_and(|cause| causes.contains(&cause)), "{text}: {said:?}");
     }
 }

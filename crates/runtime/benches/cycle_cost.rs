@@ -4,10 +4,11 @@
 //! Without arguments: a table of ns per cycle for lines of 10, 100 and 1,000 SubDevices and for one
 //! LRW of 64 and of 1,400 bytes. `count KIND CYCLES` runs so many cycles of one kind, for counting
 //! instructions: the difference of two runs is that of the cycles between.
-//! `scripted` is what the harness itself costs: the far end, which makes an answer of each frame.
+//! `count scripted BYTES CYCLES` is what the harness itself costs: the far end, which makes an answer of
+//! each frame of so many bytes, and the card, which puts it where it is to be received.
 //!
-//! As in `run`, a frame that is sent is built in the log of the tap, and what comes back lies in a
-//! buffer of its own. The thread that takes the logs is there; nothing is left out.
+//! As in `run`, a frame that is sent is built in the log of the tap, and one that comes back is received
+//! there. The thread that takes the logs is there; nothing is left out.
 
 #![allow(clippy::type_complexity, reason = "tables of a bench")]
 
@@ -22,7 +23,7 @@ use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::run::tap::{Passed, Tap, tap};
 
-use steady::{Answer, Running, answers, running, scripted, seen};
+use steady::{Answer, Running, answers, received, running, scripted};
 
 const CYCLE: Span = Span::ms(1);
 /// A running MainDevice, and what makes an answer of one of its frames.
@@ -67,23 +68,22 @@ impl Cycle {
         if let Some(first) = self.main.outputs_mut().first_mut() {
             *first = first.wrapping_add(1);
         }
-        loop {
+        while self.main.may_transmit(self.now) {
             let room = self.tap.room(self.now);
             let Some(transmit) = self.main.poll_transmit(self.now, room) else { break };
             let answer = scripted(&mut self.answers, &room[..transmit.len]);
             self.frames += 1;
-            let sent = Passed {
-                time: self.now,
-                number: self.frames,
-                path: Some(transmit.path),
-                direction: Direction::Sent,
-                truncated: false,
-            };
+            let (path, truncated) = (Some(transmit.path), false);
+            let (number, direction) = (self.frames, Direction::Sent);
+            let sent = Passed { time: self.now, number, path, direction, truncated };
             self.tap.keep(&sent, transmit.len);
             let at = self.now + Span::us(20);
             self.frames += 1;
-            self.tap.frame(&seen(self.frames, Direction::Received, at, answer));
-            self.main.handle_frame(at, Path::A, answer);
+            let room = self.tap.room(at);
+            let len = received(answer, room);
+            self.main.handle_frame(at, Path::A, &room[..len]);
+            let (number, direction) = (self.frames, Direction::Received);
+            self.tap.keep(&Passed { time: at, number, path, direction, truncated }, len);
         }
         black_box(self.main.inputs().first());
         while let Some(event) = self.main.poll_event() {
@@ -107,11 +107,13 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|one| one != "--bench").collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
-        ["count", "scripted", cycles] => {
-            let frame = vec![0; 92];
-            let mut answers = [Answer { bytes: frame.clone(), indices: vec![17], input: 89 }];
+        ["count", "scripted", bytes, cycles] => {
+            let len = 26 + bytes.parse::<usize>().expect("a number") + 2;
+            let (frame, mut room) = (vec![0; len], [0; 1_536]);
+            let mut answers = [Answer { bytes: frame.clone(), indices: vec![17], input: len - 3 }];
             for _ in 0..cycles.parse::<u64>().expect("a number") {
-                black_box(scripted(black_box(&mut answers), black_box(&frame)));
+                let answer = scripted(black_box(&mut answers), black_box(&frame));
+                black_box(received(answer, black_box(&mut room)));
             }
         }
         ["count", kind, cycles] => {

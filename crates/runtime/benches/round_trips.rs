@@ -33,7 +33,7 @@ use linesman_runtime::run::tap::{Passed, Tap, tap};
 use linesman_runtime::stop::Stop;
 
 use own_namespace::{FAR, NEAR};
-use steady::{Running, answers, running, scripted, seen};
+use steady::{Running, answers, running, scripted};
 
 /// One LRW of 64 bytes.
 const LINE: &[(&str, usize)] = &[("EL4102", 8), ("EL3102", 4)];
@@ -225,7 +225,7 @@ fn kept() -> Tap {
 fn engine_trips(running: Running) -> Best {
     let Running { mut main, mut now, .. } = running;
     let mut card = RawSocket::open(NEAR, &SocketOptions::default()).unwrap();
-    let (mut tap, mut buffer, mut number) = (kept(), [0; 1_536], 0);
+    let (mut tap, mut number) = (kept(), 0);
     let clock = HostClock::start();
     let before = main.statistics();
     let best = timed(TRIPS, || {
@@ -242,11 +242,13 @@ fn engine_trips(running: Running) -> Best {
             let (path, direction) = (Some(sent.path), Direction::Sent);
             tap.keep(&Passed { time: now, number, path, direction, truncated: false }, sent.len);
             let _ = card.wait(&clock, Instant::MAX).unwrap();
-            let len = card.recv_one(&mut buffer).unwrap().unwrap();
-            number += 1;
             let at = now + Span::ns(black_box(clock.now()).as_nanos() & 0xFF);
-            tap.frame(&seen(number, Direction::Received, at, &buffer[..len]));
-            main.handle_frame(at, Path::A, &buffer[..len]);
+            let room = tap.room(at);
+            let len = card.recv_one(room).unwrap().unwrap();
+            number += 1;
+            main.handle_frame(at, Path::A, &room[..len]);
+            let direction = Direction::Received;
+            tap.keep(&Passed { time: at, number, path, direction, truncated: false }, len);
             while main.poll_event().is_some() {}
             tap.turn(now);
         }
@@ -297,7 +299,7 @@ impl Audience for Keeping {
     }
 
     fn room(&mut self, now: Instant) -> Option<&mut [u8]> {
-        self.tap.as_mut().map(|tap| tap.room(now).as_mut_slice())
+        self.tap.as_mut().map(|tap| tap.room(now))
     }
 
     fn keep(&mut self, sent: &Passed, len: usize) {

@@ -5,11 +5,10 @@ use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
 use linesman_maindevice::{Event, MainDevice, Options, Transmit};
 use linesman_proto::address::{Network, Path};
-use linesman_proto::ethernet::MAX_LEN;
 use linesman_proto::time::{Instant, Span};
 
-use crate::line::{Cards, Line};
-use crate::run::tap::Passed;
+use crate::line::{Arrived, Cards, Intake, Line};
+use crate::run::tap::{FRAME_ROOM, Passed};
 use crate::stop::Stop;
 
 /// Most frames handed out in one go; a MainDevice has far fewer out at once.
@@ -21,14 +20,14 @@ const NAP: Span = Span::ms(50);
 pub trait Audience {
     /// A frame left a card or came back.
     fn frame(&mut self, frame: &FrameSeen<'_>);
-    /// Room for a frame of at most 1,514 bytes that may be sent at `now`, where the audience keeps
-    /// frames: it is built there. After it was sent [`keep`](Self::keep) follows in place of
-    /// [`frame`](Self::frame).
+    /// Room for the longest frame that may be sent, or come back, at `now`, where the audience keeps
+    /// frames: it is built, or received, there. When it was, [`keep`](Self::keep) follows in place
+    /// of [`frame`](Self::frame).
     fn room(&mut self, _now: Instant) -> Option<&mut [u8]> {
         None
     }
-    /// The frame in [`room`](Self::room), so many bytes, has been sent.
-    fn keep(&mut self, _sent: &Passed, _len: usize) {}
+    /// The frame in [`room`](Self::room), so many bytes, has been sent or has come back.
+    fn keep(&mut self, _passed: &Passed, _len: usize) {}
     /// The host noticed something.
     fn host(&mut self, observation: &HostObservation);
     /// The MainDevice tells something.
@@ -72,7 +71,7 @@ impl<L: Line> Driver<L> {
         Self {
             main: MainDevice::new(Network::default(), options),
             line,
-            buffer: vec![0; MAX_LEN],
+            buffer: vec![0; FRAME_ROOM],
             frames: 0,
         }
     }
@@ -103,8 +102,8 @@ impl<L: Line> Driver<L> {
         audience: &mut impl Audience,
     ) -> Result<(), LinkError> {
         loop {
-            self.receive(audience)?;
             let now = self.line.now();
+            self.receive(now, audience)?;
             if let Some(due) = self.main.poll_cycle_timeout()
                 && due <= now
             {
@@ -117,7 +116,7 @@ impl<L: Line> Driver<L> {
                 audience.event(now, event, &mut self.main);
             }
             let goes_on = audience.turn(now, &mut self.main);
-            self.send(audience)?;
+            self.send(now, audience)?;
             if !goes_on || stop.is_set() || now >= until {
                 return Ok(());
             }
@@ -128,25 +127,21 @@ impl<L: Line> Driver<L> {
     }
 
     /// Takes in what has come back, and what the host noticed.
-    fn receive(&mut self, audience: &mut impl Audience) -> Result<(), LinkError> {
-        let Self { main, line, frames, .. } = self;
+    fn receive(&mut self, now: Instant, audience: &mut impl Audience) -> Result<(), LinkError> {
+        let Self { main, line, buffer, frames } = self;
         // Frames are judged at the time at which they are taken in, not at that of their stamp.
-        let now = line.now();
-        line.receive(&mut |frame| {
-            *frames += 1;
-            let seen = seen(*frames, frame.path, Direction::Received, frame.at, frame.bytes);
-            audience.frame(&FrameSeen { truncated: frame.truncated, ..seen });
-            if !frame.truncated {
-                main.handle_frame(frame.at.max(now), frame.path, frame.bytes);
-            }
-        })?;
-        line.look_at_host(&mut |observation| audience.host(observation))
+        let taking = &mut Taking { audience: &mut *audience, main, buffer, frames, now };
+        line.receive(now, taking)?;
+        line.look_at_host(now, &mut |observation| audience.host(observation))
     }
 
-    /// Sends what the MainDevice has to send.
-    fn send(&mut self, audience: &mut impl Audience) -> Result<(), LinkError> {
+    /// Sends what the MainDevice has to send at `now`, which is a little ago.
+    fn send(&mut self, now: Instant, audience: &mut impl Audience) -> Result<(), LinkError> {
         let Self { main, line, buffer, frames } = self;
         for _ in 0..MOST_FRAMES {
+            if !main.may_transmit(now) {
+                break;
+            }
             let now = line.now();
             if let Some(room) = audience.room(now) {
                 let Some(Transmit { path, len, .. }) = main.poll_transmit(now, room) else { break };
@@ -166,6 +161,49 @@ impl<L: Line> Driver<L> {
             }
         }
         Ok(())
+    }
+}
+
+/// Takes in frames: the MainDevice judges them, the audience keeps them.
+struct Taking<'a, A> {
+    audience: &'a mut A,
+    main: &'a mut MainDevice,
+    /// Where frames are received that the audience does not keep.
+    buffer: &'a mut [u8],
+    frames: &'a mut u64,
+    now: Instant,
+}
+
+impl<A: Audience> Intake for Taking<'_, A> {
+    fn room(&mut self) -> &mut [u8] {
+        match self.audience.room(self.now) {
+            Some(room) => room,
+            None => self.buffer,
+        }
+    }
+
+    fn arrived(&mut self, arrived: Arrived) {
+        let Arrived { at, path, len, truncated } = arrived;
+        *self.frames += 1;
+        let (number, direction) = (*self.frames, Direction::Received);
+        let at_once = at.max(self.now);
+        match self.audience.room(self.now) {
+            Some(room) => {
+                if !truncated && let Some(bytes) = room.get(..len) {
+                    self.main.handle_frame(at_once, path, bytes);
+                }
+                let passed = Passed { time: at, number, path: Some(path), direction, truncated };
+                self.audience.keep(&passed, len);
+            }
+            None => {
+                let Some(bytes) = self.buffer.get(..len) else { return };
+                let seen = seen(number, path, direction, at, bytes);
+                self.audience.frame(&FrameSeen { truncated, ..seen });
+                if !truncated {
+                    self.main.handle_frame(at_once, path, bytes);
+                }
+            }
+        }
     }
 }
 

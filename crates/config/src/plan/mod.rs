@@ -11,6 +11,7 @@ pub mod layout;
 pub mod lint;
 pub mod reference;
 pub mod settings;
+mod shift;
 pub mod task;
 pub mod variable;
 
@@ -24,6 +25,7 @@ use linesman_proto::port::PortMap;
 use linesman_proto::register::{FmmuConfig, SyncManagerConfig};
 use linesman_proto::sii::{Identity, PortKind};
 use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
 use linesman_proto::topology::Tree;
 
 use crate::identity::RevisionRule;
@@ -76,6 +78,8 @@ pub struct Plan {
     pub inputs_len: usize,
     /// What the bits of the process image are called, outputs first, in the order of their places.
     pub variables: Vec<Variable>,
+    /// The shift of the outputs, where it was chosen; see [`Plan::outputs_shift`].
+    pub outputs_shift: Option<Span>,
 }
 
 /// What one SubDevice is set up with.
@@ -159,6 +163,7 @@ impl Plan {
             outputs_len: 0,
             inputs_len: 0,
             variables: Vec::new(),
+            outputs_shift: None,
         }
     }
 

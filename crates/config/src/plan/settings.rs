@@ -100,7 +100,7 @@ pub struct ClockSettings {
     pub assign_activate: u16,
     /// Cycle of SYNC0.
     pub sync0_cycle: Span,
-    /// Where SYNC0 falls within the cycle, in ns after its begin.
+    /// How much later SYNC0 falls than the shift of the outputs says, in ns.
     pub sync0_shift_ns: i64,
     /// Cycle of SYNC1, register 0x09A4; 0 with a SYNC1 that follows SYNC0.
     pub sync1_cycle: Span,

@@ -34,6 +34,9 @@ pub struct Network {
     pub reinitialise: bool,
     /// Error counters are cleared before they stop at 255, unless a SubDevice says otherwise; else they are only read.
     pub clear_counters: bool,
+    /// From the frames to SYNC0, in µs; 30 % of the cycle unless said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outputs_shift_us: Option<u32>,
 }
 
 impl Default for Network {
@@ -48,6 +51,7 @@ impl Default for Network {
             restore_state: true,
             reinitialise: true,
             clear_counters: true,
+            outputs_shift_us: None,
         }
     }
 }
@@ -102,6 +106,7 @@ impl Network {
             pack_bits: self.pack_bits,
             clock_datagrams: true,
             mailbox_states: self.mailbox_states,
+            outputs_shift: self.outputs_shift_us.map(|us| Span::us(u64::from(us))),
             ..PlanOptions::default()
         }
     }
@@ -120,7 +125,7 @@ pub struct ClockChoice {
     /// Cycle of SYNC0 in µs; that of its task unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync0_cycle_us: Option<u32>,
-    /// Shift of SYNC0 in ns.
+    /// Shift of SYNC0 in ns, on top of the shift of the outputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync0_shift_ns: Option<i64>,
     /// Cycle of SYNC1 in µs.

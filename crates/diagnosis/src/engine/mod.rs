@@ -25,6 +25,10 @@ use watched::Watched;
 /// The rules are asked at most this often; what they find keeps the time of its evidence.
 const JUDGE_EVERY: Span = Span::ms(10);
 
+/// But they are asked this soon where something has just gone wrong and nothing is said yet: what a frame
+/// shows is told when it is back, not some cycles later.
+const JUDGE_ALARM_AFTER: Span = Span::us(50);
+
 /// Rules are asked again after so long although nothing new was learnt, while something is open: a
 /// counter that did *not* rise since tells as much as one that did.
 const JUDGE_AGAIN: Span = Span::ms(100);
@@ -201,9 +205,17 @@ impl Engine {
 
     fn judge_if_due(&mut self) {
         let now = self.now;
-        if now >= self.next_judgement && self.networks.iter().any(|watched| watched.is_due(now)) {
+        let is_due = self.networks.iter().any(|watched| watched.is_due(now));
+        if is_due && (now >= self.next_judgement || self.is_alarmed()) {
             self.judge();
         }
+    }
+
+    /// Whether something has gone wrong since the rules were last asked, and nothing is said of anything.
+    fn is_alarmed(&self) -> bool {
+        let is_new = |watched: &Watched| watched.alarms() != watched.judged_alarms;
+        let is_early = self.now + JUDGE_EVERY < self.next_judgement + JUDGE_ALARM_AFTER;
+        !is_early && !self.book.has_open() && self.networks.iter().any(is_new)
     }
 
     fn judge(&mut self) {
@@ -220,6 +232,7 @@ impl Engine {
                 watched.line.derive_tree();
             }
             watched.judged = watched.line.revision();
+            watched.judged_alarms = watched.alarms();
             watched.conditions.clear();
             let view = View { line: &watched.line, now, has_ended };
             for rule in RULES {

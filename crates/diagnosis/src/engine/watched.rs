@@ -28,6 +28,8 @@ pub(super) struct Watched {
     pub(super) learner: Learner,
     pub(super) pairing: Pairing,
     pub(super) judged: u64,
+    /// What had gone wrong when the rules were last asked.
+    pub(super) judged_alarms: (u64, u64),
     /// When to ask the rules again, though nothing new was learnt.
     pub(super) again: Option<Instant>,
     pub(super) conditions: Vec<Condition>,
@@ -48,6 +50,7 @@ impl Watched {
             learner,
             pairing: Pairing::default(),
             judged: 0,
+            judged_alarms: (0, 0),
             again: None,
             conditions: Vec::new(),
             probed: None,

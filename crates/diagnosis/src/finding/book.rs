@@ -135,6 +135,12 @@ impl Book {
         &self.findings
     }
 
+    /// Whether anything is wrong at present.
+    #[must_use]
+    pub fn has_open(&self) -> bool {
+        self.findings.iter().any(|finding| finding.closed.is_none())
+    }
+
     /// Findings that follow from no other one, worst first, then in order of time.
     #[must_use]
     pub fn roots(&self) -> Vec<&Finding> {
@@ -265,7 +271,10 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
         )
     };
     let after = if symptoms.iter().all(counted) { AFTER_COUNTED } else { AFTER };
+    // What is only worth knowing has done no harm: trouble must have another cause.
+    let is_harmless = |finding: &Finding| finding.condition.severity == Severity::Info;
     !symptoms.is_empty()
+        && (is_harmless(effect) || !is_harmless(cause))
         && !was_over(cause, effect, after)
         && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))
 }

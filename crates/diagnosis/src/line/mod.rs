@@ -160,6 +160,7 @@ impl Line {
             }
             self.host.begin_spell();
             self.traffic.lost.begin_spell();
+            self.traffic.copies_lost.iter_mut().for_each(Tally::begin_spell);
         }
         self.last_errors = self.last_errors.max(Some(at));
     }

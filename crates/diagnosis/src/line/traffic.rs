@@ -60,6 +60,8 @@ pub struct Traffic {
     pub returned: u64,
     /// Frames whose way out was seen and whose return was not, though others came back later.
     pub lost: Tally,
+    /// Of those of which the copy of one card came back: how many did not come to this card.
+    pub copies_lost: [Tally; 2],
     /// The first lost frame.
     pub first_lost: Option<Seen<()>>,
     /// The latest lost frame.

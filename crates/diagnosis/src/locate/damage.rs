@@ -9,7 +9,7 @@
 use linesman_proto::address::Path;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Hop, Route};
 
 use super::survey::Survey;
@@ -105,6 +105,9 @@ impl Located {
         located
     }
 }
+
+/// Links that come up together with the computer spoil the first frames; those are not missed.
+const COMING_UP: Span = Span::ms(100);
 
 /// Whether a counter stood at its end already when the present errors began.
 fn is_stuck(track: &CounterTrack) -> bool {
@@ -351,12 +354,15 @@ impl Walk<'_, '_> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
         let line = self.survey.line();
-        let lost = line.traffic.lost;
+        // In a ring one of the two copies is lost at a time.
+        let copies = line.traffic.copies_lost[card.index()];
+        let lost = if line.traffic.lost.of_spell() == 0 { copies } else { line.traffic.lost };
         let (first, last) = (lost.first_of_spell?, lost.last?);
         let is_silent = self.carried.frames == 0 && !line.host.is_watched;
         // Counters that were read before the frame was missed say nothing of it.
         let is_read = self.is_read && self.horizon >= first;
-        let is_explained = self.survey.any_link_changed(first, last);
+        let is_first = line.traffic.first.is_some_and(|begin| last < begin + COMING_UP);
+        let is_explained = is_first || self.survey.any_link_changed(first, last);
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,
             card,

@@ -4,7 +4,7 @@
 //! they change working counters, positions and data. The former pair a frame with its request, the
 //! latter tell the two apart where the capture does not.
 
-use linesman_proto::command::Addressing;
+use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::FrameView;
 
 /// Both halves of a frame, hashed.
@@ -15,6 +15,11 @@ pub struct Fingerprint {
     /// Working counters and positions: a frame that any controller answered differs from its
     /// request.
     pub changing: u64,
+    /// What the copies of a request for both cards of a ring have in common, though one of them has some
+    /// commands replaced by NOP.
+    pub skeleton: u64,
+    /// Datagrams that are no NOP.
+    pub commands: u32,
     /// Whether any working counter is above 0.
     pub is_answered: bool,
     /// Datagrams that could be read.
@@ -27,8 +32,15 @@ impl Fingerprint {
     /// Of the datagrams of a frame.
     #[must_use]
     pub fn of(view: &FrameView<'_>) -> Self {
-        let mut print =
-            Self { lasting: 0, changing: 0, is_answered: false, datagrams: 0, is_cut: false };
+        let mut print = Self {
+            lasting: 0,
+            changing: 0,
+            skeleton: 0,
+            commands: 0,
+            is_answered: false,
+            datagrams: 0,
+            is_cut: false,
+        };
         for datagram in view.datagrams() {
             let Ok(datagram) = datagram else {
                 print.is_cut = true;
@@ -40,10 +52,11 @@ impl Fingerprint {
             let address = u64::from(datagram.logical().0);
             let (lasting, changing) =
                 if is_position { (address >> 16, address & 0xFFFF) } else { (address, 0) };
-            let head = u64::from(datagram.code()) << 56
-                | u64::from(datagram.index()) << 48
-                | (datagram.data_len() as u64) << 32;
+            let tail = u64::from(datagram.index()) << 48 | (datagram.data_len() as u64) << 32;
+            let head = u64::from(datagram.code()) << 56 | tail;
             let wkc = u64::from(datagram.wkc().0);
+            print.skeleton = mix(print.skeleton, tail | address);
+            print.commands += u32::from(datagram.command() != Some(Command::Nop));
             print.lasting = mix(print.lasting, head | lasting);
             print.changing = mix(print.changing, changing << 16 | wkc);
             print.is_answered |= wkc > 0;

@@ -7,8 +7,10 @@
 //! new request otherwise.
 //!
 //! Frames of one line come back in the order in which they were sent, so a request that later ones
-//! overtook is lost. Time stamps decide nothing here but for live sockets, since those of captures
-//! jump and run backwards.
+//! overtook is lost. What was recorded is not quite in that order, though: a card takes frames from several
+//! queues, and a long frame among many short ones is noted late. So a few that overtake a request lose it
+//! only when it has been out for long; where time stamps do not tell, since those of captures jump and run
+//! backwards, many do.
 
 use std::collections::VecDeque;
 
@@ -22,8 +24,13 @@ use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen, Sender};
 
 /// Most requests waiting for their return; beyond, the oldest is lost.
 const MOST_PENDING: usize = 256;
-/// So many later returns make a request lost: far more than two paths can reorder.
+/// So many later returns make a request lost that has been out for longer than [`REORDERED`].
 const OVERTAKEN: u16 = 16;
+/// So many do at any time: far more than short frames can be noted before a long one.
+const OVERTAKEN_BY_MANY: u16 = 64;
+/// Within this time frames may be noted in another order than they went: the longest one takes 123 µs,
+/// and waits for others.
+const REORDERED: Span = Span::ms(1);
 /// On a live socket a frame that is not back by then never comes.
 const TIMEOUT: Span = Span::ms(100);
 /// Two equal requests closer than this are one that was recorded twice: the shortest frame takes
@@ -35,6 +42,8 @@ const MOST_IN_FLIGHT: usize = 32;
 const IN_FLIGHT: Span = Span::ms(5);
 /// The copy for the other card of a ring follows within this time.
 const OTHER_CARD: Span = Span::ms(1);
+/// When both copies of so many later requests have come back, the ring is whole.
+const STILL_WHOLE: u64 = 4;
 /// How many returns are remembered to know one that was recorded twice.
 const REMEMBERED: usize = 8;
 
@@ -66,6 +75,10 @@ pub struct Pairing {
     one_way: OneWay,
     /// The second card of a ring, where cards are not told apart: it sends what the first one sends.
     other_card: Option<MacAddress>,
+    /// Requests of which both copies came back.
+    whole: u64,
+    /// Whether that is so of the latest one of which it is known.
+    was_whole: bool,
     /// Returns that were taken for requests, since this was asked.
     mistaken: u64,
 }
@@ -92,10 +105,16 @@ struct Pending {
     source: MacAddress,
     /// Who sent the same at the same time: the other card of a ring, where cards are not told apart.
     copy_by: Option<MacAddress>,
+    /// Whether it is a copy for the other card with less in it.
+    is_part: bool,
     is_live: bool,
     sent: [bool; 2],
     /// Copies that are still out.
     out: u8,
+    /// Requests of which both copies had come back when it went out, if the latest one was one of them.
+    whole_before: Option<u64>,
+    /// The card to which the first copy came back.
+    came_to: Path,
     overtaken: u16,
     returns_before: u64,
     /// Working counters of copies that came back.
@@ -145,6 +164,8 @@ impl Pairing {
                 is_last: true,
                 returns_before: self.returns,
                 is_cut_off: false,
+                is_part: false,
+                copy_lost: None,
             });
             self.returns += 1;
             return Outcome::ReturnAlone;
@@ -254,6 +275,8 @@ impl Pairing {
                         is_last: true,
                         returns_before,
                         is_cut_off: false,
+                        is_part: false,
+                        copy_lost: None,
                     });
                     self.returns += 1;
                     self.mistaken += 1;
@@ -320,6 +343,13 @@ impl Pairing {
             return Outcome::Duplicate;
         }
         self.senders.note(frame, source, is_repeated);
+        let has_more = |pending: &Pending| {
+            pending.print.skeleton == print.skeleton
+                && pending.print.commands > print.commands
+                && (pending.source, pending.path) != (source, frame.path)
+                && gap(pending.time, frame.time) <= OTHER_CARD
+        };
+        let is_part = self.pending.iter().rev().take(8).any(has_more);
         if self.pending.len() >= MOST_PENDING {
             self.lose(0, false, settle);
         }
@@ -338,9 +368,12 @@ impl Pairing {
             path: frame.path,
             source,
             copy_by: None,
+            is_part,
             is_live: frame.direction != Direction::Unknown,
             sent,
             out: 1,
+            whole_before: self.was_whole.then_some(self.whole),
+            came_to: Path::A,
             overtaken: 0,
             returns_before: self.returns,
             sums,
@@ -383,6 +416,15 @@ impl Pairing {
         let pending = &mut self.pending[found];
         pending.out -= 1;
         let is_last = pending.out == 0;
+        if !is_last {
+            // While the ring is whole, what one card sends comes to the other one.
+            let is_other = self.other_card.is_some_and(|other| other == view.source());
+            let guess = if is_other { Path::A } else { Path::B };
+            pending.came_to = frame.path.unwrap_or(guess);
+        } else if !pending.sums.is_empty() {
+            self.whole += 1;
+            self.was_whole = true;
+        }
         settle(&Exchange {
             request: Some(pending.copy()),
             reply: Some(copy(frame)),
@@ -390,6 +432,8 @@ impl Pairing {
             is_last,
             returns_before: pending.returns_before,
             is_cut_off: false,
+            is_part: pending.is_part,
+            copy_lost: None,
         });
         if is_last {
             self.remove(found);
@@ -404,16 +448,20 @@ impl Pairing {
             }
         }
         if found > 0 {
-            self.overtake(found, settle);
+            self.overtake(found, frame.time, settle);
         }
     }
 
     /// Everything sent before the request at `found` was overtaken once more.
-    fn overtake(&mut self, found: usize, settle: &mut impl FnMut(&Exchange<'_>)) {
+    fn overtake(&mut self, found: usize, now: Instant, settle: &mut impl FnMut(&Exchange<'_>)) {
         for pending in self.pending.iter_mut().take(found) {
             pending.overtaken += 1;
         }
-        while self.pending.front().is_some_and(|oldest| oldest.overtaken >= OVERTAKEN) {
+        let is_lost = |oldest: &Pending| {
+            oldest.overtaken >= OVERTAKEN_BY_MANY
+                || (oldest.overtaken >= OVERTAKEN && gap(oldest.time, now) > REORDERED)
+        };
+        while self.pending.front().is_some_and(is_lost) {
             self.lose(0, false, settle);
         }
     }
@@ -421,6 +469,16 @@ impl Pairing {
     /// Gives up on a request; what came back of its copies counts.
     fn lose(&mut self, index: usize, is_cut_off: bool, settle: &mut impl FnMut(&Exchange<'_>)) {
         let Some(pending) = self.pending.get(index) else { return };
+        let mut copy_lost = None;
+        if pending.out == 1 && !pending.sums.is_empty() && !is_cut_off {
+            // A ring that was opened loses all copies; one that is whole loses single ones.
+            let since = pending.whole_before.map(|before| self.whole - before);
+            if since.is_some_and(|since| since >= STILL_WHOLE) {
+                copy_lost = Some(if pending.came_to == Path::A { Path::B } else { Path::A });
+            } else {
+                self.was_whole = false;
+            }
+        }
         settle(&Exchange {
             request: Some(pending.copy()),
             reply: None,
@@ -428,6 +486,8 @@ impl Pairing {
             is_last: true,
             returns_before: pending.returns_before,
             is_cut_off,
+            is_part: pending.is_part,
+            copy_lost,
         });
         self.remove(index);
     }

@@ -8,7 +8,7 @@ use linesman_proto::topology::End;
 
 use super::{
     AlternativeReport, DirectionReport, EndReport, EvidenceReport, FindingReport, FindingState,
-    Number, PlaceReport,
+    Number, PlaceReport, calibration,
 };
 use crate::finding::{
     Alternative, Book, Evidence, Finding, LinkDirection, LinkEnd, Place, told_apart_by,
@@ -52,11 +52,11 @@ pub fn alone(finding: &Finding) -> FindingReport {
         closed_ns: finding.closed.map(time),
         place: place(&condition.place),
         cause: condition.cause,
-        confidence: rounded(condition.confidence),
+        confidence: rounded(calibration::measured(condition.confidence)),
         alternatives: condition
             .alternatives
             .iter()
-            .map(|other| alternative(condition.cause, other))
+            .map(|other| alternative(condition.cause, condition.confidence, other))
             .collect(),
         evidence: condition.evidence.iter().map(evidence).collect(),
         actions: condition.actions.clone(),
@@ -95,11 +95,11 @@ fn end(end: LinkEnd) -> EndReport {
     }
 }
 
-fn alternative(first: FaultName, alternative: &Alternative) -> AlternativeReport {
+fn alternative(first: FaultName, said: f64, alternative: &Alternative) -> AlternativeReport {
     AlternativeReport {
         cause: alternative.cause,
         place: alternative.place.as_ref().map(place),
-        confidence: rounded(alternative.confidence),
+        confidence: rounded(calibration::beside(said, alternative.confidence)),
         told_apart_by: told_apart_by(first, alternative.cause).map(str::to_owned),
     }
 }

@@ -4,6 +4,7 @@
 //! every reader of JSON keeps them.
 
 pub mod build;
+mod calibration;
 pub mod number;
 
 use linesman_config::fault::{Class, FaultName};

@@ -5,8 +5,8 @@
 //! **How it is found.** A line takes the same time for the same frame, to some nanoseconds; what a frame waits
 //! for on its card is the frame before it. One that takes 60 µs more than the shortest of its length, and far
 //! more than this computer usually wanders, was kept back. Many in a row that take the same longer time took
-//! another way: no finding; nor is it one as long as no process data are exchanged in a cycle, or in a recording
-//! where nobody keeps step with SYNC signals.
+//! another way: no finding; nor is it one as long as no process data are exchanged in a cycle. A recording tells
+//! it too, since it has the times at which frames went out and came back.
 //!
 //! **What it means.** The line is well: no controller counts anything. The computer, its card, a switch or a
 //! converter in between kept the frame back. Single frames now and then are the computer's: interrupts, another
@@ -48,10 +48,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
     let trips = &line.trips;
     let Some(last) = trips.late.back() else { return };
-    // Nobody waits for a frame that is sent when its sender likes; and what a recorder on another
-    // computer saw late does no harm where nobody keeps step.
+    // Nobody waits for a frame that is sent when its sender likes.
     let keeps_step = line.devices.iter().any(|device| device.sync_on.is_some_and(|on| on.value));
-    if shortest_cycle(line).is_none() || !(keeps_step || line.traffic.direction_known) {
+    if shortest_cycle(line).is_none() {
         return;
     }
     let mut first = last;

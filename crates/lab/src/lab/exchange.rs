@@ -152,32 +152,33 @@ impl Lab {
             let port = self.segment.host(path);
             let before = self.host_last[path.index()].replace(port);
             let last = before.unwrap_or_default();
-            let mut note = |what| {
-                let observation =
-                    HostObservation { network: self.network, path, time: self.now, what };
-                self.engine.handle_host(&observation);
-                if let Some(tap) = &mut self.host_tap {
-                    tap(&observation);
-                }
-            };
+            let (failures, crc) =
+                (port.tx_dropped - last.tx_dropped, port.rx_crc_errors - last.rx_crc_errors);
             if before.is_none_or(|before| before.carrier != port.carrier) {
-                note(HostEvent::Carrier(port.carrier));
+                self.observe_host(path, HostEvent::Carrier(port.carrier));
             }
-            let failures = port.tx_dropped - last.tx_dropped;
             if failures > 0 {
-                note(HostEvent::SendFailures(failures));
+                self.observe_host(path, HostEvent::SendFailures(failures));
             }
             if self.options.host_counters {
-                let crc = port.rx_crc_errors - last.rx_crc_errors;
                 let other = port.rx_length_errors - last.rx_length_errors;
                 if crc + other > 0 {
-                    note(HostEvent::CardErrors { crc, other });
+                    self.observe_host(path, HostEvent::CardErrors { crc, other });
                 }
                 let dropped = port.rx_dropped - last.rx_dropped;
                 if dropped > 0 {
-                    note(HostEvent::CardDrops(dropped));
+                    self.observe_host(path, HostEvent::CardDrops(dropped));
                 }
             }
+        }
+    }
+
+    /// The host sees something of a card: of one of the segment, or of one that is not used.
+    pub fn observe_host(&mut self, path: Path, what: HostEvent) {
+        let observation = HostObservation { network: self.network, path, time: self.now, what };
+        self.engine.handle_host(&observation);
+        if let Some(tap) = &mut self.host_tap {
+            tap(&observation);
         }
     }
 }

@@ -1,7 +1,8 @@
 //! What is done to a healthy line that is no fault: whatever the diagnosis makes of it is a false alarm.
 
 use linesman_config::fault::FaultName;
-use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_diagnosis::observe::HostEvent;
+use linesman_proto::address::{DeviceId, Path, RegisterAddress};
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
@@ -32,11 +33,18 @@ enum Disturbance {
     StopByOrder,
     /// The application moves its outputs.
     Outputs,
+    /// The application is ended, and started anew by the same plan.
+    StopAndStart,
+    /// The second socket of the computer, which this line does not use, has no link, has one, has none.
+    UnusedCard,
 }
 
-use Disturbance::{Jitter, Outputs, ReadingTool, SlowDevice, StateByOrder, StopByOrder};
+use Disturbance::{
+    Jitter, Outputs, ReadingTool, SlowDevice, StateByOrder, StopAndStart, StopByOrder, UnusedCard,
+};
 
-const ALL: [Disturbance; 6] = [Jitter, SlowDevice, ReadingTool, StateByOrder, StopByOrder, Outputs];
+const ALL: [Disturbance; 8] =
+    [Jitter, SlowDevice, ReadingTool, StateByOrder, StopByOrder, Outputs, StopAndStart, UnusedCard];
 
 /// Does some of it, one after the other, in an order drawn by chance.
 ///
@@ -62,8 +70,6 @@ fn once(
 ) -> Result<(), LabError> {
     let lasts = Span::us(stream.between(300_000, 900_000));
     match disturbance {
-        // In the lab frames come just before SYNC0, so that any delay costs the step: that is no noise.
-        Jitter if lab.options().clocks => {}
         Jitter => {
             let share = stream.log_uniform(JITTER.0, JITTER.1);
             let late_us = (cycle.as_nanos() as f64 / 1e3 * share).max(0.2);
@@ -96,6 +102,24 @@ fn once(
         }
         StateByOrder => order(lab, Some(device), AlState::PreOp, lasts)?,
         StopByOrder => order(lab, None, AlState::SafeOp, lasts)?,
+        StopAndStart => {
+            let Some(plan) = lab.plan().cloned() else { return Ok(()) };
+            let down = if stream.chance(0.5) { AlState::Init } else { AlState::PreOp };
+            let now = lab.now();
+            lab.main_mut().stop(now, down);
+            lab.run_until(now + lasts * 2)?;
+            let now = lab.now();
+            lab.main_mut().start(now, plan);
+            lab.run_while(BACK, Span::ms(20), Lab::is_up)?;
+        }
+        // In a ring the second card is in use.
+        UnusedCard if lab.tree().closes_at().is_some() => {}
+        UnusedCard => {
+            for has_link in [false, true, false] {
+                lab.observe_host(Path::B, HostEvent::Carrier(has_link));
+                lab.run_until(lab.now() + lasts)?;
+            }
+        }
         Outputs => {
             for _ in 0..40 {
                 for byte in lab.main_mut().outputs_mut() {

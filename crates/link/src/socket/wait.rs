@@ -2,7 +2,7 @@
 //!
 //! Reference: ppoll(2).
 
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 
@@ -58,14 +58,23 @@ pub fn wait_any<const N: usize>(
     clock: &HostClock,
     deadline: Instant,
 ) -> Result<Ready, LinkError> {
+    let left = (deadline != Instant::MAX).then(|| deadline.since(clock.now()));
+    wait_for(sockets, left)
+}
+
+/// The same for who has just read the clock: waits so long at most; `None` waits without end.
+///
+/// # Errors
+/// When the kernel refuses to wait.
+pub fn wait_for<const N: usize>(
+    sockets: [&dyn Waitable; N],
+    left: Option<Span>,
+) -> Result<Ready, LinkError> {
     let waited = sockets.map(|socket| socket.polled());
     let mut polled = std::array::from_fn::<_, N, _>(|index| {
         PollFd::from_borrowed_fd(waited[index].socket, PollFlags::IN)
     });
-    let left = match deadline {
-        Instant::MAX => None,
-        _ => Some(timespec(deadline.since(clock.now()).as_nanos())),
-    };
+    let left = left.map(|left| timespec(left.as_nanos()));
     match poll(&mut polled, left.as_ref()) {
         Ok(0) => Ok(Ready::Deadline),
         Ok(_) => Ok(Ready::Readable),

@@ -21,6 +21,8 @@ pub(super) struct Application {
     seen: u64,
     missed: u32,
     withheld: bool,
+    /// It has begun, and missed none the last time.
+    in_time: bool,
 }
 
 /// What a cycle found.
@@ -56,7 +58,15 @@ impl Judged {
 
 impl Application {
     pub(super) const fn new(allowed: Option<u32>) -> Self {
-        Self { allowed, begun: false, fresh: false, seen: 0, missed: 0, withheld: false }
+        Self {
+            allowed,
+            begun: false,
+            fresh: false,
+            seen: 0,
+            missed: 0,
+            withheld: false,
+            in_time: false,
+        }
     }
 
     /// It gives the outputs of this task.
@@ -69,10 +79,22 @@ impl Application {
     /// application is in time, as before, or is not watched.
     #[inline]
     pub(super) fn begin_cycle(&mut self, given: u64) -> Option<Judged> {
+        if self.seen != given && self.in_time {
+            self.seen = given;
+            self.fresh = false;
+            return None;
+        }
+        self.look(given)
+    }
+
+    #[inline(never)]
+    fn look(&mut self, given: u64) -> Option<Judged> {
         let fresh = std::mem::replace(&mut self.fresh, false) | (self.seen != given);
         self.seen = given;
         self.begun |= fresh;
-        if fresh && self.missed == 0 { None } else { self.judge(fresh) }
+        let judged = if fresh && self.missed == 0 { None } else { self.judge(fresh) };
+        self.in_time = self.begun && self.missed == 0;
+        judged
     }
 
     fn judge(&mut self, fresh: bool) -> Option<Judged> {

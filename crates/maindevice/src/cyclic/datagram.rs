@@ -6,7 +6,7 @@ use linesman_proto::address::{DeviceId, WorkingCounter};
 use linesman_proto::sii::Direction;
 use linesman_proto::time::Instant;
 
-use super::run::{self, Run};
+use super::run::Runs;
 use crate::event::Event;
 use crate::exchange::prebuilt;
 
@@ -22,12 +22,14 @@ pub(super) struct Datagram {
     wkc_at: usize,
     /// What it must come back with: as planned, and with its outputs withheld.
     expected: [Expected; 2],
+    /// The same, where it carries process data and came back so the last time; else nothing fits.
+    usual: [Usual; 2],
     /// The datagram with its outputs withheld, where that makes a difference.
     without_outputs: Option<DatagramPlan>,
     /// Inputs of those that surely give theirs.
-    inputs: Vec<Run>,
+    inputs: Runs,
     /// Inputs that become zero when the working counter is wrong.
-    cleared: Vec<Run>,
+    cleared: Runs,
     /// Whether it came back as it should the last time.
     pub(super) good: bool,
     /// When that was last the case.
@@ -36,6 +38,31 @@ pub(super) struct Datagram {
     pub(super) receipts: u64,
     /// The wrong counter that was last told of; `None` when all is well.
     pub(super) told: Option<WorkingCounter>,
+}
+
+/// Working counters with which a datagram comes back nearly always: from the least on, so many more.
+#[derive(Clone, Copy, Debug)]
+struct Usual {
+    least: u32,
+    more: u32,
+}
+
+impl Usual {
+    /// No working counter fits.
+    const NONE: Self = Self { least: u32::MAX, more: 0 };
+
+    fn new(expected: Expected) -> Self {
+        let Expected { least, most } = expected;
+        match most.0.checked_sub(least.0) {
+            Some(more) => Self { least: u32::from(least.0), more: u32::from(more) },
+            None => Self::NONE,
+        }
+    }
+
+    #[inline]
+    fn fits(self, wkc: WorkingCounter) -> bool {
+        u32::from(wkc.0).wrapping_sub(self.least) <= self.more
+    }
 }
 
 /// Where a datagram is among those of a plan.
@@ -68,13 +95,13 @@ impl Datagram {
     pub(super) fn new(plan: &Plan, datagram: &DatagramPlan, data_at: usize) -> Self {
         let command = prebuilt::withheld(datagram.command);
         let differs = command != datagram.command;
-        let mut cleared = Vec::new();
+        let mut cleared = Runs::default();
         for owned in &datagram.ownership {
             let clears = plan
                 .device(owned.device)
                 .is_some_and(|device| device.settings.on_wrong_counter == OnWrongCounter::Clear);
             if owned.direction == Direction::Inputs && clears {
-                run::push(&mut cleared, owned, data_at);
+                cleared.push(owned, data_at);
             }
         }
         // Room for every bit-wise run, so that taking over who is present allocates nothing.
@@ -88,8 +115,9 @@ impl Datagram {
             len: datagram.len,
             wkc_at: data_at + datagram.len,
             expected: [Expected::default(); 2],
+            usual: [Usual::NONE; 2],
             without_outputs: differs.then(|| DatagramPlan { command, ..datagram.clone() }),
-            inputs: Vec::with_capacity(most.sum()),
+            inputs: Runs::with_room(most.sum()),
             cleared,
             good: false,
             good_at: None,
@@ -106,12 +134,20 @@ impl Datagram {
         };
         let planned = expected(plan);
         self.expected = [planned, self.without_outputs.as_ref().map_or(planned, expected)];
+        self.note_usual();
         self.inputs.clear();
         for owned in &plan.ownership {
             if owned.direction == Direction::Inputs && least.of(owned.device).inputs {
-                run::push(&mut self.inputs, owned, self.data_at);
+                self.inputs.push(owned, self.data_at);
             }
         }
+    }
+
+    fn note_usual(&mut self) {
+        self.usual = match self.role == Role::ProcessData && self.told.is_none() {
+            true => self.expected.map(Usual::new),
+            false => [Usual::NONE; 2],
+        };
     }
 
     /// The working counter in a frame that came back.
@@ -129,22 +165,23 @@ impl Datagram {
     /// Whether it carries process data and came back as it should, as the last time.
     #[inline]
     pub(super) fn is_usual(&self, withheld: bool, wkc: WorkingCounter) -> bool {
-        self.role == Role::ProcessData && self.told.is_none() && self.expected(withheld).fits(wkc)
+        self.usual[usize::from(withheld)].fits(wkc)
     }
 
     /// It came back as it should: its inputs are taken over.
     #[inline]
     pub(super) fn take(&mut self, now: Instant, frame: &[u8], inputs: &mut [u8]) {
-        run::take(&self.inputs, frame, inputs);
         self.good = true;
         self.good_at = Some(now);
         self.receipts += 1;
+        self.inputs.take(frame, inputs);
     }
 
     /// Tells that it comes back as it should again.
     #[cold]
     pub(super) fn tell_good(&mut self, place: Place, events: &mut impl FnMut(Event)) {
         self.told = None;
+        self.note_usual();
         let Place { task, frame, datagram } = place;
         events(Event::WorkingCounterGood { task, frame, datagram });
     }
@@ -159,6 +196,7 @@ impl Datagram {
         events: &mut impl FnMut(Event),
     ) {
         self.told = Some(received);
+        self.note_usual();
         let Place { task, frame, datagram } = place;
         let expected = self.expected(withheld);
         let expected = received.clamp(expected.least, expected.most);
@@ -169,7 +207,7 @@ impl Datagram {
     #[cold]
     pub(super) fn refuse(&mut self, inputs: &mut [u8]) {
         self.good = false;
-        run::clear_image(&self.cleared, inputs);
+        self.cleared.clear_image(inputs);
     }
 }
 

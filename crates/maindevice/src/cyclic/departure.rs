@@ -1,5 +1,6 @@
 //! Frames of a task that leave together, and how a task fares with what comes back.
 
+use std::ops::Range;
 use std::sync::Mutex;
 
 use linesman_proto::time::{Instant, Span};
@@ -20,8 +21,8 @@ pub(super) struct Departure {
     pub(super) cycle: Span,
     /// The cycle of the task begins with it.
     pub(super) begins: bool,
-    /// Their indices among those of all tasks.
-    pub(super) frames: Vec<u32>,
+    /// Their places in the order of departures.
+    pub(super) frames: Range<usize>,
 }
 
 #[derive(Debug)]
@@ -72,7 +73,7 @@ impl TaskState {
     #[inline]
     pub(super) fn came(&mut self, out: &mut bool, more: bool) {
         if std::mem::replace(out, false) {
-            self.out = self.out.saturating_sub(1);
+            self.out = self.out.wrapping_sub(1);
             self.exchanged |= self.out == 0 && !more;
         }
     }

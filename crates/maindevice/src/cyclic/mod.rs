@@ -17,6 +17,7 @@ mod run;
 mod send;
 mod steer;
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -31,7 +32,7 @@ use self::application::Application;
 use self::datagram::{Datagram, Place, clear_lost};
 use self::departure::{Departure, LOST_IS_NEWS, TaskState};
 use self::quality::Share;
-use self::run::Run;
+use self::run::Runs;
 use self::steer::Steer;
 use crate::event::Event;
 use crate::exchange::Exchange;
@@ -49,10 +50,8 @@ struct Frame {
     task: usize,
     /// Its number within the task.
     number: usize,
-    /// How often it is sent at once.
-    times: u8,
     /// Where outputs go into it.
-    outputs: Vec<Run>,
+    outputs: Runs,
     datagrams: Vec<Datagram>,
     /// Bits of the datagrams that carry outputs, and of all.
     carries: u16,
@@ -76,9 +75,11 @@ pub(crate) struct Cyclic {
     frames: Vec<Frame>,
     /// When the first departure is due.
     next_at: Instant,
-    /// The departure whose frames leave now, and how many of them are left.
+    /// The departure whose frames leave now, and which of them are left, as places in the order.
     leaving: usize,
-    left: usize,
+    left: Range<usize>,
+    /// The frames in the order of departures, by their indices among those of all tasks.
+    order: Vec<u32>,
     /// When they are given up.
     deadline: Instant,
     /// How often the application has given the outputs of all tasks.
@@ -107,26 +108,36 @@ impl Cyclic {
         now: Instant,
     ) -> Self {
         exchange.prebuild(plan.tasks.iter().flat_map(|task| task.frames.iter().cloned()));
-        let (mut frames, mut departures) = (Vec::new(), Vec::<Departure>::new());
+        let (mut frames, mut departures) = (Vec::new(), Vec::<(Departure, Vec<u32>)>::new());
         for (index, task) in plan.tasks.iter().enumerate() {
             let earliest = task.frames.iter().map(|frame| frame.ahead).max().unwrap_or_default();
             let latest = task.frames.iter().map(|frame| frame.ahead).min().unwrap_or_default();
             for (number, planned) in task.frames.iter().enumerate() {
                 let next_at = now + earliest.saturating_sub(planned.ahead);
-                let same = |one: &&mut Departure| one.task == index && one.next_at == next_at;
+                let same = |(one, _): &&mut (Departure, Vec<u32>)| {
+                    one.task == index && one.next_at == next_at
+                };
                 match departures.iter_mut().find(same) {
-                    Some(departure) => departure.frames.push(frames.len() as u32),
-                    None => departures.push(Departure {
-                        task: index,
-                        next_at,
-                        cycle: task.cycle.max(Span::ns(1)),
-                        begins: planned.ahead == latest,
-                        frames: vec![frames.len() as u32],
-                    }),
+                    Some((_, leaving)) => leaving.push(frames.len() as u32),
+                    None => {
+                        let cycle = task.cycle.max(Span::ns(1));
+                        let begins = planned.ahead == latest;
+                        let departure =
+                            Departure { task: index, next_at, cycle, begins, frames: 0..0 };
+                        departures.push((departure, vec![frames.len() as u32]));
+                    }
                 }
                 frames.push(Frame::new(&plan, index, number));
             }
         }
+        let mut order = Vec::new();
+        let place = |(mut departure, leaving): (Departure, Vec<u32>)| {
+            let first = order.len();
+            order.extend(leaving);
+            departure.frames = first..order.len();
+            departure
+        };
+        let departures: Vec<Departure> = departures.into_iter().map(place).collect();
         let task = |_| TaskState {
             lost: 0,
             out: 0,
@@ -140,7 +151,8 @@ impl Cyclic {
             frames,
             next_at: now,
             leaving: 0,
-            left: 0,
+            left: 0..0,
+            order,
             deadline: now,
             given: 0,
             least: Presence::none(plan.devices.len()),
@@ -213,7 +225,7 @@ impl Cyclic {
     /// Whether a frame leaves at `now`.
     #[inline]
     pub(crate) fn is_due(&self, now: Instant) -> bool {
-        self.left > 0 || self.next_at <= now
+        !self.left.is_empty() || self.next_at <= now
     }
 
     /// A frame came back.
@@ -227,22 +239,32 @@ impl Cyclic {
         statistics: &mut Statistics,
         events: &mut impl FnMut(Event),
     ) {
-        self.refresh();
-        let more = self.left > 0 && self.is_leaving(index);
+        let live = self.live.load(Ordering::Relaxed);
+        if self.frames.get(index as usize).is_none_or(|frame| frame.version != live) {
+            self.catch_up(index);
+        }
+        let more = !self.left.is_empty() && self.is_leaving(index);
         let Some(frame) = self.frames.get_mut(index as usize) else { return };
         let Some(state) = self.tasks.get_mut(frame.task) else { return };
         state.came(&mut frame.out, more);
         if state.lost > 0 {
             state.found(frame.task, &self.line, events);
         }
-        if frame.version != self.version {
-            frame.version = self.version;
-            let Self { plan, least, most, shares, inputs, .. } = self;
-            frame.take_over(plan, index, least, most, shares, inputs);
+        if let [only] = frame.datagrams.as_mut_slice()
+            && let Some(wkc) = only.counter(reply)
+            && only.is_usual(withheld, wkc)
+        {
+            frame.status.wrong_counter = 0;
+            frame.status.input_toggle ^= frame.all;
+            only.take(now, reply, &mut self.inputs);
+            return;
         }
-        for (at, datagram) in frame.datagrams.iter_mut().enumerate() {
+        let mut datagrams = frame.datagrams.iter_mut();
+        while let Some(datagram) = datagrams.next() {
             let Some(wkc) = datagram.counter(reply) else { return };
             if !datagram.is_usual(withheld, wkc) {
+                let behind = datagrams.len();
+                let at = frame.datagrams.len() - 1 - behind;
                 return self
                     .received_otherwise(now, index, at, withheld, reply, statistics, events);
             }
@@ -250,6 +272,19 @@ impl Cyclic {
         }
         frame.status.wrong_counter = 0;
         frame.status.input_toggle ^= frame.all;
+    }
+
+    /// A frame's expectations are made anew, of who is present now.
+    #[cold]
+    fn catch_up(&mut self, index: u32) {
+        self.refresh();
+        let Self { plan, least, most, shares, inputs, version, .. } = self;
+        if let Some(frame) = self.frames.get_mut(index as usize)
+            && frame.version != *version
+        {
+            frame.version = *version;
+            frame.take_over(plan, index, least, most, shares, inputs);
+        }
     }
 
     /// The datagrams from `first` on: those before it were as they should be.
@@ -335,7 +370,7 @@ impl Cyclic {
 
     /// A frame did not come back.
     pub(crate) fn lost(&mut self, index: u32, events: &mut impl FnMut(Event)) {
-        let more = self.left > 0 && self.is_leaving(index);
+        let more = !self.left.is_empty() && self.is_leaving(index);
         let Some(frame) = self.frames.get_mut(index as usize) else { return };
         frame.status.wrong_counter = FrameStatus::WHOLE;
         for datagram in &mut frame.datagrams {
@@ -365,11 +400,11 @@ impl Cyclic {
 impl Frame {
     fn new(plan: &Plan, task: usize, number: usize) -> Self {
         let planned = &plan.tasks[task].frames[number];
-        let (mut outputs, mut datagrams, mut carries) = (Vec::new(), Vec::new(), 0);
+        let (mut outputs, mut datagrams, mut carries) = (Runs::default(), Vec::new(), 0);
         for (at, (one, data_at)) in planned.datagrams.iter().zip(data_offsets(planned)).enumerate()
         {
             for owned in one.ownership.iter().filter(|one| one.direction == Direction::Outputs) {
-                run::push(&mut outputs, owned, data_at);
+                outputs.push(owned, data_at);
                 carries |= FrameStatus::bit(at);
             }
             datagrams.push(Datagram::new(plan, one, data_at));
@@ -377,7 +412,6 @@ impl Frame {
         Self {
             task,
             number,
-            times: planned.repeats.saturating_add(1),
             outputs,
             datagrams,
             carries,

@@ -2,7 +2,7 @@
 
 use linesman_proto::time::Instant;
 
-use super::{Cyclic, FrameStatus, run};
+use super::{Cyclic, FrameStatus};
 use crate::event::Event;
 use crate::exchange::{Exchange, Order};
 use crate::statistics::Statistics;
@@ -19,41 +19,43 @@ impl Cyclic {
         events: &mut impl FnMut(Event),
         buffer: &mut [u8],
     ) -> Option<usize> {
-        if self.left == 0 {
+        if self.left.is_empty() {
             if now < self.next_at {
                 return None;
             }
-            self.depart(now, statistics, events);
+            self.depart(now, statistics, events)?;
         }
-        let departure = self.departures.get(self.leaving)?;
-        let index = departure.frames.len().checked_sub(self.left)?;
-        let index = *departure.frames.get(index)?;
-        self.left -= 1;
+        let index = *self.order.get(self.left.start)?;
+        self.left.start += 1;
         let frame = self.frames.get_mut(index as usize)?;
         let task = self.tasks.get_mut(frame.task)?;
         let withheld = task.application.is_withheld();
-        let order = Order { deadline: self.deadline, times: frame.times, withheld };
+        let was_out = std::mem::replace(&mut frame.out, true);
+        task.out += u32::from(!was_out);
+        frame.status.not_sent = if withheld { frame.carries } else { 0 };
+        let order = Order { deadline: self.deadline, withheld };
         let (runs, outputs) = (&frame.outputs, &self.outputs);
         let fill = |bytes: &mut [u8]| match withheld {
-            false => run::fill(runs, outputs, bytes),
-            true => run::clear_frame(runs, bytes),
+            false => runs.fill(outputs, bytes),
+            true => runs.clear_frame(bytes),
         };
-        let Some(len) = exchange.send_cyclic(index, order, fill, buffer) else {
-            self.left += 1;
+        let sent = exchange.send_cyclic(index, order, fill, buffer);
+        if sent.is_none() {
+            if !was_out {
+                frame.out = false;
+                task.out -= 1;
+            }
+            self.left.start -= 1;
             self.leave_out(statistics);
-            return None;
-        };
-        frame.status.not_sent = if withheld { frame.carries } else { 0 };
-        task.out += u32::from(!std::mem::replace(&mut frame.out, true));
-        Some(len)
+        }
+        sent
     }
 
     /// Too many frames are out: those that were to leave do not.
     #[cold]
     fn leave_out(&mut self, statistics: &mut Statistics) {
         let Some(departure) = self.departures.get(self.leaving) else { return };
-        let first = departure.frames.len().saturating_sub(self.left);
-        for index in departure.frames.iter().skip(first) {
+        for index in self.order.get(self.left.clone()).unwrap_or_default() {
             let Some(frame) = self.frames.get_mut(*index as usize) else { continue };
             frame.status.not_sent = FrameStatus::WHOLE;
             statistics.cyclic_unsent += 1;
@@ -61,7 +63,7 @@ impl Cyclic {
         if let Some(task) = self.tasks.get_mut(departure.task) {
             task.exchanged |= task.out == 0;
         }
-        self.left = 0;
+        self.left = 0..0;
     }
 
     /// The first departure that is due: its frames leave from now on.
@@ -71,7 +73,7 @@ impl Cyclic {
         now: Instant,
         statistics: &mut Statistics,
         events: &mut impl FnMut(Event),
-    ) {
+    ) -> Option<()> {
         let (at, behind) = match self.departures.as_mut_slice() {
             [only] => {
                 let behind = only.advance(now);
@@ -80,19 +82,22 @@ impl Cyclic {
             }
             _ => self.first_due(now),
         };
-        let Some(departure) = self.departures.get(at) else { return };
+        let departure = self.departures.get(at)?;
         self.leaving = at;
-        self.left = departure.frames.len();
+        self.left = departure.frames.clone();
         self.deadline = now + departure.cycle;
         if departure.begins {
             statistics.cycles += 1;
-            statistics.cycles_missed += behind;
+            if behind > 0 {
+                statistics.cycles_missed += behind;
+            }
             let task = departure.task;
             let application = self.tasks.get_mut(task).map(|task| &mut task.application);
             if let Some(judged) = application.and_then(|one| one.begin_cycle(self.given)) {
                 judged.tell(task, statistics, events);
             }
         }
+        Some(())
     }
 
     /// Which of several departures is due, and how many cycles of it were slept through. There is one:

@@ -29,7 +29,8 @@ use outgoing::Outgoing;
 use prebuilt::Prebuilt;
 pub(crate) use queue::{Queued, Ticket};
 pub(crate) use receive::Received;
-use receive::{Origin, origin};
+use receive::{Origin, marked, origin};
+use slot::Copies;
 pub(crate) use slot::{Purpose, Slot, SlotState};
 
 /// Most datagrams of procedures in one frame.
@@ -56,8 +57,6 @@ pub struct Transmit {
 pub(crate) struct Order {
     /// When it is given up.
     pub(crate) deadline: Instant,
-    /// How often each card sends it, once at least.
-    pub(crate) times: u8,
     /// Its outputs are not to be taken for fresh.
     pub(crate) withheld: bool,
 }
@@ -67,6 +66,8 @@ pub(crate) struct Order {
 pub(crate) struct Exchange {
     sources: [MacAddress; 2],
     origins: [Origin; 2],
+    /// That of the frames which card A sent, as they come back.
+    marked: Origin,
     /// Two cards send each frame.
     ring: bool,
     /// As many as an index byte can name.
@@ -91,6 +92,7 @@ impl Exchange {
         Self {
             sources,
             origins: sources.map(origin),
+            marked: marked(origin(sources[0])),
             cyclic: Vec::new(),
             ring,
             slots: Box::new(std::array::from_fn(|_| Slot::new())),
@@ -157,7 +159,8 @@ impl Exchange {
         slot.cards.clear();
         slot.cards.extend(slot.requests.iter().map(|queued| queued.request.card));
         let deadline = now + self.patience;
-        slot.unsent = slot.begin(Purpose::Acyclic, deadline, 1, self.ring);
+        slot.begin(Purpose::Acyclic, deadline, &Copies::new(1, self.ring));
+        slot.awaited = Slot::NONE;
         self.outgoing.push(at);
         self.acyclic_out += 1;
         self.wait_until(deadline);
@@ -165,13 +168,14 @@ impl Exchange {
 
     /// Takes over the frames of a plan. Those of the last one must have been abandoned.
     pub(crate) fn prebuild(&mut self, frames: impl Iterator<Item = FramePlan>) {
-        self.cyclic = frames.map(|frame| Prebuilt::new(&frame, self.sources[0])).collect();
+        let (source, ring) = (self.sources[0], self.ring);
+        self.cyclic = frames.map(|frame| Prebuilt::new(&frame, source, ring)).collect();
     }
 
-    /// Sends a prebuilt frame, with the outputs that `fill` puts into it, by all cards, `times` times
-    /// each. Its first copy is written into `buffer` and leaves at once; the others wait to be fetched
-    /// by [`Exchange::poll_transmit`], which must have given all it had. Gives the frame's length;
-    /// `None`: all slots are taken, and it does not go.
+    /// Sends a prebuilt frame, with the outputs that `fill` puts into it, by all cards, as often as is
+    /// planned. Its first copy is written into `buffer` and leaves at once; the others wait to be
+    /// fetched by [`Exchange::poll_transmit`], which must have given all it had. Gives the frame's
+    /// length; `None`: all slots are taken, and it does not go.
     #[inline]
     pub(crate) fn send_cyclic(
         &mut self,
@@ -182,23 +186,22 @@ impl Exchange {
     ) -> Option<usize> {
         let (at, number) = self.free_slot()?;
         let prebuilt = self.cyclic.get_mut(frame as usize)?;
-        prebuilt.number(number);
-        prebuilt.withhold(order.withheld);
-        fill(prebuilt.bytes_mut());
-        let bytes = prebuilt.bytes();
-        let len = bytes.len();
-        buffer.get_mut(..len)?.copy_from_slice(bytes);
+        let sent = buffer.get_mut(..prebuilt.len())?;
         let slot = &mut self.slots[usize::from(at)];
         slot.number = number;
         slot.withheld = order.withheld;
-        let purpose = Purpose::Cyclic { frame };
-        let further = slot.begin(purpose, order.deadline, order.times, self.ring) - 1;
-        slot.unsent = further;
-        if further > 0 {
+        slot.begin(Purpose::Cyclic { frame }, order.deadline, prebuilt.copies());
+        slot.awaited = if self.ring { Slot::NONE } else { frame };
+        self.waiting += 1;
+        self.earliest = self.earliest.min(order.deadline);
+        prebuilt.write(number, order.withheld, sent);
+        fill(sent);
+        if prebuilt.copies().unsent > 0 {
+            // They are the same, outputs and all.
+            prebuilt.keep(sent);
             self.outgoing.push(at);
         }
-        self.wait_until(order.deadline);
-        Some(len)
+        Some(sent.len())
     }
 
     /// One more slot waits.
@@ -242,9 +245,9 @@ impl Exchange {
         while let Some(at) = self.outgoing.first() {
             let slot = &mut self.slots[usize::from(at)];
             // The copies of a ring leave by turns, that of card A first.
-            let path = if self.ring && slot.unsent % 2 == 1 { Path::B } else { Path::A };
-            slot.unsent = slot.unsent.saturating_sub(1);
-            if slot.unsent == 0 {
+            let path = if self.ring && slot.copies.unsent % 2 == 1 { Path::B } else { Path::A };
+            slot.copies.unsent = slot.copies.unsent.saturating_sub(1);
+            if slot.copies.unsent == 0 {
                 self.outgoing.pop();
             }
             let purpose = slot.purpose;
@@ -280,6 +283,7 @@ impl Exchange {
     fn retire(&mut self, at: u8, state: SlotState) {
         let slot = &mut self.slots[usize::from(at)];
         slot.state = state;
+        slot.awaited = Slot::NONE;
         if slot.purpose == Purpose::Acyclic {
             self.acyclic_out = self.acyclic_out.saturating_sub(1);
         }
@@ -316,7 +320,7 @@ impl Exchange {
             self.earliest = first.unwrap_or(Instant::MAX);
             return None;
         };
-        let answered = self.slot(at).arrived.contains(&true);
+        let answered = self.slot(at).copies.arrived.contains(&true);
         self.outgoing.remove(at);
         self.retire(at, if answered { SlotState::Answered } else { SlotState::GivenUp });
         Some(at)

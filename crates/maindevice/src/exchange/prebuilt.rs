@@ -1,13 +1,20 @@
-//! Cyclic frames, built once: headers stay, outputs and index bytes change.
+//! Cyclic frames, built once: headers stay, outputs and index bytes change. A frame that is sent is put
+//! together where it leaves from: what stays is copied, but for long outputs, which are written there
+//! anyway.
 //!
 //! A reply is compared with what was sent eight bytes at a time: the first eight bytes of a datagram
 //! header are command, index, address and length, which is all that tells one datagram from another
 //! (ETG.1000.4, 5.4.1.2). Working counters are where they were sent, so nothing is parsed.
 
+use std::ops::Range;
+
 use linesman_config::plan::{DatagramPlan, FramePlan};
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::ethernet::{HEADER_LEN, MAX_LEN, MacAddress};
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, FrameBuilder};
+use linesman_proto::sii::Direction;
+
+use super::slot::Copies;
 
 /// Bits of the first eight header bytes that come back as they were sent: all but the round-trip
 /// bit, which a controller may set.
@@ -16,7 +23,7 @@ const SAME: u64 = !(0x4000_u64 << 48);
 const ADP: u64 = 0xFFFF_u64 << 16;
 
 /// Where the first datagram begins, and its index byte.
-const FIRST_HEADER: usize = HEADER_LEN + ETHERCAT_HEADER_LEN;
+pub(super) const FIRST_HEADER: usize = HEADER_LEN + ETHERCAT_HEADER_LEN;
 pub(super) const FIRST_INDEX: usize = FIRST_HEADER + 1;
 
 /// One datagram of a prebuilt frame.
@@ -30,10 +37,23 @@ struct Shape {
     masks: [u64; 2],
 }
 
+/// Outputs of fewer bytes are copied twice: one long copy is cheaper than many short ones.
+const LONG: usize = 128;
+/// Where what follows the addresses of a frame begins.
+const BEHIND_ADDRESSES: usize = 12;
+
 /// A cyclic frame as card A sends it.
 #[derive(Debug)]
 pub(crate) struct Prebuilt {
+    /// With index 0 and without outputs; where copies follow, the one that was sent last.
     bytes: Vec<u8>,
+    /// What of these bytes is copied into a frame that is sent: so many from the beginning, and these.
+    beginning: usize,
+    others: Vec<Range<usize>>,
+    /// What comes back as it was sent if nobody had a hand in it.
+    fixed: Vec<Range<usize>>,
+    /// What becomes of the copies behind the first.
+    copies: Copies,
     shapes: Vec<Shape>,
     /// Bytes that a whole reply has at least.
     len: usize,
@@ -63,7 +83,7 @@ pub(crate) const fn withheld(command: Command) -> Command {
 
 impl Prebuilt {
     /// The frame of a plan. What does not fit, which no plan has, is left out.
-    pub(crate) fn new(plan: &FramePlan, source: MacAddress) -> Self {
+    pub(crate) fn new(plan: &FramePlan, source: MacAddress, ring: bool) -> Self {
         let mut bytes = vec![0; MAX_LEN];
         let mut builder = FrameBuilder::new(&mut bytes, source);
         let mut at = FIRST_HEADER;
@@ -91,14 +111,87 @@ impl Prebuilt {
             };
             Shape { at: header, heads: commands.map(variant), masks: commands.map(mask) }
         };
-        let shapes = places.into_iter().map(shape).collect();
-        Self { shapes, bytes, len: at, withheld: false }
+        let shapes: Vec<Shape> = places.into_iter().map(shape).collect();
+        let outputs = || {
+            let datagrams = plan.datagrams.iter().zip(data_offsets(plan));
+            datagrams.flat_map(|(one, data)| {
+                let outputs =
+                    one.ownership.iter().filter(|own| own.direction == Direction::Outputs);
+                outputs.map(move |own| (own, data + own.range.start..data + own.range.end))
+            })
+        };
+        let whole = outputs().filter(|(own, _)| own.is_bytewise());
+        let mut long = joined(whole.map(|(_, range)| range));
+        long.retain(|range| range.len() >= LONG);
+        let mut others = gaps(0..len, long);
+        // No output lies in the headers.
+        let beginning = if others.is_empty() { 0 } else { others.remove(0).end };
+        let indices = shapes.iter().map(|shape| shape.at + 1..shape.at + 2);
+        let moving = joined(outputs().map(|(_, range)| range).chain(indices));
+        let fixed = gaps(BEHIND_ADDRESSES..len, moving);
+        let mut copies = Copies::new(plan.repeats.saturating_add(1), ring);
+        copies.unsent -= 1;
+        Self { shapes, bytes, beginning, others, fixed, copies, len: at, withheld: false }
     }
 
-    /// The frame, for filling in outputs.
+    /// How many bytes it has.
     #[inline]
-    pub(crate) fn bytes_mut(&mut self) -> &mut [u8] {
-        &mut self.bytes
+    pub(super) fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// Puts the frame with this number together in `sent`, which is as long, but for its outputs, of
+    /// which only those are zero that are short.
+    #[inline]
+    pub(super) fn write(&mut self, number: u32, withheld: bool, sent: &mut [u8]) {
+        if self.withheld != withheld {
+            self.withhold(withheld);
+        }
+        let beginning = (sent.get_mut(..self.beginning), self.bytes.get(..self.beginning));
+        if let (Some(to), Some(from)) = beginning {
+            to.copy_from_slice(from);
+        }
+        let [first, ..] = number.to_le_bytes();
+        if let Some(index) = sent.get_mut(FIRST_INDEX) {
+            *index = first;
+        }
+        if self.shapes.len() > 1 || !self.others.is_empty() {
+            self.write_others(number, sent);
+        }
+    }
+
+    /// What is behind the first datagram, and behind long outputs.
+    #[inline(never)]
+    fn write_others(&self, number: u32, sent: &mut [u8]) {
+        for range in &self.others {
+            if let (Some(to), Some(from)) =
+                (sent.get_mut(range.clone()), self.bytes.get(range.clone()))
+            {
+                to.copy_from_slice(from);
+            }
+        }
+        let [_, others, ..] = number.to_le_bytes();
+        for shape in self.shapes.iter().skip(1) {
+            if let Some(index) = sent.get_mut(shape.at + 1) {
+                *index = others;
+            }
+        }
+    }
+
+    /// Keeps the frame as it was sent, for the copies that follow.
+    #[cold]
+    pub(super) fn keep(&mut self, sent: &[u8]) {
+        self.bytes.copy_from_slice(sent);
+    }
+
+    #[inline]
+    pub(super) const fn copies(&self) -> &Copies {
+        &self.copies
+    }
+
+    /// Whether a frame with the datagrams that were sent is as it left the card: nobody had a hand in it.
+    pub(super) fn is_echo(&self, frame: &[u8]) -> bool {
+        self.fixed.iter().all(|range| frame.get(range.clone()) == self.bytes.get(range.clone()))
     }
 
     #[inline]
@@ -107,26 +200,11 @@ impl Prebuilt {
     }
 
     /// Turns datagrams that carry outputs into such that do not, or back.
-    #[inline]
-    pub(crate) fn withhold(&mut self, withheld: bool) {
-        if self.withheld == withheld {
-            return;
-        }
+    #[cold]
+    fn withhold(&mut self, withheld: bool) {
         self.withheld = withheld;
         for shape in &self.shapes {
             self.bytes[shape.at] = shape.heads[usize::from(withheld)].to_le_bytes()[0];
-        }
-    }
-
-    /// Marks the datagrams with the number of the frame.
-    #[inline]
-    pub(super) fn number(&mut self, number: u32) {
-        let [first, others, ..] = number.to_le_bytes();
-        if let Some(index) = self.bytes.get_mut(FIRST_INDEX) {
-            *index = first;
-        }
-        for shape in self.shapes.iter().skip(1) {
-            self.bytes[shape.at + 1] = others;
         }
     }
 
@@ -173,6 +251,33 @@ pub(super) enum Shaped {
     CutOff,
     /// Other datagrams, or other marks.
     Otherwise,
+}
+
+/// Ranges in order, each one joined with those that it touches or overlaps.
+fn joined(ranges: impl Iterator<Item = Range<usize>>) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = ranges.filter(|range| !range.is_empty()).collect();
+    ranges.sort_by_key(|range| range.start);
+    let mut joined: Vec<Range<usize>> = Vec::new();
+    for range in ranges {
+        match joined.last_mut() {
+            Some(last) if range.start <= last.end => last.end = last.end.max(range.end),
+            Some(_) | None => joined.push(range),
+        }
+    }
+    joined
+}
+
+/// What of `all` is in none of `taken`, which are in order and apart.
+fn gaps(all: Range<usize>, taken: Vec<Range<usize>>) -> Vec<Range<usize>> {
+    let mut at = all.start;
+    let mut gaps = Vec::new();
+    for range in taken.into_iter().chain(std::iter::once(all.end..all.end)) {
+        if range.start > at {
+            gaps.push(at..range.start.min(all.end));
+        }
+        at = at.max(range.end);
+    }
+    gaps
 }
 
 /// Where the data of each datagram of a plan's frame begin, in order.

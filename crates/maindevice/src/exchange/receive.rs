@@ -4,8 +4,8 @@ use linesman_proto::address::Path;
 use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, MAX_LEN, MacAddress, SOURCE_MARK};
 use linesman_proto::time::Instant;
 
-use super::prebuilt::{FIRST_INDEX, Shaped};
-use super::{Exchange, Purpose, SlotState, merge};
+use super::prebuilt::{FIRST_HEADER, FIRST_INDEX, Shaped};
+use super::{Exchange, Purpose, Slot, SlotState, merge};
 
 /// Offset of the source address in a frame.
 const SOURCE_AT: usize = 6;
@@ -40,6 +40,11 @@ pub(crate) enum Received {
 /// Source address and EtherType of a frame as one number.
 pub(super) type Origin = u64;
 
+/// The same of a frame that comes back from the line.
+pub(super) const fn marked(origin: Origin) -> Origin {
+    origin | SOURCE_MARK as Origin
+}
+
 pub(super) fn origin(source: MacAddress) -> Origin {
     let [a, b, c, d, e, f] = source.0;
     let [g, h] = ETHERTYPE_ETHERCAT.to_be_bytes();
@@ -53,25 +58,20 @@ impl Exchange {
     /// [`Exchange::receive`] tells what it is.
     #[inline]
     pub(crate) fn receive_usual(&mut self, frame: &[u8]) -> Option<(u32, bool)> {
-        let head: &[u8; FIRST_INDEX + 1] = frame.first_chunk()?;
-        let at = head[FIRST_INDEX];
-        let slot = &mut self.slots[usize::from(at)];
-        let Purpose::Cyclic { frame: index } = slot.purpose else { return None };
-        let marked = self.origins[0] | u64::from(SOURCE_MARK);
+        let head: &[u8; FIRST_HEADER + 8] = frame.first_chunk()?;
+        let slot = &mut self.slots[usize::from(head[FIRST_INDEX])];
+        let index = slot.awaited;
+        let prebuilt = self.cyclic.get(index as usize)?;
         let origin = head[SOURCE_AT..].first_chunk().map(|word| u64::from_le_bytes(*word));
-        if slot.state != SlotState::Waiting
-            || self.ring
-            || origin != Some(marked)
+        if origin != Some(self.marked)
             || head[TYPE_AT] >> 4 != DATAGRAMS
             || frame.len() > MAX_LEN
+            || !prebuilt.is_like(frame, slot.number, slot.withheld)
         {
             return None;
         }
-        let prebuilt = self.cyclic.get(index as usize)?;
-        if !prebuilt.is_like(frame, slot.number, slot.withheld) {
-            return None;
-        }
-        slot.arrived[0] = true;
+        slot.awaited = Slot::NONE;
+        slot.copies.arrived[0] = true;
         slot.state = SlotState::Answered;
         let withheld = slot.withheld;
         self.waits_no_longer();
@@ -112,7 +112,7 @@ impl Exchange {
         if self.ring {
             return self.receive_copy(at, path, sender, frame);
         }
-        slot.arrived[0] = true;
+        slot.copies.arrived[0] = true;
         if slot.purpose == Purpose::Acyclic {
             slot.reply.extend_from_slice(frame);
         }
@@ -134,10 +134,10 @@ impl Exchange {
     fn receive_copy(&mut self, at: u8, path: Path, sender: Path, frame: &[u8]) -> Received {
         let slot = &mut self.slots[usize::from(at)];
         let copy = sender.index();
-        if slot.arrived[copy] || !slot.outstanding[copy] {
+        if slot.copies.arrived[copy] || !slot.copies.outstanding[copy] {
             return Received::Duplicate;
         }
-        slot.arrived[copy] = true;
+        slot.copies.arrived[copy] = true;
         self.ring_intact = Some(path != sender);
         if slot.reply.is_empty() {
             slot.reply.extend_from_slice(frame);
@@ -157,8 +157,9 @@ impl Exchange {
         let slot = self.slot(at);
         match slot.purpose {
             Purpose::Acyclic => frame.starts_with(&slot.sent),
-            Purpose::Cyclic { frame: index } => (self.cyclic.get(index as usize))
-                .is_some_and(|prebuilt| frame.starts_with(prebuilt.bytes())),
+            Purpose::Cyclic { frame: index } => {
+                (self.cyclic.get(index as usize)).is_some_and(|prebuilt| prebuilt.is_echo(frame))
+            }
         }
     }
 

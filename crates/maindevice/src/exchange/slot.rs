@@ -36,11 +36,41 @@ pub(crate) enum SlotState {
     GivenUp,
 }
 
+/// What has become of the copies of a frame, by the card that sends them.
+#[derive(Clone, Copy, Debug)]
+// Copied as one word.
+#[repr(align(8))]
+pub(crate) struct Copies {
+    /// On their way.
+    pub(crate) outstanding: [bool; 2],
+    /// Come back.
+    pub(crate) arrived: [bool; 2],
+    /// Further copies of the same frame that each card has sent and that have not come back.
+    pub(crate) spares: [u8; 2],
+    /// Copies that nobody has fetched yet.
+    pub(crate) unsent: u16,
+}
+
+impl Copies {
+    /// Of a frame that goes out, `times` times by each card.
+    pub(super) fn new(times: u8, ring: bool) -> Self {
+        Self {
+            outstanding: [true, ring],
+            arrived: [false; 2],
+            spares: [times.saturating_sub(1); 2],
+            unsent: u16::from(times) << u16::from(ring),
+        }
+    }
+}
+
 /// One frame on its way.
 #[derive(Debug)]
 pub(crate) struct Slot {
     pub(crate) state: SlotState,
     pub(crate) purpose: Purpose,
+    /// The prebuilt frame whose only copy is waited for; [`Slot::NONE`] where it is another frame, or
+    /// none.
+    pub(crate) awaited: u32,
     /// The frame before datagrams of the other card are masked.
     pub(crate) sent: Vec<u8>,
     /// The card that carries each datagram, where it is one only; empty when all go by both.
@@ -53,57 +83,43 @@ pub(crate) struct Slot {
     pub(crate) withheld: bool,
     /// It came back without its end.
     pub(crate) truncated: bool,
-    /// Further copies of the same frame that each card has sent and that have not come back.
-    pub(crate) spares: [u8; 2],
-    /// Copies that nobody has fetched yet.
-    pub(crate) unsent: u16,
     pub(crate) deadline: Instant,
-    /// Copies by the card that sent them: on their way, or come back.
-    pub(crate) outstanding: [bool; 2],
-    pub(crate) arrived: [bool; 2],
+    pub(crate) copies: Copies,
     /// The datagrams in it, in order; empty for cyclic frames.
     pub(crate) requests: Vec<Queued>,
 }
 
 impl Slot {
+    /// No prebuilt frame.
+    pub(crate) const NONE: u32 = u32::MAX;
+
     /// A slot with room for the longest frame, so that using it allocates nothing.
     pub(crate) fn new() -> Self {
         Self {
             state: SlotState::Free,
             purpose: Purpose::Acyclic,
+            awaited: Self::NONE,
             sent: Vec::with_capacity(MAX_LEN),
             cards: Vec::with_capacity(MAX_ACYCLIC_DATAGRAMS),
             reply: Vec::with_capacity(MAX_LEN),
             number: 0,
             withheld: false,
             truncated: false,
-            spares: [0; 2],
-            unsent: 0,
             deadline: Instant::MAX,
-            outstanding: [false; 2],
-            arrived: [false; 2],
+            copies: Copies::new(0, false),
             requests: Vec::with_capacity(MAX_ACYCLIC_DATAGRAMS),
         }
     }
 
-    /// It goes out, `times` times by each card; gives how many copies that are.
+    /// It goes out.
     #[inline]
-    pub(super) fn begin(
-        &mut self,
-        purpose: Purpose,
-        deadline: Instant,
-        times: u8,
-        ring: bool,
-    ) -> u16 {
+    pub(super) fn begin(&mut self, purpose: Purpose, deadline: Instant, copies: &Copies) {
         self.state = SlotState::Waiting;
         self.purpose = purpose;
         self.deadline = deadline;
-        self.outstanding = [true, ring];
-        self.arrived = [false; 2];
+        self.copies = *copies;
         self.truncated = false;
-        self.spares = [times.saturating_sub(1); 2];
         self.reply.clear();
-        u16::from(times) << u16::from(ring)
     }
 
     /// Whether `reply` is a copy of this frame that card `sender` sent, come back from the line:
@@ -133,7 +149,7 @@ impl Slot {
 
     /// What a copy is that came at `now` although the slot, number `at`, waits for none.
     pub(super) fn answered_again(&mut self, at: u8, now: Instant, sender: Path) -> Received {
-        let spares = &mut self.spares[sender.index()];
+        let spares = &mut self.copies.spares[sender.index()];
         match self.state {
             SlotState::Answered if *spares > 0 => {
                 *spares -= 1;
@@ -154,7 +170,8 @@ impl Slot {
 
     /// Whether all copies that were sent have come back.
     pub(crate) fn is_complete(&self) -> bool {
-        !self.outstanding.into_iter().zip(self.arrived).any(|(out, back)| out && !back)
+        let Copies { outstanding, arrived, .. } = self.copies;
+        !outstanding.into_iter().zip(arrived).any(|(out, back)| out && !back)
     }
 }
 

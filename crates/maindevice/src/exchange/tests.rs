@@ -1,11 +1,12 @@
 //! Slots against frames made by hand: an answering line of a few bytes.
 
-use linesman_proto::address::{LogicalAddress, RegisterAddress, StationAddress};
+use linesman_proto::address::{DeviceId, LogicalAddress, RegisterAddress, StationAddress};
 use linesman_proto::ethernet::SOURCE_MARK;
 
-use linesman_config::plan::{DatagramPlan, Role};
+use linesman_config::plan::{DatagramPlan, Ownership, Role};
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
+use linesman_proto::sii::Direction;
 use proptest::prelude::*;
 
 use super::*;
@@ -222,12 +223,19 @@ fn with_cyclic(number: u32) -> (Exchange, Vec<u8>) {
     };
     let logical = DatagramAddress::Logical(LogicalAddress(0x1_0000));
     let status = DatagramAddress::Physical(0, RegisterAddress(0x0130));
-    let datagrams = vec![
+    let mut datagrams = vec![
         datagram(Command::Lrw, logical, 12, Role::ProcessData),
         datagram(Command::Brd, status, 2, Role::Presence),
     ];
+    datagrams[0].ownership.push(Ownership {
+        device: DeviceId(0),
+        direction: Direction::Outputs,
+        range: 0..4,
+        image_at: 0,
+        masks: Ownership::WHOLE,
+    });
     exchange.prebuild(std::iter::once(FramePlan::new(datagrams)));
-    let order = Order { deadline: NOW + Span::ms(1), times: 1, withheld: false };
+    let order = Order { deadline: NOW + Span::ms(1), withheld: false };
     let mut buffer = vec![0; MAX_LEN];
     let fill = |bytes: &mut [u8]| bytes[26..30].copy_from_slice(&[1, 2, 3, 4]);
     let len = exchange.send_cyclic(0, order, fill, &mut buffer).unwrap();

@@ -10,7 +10,7 @@ pub(crate) mod waitlist;
 pub mod wire;
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
@@ -49,17 +49,46 @@ pub(crate) struct Board {
     now: AtomicU64,
     /// When the first sleeper is to be woken, in ns.
     first_timer: AtomicU64,
+    /// What there is to do, as bits of [`stir`].
+    stirred: AtomicU8,
+    /// Tasks that want to be polled.
+    ready: Mutex<VecDeque<u64>>,
+}
+
+/// What there is to do.
+mod stir {
     /// A task has changed something.
-    news: AtomicBool,
+    pub(super) const NEWS: u8 = 1;
+    /// A task wants to be polled.
+    pub(super) const READY: u8 = 2;
     /// There are events.
-    events: AtomicBool,
+    pub(super) const EVENTS: u8 = 4;
 }
 
 impl Board {
     /// For tasks: whatever they change is news for the engine.
     pub(crate) fn lock(&self) -> MutexGuard<'_, Shared> {
-        self.news.store(true, Ordering::Relaxed);
+        self.stir(stir::NEWS);
         lock(&self.shared)
+    }
+
+    fn stir(&self, what: u8) {
+        self.stirred.fetch_or(what, Ordering::Relaxed);
+    }
+
+    fn settle(&self, what: u8) {
+        self.stirred.fetch_and(!what, Ordering::Relaxed);
+    }
+
+    #[inline]
+    fn is_stirred(&self, what: u8) -> bool {
+        self.stirred.load(Ordering::Relaxed) & what != 0
+    }
+
+    /// A task wants to be polled.
+    fn push_ready(&self, id: u64) {
+        lock(&self.ready).push_back(id);
+        self.stir(stir::READY);
     }
 
     #[inline]
@@ -69,7 +98,7 @@ impl Board {
 
     /// Something was put among the events.
     pub(crate) fn note_event(&self) {
-        self.events.store(true, Ordering::Relaxed);
+        self.stir(stir::EVENTS);
     }
 
     /// Timers have changed.
@@ -94,26 +123,10 @@ pub(crate) struct Shared {
     pub(crate) events: VecDeque<Event>,
 }
 
-/// Tasks that want to be polled.
-#[derive(Default)]
-struct ReadyTasks {
-    queue: Mutex<VecDeque<u64>>,
-    any: AtomicBool,
-}
-
-impl ReadyTasks {
-    fn push(&self, id: u64) {
-        lock(&self.queue).push_back(id);
-        self.any.store(true, Ordering::Relaxed);
-    }
-}
-
-type Ready = Arc<ReadyTasks>;
-
 /// Wakes one task by putting it into the queue of those that are ready.
 struct TaskWaker {
     id: u64,
-    ready: Ready,
+    board: Arc<Board>,
     /// It is in the queue already.
     queued: Arc<AtomicBool>,
 }
@@ -125,7 +138,7 @@ impl Wake for TaskWaker {
 
     fn wake_by_ref(self: &Arc<Self>) {
         if !self.queued.swap(true, Ordering::Relaxed) {
-            self.ready.push(self.id);
+            self.board.push_ready(self.id);
         }
     }
 }
@@ -140,7 +153,6 @@ struct Task {
 /// The poller.
 pub(crate) struct Executor {
     board: Arc<Board>,
-    ready: Ready,
     tasks: BTreeMap<u64, Task>,
     next_task: u64,
     next_group: u32,
@@ -162,16 +174,10 @@ impl Executor {
             shared: Mutex::new(shared),
             now: AtomicU64::new(0),
             first_timer: AtomicU64::new(u64::MAX),
-            news: AtomicBool::new(false),
-            events: AtomicBool::new(false),
+            stirred: AtomicU8::new(0),
+            ready: Mutex::default(),
         };
-        Self {
-            board: Arc::new(board),
-            ready: Ready::default(),
-            tasks: BTreeMap::new(),
-            next_task: 0,
-            next_group: 0,
-        }
+        Self { board: Arc::new(board), tasks: BTreeMap::new(), next_task: 0, next_group: 0 }
     }
 
     /// The time to which the engine was advanced last.
@@ -186,13 +192,17 @@ impl Executor {
     /// Whether tasks have changed something since this was asked last.
     #[inline]
     pub(crate) fn take_news(&self) -> bool {
-        self.board.news.load(Ordering::Relaxed) && self.board.news.swap(false, Ordering::Relaxed)
+        let news = self.board.is_stirred(stir::NEWS);
+        if news {
+            self.board.settle(stir::NEWS);
+        }
+        news
     }
 
     /// The same, for a look.
     #[inline]
     pub(crate) fn has_news(&self) -> bool {
-        self.board.news.load(Ordering::Relaxed)
+        self.board.is_stirred(stir::NEWS)
     }
 
     /// Tells the user of the MainDevice.
@@ -210,13 +220,13 @@ impl Executor {
     /// The next thing to tell.
     #[inline]
     pub(crate) fn poll_event(&mut self) -> Option<Event> {
-        if self.board.events.load(Ordering::Relaxed) { self.take_event() } else { None }
+        if self.board.is_stirred(stir::EVENTS) { self.take_event() } else { None }
     }
 
     fn take_event(&mut self) -> Option<Event> {
         let event = self.shared().events.pop_front();
         if event.is_none() {
-            self.board.events.store(false, Ordering::Relaxed);
+            self.board.settle(stir::EVENTS);
         }
         event
     }
@@ -276,7 +286,7 @@ impl Executor {
     /// Whether there is something to run, or tasks have changed something.
     #[inline]
     pub(crate) fn is_stirred(&self) -> bool {
-        self.board.news.load(Ordering::Relaxed) || self.ready.any.load(Ordering::Relaxed)
+        self.board.is_stirred(stir::NEWS | stir::READY)
     }
 
     /// Polls whoever is ready until nobody is.
@@ -290,7 +300,7 @@ impl Executor {
     fn run_all(&mut self) {
         loop {
             self.adopt();
-            let Some(id) = lock(&self.ready.queue).pop_front() else { break };
+            let Some(id) = lock(&self.board.ready).pop_front() else { break };
             let Some(task) = self.tasks.get_mut(&id) else { continue };
             task.queued.store(false, Ordering::Relaxed);
             let waker = task.waker.clone();
@@ -301,7 +311,7 @@ impl Executor {
                 }
             }
         }
-        self.ready.any.store(false, Ordering::Relaxed);
+        self.board.settle(stir::READY);
     }
 
     fn adopt(&mut self) {
@@ -310,10 +320,10 @@ impl Executor {
             let id = self.next_task;
             self.next_task += 1;
             let queued = Arc::new(AtomicBool::new(true));
-            let ready = Arc::clone(&self.ready);
-            let waker = Waker::from(Arc::new(TaskWaker { id, ready, queued: Arc::clone(&queued) }));
+            let board = Arc::clone(&self.board);
+            let waker = Waker::from(Arc::new(TaskWaker { id, board, queued: Arc::clone(&queued) }));
             self.tasks.insert(id, Task { group, future, waker, queued });
-            self.ready.push(id);
+            self.board.push_ready(id);
         }
     }
 

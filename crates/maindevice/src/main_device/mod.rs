@@ -101,27 +101,30 @@ impl MainDevice {
     /// The next frame to be sent, written into `buffer`, which must hold 1514 bytes.
     #[inline]
     pub fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
-        let due = self.running.as_ref().is_some_and(|running| running.cyclic.is_due(now));
-        if due || self.executor.has_news() || self.exchange.has_any() {
-            return self.transmit(now, due, buffer);
-        }
-        None
-    }
-
-    /// The next frame, where there may be one: a cyclic one if it is `due`.
-    fn transmit(&mut self, now: Instant, due: bool, buffer: &mut [u8]) -> Option<Transmit> {
-        self.executor.advance(now);
-        if due
+        if let Some(running) = &self.running
+            && running.cyclic.is_due(now)
             && !self.exchange.has_outgoing()
             && let Some(sent) = self.transmit_cyclic(now, buffer)
         {
             return Some(sent);
         }
-        self.transmit_other(now, buffer)
+        if self.executor.has_news() || self.exchange.has_any() {
+            return self.transmit_other(now, buffer);
+        }
+        None
+    }
+
+    /// Whether [`MainDevice::poll_transmit`] may give a frame: false saves asking.
+    #[inline]
+    #[must_use]
+    pub fn may_transmit(&self, now: Instant) -> bool {
+        self.running.as_ref().is_some_and(|running| running.cyclic.is_due(now))
+            || self.executor.has_news()
+            || self.exchange.has_any()
     }
 
     /// The next frame of those whose cycle has begun.
-    #[inline]
+    #[inline(never)]
     fn transmit_cyclic(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
         let Self { running, exchange, statistics, executor, .. } = self;
         let emit = &mut |event| executor.emit(event);
@@ -136,6 +139,7 @@ impl MainDevice {
     /// A further copy of a cyclic frame, or a frame of procedures.
     #[inline(never)]
     fn transmit_other(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
+        self.executor.advance(now);
         self.submit();
         if !self.exchange.has_outgoing() {
             if !self.exchange.has_queued() {
@@ -196,7 +200,7 @@ impl MainDevice {
 
     /// A frame has arrived at a card, with a good check sequence. Nothing is given up here, so that a
     /// frame which was fetched together with this one, late, still counts.
-    #[inline]
+    #[inline(never)]
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.executor.advance(now);
         match self.exchange.receive_usual(frame) {

@@ -19,7 +19,8 @@ const LEAD: Span = Span::ms(20);
 /// How often a start that came too late is set anew.
 const ATTEMPTS: u32 = 5;
 
-/// Sets the SyncSignals of a SubDevice; all off when its settings want none.
+/// Sets the SyncSignals of a SubDevice; all off when its settings want none. SYNC0 falls `shift_ns` after
+/// the begin of a cycle.
 ///
 /// # Errors
 /// [`ExchangeError`] when it does not answer.
@@ -27,6 +28,7 @@ pub(crate) async fn set(
     wire: &Wire,
     station: StationAddress,
     settings: &ClockSettings,
+    shift_ns: i64,
 ) -> Result<(), ExchangeError> {
     let target = Target::Station(station);
     let [control, activation] = settings.assign_activate.to_le_bytes();
@@ -39,7 +41,7 @@ pub(crate) async fn set(
     let mut lead = LEAD.as_nanos();
     for _ in 0..ATTEMPTS {
         let now = clock::time(wire, station, &register::SYSTEM_TIME).await?;
-        let first = first_after(now.wrapping_add(lead), cycle, settings.sync0_shift_ns);
+        let first = first_after(now.wrapping_add(lead), cycle, shift_ns);
         let long = |span: Span| u32::try_from(span.as_nanos()).unwrap_or(u32::MAX);
         let writes = vec![
             (register::CYCLIC_UNIT_CONTROL.address, vec![control]),

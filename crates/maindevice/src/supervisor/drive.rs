@@ -86,7 +86,8 @@ impl Keeper<'_> {
                 clocks::ready(context).await;
                 clocks::set_one(context, device.id).await;
                 if let Some(settings) = &device.settings.clock {
-                    sync_signal::set(wire, device.station, settings).await?;
+                    let shift_ns = context.plan.sync0_shift_ns(device);
+                    sync_signal::set(wire, device.station, settings, shift_ns).await?;
                 }
                 if wire.now() > began {
                     self.note(Phase::Clocks, began);

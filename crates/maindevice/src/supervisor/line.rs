@@ -137,6 +137,11 @@ impl Line {
         self.devices.get(id.index()).map_or(Found::Unknown, |live| live.found)
     }
 
+    /// Whether every SubDevice is where it can be reached.
+    pub(crate) fn are_all_there(&self) -> bool {
+        self.devices.iter().all(|live| matches!(live.found, Found::There { .. }))
+    }
+
     /// Notes where a SubDevice is; returns where it was.
     pub(crate) fn set_found(&mut self, id: DeviceId, found: Found) -> Found {
         self.changes(id);

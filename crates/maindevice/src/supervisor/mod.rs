@@ -20,7 +20,7 @@ pub(crate) mod times;
 use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::{AddressingChoice, DevicePlan, Plan};
-use linesman_proto::address::{DeviceId, Network};
+use linesman_proto::address::{DeviceId, Network, WorkingCounter};
 use linesman_proto::register;
 use linesman_proto::time::{Instant, Span};
 
@@ -99,6 +99,9 @@ pub(crate) async fn supervise(context: Context, identified: Option<Identified>) 
     loop {
         let seen = context.alerts();
         context.nap(seen, SEARCH_INTERVAL).await;
+        if context.alerts() == seen && is_calm(&context, placed_at) {
+            continue;
+        }
         context.wire.sleep(CALM).await;
         let responding = lock(&context.line).responding();
         if responding != placed_at && placed_at.is_some() {
@@ -122,8 +125,17 @@ pub(crate) async fn supervise(context: Context, identified: Option<Identified>) 
     }
 }
 
+/// Whether all are there, and as many answer as the last time.
+fn is_calm(context: &Context, answered: Option<WorkingCounter>) -> bool {
+    let line = lock(&context.line);
+    line.responding() == answered && line.are_all_there()
+}
+
 /// Asks those that are lost at their addresses. Returns whether any is still lost.
 async fn search(context: &Context) -> bool {
+    if lock(&context.line).are_all_there() {
+        return false;
+    }
     by_alias::locate(context).await;
     let lost: Vec<_> = (context.plan.devices.iter())
         .filter(|device| lock(&context.line).found(device.id) == Found::Lost)

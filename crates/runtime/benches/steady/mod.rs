@@ -8,9 +8,8 @@
 )]
 
 use linesman_config::plan::{Plan, PlanOptions, Role};
-use linesman_diagnosis::{Direction, FrameSeen};
 use linesman_maindevice::{Event, MainDevice, Options};
-use linesman_proto::address::{Network, Path};
+use linesman_proto::address::Network;
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, DATAGRAM_OVERHEAD};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
@@ -103,6 +102,13 @@ pub fn scripted<'a>(answers: &'a mut [Answer], frame: &[u8]) -> &'a [u8] {
     bytes
 }
 
+/// What a card does with a frame that it receives: it puts it where it is wanted. Gives its length.
+#[inline(never)]
+pub fn received(frame: &[u8], room: &mut [u8]) -> usize {
+    room[..frame.len()].copy_from_slice(frame);
+    frame.len()
+}
+
 pub fn answers(plan: &Plan) -> Vec<Answer> {
     use linesman_config::plan::expect::{PathView, Presence, expect};
     use linesman_proto::frame::FrameBuilder;
@@ -135,19 +141,6 @@ pub fn answers(plan: &Plan) -> Vec<Answer> {
         Answer { bytes, indices, input }
     };
     plan.tasks[0].frames.iter().map(answer).collect()
-}
-
-pub fn seen(number: u64, direction: Direction, time: Instant, bytes: &[u8]) -> FrameSeen<'_> {
-    FrameSeen {
-        network: Network(0),
-        path: Some(Path::A),
-        direction,
-        time,
-        number,
-        fcs: None,
-        truncated: false,
-        bytes,
-    }
 }
 
 /// Runs both in virtual time until an event, for a minute at most.

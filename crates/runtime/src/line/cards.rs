@@ -3,16 +3,16 @@
 use linesman_diagnosis::HostObservation;
 use linesman_link::clock::{HostClock, tighten_timers};
 use linesman_link::error::LinkError;
-use linesman_link::socket::{Bell, RawSocket, Ready, SocketOptions, Waitable, Waker, wait_any};
+use linesman_link::socket::{
+    Bell, RawSocket, Ready, SocketOptions, Waitable, Waker, wait_any, wait_for,
+};
 use linesman_maindevice::Options;
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
-use super::{Arrived, Line};
+use super::{Arrived, Intake, Line};
 use crate::host_watch::HostWatch;
 
-/// Room for a frame, in bytes: the longest has 1,514.
-const ROOM: usize = 1_536;
 /// Most frames fetched in one go, so that a flood does not keep the cycle from its work.
 const MOST: usize = 64;
 
@@ -23,7 +23,6 @@ const SHORT: Span = Span::ms(3);
 pub struct Cards {
     clock: HostClock,
     cards: Vec<Card>,
-    buffer: Vec<u8>,
     /// Frames that were sent and have not come back: so many are fetched without asking further.
     expected: usize,
     /// There may be something to fetch.
@@ -60,15 +59,7 @@ impl Cards {
             doing: "making a way to be woken",
             source,
         })?;
-        Ok(Self {
-            clock,
-            cards: cards?,
-            buffer: vec![0; ROOM],
-            expected: 0,
-            ready: true,
-            waker,
-            spin: Span::ZERO,
-        })
+        Ok(Self { clock, cards: cards?, expected: 0, ready: true, waker, spin: Span::ZERO })
     }
 
     /// Looks again and again for so long before each deadline, instead of sleeping up to it: the
@@ -106,22 +97,25 @@ impl Line for Cards {
         self.clock.now()
     }
 
-    fn receive(&mut self, taken: &mut dyn FnMut(Arrived<'_>)) -> Result<usize, LinkError> {
+    fn receive(&mut self, now: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError> {
         if !std::mem::replace(&mut self.ready, false) {
             return Ok(0);
         }
-        let Self { clock, cards, buffer, expected, .. } = self;
+        let Self { clock, cards, expected, .. } = self;
         let mut count = 0;
         for card in cards {
             for _ in 0..MOST {
-                let Some(len) = card.socket.recv_one(buffer)? else {
+                let room = intake.room();
+                let most = room.len();
+                let Some(len) = card.socket.recv_one(room)? else {
                     *expected = 0;
                     break;
                 };
                 count += 1;
-                let (at, path) = (clock.now(), card.path);
-                let bytes = &buffer[..len.min(ROOM)];
-                taken(Arrived { at, path, bytes, truncated: len > ROOM });
+                // The first one was there when we came to look.
+                let at = if count == 1 { now } else { clock.now() };
+                let path = card.path;
+                intake.arrived(Arrived { at, path, len: len.min(most), truncated: len > most });
                 *expected = expected.saturating_sub(1);
                 // All are back. Should there be more, the next wait tells at once.
                 if *expected == 0 {
@@ -142,8 +136,11 @@ impl Line for Cards {
         Ok(())
     }
 
-    fn look_at_host(&mut self, tell: &mut dyn FnMut(&HostObservation)) -> Result<(), LinkError> {
-        let now = self.clock.now();
+    fn look_at_host(
+        &mut self,
+        now: Instant,
+        tell: &mut dyn FnMut(&HostObservation),
+    ) -> Result<(), LinkError> {
         for card in &mut self.cards {
             if now < card.watch.due() {
                 continue;
@@ -166,7 +163,7 @@ impl Line for Cards {
             && sleep_until.since(now) < SHORT
         {
             // Who rings is heard soon enough, and one thing to wait for costs less than two.
-            let ready = wait_any([&card.socket as &dyn Waitable], &self.clock, sleep_until)?;
+            let ready = wait_for([&card.socket as &dyn Waitable], Some(sleep_until.since(now)))?;
             self.ready = ready != Ready::Deadline;
             return Ok(());
         }

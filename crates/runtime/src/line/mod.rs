@@ -14,15 +14,23 @@ pub use segment::{Pace, VirtualLine};
 
 /// A frame that has come back.
 #[derive(Clone, Copy, Debug)]
-pub struct Arrived<'a> {
+pub struct Arrived {
     /// When it was seen.
     pub at: Instant,
     /// At which card.
     pub path: Path,
-    /// Its bytes, without check sequence.
-    pub bytes: &'a [u8],
+    /// How many bytes it has in the room that it was received in, without check sequence.
+    pub len: usize,
     /// Its end is missing because it was longer than any frame may be.
     pub truncated: bool,
+}
+
+/// Who takes in what has come back: it says where, so that nothing is copied on the way.
+pub trait Intake {
+    /// Where the next frame is to be received: room for the longest.
+    fn room(&mut self) -> &mut [u8];
+    /// It was.
+    fn arrived(&mut self, arrived: Arrived);
 }
 
 /// A line, and the clock that it is driven by.
@@ -33,11 +41,11 @@ pub trait Line {
     /// Now.
     fn now(&self) -> Instant;
 
-    /// Takes in what has come back; gives how many frames that were.
+    /// Takes in what has come back up to `now`; gives how many frames that were.
     ///
     /// # Errors
     /// When an interface vanished, was switched off, or the kernel refuses something else.
-    fn receive(&mut self, taken: &mut dyn FnMut(Arrived<'_>)) -> Result<usize, LinkError>;
+    fn receive(&mut self, now: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError>;
 
     /// Sends a frame. What a full queue refuses is lost, and counted by the host.
     ///
@@ -45,11 +53,15 @@ pub trait Line {
     /// As [`receive`](Self::receive).
     fn send(&mut self, path: Path, frame: &[u8]) -> Result<(), LinkError>;
 
-    /// Tells what the host noticed since it was asked last, if it is time to look.
+    /// Tells what the host noticed since it was asked last, if it is time to look at `now`.
     ///
     /// # Errors
     /// As [`receive`](Self::receive).
-    fn look_at_host(&mut self, tell: &mut dyn FnMut(&HostObservation)) -> Result<(), LinkError>;
+    fn look_at_host(
+        &mut self,
+        now: Instant,
+        tell: &mut dyn FnMut(&HostObservation),
+    ) -> Result<(), LinkError>;
 
     /// Waits until a frame comes, somebody rings, or `deadline`.
     ///
@@ -70,16 +82,20 @@ impl<L: Line + ?Sized> Line for &mut L {
         (**self).now()
     }
 
-    fn receive(&mut self, taken: &mut dyn FnMut(Arrived<'_>)) -> Result<usize, LinkError> {
-        (**self).receive(taken)
+    fn receive(&mut self, now: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError> {
+        (**self).receive(now, intake)
     }
 
     fn send(&mut self, path: Path, frame: &[u8]) -> Result<(), LinkError> {
         (**self).send(path, frame)
     }
 
-    fn look_at_host(&mut self, tell: &mut dyn FnMut(&HostObservation)) -> Result<(), LinkError> {
-        (**self).look_at_host(tell)
+    fn look_at_host(
+        &mut self,
+        now: Instant,
+        tell: &mut dyn FnMut(&HostObservation),
+    ) -> Result<(), LinkError> {
+        (**self).look_at_host(now, tell)
     }
 
     fn wait(&mut self, deadline: Instant) -> Result<(), LinkError> {

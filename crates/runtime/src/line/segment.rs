@@ -14,7 +14,7 @@ use linesman_proto::address::{Network, Path};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::{HostPort, Segment};
 
-use super::{Arrived, Line};
+use super::{Arrived, Intake, Line};
 use crate::wiring::Wiring;
 
 /// How fast virtual time goes.
@@ -97,7 +97,7 @@ impl Line for VirtualLine {
         self.now
     }
 
-    fn receive(&mut self, taken: &mut dyn FnMut(Arrived<'_>)) -> Result<usize, LinkError> {
+    fn receive(&mut self, _: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError> {
         self.segment.advance(self.now);
         self.wiring.carry(self.segment.signals_mut());
         let mut count = 0;
@@ -105,8 +105,11 @@ impl Line for VirtualLine {
             count += 1;
             // What is not intact the card drops and counts; nobody behind it sees it.
             if came.intact {
-                let (at, path) = (came.at, came.path);
-                taken(Arrived { at, path, bytes: &self.arrival, truncated: false });
+                let room = intake.room();
+                let len = self.arrival.len().min(room.len());
+                room[..len].copy_from_slice(&self.arrival[..len]);
+                let truncated = len < self.arrival.len();
+                intake.arrived(Arrived { at: came.at, path: came.path, len, truncated });
             }
         }
         Ok(count)
@@ -117,7 +120,11 @@ impl Line for VirtualLine {
         Ok(())
     }
 
-    fn look_at_host(&mut self, tell: &mut dyn FnMut(&HostObservation)) -> Result<(), LinkError> {
+    fn look_at_host(
+        &mut self,
+        _: Instant,
+        tell: &mut dyn FnMut(&HostObservation),
+    ) -> Result<(), LinkError> {
         if self.now < self.look_at {
             return Ok(());
         }

@@ -1,9 +1,9 @@
 //! What the diagnosis sees of a running line, without holding up the cycle.
 //!
 //! Frames are kept in a log that was laid out beforehand, which has room for one more at any time: a
-//! frame that is sent is written there in the first place, one that was received is copied. A full or
-//! old log is handed over as a whole to the thread that judges, and an empty one taken in return. When that thread does not keep
-//! up, frames are left out and counted: the cycle never waits.
+//! frame that is sent is built there, one that comes back is received there, and neither is copied. A
+//! full or old log is handed over as a whole to the thread that judges, and an empty one taken in
+//! return. When that thread does not keep up, frames are left out and counted: the cycle never waits.
 
 use std::sync::mpsc::{self, Receiver, SyncSender, TrySendError};
 
@@ -11,13 +11,15 @@ use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
 use linesman_proto::address::{Network, Path};
 use linesman_proto::time::{Instant, Span};
 
-/// Bytes of frames in one log.
+/// Bytes of a log.
 const ROOM: usize = 256 * 1024;
 /// Room for one frame, in bytes: the longest has 1,514, and what is longer than any may be has its
 /// end cut off.
-const FRAME_ROOM: usize = 1_536;
-/// Frames in one log.
-const FRAMES: usize = 2_048;
+pub const FRAME_ROOM: usize = 1_536;
+/// What is noted of a frame lies before it: its time, its number, and a word of all else.
+const HEAD: usize = 24;
+/// What a frame takes at most.
+const ENTRY: usize = HEAD + FRAME_ROOM;
 /// Logs on their way: so far may the judging thread fall behind.
 const LOGS: usize = 8;
 /// A log that is older than this is handed over although it is not full.
@@ -26,100 +28,48 @@ const OLD: Span = Span::ms(50);
 /// After no empty log was there, none is asked for this long.
 const PAUSE: Span = Span::ms(5);
 
-/// One frame of a log.
-#[derive(Clone, Copy)]
-struct Record {
-    time: Instant,
-    number: u64,
-    end: usize,
-    path: Option<Path>,
-    direction: Direction,
-    truncated: bool,
-}
-
-impl Record {
-    const NONE: Self = Self {
-        time: Instant::ZERO,
-        number: 0,
-        end: 0,
-        path: None,
-        direction: Direction::Unknown,
-        truncated: false,
-    };
-}
-
 /// Frames and what the host noticed, in order of time.
 pub struct Log {
-    /// The frames one behind the other, and how many bytes they take.
+    /// The entries one behind the other, and how many bytes they take. There is room for another as
+    /// long as one of the longest fits.
     bytes: Box<[u8]>,
     len: usize,
-    records: Box<[Record]>,
-    count: usize,
-    /// There is no room for another frame.
-    full: bool,
     host: Vec<HostObservation>,
 }
 
 impl Log {
-    fn new(bytes: usize, frames: usize) -> Self {
-        Self {
-            bytes: vec![0; bytes].into(),
-            len: 0,
-            records: vec![Record::NONE; frames].into(),
-            count: 0,
-            full: false,
-            host: Vec::new(),
-        }
+    fn new(bytes: usize) -> Self {
+        Self { bytes: vec![0; bytes].into(), len: 0, host: Vec::new() }
     }
 
     fn clear(&mut self) {
-        (self.len, self.count, self.full) = (0, 0, false);
+        self.len = 0;
         self.host.clear();
     }
 
-    /// Room for the next frame; `None`: the log is full.
+    /// Where the next entry goes; `None`: the log is full.
     #[inline]
-    fn room(&mut self) -> Option<&mut [u8; FRAME_ROOM]> {
-        if self.full {
-            return None;
-        }
+    fn next(&mut self) -> Option<&mut [u8; ENTRY]> {
         self.bytes.get_mut(self.len..)?.first_chunk_mut()
-    }
-
-    /// The frame in [`Log::room`] is there.
-    #[inline]
-    fn keep(&mut self, passed: &Passed, len: usize) {
-        self.len += len;
-        if let Some(record) = self.records.get_mut(self.count) {
-            *record = Record {
-                time: passed.time,
-                number: passed.number,
-                end: self.len,
-                path: passed.path,
-                direction: passed.direction,
-                truncated: passed.truncated,
-            };
-            self.count += 1;
-        }
-        self.full = self.count >= self.records.len() || self.len + FRAME_ROOM > self.bytes.len();
     }
 
     /// The frames, oldest first.
     pub fn frames(&self) -> impl Iterator<Item = FrameSeen<'_>> {
-        let mut begin = 0;
-        self.records[..self.count].iter().map(move |record| {
-            let bytes = &self.bytes[begin..record.end];
-            begin = record.end;
-            FrameSeen {
+        let mut rest = &self.bytes[..self.len];
+        std::iter::from_fn(move || {
+            let (head, behind) = rest.split_first_chunk()?;
+            let (passed, len) = Passed::read(head);
+            rest = behind.get(len..)?;
+            Some(FrameSeen {
                 network: Network::default(),
-                path: record.path,
-                direction: record.direction,
-                time: record.time,
-                number: record.number,
+                path: passed.path,
+                direction: passed.direction,
+                time: passed.time,
+                number: passed.number,
                 fcs: None,
-                truncated: record.truncated,
-                bytes,
-            }
+                truncated: passed.truncated,
+                bytes: behind.get(..len)?,
+            })
         })
     }
 
@@ -145,10 +95,61 @@ pub struct Passed {
     pub truncated: bool,
 }
 
+/// The word of an entry: the frame's length in its lower half, above it these.
+const SENT: u64 = 1 << 32;
+const RECEIVED: u64 = 1 << 33;
+const BY_A: u64 = 1 << 34;
+const BY_B: u64 = 1 << 35;
+const TRUNCATED: u64 = 1 << 36;
+
+impl Passed {
+    /// Notes it before the frame, which has so many bytes.
+    #[inline]
+    fn write(&self, len: usize, head: &mut [u8; HEAD]) {
+        let direction = match self.direction {
+            Direction::Sent => SENT,
+            Direction::Received => RECEIVED,
+            Direction::Unknown => 0,
+        };
+        let path = match self.path {
+            Some(Path::A) => BY_A,
+            Some(Path::B) => BY_B,
+            None => 0,
+        };
+        let truncated = if self.truncated { TRUNCATED } else { 0 };
+        let words = [self.time.as_nanos(), self.number, len as u64 | direction | path | truncated];
+        for (to, word) in head.as_chunks_mut().0.iter_mut().zip(words) {
+            *to = word.to_le_bytes();
+        }
+    }
+
+    /// What [`Passed::write`] has noted, and the length of the frame.
+    fn read(head: &[u8; HEAD]) -> (Self, usize) {
+        let mut words = head.as_chunks().0.iter().map(|word| u64::from_le_bytes(*word));
+        let mut word = || words.next().unwrap_or(0);
+        let (time, number, rest) = (word(), word(), word());
+        let is = |bit: u64| rest & bit != 0;
+        let path = [(BY_A, Path::A), (BY_B, Path::B)].into_iter().find(|(bit, _)| is(*bit));
+        let direction = match (is(SENT), is(RECEIVED)) {
+            (true, _) => Direction::Sent,
+            (false, true) => Direction::Received,
+            (false, false) => Direction::Unknown,
+        };
+        let passed = Self {
+            time: Instant::from_nanos(time),
+            number,
+            path: path.map(|(_, path)| path),
+            direction,
+            truncated: is(TRUNCATED),
+        };
+        (passed, (rest & 0xFFFF_FFFF) as usize)
+    }
+}
+
 /// The end in the cycle.
 pub struct Tap {
     log: Log,
-    /// When the log is handed over although it is not full.
+    /// When the log is handed over although it is not full, if there is anything in it.
     due: Instant,
     full: SyncSender<Log>,
     empty: Receiver<Log>,
@@ -157,7 +158,7 @@ pub struct Tap {
     /// Frames that were left out.
     left_out: u64,
     /// Where they go.
-    nowhere: Box<[u8; FRAME_ROOM]>,
+    nowhere: Box<[u8; ENTRY]>,
     /// Wait for the other side rather than leave anything out.
     waits: bool,
 }
@@ -176,23 +177,23 @@ pub fn tap(waits: bool) -> (Tap, Listener) {
     let (to_cycle, empty) = mpsc::sync_channel(LOGS + 1);
     for _ in 0..LOGS {
         // There is room for all of them.
-        let _ = to_cycle.try_send(Log::new(ROOM, FRAMES));
+        let _ = to_cycle.try_send(Log::new(ROOM));
     }
     let tap = Tap {
-        log: Log::new(ROOM, FRAMES),
-        due: Instant::MAX,
+        log: Log::new(ROOM),
+        due: Instant::ZERO,
         full_until: Instant::ZERO,
         full,
         empty,
         left_out: 0,
-        nowhere: Box::new([0; FRAME_ROOM]),
+        nowhere: Box::new([0; ENTRY]),
         waits,
     };
     (tap, Listener { full: from_cycle, empty: to_cycle })
 }
 
 impl Tap {
-    /// A frame left a card or came back.
+    /// A frame left a card or came back: it is copied.
     #[inline]
     pub fn frame(&mut self, frame: &FrameSeen<'_>) {
         let len = frame.bytes.len().min(FRAME_ROOM);
@@ -205,23 +206,28 @@ impl Tap {
     /// Room for a frame that passes about `now`. [`Tap::keep`] says that it did, else it is as if
     /// nothing had been written.
     #[inline]
-    pub fn room(&mut self, now: Instant) -> &mut [u8; FRAME_ROOM] {
-        if self.log.full {
+    pub fn room(&mut self, now: Instant) -> &mut [u8] {
+        if self.log.next().is_none() {
             self.next_log(now);
         }
-        self.log.room().unwrap_or(&mut self.nowhere)
+        let (_, room) = self.log.next().unwrap_or(&mut self.nowhere).split_at_mut(HEAD);
+        room
     }
 
     /// The frame that was written into [`Tap::room`] has passed; it has so many bytes.
     #[inline]
     pub fn keep(&mut self, passed: &Passed, len: usize) {
-        if self.log.count == 0 {
-            self.due = passed.time + OLD;
+        let Some(entry) = self.log.next() else { return self.leave_out() };
+        let len = len.min(FRAME_ROOM);
+        if let Some(head) = entry.first_chunk_mut() {
+            passed.write(len, head);
         }
-        match self.log.full {
-            false => self.log.keep(passed, len),
-            true => self.left_out += 1,
-        }
+        self.log.len += HEAD + len;
+    }
+
+    #[cold]
+    fn leave_out(&mut self) {
+        self.left_out += 1;
     }
 
     /// The log is full: the next one takes the frame, if there is one.
@@ -241,9 +247,17 @@ impl Tap {
     /// Hands over what is old.
     #[inline]
     pub fn turn(&mut self, now: Instant) {
-        if now >= self.due && !self.hand_over() {
-            // Nobody takes it now: there is room left, and asking costs something.
-            self.due = now + OLD;
+        if now >= self.due {
+            self.hand_over_old(now);
+        }
+    }
+
+    #[cold]
+    fn hand_over_old(&mut self, now: Instant) {
+        // Should nobody take it now, there is room left, and asking costs something.
+        self.due = now + OLD;
+        if self.log.len > 0 || !self.log.host.is_empty() {
+            self.hand_over();
         }
     }
 
@@ -262,7 +276,6 @@ impl Tap {
         let Some(mut next) = next else { return false };
         next.clear();
         let log = std::mem::replace(&mut self.log, next);
-        self.due = Instant::MAX;
         match self.full.try_send(log) {
             Ok(()) => true,
             // As many logs as there is room for: it cannot be full.
@@ -278,7 +291,7 @@ impl Tap {
 impl Drop for Tap {
     fn drop(&mut self) {
         // Nobody may listen any more.
-        let _ = self.full.try_send(std::mem::replace(&mut self.log, Log::new(0, 0)));
+        let _ = self.full.try_send(std::mem::replace(&mut self.log, Log::new(0)));
     }
 }
 

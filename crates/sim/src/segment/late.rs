@@ -1,7 +1,9 @@
 //! Frames that a card sends later than it was told to: a busy host, a queue.
 //!
 //! A host keeps back a single frame now and then, or all of them by so much for a while. Either way
-//! the frame waits in the card, those behind it wait with it, and it goes on its way when it leaves.
+//! the frame waits in the card, those behind it wait with it, and it goes on its way when it leaves. A card
+//! that is in time sends one frame after the other, too: what is handed to it while one is still leaving
+//! waits for its end.
 
 use std::collections::VecDeque;
 
@@ -25,8 +27,17 @@ pub(super) struct Lateness {
     all: Vec<(Instant, Span, FaultId)>,
     /// Single frames: the next from an instant on, by how much, and whose doing it is.
     single: VecDeque<(Instant, Span, FaultId)>,
-    /// When the last frame that was kept back has left.
+    /// When the last frame that was sent, or kept back, has left.
     busy_until: Instant,
+}
+
+impl Lateness {
+    /// A frame leaves at `leaves`, and takes so long: the next one follows after the gap.
+    #[inline]
+    pub(super) fn sends(&mut self, leaves: Instant, duration: Span) {
+        let free = leaves + duration + Span::ns(GAP as u64 * BYTE_NS);
+        self.busy_until = self.busy_until.max(free);
+    }
 }
 
 /// Frames that wait in the cards, by the time at which they leave.
@@ -78,8 +89,8 @@ impl Card {
         if leaves <= now {
             return None;
         }
-        let len = PREAMBLE_LEN + bytes.max(MIN_LEN) + FCS_LEN + GAP;
-        lateness.busy_until = leaves + Span::ns(len as u64 * BYTE_NS);
+        let len = PREAMBLE_LEN + bytes.max(MIN_LEN) + FCS_LEN;
+        lateness.sends(leaves, Span::ns(len as u64 * BYTE_NS));
         Some((leaves, most.map(|(.., fault)| fault)))
     }
 }
@@ -103,9 +114,12 @@ impl Segment {
             let effect = Effect::FrameHeldBack { by: leaves.since(now) };
             self.world.truth.effect(now, fault, Place::Host(path), effect);
         }
+        let mut bytes = self.spare.pop().unwrap_or_default();
+        bytes.clear();
+        bytes.extend_from_slice(frame);
         let waiting = &mut self.waiting.0;
         let before = waiting.iter().take_while(|(other, _, _)| *other <= leaves).count();
-        waiting.insert(before, (leaves, path, frame.to_vec()));
+        waiting.insert(before, (leaves, path, bytes));
         true
     }
 
@@ -115,6 +129,7 @@ impl Segment {
         while self.waiting.0.front().is_some_and(|(leaves, _, _)| *leaves <= now) {
             if let Some((leaves, path, frame)) = self.waiting.0.pop_front() {
                 self.send(leaves, path, &frame);
+                self.recycle(frame);
             }
         }
     }

@@ -105,7 +105,7 @@ impl Segment {
 
     // ---- frames ----
 
-    /// A card sends a frame: its first bit leaves the card at `now`. A card pads what is shorter
+    /// A card sends a frame: its first bit leaves the card at `now`, or when the frame before it has left. A card pads what is shorter
     /// than 60 bytes, and sends nothing without a carrier or longer than 1514 bytes.
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.now = self.now.max(now);
@@ -148,7 +148,9 @@ impl Segment {
         if leaves > now {
             self.world.look_ahead(leaves, duration);
         }
-        self.world.cards[path.index()].sent_until = leaves + duration;
+        let card = &mut self.world.cards[path.index()];
+        card.sent_until = leaves + duration;
+        card.lateness.sends(leaves, duration);
         let mut traveller = Traveller::new(frame);
         match self.world.carry(path, leaves, &mut traveller) {
             Outcome::Arrived(path, at) => self.arrivals.push(at, path, traveller.frame),

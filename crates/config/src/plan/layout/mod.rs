@@ -56,6 +56,8 @@ pub struct PlanOptions {
     pub clock_datagrams: bool,
     /// A cyclic datagram that reads which mailboxes hold something.
     pub mailbox_states: bool,
+    /// The shift of the outputs: from the frames to SYNC0. `None`: 30 % of the cycle (SYN-11).
+    pub outputs_shift: Option<Span>,
 }
 
 impl Default for PlanOptions {
@@ -68,6 +70,7 @@ impl Default for PlanOptions {
             pack_bits: false,
             clock_datagrams: false,
             mailbox_states: false,
+            outputs_shift: None,
         }
     }
 }
@@ -181,6 +184,7 @@ impl Plan {
         }
         let mut plan = Self {
             devices: devices.iter().zip(0..).map(|(planned, id)| device(planned, id)).collect(),
+            outputs_shift: options.outputs_shift,
             ..Self::empty(tree)
         };
         let tasks = match options.tasks.as_slice() {

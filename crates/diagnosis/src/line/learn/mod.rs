@@ -132,6 +132,9 @@ impl Learner {
                 continue;
             };
             let sum = exchange.sum(index, datagram.wkc().0);
+            if exchange.is_part && sum == 0 {
+                continue;
+            }
             let answer = Answer {
                 command,
                 effect: command.effect(),
@@ -344,8 +347,15 @@ impl Learner {
 /// A request that never came back, or of which only some copies did.
 fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
     let Ok(view) = FrameView::parse(request.bytes) else { return };
+    if exchange.is_part {
+        return;
+    }
     if exchange.earlier.is_empty() && !exchange.is_cut_off {
         line.traffic.record_lost(request.time, request.number, exchange.returns_before);
+        line.touch();
+    }
+    if let Some(card) = exchange.copy_lost {
+        line.traffic.copies_lost[card.index()].add(1, request.time);
         line.touch();
     }
     for (index, datagram) in view.datagrams().enumerate() {

@@ -166,7 +166,8 @@ fn clocks(plan: &Plan, output: &Output) -> String {
     let Some(reference) = plan.reference_clock().and_then(|id| plan.device(id)) else {
         return String::new();
     };
-    let headings = ["No", "Clock of", "Activation", "SYNC0 (ms)", "shift (µs)", "SYNC1 (ms)"];
+    let headings =
+        ["No", "Clock of", "Activation", "SYNC0 (ms)", "after frames (µs)", "SYNC1 (ms)"];
     let mut table = Table::new(&headings, output.paint());
     for device in &plan.devices {
         let Some(clock) = &device.settings.clock else { continue };
@@ -176,7 +177,7 @@ fn clocks(plan: &Plan, output: &Output) -> String {
             device.name.clone(),
             format!("0x{:04X}", clock.assign_activate),
             ms(clock.sync0_cycle.as_nanos()),
-            format!("{:.1}", clock.sync0_shift_ns as f64 / 1e3),
+            format!("{:.1}", plan.sync0_shift_ns(device) as f64 / 1e3),
             if clock.sync1() { ms(clock.sync1_cycle.as_nanos()) } else { String::new() },
         ]);
     }

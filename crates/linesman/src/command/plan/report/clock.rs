@@ -3,18 +3,16 @@
 use linesman_config::plan::Plan;
 use serde::Serialize;
 
-/// Share of a cycle that is usual for the shift of outputs (SYN-11).
-const USUAL_SHIFT_PERCENT: u64 = 30;
-
 /// The distributed clocks.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ClockReport {
     /// Number of the reference clock.
     reference: u32,
-    /// Shift of the outputs that is usual: 30 % of the cycle of the first task with a clock.
+    /// Shift of the outputs in the first task with a clock: from its frames to SYNC0.
     outputs_shift_ns: u64,
-    /// What the line delays a frame at least, without cables and jitter: outputs cannot be there sooner.
+    /// What the line and the frames themselves take at least, without cables and jitter: outputs cannot be
+    /// there sooner.
     least_outputs_shift_ns: u64,
     devices: Vec<ClockDeviceReport>,
 }
@@ -26,7 +24,10 @@ struct ClockDeviceReport {
     no: u32,
     assign_activate: u16,
     sync0_cycle_ns: u64,
+    /// Its own shift, on top of that of the outputs.
     sync0_shift_ns: i64,
+    /// From the frames at the reference clock to SYNC0.
+    sync0_after_frames_ns: i64,
     sync1_cycle_ns: u64,
 }
 
@@ -35,17 +36,18 @@ pub(super) fn of(plan: &Plan) -> Option<ClockReport> {
     let reference = plan.reference_clock()?;
     let clocked = || plan.devices.iter().filter_map(|one| Some((one, one.settings.clock?)));
     let task = clocked().find_map(|(device, _)| plan.task_of(device.id));
-    let cycle = task.or(plan.tasks.first()).map_or(0, |task| task.cycle.as_nanos());
+    let task = task.or(plan.tasks.first())?;
     Some(ClockReport {
         reference: reference.no(),
-        outputs_shift_ns: cycle * USUAL_SHIFT_PERCENT / 100,
-        least_outputs_shift_ns: plan.least_delay().as_nanos(),
+        outputs_shift_ns: plan.outputs_shift(task).as_nanos(),
+        least_outputs_shift_ns: plan.least_outputs_shift(task).as_nanos(),
         devices: clocked()
             .map(|(device, clock)| ClockDeviceReport {
                 no: device.id.no(),
                 assign_activate: clock.assign_activate,
                 sync0_cycle_ns: clock.sync0_cycle.as_nanos(),
                 sync0_shift_ns: clock.sync0_shift_ns,
+                sync0_after_frames_ns: plan.sync0_shift_ns(device),
                 sync1_cycle_ns: clock.sync1_cycle.as_nanos(),
             })
             .collect(),
