@@ -275,9 +275,8 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
     let is_hurt =
         |symptom: &Symptom| matches!(symptom, Symptom::StateLost(_) | Symptom::Emergency(_));
     let is_harmless = cause.condition.severity == Severity::Info;
-    !symptoms.is_empty()
-        && !(is_harmless && symptoms.iter().any(is_hurt))
-        && !was_over(cause, effect, after)
+    let hides_harm = is_harmless && symptoms.iter().any(is_hurt);
+    !(symptoms.is_empty() || hides_harm || was_over(cause, effect, after))
         && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))
 }
 

@@ -12,6 +12,8 @@
 //! only when it has been out for long; where time stamps do not tell, since those of captures jump and run
 //! backwards, many do.
 
+mod loss;
+
 use std::collections::VecDeque;
 
 use linesman_proto::address::Path;
@@ -24,13 +26,6 @@ use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen, Sender};
 
 /// Most requests waiting for their return; beyond, the oldest is lost.
 const MOST_PENDING: usize = 256;
-/// So many later returns make a request lost that has been out for longer than [`REORDERED`].
-const OVERTAKEN: u16 = 16;
-/// So many do at any time: far more than short frames can be noted before a long one.
-const OVERTAKEN_BY_MANY: u16 = 64;
-/// Within this time frames may be noted in another order than they went: the longest one takes 123 µs,
-/// and waits for others.
-const REORDERED: Span = Span::ms(1);
 /// On a live socket a frame that is not back by then never comes.
 const TIMEOUT: Span = Span::ms(100);
 /// Two equal requests closer than this are one that was recorded twice: the shortest frame takes
@@ -42,8 +37,6 @@ const MOST_IN_FLIGHT: usize = 32;
 const IN_FLIGHT: Span = Span::ms(5);
 /// The copy for the other card of a ring follows within this time.
 const OTHER_CARD: Span = Span::ms(1);
-/// When both copies of so many later requests have come back, the ring is whole.
-const STILL_WHOLE: u64 = 4;
 /// How many returns are remembered to know one that was recorded twice.
 const REMEMBERED: usize = 8;
 
@@ -449,53 +442,6 @@ impl Pairing {
         }
         if found > 0 {
             self.overtake(found, frame.time, settle);
-        }
-    }
-
-    /// Everything sent before the request at `found` was overtaken once more.
-    fn overtake(&mut self, found: usize, now: Instant, settle: &mut impl FnMut(&Exchange<'_>)) {
-        for pending in self.pending.iter_mut().take(found) {
-            pending.overtaken += 1;
-        }
-        let is_lost = |oldest: &Pending| {
-            oldest.overtaken >= OVERTAKEN_BY_MANY
-                || (oldest.overtaken >= OVERTAKEN && gap(oldest.time, now) > REORDERED)
-        };
-        while self.pending.front().is_some_and(is_lost) {
-            self.lose(0, false, settle);
-        }
-    }
-
-    /// Gives up on a request; what came back of its copies counts.
-    fn lose(&mut self, index: usize, is_cut_off: bool, settle: &mut impl FnMut(&Exchange<'_>)) {
-        let Some(pending) = self.pending.get(index) else { return };
-        let mut copy_lost = None;
-        if pending.out == 1 && !pending.sums.is_empty() && !is_cut_off {
-            // A ring that was opened loses all copies; one that is whole loses single ones.
-            let since = pending.whole_before.map(|before| self.whole - before);
-            if since.is_some_and(|since| since >= STILL_WHOLE) {
-                copy_lost = Some(if pending.came_to == Path::A { Path::B } else { Path::A });
-            } else {
-                self.was_whole = false;
-            }
-        }
-        settle(&Exchange {
-            request: Some(pending.copy()),
-            reply: None,
-            earlier: &pending.sums,
-            is_last: true,
-            returns_before: pending.returns_before,
-            is_cut_off,
-            is_part: pending.is_part,
-            copy_lost,
-        });
-        self.remove(index);
-    }
-
-    fn remove(&mut self, index: usize) {
-        if let Some(pending) = self.pending.remove(index) {
-            self.spare.push(pending.bytes);
-            self.spare_sums.push(pending.sums);
         }
     }
 

@@ -1,9 +1,9 @@
 //! How often a finding is right of which its rule is so sure.
 //!
 //! A rule says how sure it is by its own evidence, so that hypotheses can be ranked. Whether 70 % is right seven
-//! times of ten only a corpus can tell: `linesman lab score` holds both against each other. What is reported is
-//! what was measured there, on seeds 1 to 400: the share of findings with just the right cause and place,
-//! without admitted sets.
+//! times of ten only a corpus can tell: `linesman lab score` holds both against each other. The table is
+//! drawn through such figures of seeds 1 to 400: the share of findings with just the right cause and place,
+//! without admitted sets. How well it fits now is in the last table of `docs/score.md`.
 
 /// What a rule says, and what was measured, smoothed so that more never becomes less. Up to one half rules are
 /// taken at their word: they name sets of causes there, with several about as likely.

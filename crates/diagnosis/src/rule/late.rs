@@ -6,7 +6,8 @@
 //! for on its card is the frame before it. One that takes 60 µs more than the shortest of its length, and far
 //! more than this computer usually wanders, was kept back. Many in a row that take the same longer time took
 //! another way: no finding; nor is it one as long as no process data are exchanged in a cycle. A recording tells
-//! it too, since it has the times at which frames went out and came back.
+//! it too, since it has the times at which frames went out and came back; but where nobody keeps step with SYNC
+//! signals, only of frames that are late by a cycle or more.
 //!
 //! **What it means.** The line is well: no controller counts anything. The computer, its card, a switch or a
 //! converter in between kept the frame back. Single frames now and then are the computer's: interrupts, another
@@ -50,9 +51,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let Some(last) = trips.late.back() else { return };
     // Nobody waits for a frame that is sent when its sender likes.
     let keeps_step = line.devices.iter().any(|device| device.sync_on.is_some_and(|on| on.value));
-    if shortest_cycle(line).is_none() {
-        return;
-    }
+    let Some(cycle) = shortest_cycle(line) else { return };
     let mut first = last;
     for late in trips.late.iter().rev() {
         if first.sent.since(late.sent) > TOGETHER {
@@ -62,6 +61,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
     let of_spell = || trips.late.iter().filter(|late| late.sent >= first.sent);
     let worst = of_spell().map(|late| late.by).max().unwrap_or(Span::ZERO);
+    // What a recorder saw late by less than a cycle did no harm where nobody keeps step.
+    if !keeps_step && !line.traffic.direction_known && worst < cycle {
+        return;
+    }
     let share = trips.share();
     let (cause, other) = if trips.is_queue() {
         (FaultName::LateFrames, FaultName::HostJitter)
@@ -89,7 +92,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         condition = condition.explaining(hurt.iter().map(|device| Symptom::StateLost(device.id)));
         condition =
             condition.explaining(hurt.iter().map(|device| Symptom::WorkingCounter(device.id)));
-    } else if keeps_step && worst >= shortest_cycle(line).unwrap_or(Span::s(1)) {
+    } else if keeps_step && worst >= cycle {
         // Where nobody keeps step, a late frame costs a cycle; every computer has some.
         condition.severity = Severity::Warning;
     }

@@ -48,7 +48,8 @@ pub(crate) fn switch_on(lab: &mut Lab, mode: &EsiOpMode) -> Result<(), String> {
     let station = lab.plan().expect("a plan").devices.last().expect("a device").station;
     let now = access(lab, station, 0x0910, 8, None)?;
     let now = u64::from_le_bytes(now.try_into().map_err(|_| "no system time")?);
-    let start = now + Span::ms(3).as_nanos();
+    // What is asked beside the cycle goes right behind its frame; the signal must not fall upon the frames.
+    let start = now + Span::ms(3).as_nanos() + CYCLE.as_nanos() * 3 / 10;
     let [cyclic, activation] = mode.assign_activate.to_le_bytes();
     for (register, data) in [
         (0x0990, start.to_le_bytes().to_vec()),

@@ -181,7 +181,11 @@ impl Multiplexer {
         loop {
             let request = Request::write(self.target, self.areas.receive.offset, &buffer);
             match self.wire.submit(request).await {
-                Ok(reply) if reply.answered() => return Ok(true),
+                Ok(reply) if reply.answered() => {
+                    // One without a counter that was taken twice is answered twice.
+                    self.late |= uncertain && counter == Counter::NONE;
+                    return Ok(true);
+                }
                 // Full, unless the SubDevice does not answer at all. After a lost frame it is our own
                 // message that fills it.
                 Ok(_) => {
