@@ -69,15 +69,23 @@ def linesman_serves_subdevices_that_nobody_drives(line):
 
 @check
 def of_two_maindevices_that_begin_at_once_one_is_refused(line):
+    """Both listen, for a time that each draws by chance. Two that draw the same within a millisecond do not hear each
+    other: that may happen once, not as a rule."""
     with Segment(line, LINESMAN, LINE.file):
-        for _ in range(3):
+        told_apart, seen = 0, []
+        for _ in range(4):
             both = [line.start(line.near, LINESMAN, "run", "--on", NEAR, "--seconds", 3, "--json") for _ in range(2)]
             ended = [line.finish(one) for one in both]
+            seen.append([(status, out[:200]) for status, out, _ in ended])
             refused = [out for status, out, _ in ended if status == 2]
-            assert len(refused) == 1 and "another MainDevice drives this line" in refused[0], ended
+            if len(refused) != 1:
+                continue
+            assert "another MainDevice drives this line" in refused[0], ended
             # The one that was heard first runs as if it were alone.
             report = next(parse(out, err) for status, out, err in ended if status != 2)
             assert report["settled"] and report["reached_ns"], report["counts"]
+            told_apart += 1
+        assert told_apart >= 3, seen
 
 
 def serve(line, where, command, *arguments):
