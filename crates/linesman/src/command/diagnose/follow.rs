@@ -98,9 +98,7 @@ impl Follower {
 
     /// Tells people all that is held.
     pub(crate) fn flush(&mut self, names: &Names, output: &mut Output) {
-        for event in std::mem::take(&mut self.held) {
-            self.tell_people(&event, names, output);
-        }
+        self.tell_until(Instant::MAX, names, output);
     }
 
     /// Tells people what has been held for long enough.
