@@ -34,7 +34,7 @@ const MOST_PERCENT: f64 = 5.0;
 /// What is put in, half a second after the line is up.
 const CASES: [(&str, &str); 3] = [
     ("healthy", ""),
-    ("counters", "kind = 'cable-degraded'\nat = 'D20.C-D40.A'\nhits_per_s = 200\nmovement_ms = 50"),
+    ("counters", "kind = 'cable-degraded'\nat = 'D16.C-D32.A'\nhits_per_s = 200\nmovement_ms = 50"),
     ("cut", "kind = 'device-off'\ndevice = 'D70'"),
 ];
 
@@ -55,16 +55,16 @@ struct Recorded {
 fn line() -> String {
     let mut text = "name = \"plant\"\nseed = 7\n".to_owned();
     for number in 0..DEVICES {
-        // Couplers with nineteen terminals each: more would be too much for their E-bus.
+        // Couplers with fifteen terminals each: more would be too much for their E-bus.
         let kind = match number {
-            _ if number % 20 == 0 => "EK1100",
+            _ if number % 16 == 0 => "EK1100",
             _ if number % 4 == 0 => "EL3102",
             _ if number % 2 == 0 => "EL2008",
             _ => "EL1008",
         };
         let on = match number {
             0 => "maindevice".to_owned(),
-            _ if number % 20 == 0 => format!("D{}.C", number - 20),
+            _ if number % 16 == 0 => format!("D{}.C", number - 16),
             _ => format!("D{}.B", number - 1),
         };
         writeln!(text, "[[device]]\nname = \"D{number}\"\ntype = \"{kind}\"\non = \"{on}\"")
@@ -98,8 +98,8 @@ fn record(fault: &str) -> Recorded {
 
 /// Time of this thread on a processor, in ns.
 fn cpu_ns() -> u64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
-    text.split_whitespace().next().unwrap().parse().unwrap()
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    now.tv_sec.unsigned_abs() * 1_000_000_000 + now.tv_nsec.unsigned_abs()
 }
 
 /// Lets a fresh engine take it in for so long; gives ns on a processor per second of the line, from when it
@@ -158,7 +158,9 @@ fn main() {
         let mut best = f64::MAX;
         for _ in 0..5 {
             let (spent, engine) = play(&recorded, SECONDS);
-            assert_eq!(engine.diagnosis().findings.is_empty(), fault.is_empty(), "{name}");
+            let told = engine.diagnosis();
+            let found: Vec<_> = told.findings.iter().map(|one| one.code.as_str()).collect();
+            assert_eq!(found.is_empty(), fault.is_empty(), "{name}: {found:?}");
             best = best.min(spent);
         }
         let percent = best / 1e7;
