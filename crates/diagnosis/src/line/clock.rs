@@ -118,10 +118,16 @@ pub struct Passed {
 }
 
 impl Passed {
-    /// What the reference clock went on by since an earlier frame, in ns.
+    /// What the reference clock went on by since an earlier frame, in ns. The low 32 bits alone come round
+    /// every 4.3 s: then that is meant which is nearest to what passed for the sender.
     const fn since(&self, earlier: &Self) -> i64 {
         let passed = self.time.wrapping_sub(earlier.time);
-        if self.is_short || earlier.is_short { passed as u32 as i32 as i64 } else { passed as i64 }
+        if !(self.is_short || earlier.is_short) {
+            return passed as i64;
+        }
+        let expected = self.sent.as_nanos().wrapping_sub(earlier.sent.as_nanos());
+        let beside = passed.wrapping_sub(expected) as u32 as i32;
+        expected as i64 + beside as i64
     }
 }
 
@@ -176,7 +182,7 @@ impl Reference {
     const STRETCH: Span = Span::ms(200);
     const MARKS: usize = 10;
     /// Two sound quartzes, of the computer and of a SubDevice, do not differ by more, in parts per million.
-    const SOUND: i64 = 300;
+    pub const SOUND: i64 = 300;
 
     /// The first frame that hands its time round.
     #[must_use]
@@ -341,6 +347,22 @@ mod tests {
         assert_eq!(running().wrong_speed, Some(1_000));
         assert_eq!(running_at(999_000).wrong_speed, Some(-1_000));
         assert_eq!(running_at(1_000_100).wrong_speed, None);
+    }
+
+    #[test]
+    fn a_short_time_that_came_round_in_a_long_silence_did_not_go_back() {
+        let short = |ms: u64, time: u64| {
+            let time = time & 0xFFFF_FFFF;
+            Seen::new(Passed { sent: at(ms), time, is_short: true }, at(ms), Some(ms))
+        };
+        let mut reference = Reference::new(DeviceId(0), short(0, 1_000));
+        assert!(!reference.record(short(1, 1_001_000)));
+        // 2.2 s are more than 31 bits of nanoseconds, 5 s more than 32.
+        assert!(!reference.record(short(2_201, 2_201_001_000)));
+        assert!(!reference.record(short(7_201, 7_201_001_000)));
+        assert_eq!(reference.went_back, None);
+        assert!(reference.record(short(7_202, 7_101_001_000)));
+        assert!(reference.went_back.is_some_and(|seen| seen.value < -90_000_000));
     }
 
     #[test]

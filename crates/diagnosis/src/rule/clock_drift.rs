@@ -8,7 +8,8 @@
 //! them do at once, in the same direction, it is the reference that runs wrong; so it is when the time that it
 //! gives goes faster or slower than the clock of the computer by more than any sound quartz.
 //!
-//! Nobody reads these registers all the time: live, the diagnosis asks for them by turns.
+//! Nobody reads these registers all the time: live, the diagnosis asks for them by turns. A clock that goes off
+//! while no frame comes round, by no more than a sound quartz does in that time, was left alone and is well.
 //!
 //! **What it means.** Control in the controller follows quartzes that are off by some hundreds of parts per
 //! million, and sound ones are off by fifty at most. Heat and damage make it more. The SYNC signals of the
@@ -23,7 +24,7 @@ use linesman_proto::address::{DeviceId, RegisterAddress};
 
 use super::{Rule, RulePage, View, reference_clock};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::clock::Astray;
+use crate::line::clock::{Astray, Reference};
 use crate::line::{Device, Line};
 
 /// The page.
@@ -48,7 +49,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
     let astray: Vec<(&Device, Astray)> = (line.devices.iter())
         .filter_map(|device| Some((device, device.clock.astray?)))
-        .filter(|(device, astray)| !was_gone(device, astray))
+        .filter(|(device, astray)| !was_gone(device, astray) && !was_left_alone(line, astray))
         .collect();
     if astray.is_empty() {
         conditions.extend(alone(line));
@@ -70,6 +71,17 @@ fn was_gone(device: &Device, astray: &Astray) -> bool {
     let is_within = |at| at >= astray.near.at && at <= astray.far.at;
     device.absences.iter().any(|absence| is_within(absence.since.at))
         || device.al.changes.iter().any(|change| change.is_own_fall() && is_within(change.at))
+}
+
+/// Whether no frame came round meanwhile, so that nobody was steered, and the clock went off by no more than
+/// a sound quartz does in such a time.
+fn was_left_alone(line: &Line, astray: &Astray) -> bool {
+    let alone = line.traffic.silences.iter().map(|silence| {
+        let ended = silence.ended.unwrap_or(line.now).min(astray.far.at);
+        ended.since(silence.since.at.max(astray.near.at).min(ended)).as_nanos()
+    });
+    let off = u128::from(astray.worst.value.unsigned_abs().saturating_sub(astray.near.value.unsigned_abs()));
+    off * 1_000_000 <= alone.map(u128::from).sum::<u128>() * Reference::SOUND as u128
 }
 
 /// The reference clock, if it is that which runs wrong.

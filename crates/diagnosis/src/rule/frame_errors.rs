@@ -100,6 +100,11 @@ fn add(
         (None, _) | (_, None) => return,
     };
     let is_unknown = matches!(suspicion.last_hop, Some(LastHop::Unknown { .. }));
+    // Ports were closed one after the other until frames came back: they were lost where that search ended.
+    let was_found = view.line.hole.and_then(|hole| hole.found);
+    if is_unknown && was_found.is_some_and(|found| first <= found.at) {
+        return;
+    }
     let page = match (is_unknown, most_likely.spot) {
         (true, _) => &LAST_HOP,
         (false, Spot::Link(..)) => &ON_LINK,

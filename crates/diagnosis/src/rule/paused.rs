@@ -10,7 +10,8 @@
 //!
 //! Without any watchdog that expired: all frames stayed away for 20 ms or more and then came again, while no
 //! link was lost, no SubDevice restarted, and no counter of any of them moved. Then they did not leave this
-//! computer, or did not get into it.
+//! computer, or did not get into it. Where the card is watched, it must have refused frames meanwhile: frames
+//! that it took and that nobody brought back vanished on the line (`H100`).
 //!
 //! **What it means.** The application, or the program that sends, stood still: a long call within the cycle
 //! (an SDO, a file, a print), a garbage collector, a debugger, a process without real-time priority, a
@@ -202,6 +203,10 @@ fn stalled(line: &Line) -> Option<Condition> {
         let last = line.host.card(*card).send_failures.last;
         last.is_some_and(|last| last >= pause.from && last <= pause.to + READ_WITHIN)
     });
+    // Who watches the card would know that it took nothing: then the frames left, and vanished on the line.
+    if refused.is_none() && line.host.is_watched {
+        return None;
+    }
     let frame = silence.since.frame.unwrap_or(0);
     let mut condition = Condition::new(&PAGE, Place::Host, FaultName::WatchdogStarved, pause.from)
         .confidence(if refused.is_some() { 0.8 } else { 0.5 })

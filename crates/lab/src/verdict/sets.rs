@@ -309,9 +309,29 @@ pub static TWINS: AdmittedSet = AdmittedSet {
     },
 };
 
+/// One of several equal devices in a row: the others have moved up.
+pub static EQUALS: AdmittedSet = AdmittedSet {
+    name: "equals",
+    causes: &[DeviceMissing],
+    while_so: "the missing one stands in a row of equal ones, of which the project knows neither alias nor \
+               serial number",
+    why: "whichever of two equal devices in a row is taken out, one of them is left, and stands at the same \
+          place of the line",
+    proof: Proof {
+        host_counters: true,
+        until_ms: 4_000,
+        plays: &[
+            Play { cause: Some(DeviceMissing), file: "kind = 'device-missing'\ndevice = 'T4'" },
+            Play { cause: Some(DeviceMissing), file: "kind = 'device-missing'\ndevice = 'T5'" },
+        ],
+        parted: Parted::ByAlias,
+    },
+};
+
 /// All of them.
 pub static ALL: &[&AdmittedSet] = &[
     &SILENT, &ONE_END, &OVERLOAD, &SYMBOLS, &BOTH_WAYS, &FIRST_HOP, &LAST_HOP, &UNCOUNTED, &TWINS,
+    &EQUALS,
 ];
 
 #[cfg(test)]

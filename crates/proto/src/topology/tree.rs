@@ -7,6 +7,7 @@
 //! Reference: S1 chapter 3; read [`wiring`](super::wiring) first.
 
 mod ring;
+mod row;
 
 use super::wiring::{End, Link, ports_after};
 use crate::address::Path;
