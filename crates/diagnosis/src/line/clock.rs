@@ -118,6 +118,9 @@ pub struct Passed {
 }
 
 impl Passed {
+    /// A frame may be on its way for so long after it was sent: the host stood still. In ns.
+    const AHEAD: i64 = 200_000_000;
+
     /// What the reference clock went on by since an earlier frame, in ns. The low 32 bits alone come round
     /// every 4.3 s: then that is meant which is nearest to what passed for the sender.
     const fn since(&self, earlier: &Self) -> i64 {
@@ -126,8 +129,10 @@ impl Passed {
             return passed as i64;
         }
         let expected = self.sent.as_nanos().wrapping_sub(earlier.sent.as_nanos());
-        let beside = passed.wrapping_sub(expected) as u32 as i32;
-        expected as i64 + beside as i64
+        let beside = passed.wrapping_sub(expected) as u32 as i32 as i64;
+        // No clock goes ahead by so much: then it has gone back, and come round.
+        let round = if beside > Self::AHEAD { 1_i64 << 32 } else { 0 };
+        expected as i64 + beside - round
     }
 }
 

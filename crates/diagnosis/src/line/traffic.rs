@@ -105,6 +105,9 @@ pub struct Traffic {
     pub broadcast_answers: u16,
     /// The working counter of the latest broadcast read, with when it last changed.
     pub broadcast_now: Option<Seen<u16>>,
+    /// In a ring, the latest broadcast read whose copies were both processed by somebody: by how many
+    /// each, in the order in which they came back.
+    pub broadcast_split: Option<Seen<(u16, u16)>>,
     /// The first broadcast read that fewer controllers answered than one before.
     pub broadcast_first_low: Option<Seen<u16>>,
     /// Most controllers that a frame passed, by what they add to positions.

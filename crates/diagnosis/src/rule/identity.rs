@@ -85,7 +85,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     {
         return;
     }
-    if super::wiring::judges(line) {
+    if super::wiring::judges(line) || super::ring_reversed::judges(line) {
         return;
     }
     let slots = slots(line);

@@ -25,6 +25,7 @@ pub mod processor_stopped;
 pub mod reference_clock;
 pub mod reported_wrong;
 pub mod restarted;
+pub mod ring_reversed;
 pub mod second_maindevice;
 pub mod shared_address;
 pub mod state_error;
@@ -97,6 +98,7 @@ pub const RULES: &[Rule] = &[
     frame_errors::RULE,
     identity::RULE,
     wiring::RULE,
+    ring_reversed::RULE,
     ebus_budget::RULE,
     reported_wrong::RULE,
     //

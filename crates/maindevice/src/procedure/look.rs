@@ -104,11 +104,12 @@ pub async fn count(wire: &Wire, network: Network) -> Result<(u16, OredStates), L
 /// [`LookError`] when there are none.
 pub async fn places(wire: &Wire, network: Network) -> Result<(Vec<Target>, OredStates), LookError> {
     let (count, states) = self::count(wire, network).await?;
-    if wire.ring_intact() != Some(false) {
+    if wire.ring_intact().is_none() {
         let places = (0..count).map(|position| Target::Position(Position(position)));
         return Ok((places.collect(), states));
     }
-    // A half for each card; that of card B is processed from the break outwards, so it follows.
+    // A half for each card; that of card B is processed from the break outwards, so it follows. In a closed
+    // ring card A has all of them, but for those that are plugged in the wrong way round.
     let mut places = Vec::with_capacity(usize::from(count));
     for card in Path::ALL {
         let status = register::AL_STATUS;

@@ -45,6 +45,8 @@ struct Answer<'a> {
     ado: RegisterAddress,
     /// Its working counter, all copies so far together.
     sum: u16,
+    /// The working counter of this copy alone.
+    own: u16,
     is_last: bool,
     /// Whether positions can be counted: there is but one copy.
     is_single: bool,
@@ -142,6 +144,7 @@ impl Learner {
                 reply: datagram,
                 ado: datagram.ado(),
                 sum,
+                own: datagram.wkc().0,
                 is_last: exchange.is_last,
                 is_single: exchange.is_last && exchange.earlier.is_empty(),
                 sent_at: exchange.request.map(|request| request.time),
@@ -234,6 +237,10 @@ impl Learner {
         let counts = answer.command == Command::Brd && answer.ado < FIRST_OPTIONAL;
         if counts {
             line.traffic.broadcast_answers = line.traffic.broadcast_answers.max(answer.sum);
+            let split = (answer.sum - answer.own, answer.own);
+            let is_split = split.0 > 0 && split.1 > 0;
+            line.traffic.broadcast_split =
+                is_split.then_some(Seen::new(split, answer.at, Some(answer.frame)));
             let is_news = line.traffic.broadcast_now.is_none_or(|known| known.value != answer.sum);
             if is_news {
                 let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));

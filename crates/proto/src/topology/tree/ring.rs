@@ -19,6 +19,16 @@ impl Tree {
         self.closes_at
     }
 
+    /// The controllers on the way from card A to card B, in this order; none if the line is no ring.
+    #[must_use]
+    pub fn ring_nodes(&self) -> Vec<usize> {
+        let last = self.closes_at().map(|(node, _)| node);
+        let mut nodes: Vec<usize> =
+            std::iter::successors(last, |node| self.parent(*node)).collect();
+        nodes.reverse();
+        nodes
+    }
+
     /// The index in [`Tree::links`] of the link to card B, if the line is a ring.
     #[must_use]
     pub fn ring_link(&self) -> Option<usize> {

@@ -1,0 +1,147 @@
+//! Who is plugged in the wrong way round within a closed ring (C304).
+//!
+//! A controller processes what comes in at its port A. In a closed ring all do so with the frames of card A,
+//! and those of card B come round untouched. One whose IN and OUT are exchanged, and what hangs on it beside
+//! the ring, is processed by the frames of card B instead: a broadcast read is answered in both copies,
+//! though no link is open.
+
+use linesman_config::fault::FaultName;
+use linesman_config::identity::mismatch;
+use linesman_proto::address::DeviceId;
+use linesman_proto::register::table;
+use linesman_proto::topology::Tree;
+
+use super::wiring::PLUGGED;
+use super::{Rule, View};
+use crate::finding::{Condition, Evidence, Place, Symptom};
+use crate::line::{Device, Line, Seen};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[], judge };
+
+/// Who is reversed, and how sure.
+struct Reversed {
+    node: usize,
+    /// Others whose answers would be as many.
+    others: Vec<usize>,
+}
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    let Some((tree, split)) = split(line) else { return };
+    if let Some(reversed) = find(line, tree, split.value) {
+        conditions.push(condition(line, tree, &reversed, split));
+    }
+}
+
+/// Whether somebody is plugged in the wrong way round, so that positions mean others than planned.
+pub(super) fn judges(line: &Line) -> bool {
+    split(line).is_some_and(|(tree, split)| find(line, tree, split.value).is_some())
+}
+
+/// The planned ring, if both copies of a broadcast are processed although it is closed.
+fn split(line: &Line) -> Option<(&Tree, Seen<(u16, u16)>)> {
+    let tree = line.tree.as_ref().filter(|_| line.tree_is_planned)?;
+    let split = line.traffic.broadcast_split?;
+    let (one, other) = split.value;
+    let is_whole = usize::from(one) + usize::from(other) == tree.len();
+    (is_whole && tree.closes_at().is_some() && !is_open(line, tree)).then_some((tree, split))
+}
+
+/// Whether the ring is open somewhere: both its ends have a link less than planned. Whose answers are taken
+/// for whose is not certain here, so it is counted how many there are with so many links.
+fn is_open(line: &Line, tree: &Tree) -> bool {
+    let mut planned: Vec<usize> =
+        (0..tree.len()).map(|node| tree.open_ports(node).count()).collect();
+    let shown = line.devices.iter().filter(|device| !is_silent(device));
+    let mut shown = shown.filter_map(|device| Some(device.dl.first?.value.active_ports().count()));
+    !shown.all(|count| {
+        let at = planned.iter().position(|known| *known == count);
+        at.map(|at| planned.swap_remove(at)).is_some()
+    })
+}
+
+/// Whether a planned one does not answer to its address.
+const fn is_silent(device: &Device) -> bool {
+    device.answered.is_none() || device.silent.is_some()
+}
+
+/// A controller of the ring, with all that hangs on it beside the ring.
+fn block(tree: &Tree, ring: &[usize], at: usize) -> Vec<usize> {
+    let further = ring.get(at + 1).map_or(&[][..], |next| tree.subtree(*next));
+    tree.subtree(ring[at]).iter().copied().filter(|node| !further.contains(node)).collect()
+}
+
+/// Whose share of the line is as large as that of one copy. Of several it is the one by which identities fit:
+/// those of card B have the last addresses. Then the one of which most do not answer to their address.
+fn find(line: &Line, tree: &Tree, split: (u16, u16)) -> Option<Reversed> {
+    let ring = tree.ring_nodes();
+    let is_as_large = |at: &usize| {
+        let len = block(tree, &ring, *at).len();
+        len == usize::from(split.0) || len == usize::from(split.1)
+    };
+    let mut fitting: Vec<usize> = (0..ring.len()).filter(is_as_large).collect();
+    let misfits = |at: &usize| {
+        let block = block(tree, &ring, *at);
+        let (behind, before): (Vec<usize>, Vec<usize>) =
+            tree.order().iter().partition(|node| block.contains(node));
+        let pairs = before.iter().chain(&behind).zip(tree.order());
+        pairs.filter(|(planned, found)| is_another(line, **planned, **found)).count()
+    };
+    let unanswered = |at: &usize| {
+        let block = block(tree, &ring, *at);
+        let device = |node: &usize| line.devices.get(*node);
+        block.iter().filter_map(device).filter(|device| is_silent(device)).count()
+    };
+    let rank = |at: &usize| (misfits(at), std::cmp::Reverse(unanswered(at)));
+    fitting.sort_by_key(rank);
+    let best = rank(fitting.first()?);
+    let is_equal = |at: &&usize| rank(at) == best;
+    let others = fitting.iter().skip(1).filter(is_equal).map(|at| ring[*at]).collect();
+    Some(Reversed { node: ring[fitting[0]], others })
+}
+
+/// Whether who answers to the address of `found` cannot be the one planned as `planned`.
+fn is_another(line: &Line, planned: usize, found: usize) -> bool {
+    let planned = line.devices.get(planned).and_then(|device| device.planned);
+    let found = line.devices.get(found).and_then(|device| device.identity.identity());
+    let pair = planned.and_then(|planned| Some((planned.identity?, planned.rule))).zip(found);
+    pair.is_some_and(|((planned, rule), found)| mismatch(&planned, &found, rule).is_some())
+}
+
+fn condition(line: &Line, tree: &Tree, reversed: &Reversed, split: Seen<(u16, u16)>) -> Condition {
+    let id = |node: usize| DeviceId(node as u32);
+    let place = |node| Place::device(line.network, id(node));
+    let cause_of = |node: usize| match tree.parent(node) {
+        None => FaultName::MainDeviceWrongPort,
+        Some(_) => FaultName::PortsSwapped,
+    };
+    let label = line.label(id(reversed.node));
+    let (one, other) = split.value;
+    let text = format!(
+        "the ring is closed, and both copies of a broadcast were processed, by {one} and by {other} \
+         SubDevices: frames of card A do not come in at port A of {label}"
+    );
+    let sure = 0.9 / (1 + reversed.others.len()) as f64;
+    let shown = Evidence::register(id(reversed.node), table::AL_STATUS.address, &split, text);
+    let mut condition =
+        Condition::new(&PLUGGED, place(reversed.node), cause_of(reversed.node), split.at)
+            .confidence(sure)
+            .confirmed(split.at)
+            .shown_by(shown);
+    for other in &reversed.others {
+        condition = condition.or_at(cause_of(*other), place(*other), sure);
+    }
+    // Positions mean others than planned, so whatever is said of single ones follows from this.
+    let follows = line.devices.iter().flat_map(|device| {
+        let id = device.id;
+        let ports = linesman_proto::port::Port::ALL.into_iter().flat_map(move |port| {
+            [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
+        });
+        ports.chain([Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)])
+    });
+    condition
+        .explaining(follows)
+        .advise(format!("Exchange the cables at the IN and OUT ports of {label}."))
+        .advise("In a ring frames of card A come in at IN (port A) of each SubDevice.")
+}
