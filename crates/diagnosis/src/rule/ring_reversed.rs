@@ -45,7 +45,9 @@ fn split(line: &Line) -> Option<(&Tree, Seen<(u16, u16)>)> {
     let split = line.traffic.broadcast_split?;
     let (one, other) = split.value;
     let is_whole = usize::from(one) + usize::from(other) == tree.len();
-    (is_whole && tree.closes_at().is_some() && !is_open(line, tree)).then_some((tree, split))
+    // Nobody is turned round while a line runs.
+    let was_well = line.traffic.was_processed_by_one || tree.closes_at().is_none();
+    (is_whole && !was_well && !is_open(line, tree)).then_some((tree, split))
 }
 
 /// Whether the ring is open somewhere: both its ends have a link less than planned. Whose answers are taken
@@ -127,8 +129,10 @@ fn condition(line: &Line, tree: &Tree, reversed: &Reversed, split: Seen<(u16, u1
     let mut condition =
         Condition::new(&PLUGGED, place(reversed.node), cause_of(reversed.node), split.at)
             .confidence(sure)
-            .confirmed(split.at)
             .shown_by(shown);
+    if reversed.others.is_empty() {
+        condition = condition.confirmed(split.at);
+    }
     for other in &reversed.others {
         condition = condition.or_at(cause_of(*other), place(*other), sure);
     }

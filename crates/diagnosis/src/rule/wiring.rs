@@ -13,7 +13,9 @@
 //!
 //! * `C304` a SubDevice is plugged in the wrong way round: frames come in at another port than planned. Of
 //!   the first one: the MainDevice is plugged into the wrong port. Or a cable leads to another port or
-//!   SubDevice than planned, with all behind it.
+//!   SubDevice than planned, with all behind it. In a closed ring no receive times tell; there somebody is
+//!   plugged in the wrong way round when both copies of a broadcast are processed, that of card B by him and
+//!   all that hangs on him.
 //! * `C305` two SubDevices of the same kind sit in each other's place; only alias or serial number tell.
 //!
 //! Everything may run all the same. A reversed SubDevice works on what hangs on its port A before itself,

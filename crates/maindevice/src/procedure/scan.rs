@@ -14,7 +14,7 @@ use linesman_proto::register::{self, AlStatus, DlStatus};
 use linesman_proto::sii::{Identity, Image};
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::{DcTime32, Instant, Span};
-use linesman_proto::topology::derive::Doubt;
+use linesman_proto::topology::derive::{Doubt, TopologyError};
 use linesman_proto::topology::{Reconstruction, SeenController, Tree, Wired};
 
 use super::look::{self, Look, LookError, LookedDevice};
@@ -114,7 +114,13 @@ async fn scan_once(wire: &Wire, network: Network) -> Result<Inventory, ScanError
     if after != before {
         return Err(ScanError::Changing { before, after });
     }
-    Ok(Inventory { devices, wiring: wiring(&seen, half) })
+    let mut wiring = wiring(&seen, half);
+    if wire.ring_intact() == Some(true) && half < seen.len() {
+        // Where the halves meet is no end of the line.
+        let reversed = TopologyError::RingReversed { node: half, behind: seen.len() - half - 1 };
+        wiring.errors = vec![reversed];
+    }
+    Ok(Inventory { devices, wiring })
 }
 
 /// The line as card A sees it; in a broken ring also the half behind card B, from `half` on.

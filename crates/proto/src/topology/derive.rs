@@ -96,6 +96,17 @@ pub enum Doubt {
 /// What is inconsistent in what was seen. Controllers are named by position, counted from 0.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
 pub enum TopologyError {
+    /// The ring is closed, and yet frames of card B are processed: somebody is entered by its OUT port.
+    #[error(
+        "position {node} and {behind} behind it process the frames of card B, though the ring is closed: it is \
+         plugged in the wrong way round. Exchange the cables at its IN and OUT ports"
+    )]
+    RingReversed {
+        /// The first controller that does so.
+        node: usize,
+        /// How many more do.
+        behind: usize,
+    },
     /// A controller that answered reports no open port.
     #[error(
         "position {node}: it answered, but DL status (0x0110) shows no open port; read it again"
