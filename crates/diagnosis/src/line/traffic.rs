@@ -108,6 +108,9 @@ pub struct Traffic {
     /// In a ring, the latest broadcast read whose copies were both processed by somebody: by how many
     /// each, in the order in which they came back.
     pub broadcast_split: Option<Seen<(u16, u16)>>,
+    /// When that was so the last time: who is reached by card B alone gets no time of a reference clock that
+    /// card A reaches.
+    pub latest_split: Option<Instant>,
     /// Whether a broadcast read came back in two copies, and one of them alone was processed by anybody.
     pub was_processed_by_one: bool,
     /// The first broadcast read that fewer controllers answered than one before.

@@ -73,13 +73,17 @@ fn was_gone(device: &Device, astray: &Astray) -> bool {
         || device.al.changes.iter().any(|change| change.is_own_fall() && is_within(change.at))
 }
 
-/// Whether no frame came round meanwhile, so that nobody was steered, and the clock went off by no more than
-/// a sound quartz does in such a time.
+/// Whether no frame came round meanwhile, or the ring was in halves, so that nobody was steered, and the clock
+/// went off by no more than a sound quartz does in such a time.
 fn was_left_alone(line: &Line, astray: &Astray) -> bool {
     let alone = line.traffic.silences.iter().map(|silence| {
         let ended = silence.ended.unwrap_or(line.now).min(astray.far.at);
         ended.since(silence.since.at.max(astray.near.at).min(ended)).as_nanos()
     });
+    let is_in_halves = line.traffic.latest_split.is_some_and(|split| split >= astray.near.at);
+    if is_in_halves && astray.ppm.unsigned_abs() <= Reference::SOUND.unsigned_abs() {
+        return true;
+    }
     let off = u128::from(astray.worst.value.unsigned_abs().saturating_sub(astray.near.value.unsigned_abs()));
     off * 1_000_000 <= alone.map(u128::from).sum::<u128>() * Reference::SOUND as u128
 }

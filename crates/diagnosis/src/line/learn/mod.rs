@@ -241,6 +241,9 @@ impl Learner {
             let is_split = split.0 > 0 && split.1 > 0;
             line.traffic.broadcast_split =
                 is_split.then_some(Seen::new(split, answer.at, Some(answer.frame)));
+            if is_split {
+                line.traffic.latest_split = Some(answer.at);
+            }
             line.traffic.was_processed_by_one |= !answer.is_single && !is_split && answer.sum > 0;
             let is_news = line.traffic.broadcast_now.is_none_or(|known| known.value != answer.sum);
             if is_news {
