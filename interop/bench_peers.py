@@ -105,7 +105,8 @@ def main():
                     if found is None:
                         why[name] = words
                         continue
-                    found["cpu_us"] = found["cpu"] * 1e6 / max(1, found["cycles"])
+                    # Who is in OP too late has no cycle to be measured in.
+                    found["cpu_us"] = found["cpu"] * 1e6 / found["cycles"] if found["cycles"] > 100 else float("inf")
                     so_far = best.setdefault(name, found)
                     for key in ("op_ms", "cpu_us"):
                         so_far[key] = min(so_far[key], found[key])
