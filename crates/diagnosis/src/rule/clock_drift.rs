@@ -9,7 +9,8 @@
 //! gives goes faster or slower than the clock of the computer by more than any sound quartz.
 //!
 //! Nobody reads these registers all the time: live, the diagnosis asks for them by turns. A clock that goes off
-//! while no frame comes round, by no more than a sound quartz does in that time, was left alone and is well.
+//! while no frame comes round, by no more than a sound quartz does in that time, was left alone and is well; so is
+//! one that goes off when the reference clock does not answer, or is in the other half of a ring.
 //!
 //! **What it means.** Control in the controller follows quartzes that are off by some hundreds of parts per
 //! million, and sound ones are off by fifty at most. Heat and damage make it more. The SYNC signals of the
@@ -21,6 +22,7 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::time::Instant;
 
 use super::{Rule, RulePage, View, reference_clock};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
@@ -73,6 +75,15 @@ fn was_gone(device: &Device, astray: &Astray) -> bool {
         || device.al.changes.iter().any(|change| change.is_own_fall() && is_within(change.at))
 }
 
+/// Whether a SubDevice did not answer when a clock went astray, or not long before.
+fn was_silent(device: &Device, astray: &Astray) -> bool {
+    let began = |since: Instant| since <= astray.far.at;
+    device.silent.is_some_and(|silent| began(silent.at))
+        || device.absences.iter().any(|absence| {
+            began(absence.since.at) && absence.ended.is_none_or(|ended| ended >= astray.near.at)
+        })
+}
+
 /// Whether no frame came round meanwhile, or the ring was in halves, so that nobody was steered, and the clock
 /// went off by no more than a sound quartz does in such a time.
 fn was_left_alone(line: &Line, astray: &Astray) -> bool {
@@ -80,11 +91,20 @@ fn was_left_alone(line: &Line, astray: &Astray) -> bool {
         let ended = silence.ended.unwrap_or(line.now).min(astray.far.at);
         ended.since(silence.since.at.max(astray.near.at).min(ended)).as_nanos()
     });
+    // Where the reference does not answer, nobody puts its time into the frame, and the others take what is there.
+    let without_reference = line.references.iter().any(|reference| {
+        line.device(reference.device).is_some_and(|device| was_silent(device, astray))
+    });
+    if without_reference {
+        return true;
+    }
     let is_in_halves = line.traffic.latest_split.is_some_and(|split| split >= astray.near.at);
     if is_in_halves && astray.ppm.unsigned_abs() <= Reference::SOUND.unsigned_abs() {
         return true;
     }
-    let off = u128::from(astray.worst.value.unsigned_abs().saturating_sub(astray.near.value.unsigned_abs()));
+    let off = u128::from(
+        astray.worst.value.unsigned_abs().saturating_sub(astray.near.value.unsigned_abs()),
+    );
     off * 1_000_000 <= alone.map(u128::from).sum::<u128>() * Reference::SOUND as u128
 }
 

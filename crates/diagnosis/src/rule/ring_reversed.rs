@@ -139,9 +139,9 @@ fn condition(line: &Line, tree: &Tree, reversed: &Reversed, split: Seen<(u16, u1
     // Positions mean others than planned, so whatever is said of single ones follows from this.
     let follows = line.devices.iter().flat_map(|device| {
         let id = device.id;
-        let ports = linesman_proto::port::Port::ALL.into_iter().flat_map(move |port| {
-            [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
-        });
+        let ports = linesman_proto::port::Port::ALL
+            .into_iter()
+            .flat_map(move |port| [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]);
         ports.chain([Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)])
     });
     condition
