@@ -57,6 +57,9 @@ on = "T4.B"
 serial = 105
 "#;
 
+/// How a play begins of which the equal devices have been built in at each other's place.
+pub const EXCHANGED: &str = "# exchanged";
+
 /// When the fault of a play begins, in ms.
 const BEGIN_MS: u64 = 3_000;
 /// How long is watched what parts the causes, in ms.
@@ -105,10 +108,8 @@ pub struct Twist {
 pub fn play(set: &AdmittedSet, play: &Play, twist: Twist) -> Result<Played, String> {
     let mut until_ms = set.proof.until_ms;
     let mut text = LINE.to_owned();
-    // Of two equal devices the other one was built in at each place; so it was where the second one is
-    // taken out, since the one that stays is the same then.
-    let takes_the_second = play.file.contains("device-missing") && play.file.contains("T5");
-    if play.cause.is_none() || takes_the_second {
+    if play.cause.is_none() || play.file.starts_with(EXCHANGED) {
+        // Of two equal devices the other one was built in at each place.
         for (one, other) in [("T4", "T5"), ("104", "105")] {
             text = text.replace(one, "#").replace(other, one).replace('#', other);
         }
