@@ -4,6 +4,8 @@
 
 mod support;
 
+use linesman_sim::device::files::FirmwareImage;
+use serde_json::Value;
 use support::running::{PLANT, Running};
 use support::{assert_valid, linesman};
 use tempfile::TempDir;
@@ -69,6 +71,75 @@ fn an_error_is_cleared_while_the_line_runs() {
     assert_eq!(states["devices"][1]["al_state"], "OP");
 }
 
+/// What a register command reports of a running line.
+fn registers(socket: &str, rest: &[&str], status: i32) -> Value {
+    let run = linesman([&["reg", socket], rest, &["--json"]].concat());
+    assert_eq!(run.status, status, "{rest:?}: {}", run.all());
+    let json = run.json();
+    assert_valid(&json, if status == 0 { "registers" } else { "error" });
+    json
+}
+
+// S1 L882: the register editor of the sources. What it must not do by accident needs a word of consent.
+// proves: ESC-16
+#[test]
+fn any_register_is_read_and_written_while_the_line_runs() {
+    let running = Running::start(PLANT);
+    let socket = running.socket();
+    let reg = |rest: &[&str]| registers(&socket, rest, 0);
+    // By address and by name, one of many and many at once, each with its meaning.
+    for (named, address) in
+        [("al-status", "0x0130"), ("dl-status", "0x0110"), ("fmmu-1", "0x0610"), ("user-ram", "0x0F80")]
+    {
+        let (by_name, by_address) = (reg(&["2", "read", named]), reg(&["2", "read", address]));
+        assert_eq!(by_name["registers"][0]["name"], by_address["registers"][0]["name"]);
+        assert_eq!(by_name["address"], by_address["address"]);
+    }
+    assert_eq!(reg(&["2", "read", "al-status"])["registers"][0]["meaning"], "OP");
+    let station = reg(&["2", "read", "0x0010"]);
+    assert_eq!(station["bytes"], "02 10", "{station}");
+    let counters = reg(&["2", "read", "rx-error-counter-port-b"]);
+    assert_eq!(counters["address"], 0x0302);
+    assert_eq!(counters["registers"][0]["name"], "RX error counter, port B");
+    // Written, and read again: bytes, and a number of the length of its register.
+    reg(&["2", "write", "0x0F80", "DE AD BE EF"]);
+    assert_eq!(reg(&["2", "read", "0x0F80", "--len", "4"])["bytes"], "DE AD BE EF");
+    reg(&["2", "write", "ecat-event-mask", "0x0005"]);
+    let mask = reg(&["2", "read", "0x0200"]);
+    assert_eq!(mask["bytes"], "05 00", "{mask}");
+    // What would take it off the line, out of OP, or away from its process data is refused in words and changes
+    // nothing; so is what nobody can write.
+    for (register, value, words) in [
+        ("0x0010", "0x2000", "frames that are meant for the SubDevice"),
+        ("dl-control", "0", "a port that is closed"),
+        ("al-control", "1", "linesman state"),
+        ("watchdog-time-process-data", "1", "outputs fall"),
+        ("0x0500", "1", "linesman sii"),
+        ("fmmu-0", "0", "go elsewhere"),
+        ("syncmanager-0", "0", "go elsewhere"),
+        ("0x1000", "1", "process data"),
+        ("al-status", "1", "only read"),
+    ] {
+        let write = ["2", "write", register, value, "--len", "1"];
+        let refused = registers(&socket, if value.len() > 3 { &write[..4] } else { &write }, 2);
+        assert!(refused["reason"].as_str().unwrap().contains(words), "{refused}");
+        assert!(refused["next_step"].as_str().unwrap().contains("--force"), "{refused}");
+    }
+    assert_eq!(reg(&["2", "read", "0x0010"])["bytes"], "02 10");
+    assert_eq!(reg(&["2", "read", "al-status"])["registers"][0]["meaning"], "OP");
+    // With consent it is written: a longer watchdog, which harms nobody here.
+    let before = reg(&["2", "read", "watchdog-time-process-data"]);
+    let write = ["2", "write", "watchdog-time-process-data", "5000"];
+    registers(&socket, &write, 2);
+    assert_eq!(reg(&["2", "read", "0x0420"])["bytes"], before["bytes"]);
+    let written = reg(&[&write[..], &["--force"]].concat());
+    assert_eq!(written["registers"][0]["address"], 0x0420, "{written}");
+    assert_eq!(reg(&["2", "read", "0x0420"])["bytes"], "88 13");
+    // The line has run on.
+    let report = running.until("is shown", |_| true);
+    assert!(report["devices"].as_array().unwrap().iter().all(|one| one["al_state"] == "OP"));
+}
+
 #[test]
 fn a_socket_without_a_run_is_told() {
     let folder = TempDir::new().unwrap();
@@ -80,4 +151,41 @@ fn a_socket_without_a_run_is_told() {
     let running = Running::start(PLANT);
     let nobody = linesman(["state", &running.socket(), "9"]);
     assert_eq!(nobody.status, 2, "{}", nobody.all());
+}
+
+// S0 L2431-2461: BOOT, and files both ways, from the tool; beside a line that runs on.
+// proves: SW-14
+#[test]
+fn firmware_is_taken_in_boot_and_files_go_both_ways() {
+    let plant = format!("{PLANT}[[device]]\nname = \"C4\"\ntype = \"EL6601\"\non = \"T3.B\"\n");
+    let running = Running::start(&plant);
+    let socket = running.socket();
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let done = |words: &[&str]| {
+        let run = linesman(words);
+        assert_eq!(run.status, 0, "{words:?}: {}", run.all());
+        run
+    };
+    let state = || linesman(["state", &socket, "4", "--json"]).json()["devices"][0]["al_state"].clone();
+    // A file there and back.
+    let settings: Vec<u8> = (0..300).map(|byte| byte as u8).collect();
+    std::fs::write(path("settings"), &settings).unwrap();
+    done(&["foe", &socket, "4", "write", "settings.txt", &path("settings")]);
+    done(&["foe", &socket, "4", "read", "settings.txt", &path("back")]);
+    assert_eq!(std::fs::read(path("back")).unwrap(), settings);
+    assert_eq!(state(), "OP", "that needs no other state");
+    // Firmware: it is taken in BOOT only, and the SubDevice is brought back to where it was.
+    let version = || done(&["sdo", &socket, "4", "read", "0x100A", "--type", "STRING"]).stdout;
+    let before = version();
+    let image = FirmwareImage::build("EL6601", "47", &[0x5A; 20_000]);
+    std::fs::write(path("new.efw"), &image).unwrap();
+    let refused = linesman(["foe", &socket, "4", "write", "new.efw", &path("new.efw"), "--json"]);
+    assert_eq!((refused.status, refused.json()["code"].as_u64()), (1, Some(0x8008)), "{}", refused.all());
+    let wrote = done(&["foe", &socket, "4", "write", "new.efw", &path("new.efw"), "--boot", "--json"]);
+    assert_eq!(wrote.json()["size"], image.len(), "{}", wrote.all());
+    running.until("is back in OP", |report| report["devices"][3]["al_state"] == "OP");
+    assert!(!before.contains("47") && version().contains("47"), "{before} then {}", version());
+    let others = linesman(["state", &socket, "--json"]).json();
+    assert!(others["devices"].as_array().unwrap().iter().all(|one| one["al_state"] == "OP"));
 }
