@@ -88,9 +88,12 @@ fn any_register_is_read_and_written_while_the_line_runs() {
     let socket = running.socket();
     let reg = |rest: &[&str]| registers(&socket, rest, 0);
     // By address and by name, one of many and many at once, each with its meaning.
-    for (named, address) in
-        [("al-status", "0x0130"), ("dl-status", "0x0110"), ("fmmu-1", "0x0610"), ("user-ram", "0x0F80")]
-    {
+    for (named, address) in [
+        ("al-status", "0x0130"),
+        ("dl-status", "0x0110"),
+        ("fmmu-1", "0x0610"),
+        ("user-ram", "0x0F80"),
+    ] {
         let (by_name, by_address) = (reg(&["2", "read", named]), reg(&["2", "read", address]));
         assert_eq!(by_name["registers"][0]["name"], by_address["registers"][0]["name"]);
         assert_eq!(by_name["address"], by_address["address"]);
@@ -167,7 +170,8 @@ fn firmware_is_taken_in_boot_and_files_go_both_ways() {
         assert_eq!(run.status, 0, "{words:?}: {}", run.all());
         run
     };
-    let state = || linesman(["state", &socket, "4", "--json"]).json()["devices"][0]["al_state"].clone();
+    let state =
+        || linesman(["state", &socket, "4", "--json"]).json()["devices"][0]["al_state"].clone();
     // A file there and back.
     let settings: Vec<u8> = (0..300).map(|byte| byte as u8).collect();
     std::fs::write(path("settings"), &settings).unwrap();
@@ -181,11 +185,123 @@ fn firmware_is_taken_in_boot_and_files_go_both_ways() {
     let image = FirmwareImage::build("EL6601", "47", &[0x5A; 20_000]);
     std::fs::write(path("new.efw"), &image).unwrap();
     let refused = linesman(["foe", &socket, "4", "write", "new.efw", &path("new.efw"), "--json"]);
-    assert_eq!((refused.status, refused.json()["code"].as_u64()), (1, Some(0x8008)), "{}", refused.all());
-    let wrote = done(&["foe", &socket, "4", "write", "new.efw", &path("new.efw"), "--boot", "--json"]);
+    assert_eq!(
+        (refused.status, refused.json()["code"].as_u64()),
+        (1, Some(0x8008)),
+        "{}",
+        refused.all()
+    );
+    let wrote =
+        done(&["foe", &socket, "4", "write", "new.efw", &path("new.efw"), "--boot", "--json"]);
     assert_eq!(wrote.json()["size"], image.len(), "{}", wrote.all());
     running.until("is back in OP", |report| report["devices"][3]["al_state"] == "OP");
     assert!(!before.contains("47") && version().contains("47"), "{before} then {}", version());
     let others = linesman(["state", &socket, "--json"]).json();
     assert!(others["devices"].as_array().unwrap().iter().all(|one| one["al_state"] == "OP"));
+}
+
+/// A stepper stage, and what it notes of itself: severity and number of the text, and when.
+fn noting(messages: &[(u8, u16, u32)]) -> String {
+    let mut plant = format!("{PLANT}[[device]]\nname = \"M4\"\ntype = \"EL7041\"\non = \"T3.B\"\n");
+    for (severity, text, at_ms) in messages {
+        let [low, high] = text.to_le_bytes();
+        plant += &format!(
+            "[[fault]]\nkind = \"emergency\"\ndevice = \"M4\"\ncode = 0xFF00\n\
+             data = \"{severity:02X} {low:02X} {high:02X}\"\nfrom_ms = {at_ms}\n"
+        );
+    }
+    plant
+}
+
+// S0 L2388-2397, S1 L1010-1025: five messages, with type, flag, time and text; three have been acknowledged, two
+// are new.
+// proves: SW-08
+#[test]
+fn the_five_messages_of_the_sources_are_read_acknowledged_and_exported() {
+    let later = 9_000;
+    let plant = noting(&[
+        (0, 0x0003, 1_500),
+        (2, 0x8406, 1_700),
+        (1, 0x4101, later),
+        (1, 0x4413, later + 200),
+    ]);
+    let running = Running::start(&plant);
+    let socket = running.socket();
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let texts = [
+        (0x0002, "Communication established"),
+        (0x0003, "Initialization: 0x0, 0x0, 0xFF"),
+        (0x8406, "Undervoltage DC-Link"),
+        (0x4101, "Terminal-Overtemperature"),
+        (0x4413, "I2T Amplifier overload"),
+    ];
+    let messages: String = texts
+        .iter()
+        .map(|(id, text)| {
+            format!(
+                "<DiagMessage><TextId>#x{id:04X}</TextId><MessageText LcId=\"1033\">{text}</MessageText></DiagMessage>"
+            )
+        })
+        .collect();
+    let esi = format!(
+        "<EtherCATInfo><Vendor><Id>2</Id></Vendor><Descriptions><Devices><Device>\
+         <Type ProductCode=\"#x1B813052\" RevisionNo=\"#x001A0000\">EL7041</Type><Name LcId=\"1033\">Stepper</Name>\
+         <Profile><DiagMessages>{messages}</DiagMessages></Profile></Device></Devices></Descriptions></EtherCATInfo>"
+    );
+    std::fs::write(path("texts.xml"), esi).unwrap();
+    let esi = path("texts.xml");
+    let history = |more: &[&str]| {
+        let words = ["history", &socket, "4", "--esi", &esi, "--json"];
+        let run = linesman([&words, more].concat());
+        assert_eq!(run.status, 0, "{}", run.all());
+        let report = run.json();
+        assert_valid(&report, "history");
+        report
+    };
+    // Whether it is new, its severity, its text; the newest first or last, as the program has it.
+    let rows = |report: &Value| -> Vec<(bool, String, String)> {
+        let text = |one: &Value, key: &str| one[key].as_str().unwrap().to_owned();
+        let all = report["messages"].as_array().unwrap().iter();
+        let row = |one: &Value| (one["new"] == true, text(one, "severity"), text(one, "text"));
+        all.map(row).collect()
+    };
+    let wait_for = |count: usize| {
+        (0..400).find(|_| {
+            let report = history(&[]);
+            let here = report["messages"].as_array().unwrap().len() == count;
+            std::thread::sleep(std::time::Duration::from_millis(if here { 0 } else { 50 }));
+            here
+        })
+    };
+    let row =
+        |new: bool, severity: &str, at: usize| (new, severity.to_owned(), texts[at].1.to_owned());
+    assert!(wait_for(3).is_some(), "{}", history(&[]));
+    let first = history(&["--acknowledge"]);
+    let mut seen = rows(&first);
+    seen.sort();
+    let mut expected =
+        [row(true, "information", 0), row(true, "information", 1), row(true, "error", 2)];
+    expected.sort();
+    assert_eq!(seen, expected);
+    assert!(wait_for(5).is_some(), "{}", history(&[]));
+    let mut seen = rows(&history(&[]));
+    seen.sort();
+    let mut expected = [
+        row(false, "information", 0),
+        row(false, "information", 1),
+        row(false, "error", 2),
+        row(true, "warning", 3),
+        row(true, "warning", 4),
+    ];
+    expected.sort();
+    assert_eq!(seen, expected);
+    // Only the new ones, for a spreadsheet.
+    let csv = path("new.csv");
+    let new = history(&["--only-new", "--export", &csv, "--acknowledge"]);
+    assert_eq!(rows(&new).len(), 2, "{new}");
+    let csv = std::fs::read_to_string(csv).unwrap();
+    assert!(csv.lines().count() == 3 && csv.contains("I2T Amplifier overload"), "{csv}");
+    assert_eq!(rows(&history(&["--only-new"])), []);
+    assert_eq!(history(&[])["messages"].as_array().unwrap().len(), 5, "they are kept");
 }

@@ -37,11 +37,8 @@ fn project(first: &str, second: &str) -> String {
                     [[device]]\nname = \"K1\"\non = \"maindevice\"\n[device.description]\nports = \"YK\"\n"
         .to_owned();
     for (name, on, clock) in [("X1", "K1.B", first), ("X2", "X1.B", second)] {
-        writeln!(
-            text,
-            "[[device]]\nname = \"{name}\"\ntype = \"AXIS-1\"\non = \"{on}\"\n{clock}"
-        )
-        .unwrap();
+        writeln!(text, "[[device]]\nname = \"{name}\"\ntype = \"AXIS-1\"\non = \"{on}\"\n{clock}")
+            .unwrap();
     }
     text
 }
@@ -197,7 +194,8 @@ fn who_is_too_old_to_be_the_reference_clock_is_told_in_scan_and_plan() {
                 ),
             );
             let doubts = bench.plan()["findings"].clone();
-            let doubt = doubts.as_array().unwrap().iter().find(|one| one["name"] == "reference-clock");
+            let doubt =
+                doubts.as_array().unwrap().iter().find(|one| one["name"] == "reference-clock");
             let text = doubt.map(|doubt| doubt["text"].as_str().unwrap().to_owned());
             if let Some(text) = &text {
                 assert!(text.contains(&format!("{since:04}")) && text.contains(kind), "{text}");
@@ -238,7 +236,8 @@ fn a_clock_that_leaves_the_sync_window_is_logged_and_shown_and_sets_the_bit_of_t
     // In the log: it leaves the window, and comes back when it is healed.
     let bench = Bench::new(&machine);
     bench.write("plant.toml", &drift("from_ms = 3000\nto_ms = 3500\n"));
-    let (on, log) = (format!("sim:{}", bench.path("plant.toml").display()), bench.path("log.sqlite"));
+    let (on, log) =
+        (format!("sim:{}", bench.path("plant.toml").display()), bench.path("log.sqlite"));
     let ran = linesman([
         "run",
         text(&bench.path("machine.toml")).as_str(),
@@ -255,12 +254,16 @@ fn a_clock_that_leaves_the_sync_window_is_logged_and_shown_and_sets_the_bit_of_t
     let entries: Vec<&Value> = told["entries"].as_array().unwrap().iter().collect();
     let texts: Vec<&str> = entries.iter().map(|entry| entry["text"].as_str().unwrap()).collect();
     assert!(texts.len() >= 2, "{texts:?}");
-    assert!(texts[0].contains("its clock has left the sync window") && texts[0].contains("400 ns allowed"));
+    assert!(
+        texts[0].contains("its clock has left the sync window")
+            && texts[0].contains("400 ns allowed")
+    );
     assert!(texts.last().unwrap().contains("within the sync window again"), "{texts:?}");
     assert!(entries.iter().all(|entry| entry["no"] == 3), "the one whose clock it is: {texts:?}");
     assert_eq!(entries[0]["severity"], "warning");
     // In the table, and in the word of the network, as long as it lasts; before, all is well.
-    let running = Running::with(&drift("from_ms = 6000\n"), &[("machine.toml", &machine), ("axis.xml", ESI)]);
+    let running =
+        Running::with(&drift("from_ms = 6000\n"), &[("machine.toml", &machine), ("axis.xml", ESI)]);
     let well = running.until("tells how far clocks are off", |report| {
         !report["devices"][2]["clock_difference_ns"].is_null()
     });
@@ -268,11 +271,13 @@ fn a_clock_that_leaves_the_sync_window_is_logged_and_shown_and_sets_the_bit_of_t
     assert_eq!(well["state"]["word"], 0, "{well}");
     let difference = |report: &Value| report["devices"][2]["clock_difference_ns"].as_u64().unwrap();
     assert!(difference(&well) <= 400, "{well}");
-    assert!(well["devices"][0]["clock_difference_ns"].is_null(), "no SyncSignals, nothing to watch");
+    assert!(
+        well["devices"][0]["clock_difference_ns"].is_null(),
+        "no SyncSignals, nothing to watch"
+    );
     assert!(well["devices"][1]["clock_difference_ns"].is_null(), "the reference");
-    let apart = running.until("drifts out of the window", |report| {
-        report["devices"][2]["clock_apart"] == true
-    });
+    let apart = running
+        .until("drifts out of the window", |report| report["devices"][2]["clock_apart"] == true);
     assert!(difference(&apart) > 400, "{apart}");
     assert_eq!(apart["state"]["word"].as_u64().unwrap() & 0x1000, 0x1000, "{}", apart["state"]);
     assert!(apart["state"]["text"].as_str().unwrap().contains("clocks not in sync"), "{apart}");
@@ -292,9 +297,8 @@ fn the_offset_between_the_time_of_the_network_and_that_of_the_host_is_shown() {
     let first = running.until("tells the offset", |report| offset(report).is_some());
     assert_eq!(first["clock"]["reference"], 2);
     let at = |report: &Value| report["time_ns"].as_i64().unwrap();
-    let later = running.until("has run for three seconds more", |report| {
-        at(report) > at(&first) + 3_000_000_000
-    });
+    let later = running
+        .until("has run for three seconds more", |report| at(report) > at(&first) + 3_000_000_000);
     let moved = offset(&later).unwrap() - offset(&first).unwrap();
     // Both are told once a second: that is how far the times are uncertain.
     let expected = (at(&later) - at(&first)) / 10_000;

@@ -133,15 +133,31 @@ fn a_fall_from_op_by_a_fault_of_its_own_is_logged_with_its_code() {
         let texts = texts(&entries);
         let at = texts.iter().position(|text| text.starts_with(expected));
         let at = at.unwrap_or_else(|| panic!("{expected}: {texts:#?}"));
-        assert_eq!((&entries[at]["kind"], &entries[at]["severity"]), (&"abnormal-state".into(), &"error".into()));
+        assert_eq!(
+            (&entries[at]["kind"], &entries[at]["severity"]),
+            (&"abnormal-state".into(), &"error".into())
+        );
         assert_eq!(entries[at]["no"], 3);
-        assert!(texts[at + 1].starts_with("'3 (EL4102)' (1003): ") && texts[at + 1].contains(words), "{texts:#?}");
+        assert!(
+            texts[at + 1].starts_with("'3 (EL4102)' (1003): ") && texts[at + 1].contains(words),
+            "{texts:#?}"
+        );
         // It was up before, and it is nobody else's.
-        assert!(texts[..at].iter().any(|text| text.contains("have reached their states")), "{texts:#?}");
+        assert!(
+            texts[..at].iter().any(|text| text.contains("have reached their states")),
+            "{texts:#?}"
+        );
         let abnormal = entries.iter().filter(|entry| entry["kind"] == "abnormal-state");
         assert!(abnormal.clone().all(|entry| entry["no"] == 3), "{texts:#?}");
         let log = folder.path().join("log.sqlite");
-        let found = linesman(["log", log.to_str().unwrap(), "--kind", "abnormal-state", "--severity", "error"]);
+        let found = linesman([
+            "log",
+            log.to_str().unwrap(),
+            "--kind",
+            "abnormal-state",
+            "--severity",
+            "error",
+        ]);
         assert!(found.stdout.contains(expected), "{}", found.all());
     }
 }
@@ -174,9 +190,9 @@ fn a_wrong_working_counter_is_followed_at_once_by_what_was_read_because_of_it() 
         let after = nanos(entry) - nanos(counter);
         assert!((0..40_000_000).contains(&after), "{after} ns: {entry}");
     }
-    let text = entries.iter().find(|entry| {
-        entry["text"].as_str().unwrap().contains("Communication interrupted")
-    });
+    let text = entries
+        .iter()
+        .find(|entry| entry["text"].as_str().unwrap().contains("Communication interrupted"));
     assert!(text.unwrap()["text"].as_str().unwrap().contains("'3 (EK1100)' (1003) - '4 (EL2008)'"));
 }
 

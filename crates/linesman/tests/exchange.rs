@@ -23,8 +23,8 @@ use linesman_proto::command::Command;
 use linesman_proto::frame::FrameView;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::named_files::NamedFiles;
 use linesman_runtime::line::{Arrived, Intake, Line};
+use linesman_runtime::named_files::NamedFiles;
 use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{Beside, RunOptions, Wanted, run};
 use linesman_runtime::stop::Stop;
@@ -229,6 +229,7 @@ fn drive(line: Watched, wanted: Wanted, program: impl Application, lasts: Option
         lasts,
         real_time: None,
         allowed_misses: Some(2),
+        hold: false,
         diagnose: None,
     };
     let (notes, _told) = sync_channel(1);
@@ -297,18 +298,22 @@ fn at_the_end_of_a_task_frames_leave_when_the_program_returns_and_a_second_one_r
         assert_eq!(second.inputs, next.inputs);
     }
     // Frames jitter as the program does.
-    assert!(delays.iter().max() > Some(&Span::us(650)) && delays.iter().min() < Some(&Span::us(150)));
+    assert!(
+        delays.iter().max() > Some(&Span::us(650)) && delays.iter().min() < Some(&Span::us(150))
+    );
 }
 
 /// How much earlier frames with inputs leave than those with outputs, in a project of the sources whose base
 /// time and ticks are these.
 fn ahead(folder: &FilePath, base_time_us: u32, pre_ticks: u32) -> Span {
-    let path =
-        format!("{}/tests/data/plan/separate-inputs.toml", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/tests/data/plan/separate-inputs.toml", env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(path).unwrap();
     let text = text.replace("pre_ticks = 3", &format!("pre_ticks = {pre_ticks}"));
-    let text = format!("[network]\nbase_time_us = {base_time_us}\n\n{text}")
-        .replacen("name = \"separate-inputs\"", "", 1);
+    let text = format!("[network]\nbase_time_us = {base_time_us}\n\n{text}").replacen(
+        "name = \"separate-inputs\"",
+        "",
+        1,
+    );
     let project = folder.join(format!("{base_time_us}-{pre_ticks}.toml"));
     fs::write(&project, format!("name = \"separate-inputs\"\n{text}")).unwrap();
     let segment = folder.join(format!("{base_time_us}-{pre_ticks}-segment.toml"));

@@ -105,7 +105,11 @@ fn of_38332_events_the_2630_of_one_source_are_filtered_and_exported() {
     let file = path.to_str().unwrap();
     for filter in [["--device", "Term 14"], ["--kind", "abnormal-state"], ["--severity", "error"]] {
         let shown = linesman(["log", file, filter[0], filter[1]]);
-        assert!(shown.stdout.contains("2,630 of 38,332 entries"), "{}", &shown.stdout[shown.stdout.len() - 200..]);
+        assert!(
+            shown.stdout.contains("2,630 of 38,332 entries"),
+            "{}",
+            &shown.stdout[shown.stdout.len() - 200..]
+        );
         let csv = linesman(["log", file, filter[0], filter[1], "--csv"]);
         assert_eq!(csv.stdout.lines().count(), 2_631, "with the headings");
         let json = linesman(["log", file, filter[0], filter[1], "--json"]).json();

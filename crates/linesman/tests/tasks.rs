@@ -251,10 +251,11 @@ fn devices_are_put_into_sync_units_by_name() {
 // proves: FRM-24
 #[test]
 fn devices_are_put_into_sync_units_by_name_task_and_repetition() {
-    let mut text = "name = \"units\"\n[[task]]\nname = \"NC-Task 1 SAF\"\ncycle_us = 2000\nrepeats = 1\n\
+    let mut text =
+        "name = \"units\"\n[[task]]\nname = \"NC-Task 1 SAF\"\ncycle_us = 2000\nrepeats = 1\n\
                     [[task]]\nname = \"Task 2\"\ncycle_us = 10000\n\
                     [[device]]\nname = \"Coupler\"\non = \"maindevice\"\n[device.description]\n"
-        .to_owned();
+            .to_owned();
     let mut on = "Coupler.B".to_owned();
     for (name, choices) in [
         ("Drive 1", "sync_unit = \"Axes\"\nframe_repeat = true\n"),

@@ -300,7 +300,9 @@ fn every_field_of_the_headers_of_the_frame_of_516_bytes_is_read() {
     let datagrams: Vec<_> = view.datagrams().map(Result::unwrap).collect();
     assert_eq!(datagrams.len(), 7);
     let mut offset = 16;
-    for (number, (datagram, (command, address, len, wkc))) in datagrams.iter().zip(SEVEN).enumerate() {
+    for (number, (datagram, (command, address, len, wkc))) in
+        datagrams.iter().zip(SEVEN).enumerate()
+    {
         let is_last = number == 6;
         assert_eq!((datagram.command(), datagram.code()), (Some(command), command.code()));
         assert_eq!(datagram.index(), 0xB0 + number as u8);

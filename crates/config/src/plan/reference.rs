@@ -66,7 +66,9 @@ mod tests {
             assert_eq!(since(variant), Some(least), "{row}");
             assert_eq!(since(row), Some(least), "{row}");
             let revision = |number: u16| u32::from(number) << 16 | 0x000A;
-            assert!(is_possible(variant, revision(least)) && is_possible(variant, revision(least + 9)));
+            assert!(
+                is_possible(variant, revision(least)) && is_possible(variant, revision(least + 9))
+            );
             if let Some(older) = least.checked_sub(1) {
                 assert!(!is_possible(variant, revision(older)), "{row}");
             }

@@ -53,7 +53,8 @@ impl WatchedClock {
             false => register::SYSTEM_TIME_DIFFERENCE,
         };
         let look = Look { is_reference, asked_at: context.wire.now() };
-        let read = context.wire.read(Target::Station(device.station), register.address, register.len);
+        let read =
+            context.wire.read(Target::Station(device.station), register.address, register.len);
         Some(async move { (look, read.await) })
     }
 
@@ -73,7 +74,8 @@ impl WatchedClock {
                 self.told_at = Some(now);
                 // It was read somewhere between.
                 let half = Span::ns(now.since(look.asked_at).as_nanos() / 2);
-                let host = context.options.clock_epoch.0.wrapping_add((look.asked_at + half).as_nanos());
+                let host =
+                    context.options.clock_epoch.0.wrapping_add((look.asked_at + half).as_nanos());
                 let network = DcTime(u64::from_le_bytes(reply.bytes(0)));
                 let ahead_ns = match network.0 >> 32 {
                     // A clock of 32 bits; or one of the first four seconds, of which the same is true.

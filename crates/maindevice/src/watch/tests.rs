@@ -245,7 +245,10 @@ fn the_network_word_sums_up() {
     assert_eq!(watch.standing().network_state().0, 0x1C30);
     watch.handle_event(at(4), &clock(Span::ns(300), false));
     assert_eq!(watch.standing().network_state().0, 0x0C30);
-    assert_eq!(watch.standing().device(DeviceId(2)).unwrap().clock_difference(), Some(Span::ns(300)));
+    assert_eq!(
+        watch.standing().device(DeviceId(2)).unwrap().clock_difference(),
+        Some(Span::ns(300))
+    );
 }
 
 // proves: DIA-09 partial: totals, HW-19 partial: totals

@@ -109,7 +109,9 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
                 (true, false) => (Severity::Info, "is within the sync window again"),
                 (false, false) | (true, true) => return Vec::new(),
             };
-            let text = format!(": its clock {how}: {difference} off the reference clock, {window} allowed");
+            let text = format!(
+                ": its clock {how}: {difference} off the reference clock, {window} allowed"
+            );
             vec![about(*id, severity, EntryKind::Clock, text)]
         }
         Event::WorkingCounter { task, frame, datagram, expected, received } => vec![line(

@@ -12,9 +12,9 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use super::report::{
-    Count, FrameCounts, MailboxTrouble, Neighbour, OddFrames, OnlineChange, OnlineClock, OnlineDevice,
-    OnlineFrame, OnlineIdentity, OnlineMailbox, OnlinePort, OnlineReport, OnlineSyncUnit, SCHEMA,
-    Word,
+    Count, FrameCounts, MailboxTrouble, Neighbour, OddFrames, OnlineChange, OnlineClock,
+    OnlineDevice, OnlineFrame, OnlineIdentity, OnlineMailbox, OnlinePort, OnlineReport,
+    OnlineSyncUnit, SCHEMA, Word,
 };
 use super::snapshot::Snapshot;
 

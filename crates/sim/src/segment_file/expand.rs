@@ -381,8 +381,7 @@ fn parent_of<'a>(by_name: &BTreeMap<&str, &'a Planned>, on: &Attachment) -> Opti
 /// Which other port of the parent would be of the kind that is needed; empty when none is.
 fn instead(parent: Option<&Planned>, needed: PortKind) -> String {
     let Some(parent) = parent else { return String::new() };
-    let fits =
-        parent.ports.iter().filter(|(port, kind)| **kind == needed && *port != parent.entry);
+    let fits = parent.ports.iter().filter(|(port, kind)| **kind == needed && *port != parent.entry);
     let ports: Vec<String> = fits.map(|(port, _)| format!("{}.{port}", parent.name)).collect();
     match ports.is_empty() {
         true => String::new(),

@@ -54,7 +54,9 @@ fn set_loop(bench: &mut Bench, name: &str, ports: &[Port], mode: LoopMode) {
     for port in ports {
         control = control.with_loop_mode(*port, mode);
     }
-    assert!(bench.send(Command::Fpwr, address, &control.to_bytes()).is_none_or(|(_, wkc)| wkc == 1));
+    assert!(
+        bench.send(Command::Fpwr, address, &control.to_bytes()).is_none_or(|(_, wkc)| wkc == 1)
+    );
     bench.wait(Span::ms(1));
 }
 
@@ -98,8 +100,14 @@ fn with_all_ports_closed_frames_still_go_back_by_port_a() {
         // K1, T2, T3; what is behind T3 is cut off, and behind T2 comes the other branch of K1.
         let (_, wkc) = bench.broadcast(0x0000, 1).unwrap();
         assert_eq!(wkc, 6, "K1 to T3, and K6 to K8");
-        assert_eq!(bench.send(Command::Fprd, at(station(&bench, "T3"), 0x0000), &[0]).unwrap().1, 1);
-        assert_eq!(bench.send(Command::Fprd, at(station(&bench, "T4"), 0x0000), &[0]).unwrap().1, 0);
+        assert_eq!(
+            bench.send(Command::Fprd, at(station(&bench, "T3"), 0x0000), &[0]).unwrap().1,
+            1
+        );
+        assert_eq!(
+            bench.send(Command::Fprd, at(station(&bench, "T4"), 0x0000), &[0]).unwrap().1,
+            0
+        );
     }
     // The first of all: everything is cut off, and the frame is back all the same.
     let mut bench = addressed(Bench::plant());
@@ -278,7 +286,8 @@ fn mapped() -> Bench {
     map(&mut bench, "T3", FmmuConfig::outputs(LogicalAddress(0x0001_0000), 1, out));
     map(&mut bench, "T4", FmmuConfig::outputs(LogicalAddress(0x0001_0001), 1, out));
     map(&mut bench, "T5", FmmuConfig::inputs(LogicalAddress(0x0001_0000), 1, inward));
-    let both = FmmuConfig { reads: true, ..FmmuConfig::outputs(LogicalAddress(0x0001_0002), 1, out) };
+    let both =
+        FmmuConfig { reads: true, ..FmmuConfig::outputs(LogicalAddress(0x0001_0002), 1, out) };
     map(&mut bench, "T7", both);
     let address = at(station(&bench, "T5"), RAM + 8);
     assert_eq!(bench.send(Command::Fpwr, address, &[0xA5]).unwrap().1, 1);
@@ -308,7 +317,10 @@ fn subdevices_are_addressed_by_station_and_by_logical_bytes_of_their_fmmus() {
     assert_eq!(bench.send(Command::Fpwr, at(0x2222, RAM), &[1]).unwrap().1, 0);
     // By logical bytes: one datagram reaches two of them, each its own byte.
     assert_eq!(bench.send(Command::Lwr, logical(0x0001_0000), &[0x11, 0x22]).unwrap().1, 2);
-    assert_eq!((ram(&mut bench, "T3"), ram(&mut bench, "T4"), ram(&mut bench, "T2")), (0x11, 0x22, 0));
+    assert_eq!(
+        (ram(&mut bench, "T3"), ram(&mut bench, "T4"), ram(&mut bench, "T2")),
+        (0x11, 0x22, 0)
+    );
     let (data, wkc) = bench.send(Command::Lrd, logical(0x0001_0000), &[0; 2]).unwrap();
     assert_eq!((data.as_slice(), wkc), (&[0xA5, 0][..], 1));
     // Where nothing is mapped nobody answers.
@@ -399,7 +411,11 @@ fn registers_end_where_process_data_begin() {
     // The whole memory behind 0x1000 can: 1 KiB and more, byte by byte.
     for address in (0x1000..0x1400).step_by(64) {
         let pattern: Vec<u8> = (0..64).map(|byte| (address as u8) ^ byte).collect();
-        assert_eq!(bench.send(Command::Fpwr, at(t3, address), &pattern).unwrap().1, 1, "0x{address:04X}");
+        assert_eq!(
+            bench.send(Command::Fpwr, at(t3, address), &pattern).unwrap().1,
+            1,
+            "0x{address:04X}"
+        );
         let read = bench.send(Command::Fprd, at(t3, address), &[0; 64]).unwrap();
         assert_eq!(read, (pattern, 1), "0x{address:04X}");
     }

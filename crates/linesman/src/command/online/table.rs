@@ -190,7 +190,9 @@ fn frames(report: &OnlineReport) -> String {
     if let Some(clock) = report.clock {
         let (off, reference) = (time(clock.ahead_ns.unsigned_abs()), clock.reference);
         let how = if clock.ahead_ns < 0 { "behind" } else { "ahead of" };
-        text.push_str(&format!("The network's time, that of {reference}, is {off} {how} the host's.\n"));
+        text.push_str(&format!(
+            "The network's time, that of {reference}, is {off} {how} the host's.\n"
+        ));
     }
     for card in &report.cards {
         let link = match card.carrier {

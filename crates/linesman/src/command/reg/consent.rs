@@ -54,7 +54,9 @@ fn effect(found: &Description, len: usize) -> Option<String> {
         }
         "PHY management interface" => "it changes how a port makes its link",
         "FMMU" | "SyncManager" => "process data and mailbox messages go elsewhere",
-        "Distributed clocks: latch unit" => "times that are latched are lost for whoever waits for them",
+        "Distributed clocks: latch unit" => {
+            "times that are latched are lost for whoever waits for them"
+        }
         group if group.starts_with("Distributed clocks") => {
             "the clock, or the SyncSignals, of the SubDevice move"
         }
@@ -82,8 +84,8 @@ mod tests {
     #[test]
     fn what_changes_the_line_needs_consent_wherever_it_lies_in_the_range() {
         let addresses = [
-            0x0010, 0x0040, 0x0100, 0x0108, 0x0120, 0x0130, 0x0420, 0x0500, 0x0510, 0x0600, 0x0800, 0x0910,
-            0x0980, 0x09A8, 0x0F00, 0x1000,
+            0x0010, 0x0040, 0x0100, 0x0108, 0x0120, 0x0130, 0x0420, 0x0500, 0x0510, 0x0600, 0x0800,
+            0x0910, 0x0980, 0x09A8, 0x0F00, 0x1000,
         ];
         for address in addresses {
             assert!(is_refused(address, 1), "0x{address:04X}");
