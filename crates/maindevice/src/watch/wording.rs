@@ -213,10 +213,10 @@ fn states(
     lines.into_iter().map(|text| LogEntry { at, severity, kind, device, text }).collect()
 }
 
-/// `task "motion"`.
+/// `task 'motion'`.
 fn named(plan: &Plan, task: usize) -> String {
     match plan.tasks.get(task).map(|task| task.name.as_str()) {
-        Some(name) if !name.is_empty() => format!("task \"{name}\""),
+        Some(name) if !name.is_empty() => format!("task '{name}'"),
         Some(_) | None => format!("task {}", task + 1),
     }
 }

@@ -90,6 +90,42 @@ fn controllers_have_two_to_four_ports_and_are_entered_by_port_a() {
     }
 }
 
+// S0 L83-99, S4 L17-36: terminals have two ports, couplers three, a junction for terminals four; a large junction
+// is three controllers with eight sockets.
+// proves: ESC-11
+#[test]
+fn known_devices_have_their_shape() {
+    let ports = |bench: &mut Bench, place: u16| {
+        let read = |bench: &mut Bench, ado: u16, len: usize| {
+            bench.send(Command::Fprd, at(0x1000 + place, ado), &vec![0; len]).unwrap().0
+        };
+        let bytes: [u8; EscInformation::LEN] =
+            read(bench, 0x0000, EscInformation::LEN).try_into().unwrap();
+        let status = DlStatus(u16::from_le_bytes(read(bench, 0x0110, 2).try_into().unwrap()));
+        let implemented: Vec<Port> =
+            EscInformation::from_bytes(bytes).ports.implemented().collect();
+        (implemented.len(), status.active_ports().count())
+    };
+    for (kind, expected) in
+        [("EL1008", 2), ("EL2008", 2), ("EL3104", 2), ("EL6601", 2), ("EL7041", 2), ("EK1122", 4)]
+    {
+        let text = device("K", "EK1100", "maindevice", "") + &device("X", kind, "K.B", "");
+        let mut bench = addressed(Bench::new(&text));
+        assert_eq!(ports(&mut bench, 0).0, 3, "a coupler");
+        assert_eq!(ports(&mut bench, 1).0, expected, "{kind}");
+    }
+    let mut bench = addressed(Bench::new(&device("K", "EK1101", "maindevice", "")));
+    assert_eq!(ports(&mut bench, 0), (3, 1));
+    let mut bench = addressed(Bench::new(&device("J", "CU1128", "maindevice", "")));
+    assert_eq!(bench.count(), Some(3));
+    let (all, active) = (0..3).fold((0, 0), |(all, active), place| {
+        let (ports, open) = ports(&mut bench, place);
+        (all + ports, active + open)
+    });
+    // Of those with somebody at the other end all but the one to the MainDevice are inside the housing.
+    assert_eq!((all, all - (active - 1)), (12, 8));
+}
+
 // S0 L49: when every other port is closed, even A itself, frames go out by A.
 // proves: ESC-03
 #[test]
