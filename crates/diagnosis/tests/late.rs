@@ -45,7 +45,9 @@ fn recorded(late_ns: u64) -> Diagnosis {
 // silent: T411
 #[test]
 fn a_recording_notes_frames_that_are_late_by_a_tenth_of_the_cycle_where_nobody_keeps_step() {
-    for (late_ns, shown) in [(1_300_000, "1.300 ms at most, 130 %"), (300_000, "0.300 ms at most, 30 %")] {
+    for (late_ns, shown) in
+        [(1_300_000, "1.300 ms at most, 130 %"), (300_000, "0.300 ms at most, 30 %")]
+    {
         let report = recorded(late_ns);
         assert_eq!(codes(&report), ["T411"], "{}", text(&report));
         let finding = &report.findings[0];

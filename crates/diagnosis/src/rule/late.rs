@@ -99,7 +99,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     if hurt.is_empty() && is_recorded {
         let text = match keeps_step {
             true => "no SubDevice has lost its step meanwhile, as far as the recording shows",
-            false => "nobody keeps step with SYNC signals, as far as the recording shows: nobody missed them",
+            false => {
+                "nobody keeps step with SYNC signals, as far as the recording shows: nobody missed them"
+            }
         };
         condition = condition.shown_by(Evidence::host(Some(last.sent), text));
     }

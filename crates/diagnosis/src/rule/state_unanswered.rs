@@ -74,8 +74,9 @@ fn condition(line: &Line, device: &Device, request: &StateRequest) -> Condition 
             .about([Symptom::StateLost(id)])
             .explaining([Symptom::WorkingCounter(id)]);
     let mut condition = match &request.polled {
-        Some(seen) => condition
-            .shown_by(Evidence::register(id, AL_STATUS, seen, stays).values(state, state)),
+        Some(seen) => {
+            condition.shown_by(Evidence::register(id, AL_STATUS, seen, stays).values(state, state))
+        }
         None => condition,
     };
     let wanted = Some(u64::from(asked.value.bits()));
