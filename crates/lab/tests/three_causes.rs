@@ -84,15 +84,17 @@ fn interference_device_and_firmware_are_told_apart() {
 }
 
 // S3 L76: off or disconnected, firmware that fails, a cycle that firmware cannot follow.
-// proves: FRM-20 partial: firmware that hangs keeps its working counter in the segment, and is known by other signs
+// proves: FRM-20
 #[test]
 fn who_is_gone_whose_firmware_fails_and_whose_cycle_is_too_fast_are_told_apart() {
     use FaultName::{CycleTooFast, DeviceOff, FirmwareFault, LinkOpen, SupplyOff};
     for (text, causes, lowers) in [
         // Nobody can tell these apart as long as it is gone.
         ("kind = 'device-off'\ndevice = 'T2'", &[DeviceOff, LinkOpen, SupplyOff][..], true),
-        ("kind = 'firmware-fault'\ndevice = 'T2'\nhow = 'hangs'", &[FirmwareFault], false),
+        ("kind = 'firmware-fault'\ndevice = 'T2'\nhow = 'memory-blocked'", &[FirmwareFault], true),
         ("kind = 'cycle-too-fast'\ndevice = 'T2'\nneeds_us = 9000.0", &[CycleTooFast], true),
+        // Without the symptom: buffers that were left open go on being served by the controller.
+        ("kind = 'firmware-fault'\ndevice = 'T2'\nhow = 'hangs'", &[FirmwareFault], false),
     ] {
         let lab = broken(text, true);
         let line = lab.engine().line(Network(0)).unwrap();

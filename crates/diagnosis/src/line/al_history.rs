@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use linesman_proto::register::{AlControl, AlStatus};
-use linesman_proto::state::{AlState, AlStatusCode, StateValue};
-use linesman_proto::time::Instant;
+use linesman_proto::state::{AlState, AlStatusCode, StateTimeouts, StateValue};
+use linesman_proto::time::{Instant, Span};
 
 use super::{Seen, push_kept};
 
@@ -27,6 +27,55 @@ pub struct AlHistory {
     pub errors: VecDeque<AlError>,
     /// Whether it was in the state last asked for, without error, since it was asked.
     pub has_arrived: bool,
+    /// Requests for a state and how they fared, oldest first: the latest, and at most
+    /// [`CHANGES_KEPT`](super::CHANGES_KEPT) that waited longer than a step may take.
+    pub requests: VecDeque<StateRequest>,
+}
+
+/// A request for a state, and those that followed it before the controller moved.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct StateRequest {
+    /// The first one, written to AL control (0x0120).
+    pub asked: Seen<StateValue>,
+    /// The state that was asked for last.
+    pub to: AlState,
+    /// The state in which it was, and stays.
+    pub from: AlState,
+    /// How often it was asked.
+    pub times: u32,
+    /// How often its controller did not take the request, because the one before was not fetched yet
+    /// (working counter 0).
+    pub untaken: u32,
+    /// How often AL status was read since and showed nothing new.
+    pub polls: u32,
+    /// When it was last read so.
+    pub polled: Option<Seen<()>>,
+    /// When AL status changed: it had heard.
+    pub ended: Option<Instant>,
+}
+
+impl StateRequest {
+    /// Nobody is late by less, whatever the step: requests are looked after in turns.
+    const LEAST: Span = Span::s(1);
+
+    /// For how long AL status has been seen not to move.
+    #[must_use]
+    pub fn waited(&self) -> Span {
+        self.polled.map_or(Span::ZERO, |polled| polled.at.since(self.asked.at))
+    }
+
+    /// How long the step may take at most.
+    #[must_use]
+    pub fn limit(&self) -> Span {
+        let to = self.asked.value.state().unwrap_or(self.to);
+        StateTimeouts::DEFAULT.of(self.from, to).max(Self::LEAST)
+    }
+
+    /// Whether it has not been answered for longer than the step may take.
+    #[must_use]
+    pub fn is_overdue(&self) -> bool {
+        self.waited() >= self.limit()
+    }
 }
 
 /// An error that a controller signalled in AL status.
@@ -75,6 +124,7 @@ impl AlChange {
 impl AlHistory {
     /// Takes a reading of AL status. Says whether it is news.
     pub fn record_status(&mut self, status: AlStatus, at: Instant, frame: Option<u64>) -> bool {
+        let was_overdue = self.record_answer(status, Seen::new((), at, frame));
         self.record_error(status, at, frame);
         let before = self.status.replace(Seen::new(status, at, frame));
         self.highest = self.highest.max(status.state().state());
@@ -82,7 +132,7 @@ impl AlHistory {
         if before.value == status {
             // The first sighting is the evidence, not the thousandth.
             self.status = Some(before);
-            return false;
+            return was_overdue;
         }
         self.change_count += 1;
         let requested = self.requested.and_then(|requested| requested.value.state());
@@ -91,6 +141,47 @@ impl AlHistory {
             AlChange { from: before.value, to: status, at, frame, requested },
         );
         true
+    }
+
+    /// AL status was read: an answer to what was asked is whatever is new in it. Says whether somebody has
+    /// just waited too long.
+    fn record_answer(&mut self, status: AlStatus, seen: Seen<()>) -> bool {
+        let Some(open) = self.requests.back_mut().filter(|request| request.ended.is_none()) else {
+            return false;
+        };
+        if status.error() || status.state().state() != Some(open.from) {
+            open.ended = Some(seen.at);
+            return false;
+        }
+        let was_overdue = open.is_overdue();
+        open.polls = open.polls.saturating_add(1);
+        open.polled = Some(seen);
+        !was_overdue && open.is_overdue()
+    }
+
+    /// A state is asked for in which it is not. What it is told while it signals an error is for that.
+    fn note_request(&mut self, requested: Seen<StateValue>, was_taken: bool) {
+        let (Some(from), Some(to)) = (self.state(), requested.value.state()) else { return };
+        if to == from || self.has_error() {
+            return;
+        }
+        let untaken = u32::from(!was_taken);
+        match self.requests.back_mut() {
+            Some(open) if open.ended.is_none() => {
+                open.times = open.times.saturating_add(1);
+                open.untaken = open.untaken.saturating_add(untaken);
+                open.to = to;
+                return;
+            }
+            Some(last) if !last.is_overdue() => {
+                self.requests.pop_back();
+            }
+            Some(_) | None => {}
+        }
+        let (polled, ended) = (None, None);
+        let new =
+            StateRequest { asked: requested, to, from, times: 1, untaken, polls: 0, polled, ended };
+        push_kept(&mut self.requests, new);
     }
 
     /// Whether the error bit is but an echo: a controller without a processor behind it copies AL
@@ -145,6 +236,13 @@ impl AlHistory {
             self.has_arrived = false;
         }
         self.requested = Some(requested);
+        self.note_request(requested, true);
+    }
+
+    /// AL control was written, and the controller did not take it: its processor has not fetched what was
+    /// written before. Reference: S2, AL control; the register can be written once until it was read.
+    pub fn record_untaken(&mut self, requested: Seen<StateValue>) {
+        self.note_request(requested, false);
     }
 
     /// Whether the MainDevice asked for a state without process data.

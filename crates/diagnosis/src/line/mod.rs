@@ -26,7 +26,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 
-pub use al_history::{AlChange, AlError, AlHistory};
+pub use al_history::{AlChange, AlError, AlHistory, StateRequest};
 pub use beat::{Beat, Off, Pause};
 pub use clock::{ClockHistory, Reference};
 pub use counters::{CounterHistory, CounterTrack, Rise};

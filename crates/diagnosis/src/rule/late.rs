@@ -7,7 +7,7 @@
 //! more than this computer usually wanders, was kept back. Many in a row that take the same longer time took
 //! another way: no finding; nor is it one as long as no process data are exchanged in a cycle. A recording tells
 //! it too, since it has the times at which frames went out and came back; but where nobody keeps step with SYNC
-//! signals, only of frames that are late by a cycle or more.
+//! signals, only of frames that are late by a tenth of the cycle or more: the times of a recording wander, too.
 //!
 //! **What it means.** The line is well: no controller counts anything. The computer, its card, a switch or a
 //! converter in between kept the frame back. Single frames now and then are the computer's: interrupts, another
@@ -42,6 +42,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const QUIET: Span = Span::s(2);
 /// What lies closer together belongs together.
 const TOGETHER: Span = Span::s(10);
+/// A recording tells of what is late by this part of the cycle: half of what is doubtful to whoever keeps step.
+const RECORDED: u64 = 10;
 /// A state that was lost is read so long after the frame that was late.
 const READ_WITHIN: Span = Span::s(2);
 
@@ -61,20 +63,27 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
     let of_spell = || trips.late.iter().filter(|late| late.sent >= first.sent);
     let worst = of_spell().map(|late| late.by).max().unwrap_or(Span::ZERO);
-    // What a recorder saw late by less than a cycle did no harm where nobody keeps step.
-    if !keeps_step && !line.traffic.direction_known && worst < cycle {
+    // What a recorder notes a little late was perhaps noted late, and did no harm where nobody keeps step.
+    let is_recorded = !line.traffic.direction_known;
+    if is_recorded && !keeps_step && worst * RECORDED < cycle {
         return;
     }
-    let share = trips.share();
     let (cause, other) = if trips.is_queue() {
         (FaultName::LateFrames, FaultName::HostJitter)
     } else {
         (FaultName::HostJitter, FaultName::LateFrames)
     };
     let text = format!(
-        "{} frames came back late, {share} % of those between the first and the last: up to {:.3} ms later than the line takes",
-        trips.late_count,
-        worst.as_secs_f64() * 1e3
+        "{} later than the line takes: by {:.3} ms at most, {} % of the cycle",
+        match trips.late_count {
+            1 => "one frame came back".to_owned(),
+            late => format!(
+                "{late} of {} frames between the first late one and the last came back",
+                trips.compared
+            ),
+        },
+        worst.as_secs_f64() * 1e3,
+        worst.as_nanos() * 100 / cycle.as_nanos().max(1)
     );
     let mut condition = Condition::new(&PAGE, Place::Host, cause, first.sent)
         .confidence(0.6)
@@ -87,6 +96,15 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let in_step = line.devices.iter().filter(|device| device.sync_on.is_some_and(|on| on.value));
     let hurt: Vec<&Device> =
         in_step.filter(|device| was_hurt(device, first.sent, last.sent + last.by)).collect();
+    if hurt.is_empty() && is_recorded {
+        let text = match keeps_step {
+            true => "no SubDevice has lost its step meanwhile, as far as the recording shows",
+            false => {
+                "nobody keeps step with SYNC signals, as far as the recording shows: nobody missed them"
+            }
+        };
+        condition = condition.shown_by(Evidence::host(Some(last.sent), text));
+    }
     if !hurt.is_empty() {
         condition.severity = Severity::Error;
         condition = condition.explaining(hurt.iter().map(|device| Symptom::StateLost(device.id)));

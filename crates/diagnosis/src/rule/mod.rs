@@ -29,6 +29,7 @@ pub mod ring_reversed;
 pub mod second_maindevice;
 pub mod shared_address;
 pub mod state_error;
+pub mod state_unanswered;
 pub mod watchdog_short;
 pub mod wiring;
 pub mod working_counter;
@@ -111,6 +112,7 @@ pub const RULES: &[Rule] = &[
     processor_stopped::RULE,
     watchdog_short::RULE,
     state_error::RULE,
+    state_unanswered::RULE,
     working_counter::RULE,
     one_direction::RULE,
     emergency::RULE,

@@ -25,6 +25,9 @@ pub enum Trouble {
     FrozenApplication,
     /// It does not answer requests for a state.
     DeafToRequests,
+    /// It keeps the buffers of its process data locked: who reads or writes there adds nothing to a working
+    /// counter.
+    LockedBuffers,
     /// A setting of it does not fit what its data say.
     Mismatch(Mismatch),
 }
@@ -78,6 +81,7 @@ impl Troubles {
             | Trouble::MailboxNotFilled
             | Trouble::FrozenApplication
             | Trouble::DeafToRequests
+            | Trouble::LockedBuffers
             | Trouble::Mismatch(_) => Seed::default(),
         };
         self.0.push((trouble, seed.stream("trouble")));
@@ -106,6 +110,7 @@ impl Troubles {
             | Trouble::MailboxNotFilled
             | Trouble::FrozenApplication
             | Trouble::DeafToRequests
+            | Trouble::LockedBuffers
             | Trouble::Mismatch(_) => sum,
         })
     }
@@ -124,6 +129,7 @@ impl Troubles {
             | Trouble::MailboxNotFilled
             | Trouble::FrozenApplication
             | Trouble::DeafToRequests
+            | Trouble::LockedBuffers
             | Trouble::Mismatch(_) => None,
         })
     }

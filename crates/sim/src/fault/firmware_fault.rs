@@ -23,9 +23,17 @@ pub(super) const KIND: Kind = Kind {
                       in INIT with code 0x0060. `inputs-frozen`: its application stops, the rest \
                       works; a device that starts like that has no values to exchange and does not \
                       get to OP (0x0018, 0x0019 or 0x002B). `state-machine-dead`: requests for a state stay unanswered, the rest \
-                      works.",
+                      works. `memory-blocked`: its processor stops with the buffers of its process data \
+                      locked (0x0807 + 8n bit 0): its share of working counters is missing, its AL status \
+                      stays.",
             shape: Shape::Word {
-                words: &["hangs", "restarts", "inputs-frozen", "state-machine-dead"],
+                words: &[
+                    "hangs",
+                    "restarts",
+                    "inputs-frozen",
+                    "state-machine-dead",
+                    "memory-blocked",
+                ],
             },
         },
         Parameter {
@@ -40,7 +48,7 @@ pub(super) const KIND: Kind = Kind {
         },
     ],
     start: |start| {
-        let change = match start.values.text("how") {
+        let changes: &[SoftwareChange] = match start.values.text("how") {
             Some("restarts") => {
                 let (boot, every) = (start.milliseconds("boot_ms"), start.milliseconds("every_ms"));
                 if every != Span::ZERO && every <= boot {
@@ -49,13 +57,18 @@ pub(super) const KIND: Kind = Kind {
                 let nodes = start.target.nodes;
                 return Ok(Box::new(Crashes { nodes, boot, every, at: start.from, next: 0 }));
             }
-            Some("inputs-frozen") => SoftwareChange::Begin(Trouble::FrozenApplication),
-            Some("state-machine-dead") => SoftwareChange::Begin(Trouble::DeafToRequests),
-            Some(_) | None => SoftwareChange::Hang,
+            Some("inputs-frozen") => &[SoftwareChange::Begin(Trouble::FrozenApplication)],
+            Some("state-machine-dead") => &[SoftwareChange::Begin(Trouble::DeafToRequests)],
+            Some("memory-blocked") => {
+                &[SoftwareChange::Begin(Trouble::LockedBuffers), SoftwareChange::Hang]
+            }
+            Some(_) | None => &[SoftwareChange::Hang],
         };
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
-        Ok(Listed::boxed(nodes.map(|node| (from, Change::Software { node, change }))))
+        Ok(Listed::boxed(nodes.flat_map(move |node| {
+            changes.iter().map(move |change| (from, Change::Software { node, change: *change }))
+        })))
     },
 };
 

@@ -316,6 +316,10 @@ impl Learner {
                 device.mailbox.polled = Some(answer.at);
                 return;
             }
+            if answer.is_last && registers::untaken(device, answer) {
+                // Whether it is there, others tell: who does not fetch requests takes no new one.
+                return;
+            }
             if answer.is_last && answer.ado < FIRST_OPTIONAL && device.answered.is_some() {
                 let is_news = device.silent.is_none();
                 device.is_silent(answer.at, Some(answer.frame));

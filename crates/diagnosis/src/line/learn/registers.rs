@@ -99,6 +99,18 @@ pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     }
 }
 
+/// A request for a state was not taken by a controller that has answered before. Says whether it was one.
+pub(super) fn untaken(device: &mut Device, answer: &Answer<'_>) -> bool {
+    let control = part(answer.written(), answer.ado, AL_CONTROL, 1);
+    let Some(control) = control.filter(|_| answer.effect.writes && device.answered.is_some())
+    else {
+        return false;
+    };
+    let requested = AlControl(u16::from(control[0])).requested();
+    device.al.record_untaken(Seen::new(requested, answer.at, Some(answer.frame)));
+    true
+}
+
 /// All controllers' registers were read; their data are ORed together.
 pub(super) fn broadcast_read(line: &mut Line, answer: &Answer<'_>) {
     let Some(status) = al_status(answer.reply.data(), answer.ado) else { return };

@@ -26,6 +26,7 @@ impl Firmware for Processor {
         self.synchronisation.start(&self.description.dictionary, &mut self.dictionary);
         self.step = None;
         self.emergencies.clear();
+        self.has_locked = false;
         self.has_values = false;
         self.next_sample = now;
         self.make_safe(pdi);
@@ -35,6 +36,7 @@ impl Firmware for Processor {
         if pdi.take_activation_event() {
             self.check_again(pdi);
         }
+        self.mind_locks(pdi);
         self.serve_process_data(now, pdi);
         self.serve_requests(now, pdi);
         let state = ApplicationLayer::state(pdi);
@@ -91,7 +93,7 @@ impl Firmware for Processor {
         // What the MainDevice asked meanwhile nobody has heard.
         pdi.take_al_control_event();
         self.start(now, pdi);
-        self.lock_outputs(pdi, false);
+        self.lock_all(pdi, false);
         ApplicationLayer::fail(pdi, AlState::Init, AlStatusCode::RESTARTED_LOCALLY);
         self.note_crash(pdi);
     }

@@ -124,6 +124,8 @@ pub struct Processor {
     has_values: bool,
     /// It reads its SII itself on the way to PREOP.
     reads_sii: bool,
+    /// It has locked all buffers of its process data.
+    has_locked: bool,
     /// Settings before they were made not to fit.
     former: Vec<mismatch::Former>,
     /// Errors to tell of.
@@ -165,6 +167,7 @@ impl Processor {
             troubles: Troubles::default(),
             has_values: false,
             reads_sii: false,
+            has_locked: false,
             former: Vec::new(),
             emergencies: Vec::new(),
             buffer: Vec::new(),
@@ -321,6 +324,20 @@ impl Processor {
             if buffer.direction == Direction::Outputs {
                 pdi.deactivate_sync_manager(buffer.sync_manager, locked);
             }
+        }
+    }
+
+    /// Locks all buffers of its process data when that is wrong with it, and unlocks them when it is over.
+    fn mind_locks(&mut self, pdi: &mut Pdi<'_>) {
+        let locks = self.troubles.has(Trouble::LockedBuffers);
+        if std::mem::replace(&mut self.has_locked, locks) != locks {
+            self.lock_all(pdi, locks);
+        }
+    }
+
+    fn lock_all(&self, pdi: &mut Pdi<'_>, locked: bool) {
+        for buffer in &self.description.buffers {
+            pdi.deactivate_sync_manager(buffer.sync_manager, locked);
         }
     }
 
