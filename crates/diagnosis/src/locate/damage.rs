@@ -13,7 +13,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Hop, Route};
 
 use super::survey::Survey;
-use crate::line::CounterTrack;
+use crate::line::{CounterTrack, Rise};
 
 /// Damage on one hop: a link in one direction, with the sender and the receiver at its ends.
 #[derive(Clone, PartialEq, Debug)]
@@ -305,11 +305,22 @@ impl Walk<'_, '_> {
             let by = u64::from(rise.difference.rise);
             if rise.at > horizon {
                 reading.settled = reading.settled.saturating_sub(by);
-            } else if self.survey.falls_with_link_change(hop.link, rise) {
+            } else if self.survey.falls_with_link_change(hop.link, rise)
+                || (by == 1 && self.was_cut_before(hop, rise))
+            {
                 reading.excused += by;
             }
         }
         reading
+    }
+
+    /// Whether another link of the controller that sends on this hop changed then: the frame that it was
+    /// sending on is cut off, and who comes next is the first that can count it.
+    fn was_cut_before(&self, hop: Hop, rise: &Rise) -> bool {
+        let End::Controller(node, _) = hop.from else { return false };
+        let others = Port::ALL.into_iter().map(|port| End::Controller(node, port));
+        let mut links = others.filter_map(|end| self.survey.tree().link_at(end));
+        links.any(|link| self.survey.falls_with_link_change(link, rise))
     }
 
     /// When the port counted: the first and the latest reading that showed a rise.
