@@ -242,8 +242,7 @@ impl Reference {
             (self.best, self.marks) = (None, VecDeque::new());
             return true;
         }
-        self.mark(seen.value);
-        false
+        self.mark(seen.value)
     }
 
     /// It was set at `at`: that its time jumps then means nothing.
@@ -256,10 +255,11 @@ impl Reference {
         }
     }
 
-    fn mark(&mut self, passed: Passed) {
+    /// Notes a frame of the present stretch. Says whether it is known now that the speed is wrong, or worse.
+    fn mark(&mut self, passed: Passed) -> bool {
         let Some(best) = self.best else {
             (self.best, self.begun) = (Some(passed), passed.sent);
-            return;
+            return false;
         };
         if passed.sent >= self.begun + Self::STRETCH {
             if self.marks.len() == Self::MARKS {
@@ -268,14 +268,16 @@ impl Reference {
             self.marks.push_back(best);
             (self.best, self.begun) = (Some(passed), passed.sent);
             let worst = self.wrong_speed.map_or(Self::SOUND, i64::abs);
-            self.wrong_speed = self.ppm().filter(|ppm| ppm.abs() >= worst).or(self.wrong_speed);
-            return;
+            let before = self.wrong_speed;
+            self.wrong_speed = self.ppm().filter(|ppm| ppm.abs() >= worst).or(before);
+            return self.wrong_speed != before;
         }
         // Earlier by its own clock than by the sender's: it was less late.
         let sooner = passed.since(&best) < passed.sent.since(best.sent).as_nanos() as i64;
         if sooner {
             self.best = Some(passed);
         }
+        false
     }
 
     /// How much faster it goes than the clock of whoever sends, in parts per million, over the latest
@@ -338,7 +340,9 @@ mod tests {
         for ms in 1..=1_000 {
             // Every seventh frame is late by 0.3 ms.
             let late = if ms % 7 == 0 { 300_000 } else { 0 };
-            assert!(!pass(&mut reference, ms, 7_000_000_000 + ms * ns_per_ms + late));
+            let was = reference.wrong_speed;
+            let is_news = pass(&mut reference, ms, 7_000_000_000 + ms * ns_per_ms + late);
+            assert_eq!(is_news, reference.wrong_speed != was, "what is worse is told at once");
         }
         reference
     }

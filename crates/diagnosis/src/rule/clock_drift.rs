@@ -125,14 +125,17 @@ fn wrong_reference(line: &Line, astray: &[(&Device, Astray)]) -> Option<DeviceId
     (astray.len() >= 3 && is_one_way && astray.len() == read.count()).then_some(reference.device)
 }
 
-/// A reference clock that nobody is known to follow, against the clock of the computer: one of the two is
-/// wrong. With readings of others, that are near, it is the computer.
+/// The clock of a computer is not set right faster than this (Linux, `adjtimex`), in parts per million.
+const SLEWED: u64 = 500;
+
+/// A reference clock that nobody is known to leave, against the clock of the computer: one of the two is
+/// wrong. While others follow it, a difference may be a computer's clock that is being set right.
 fn alone(line: &Line) -> Option<Condition> {
     let [reference] = line.references.as_slice() else { return None };
-    reference.wrong_speed?;
+    let ppm = reference.wrong_speed?.unsigned_abs();
     let id = reference.device;
-    let others = line.devices.iter().filter(|device| device.id != id);
-    if others.into_iter().any(|device| device.clock.near.is_some()) {
+    let mut others = line.devices.iter().filter(|device| device.id != id);
+    if ppm <= SLEWED && others.any(|device| device.clock.near.is_some()) {
         return None;
     }
     let condition = of_reference(line, id, &[]);
