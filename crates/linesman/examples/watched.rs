@@ -11,7 +11,12 @@ const GOOD: DeviceState = DeviceState(8);
 
 fn main() -> Result<(), linesman::Error> {
     let place = std::env::args().nth(1).unwrap_or_else(|| "sim:line.toml".to_owned());
-    let mut segment = linesman::open(&place)?;
+    watch(&place, |line| println!("{line}"))
+}
+
+/// Runs a line for five seconds and tells what changes.
+pub fn watch(place: &str, mut tell: impl FnMut(String)) -> Result<(), linesman::Error> {
+    let mut segment = linesman::open(place)?;
     let plan = segment.scan()?.plan()?;
     let names: Vec<(DeviceId, String)> =
         plan.as_plan().devices.iter().map(|device| (device.id, device.name.clone())).collect();
@@ -26,7 +31,7 @@ fn main() -> Result<(), linesman::Error> {
             let now = (io.wc_state(*id), io.state(*id));
             if std::mem::replace(told, now) != now {
                 let data = if now.0 { "data missing" } else { "data good" };
-                println!("{name}: {data}, {}", now.1);
+                tell(format!("{name}: {data}, {}", now.1));
             }
         }
         if cycle < 5_000 { Next::Continue } else { Next::Stop }

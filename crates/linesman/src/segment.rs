@@ -92,6 +92,7 @@ pub struct Cycle {
     leave: AlState,
     io_at: Option<IoAt>,
     clocks: bool,
+    hold: bool,
 }
 
 impl Cycle {
@@ -100,7 +101,7 @@ impl Cycle {
     pub fn us(micros: u64) -> Self {
         let time = Span::us(micros.max(1));
         let (real_time, leave) = (RealTime::default(), AlState::Init);
-        Self { time, misses: 2, real_time, leave, io_at: None, clocks: false }
+        Self { time, misses: 2, real_time, leave, io_at: None, clocks: false, hold: false }
     }
 
     /// How many cycles in a row the application may be late before its outputs are withheld.
@@ -134,6 +135,14 @@ impl Cycle {
     #[must_use]
     pub const fn exchange_at_end(mut self) -> Self {
         self.io_at = Some(IoAt::TaskEnd);
+        self
+    }
+
+    /// SubDevices stay in PREOP until the application has given outputs for the first time: one that is not
+    /// ready calls [`Io::outputs_are_old`](crate::Io::outputs_are_old).
+    #[must_use]
+    pub const fn wait_for_outputs(mut self) -> Self {
+        self.hold = true;
         self
     }
 
@@ -233,6 +242,7 @@ impl Segment {
             lasts: None,
             real_time: matches!(self.line, Where::Cards(_)).then_some(cycle.real_time),
             allowed_misses: Some(cycle.misses),
+            hold: cycle.hold,
             diagnose: None,
         };
         // Nobody listens to notes here; they go nowhere.

@@ -109,6 +109,93 @@ fn a_line_that_is_cut_and_mended_is_logged_with_times_and_exported() {
     }
 }
 
+// S0 L1346, L2240-2245: it was in OP, and leaves it by itself: from where, to where, and with which code.
+// proves: SW-03
+#[test]
+fn a_fall_from_op_by_a_fault_of_its_own_is_logged_with_its_code() {
+    let device = "[[device]]\nname = \"O2\"\ntype = \"EL4102\"\non = \"I1.B\"\n";
+    for (fault, expected, words) in [
+        // Its watchdog is shorter than the cycle, while all others get their outputs in time.
+        (
+            "kind = \"watchdog-starved\"\ndevice = \"O2\"\nwatchdog_ms = 0.3\n",
+            "'3 (EL4102)' (1003): abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog",
+            "task which sends the outputs",
+        ),
+        // Its firmware crashes and starts anew.
+        (
+            "kind = \"firmware-fault\"\ndevice = \"O2\"\nhow = \"restarts\"\n",
+            "'3 (EL4102)' (1003): abnormal state change (from OP to INIT), AL 0x0060",
+            "",
+        ),
+    ] {
+        let fault = format!("{device}[[fault]]\n{fault}from_ms = 3000\nto_ms = 3500\n");
+        let (folder, entries) = logged(&fault, "5");
+        let texts = texts(&entries);
+        let at = texts.iter().position(|text| text.starts_with(expected));
+        let at = at.unwrap_or_else(|| panic!("{expected}: {texts:#?}"));
+        assert_eq!(
+            (&entries[at]["kind"], &entries[at]["severity"]),
+            (&"abnormal-state".into(), &"error".into())
+        );
+        assert_eq!(entries[at]["no"], 3);
+        assert!(
+            texts[at + 1].starts_with("'3 (EL4102)' (1003): ") && texts[at + 1].contains(words),
+            "{texts:#?}"
+        );
+        // It was up before, and it is nobody else's.
+        assert!(
+            texts[..at].iter().any(|text| text.contains("have reached their states")),
+            "{texts:#?}"
+        );
+        let abnormal = entries.iter().filter(|entry| entry["kind"] == "abnormal-state");
+        assert!(abnormal.clone().all(|entry| entry["no"] == 3), "{texts:#?}");
+        let log = folder.path().join("log.sqlite");
+        let found = linesman([
+            "log",
+            log.to_str().unwrap(),
+            "--kind",
+            "abnormal-state",
+            "--severity",
+            "error",
+        ]);
+        assert!(found.stdout.contains(expected), "{}", found.all());
+    }
+}
+
+// S0 L1485-1490, S1 L133-151: a working counter that is wrong names neither who nor why; what is read because
+// of it does.
+// proves: FRM-19
+#[test]
+fn a_wrong_working_counter_is_followed_at_once_by_what_was_read_because_of_it() {
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"K1.C-K2.A\"\nfrom_ms = 2000\n";
+    let (_folder, entries) = logged(cut, "4");
+    let first = |kind: &str| {
+        let found = entries.iter().find(|entry| entry["kind"] == kind);
+        found.unwrap_or_else(|| panic!("{kind}: {:#?}", texts(&entries)))
+    };
+    let nanos = |entry: &Value| {
+        let time = linesman_link::unix_time::UnixTime::parse(entry["time"].as_str().unwrap());
+        time.unwrap().as_nanos()
+    };
+    let counter = first("working-counter");
+    assert!(counter["no"].is_null(), "it accuses nobody: {counter}");
+    let text = counter["text"].as_str().unwrap();
+    assert!(text.starts_with("working counter of task '") && text.contains(" expected"), "{text}");
+    // Who is gone, and the port behind which they were, are known long before anything would have been read
+    // at its turn, ten times a second.
+    let (gone, port) = (first("communication"), first("link"));
+    assert!(port["text"].as_str().unwrap().contains("port C lost its neighbour"), "{port}");
+    assert_eq!(port["no"], 1);
+    for entry in [gone, port] {
+        let after = nanos(entry) - nanos(counter);
+        assert!((0..40_000_000).contains(&after), "{after} ns: {entry}");
+    }
+    let text = entries
+        .iter()
+        .find(|entry| entry["text"].as_str().unwrap().contains("Communication interrupted"));
+    assert!(text.unwrap()["text"].as_str().unwrap().contains("'3 (EK1100)' (1003) - '4 (EL2008)'"));
+}
+
 /// Steady noise moves counters with every reading, and those of everybody behind.
 #[test]
 fn steady_noise_is_told_to_people_once_in_a_while_and_logged_each_time() {

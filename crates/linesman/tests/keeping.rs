@@ -106,3 +106,72 @@ fn counters_are_not_cleared_where_the_project_says_so() {
     assert!(counted("") > 1_000);
     assert!(counted("clear_counters = false") <= 255);
 }
+
+/// The plant with noise on the way to its last device, which moves counters.
+const DISTURBED: &str =
+    "[[fault]]\nkind = \"emc-noise\"\nat = \"T2.B>T3.A\"\nhits_per_s = 400\nfrom_ms = 1500\n";
+
+/// Kinds and texts of what `run` logs of the plant with these options.
+fn logged(options: &[&str]) -> Vec<(String, String)> {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    fs::write(path("plant.toml"), format!("{PLANT}{DISTURBED}")).unwrap();
+    let (on, log) = (format!("sim:{}", path("plant.toml")), path("log"));
+    let usual = ["run", "--on", &on, "--seconds", "4", "--no-diagnosis", "--log", &log];
+    let run = linesman([&usual, options].concat());
+    assert!(run.status < 2, "{}", run.all());
+    let told = linesman(["log", &log, "--json"]).json();
+    let text = |entry: &Value, key: &str| entry[key].as_str().unwrap().to_owned();
+    let entries = told["entries"].as_array().unwrap();
+    entries.iter().map(|entry| (text(entry, "kind"), text(entry, "text"))).collect()
+}
+
+// S1 L1316-1337: start-up state, staying in PREOP until the task runs, what is logged, the toggle of the inputs.
+// proves: SW-16
+#[test]
+fn start_state_waiting_and_what_is_logged_are_options() {
+    // The state that all are driven to.
+    for (to, others) in [("SAFEOP", "OP"), ("PREOP", "SAFEOP"), ("OP", "BOOT")] {
+        let log = logged(&["--to", to]);
+        let reached = |state: &str| {
+            let words = format!(": {state} reached");
+            log.iter().filter(|(kind, text)| kind == "state" && text.ends_with(&words)).count()
+        };
+        assert_eq!((reached(to), reached(others)), (3, 0), "{to}: {log:#?}");
+    }
+    // What is logged: counters, or not.
+    let has = |log: &[(String, String)], kind: &str| log.iter().any(|(one, _)| one == kind);
+    let all = logged(&[]);
+    assert!(has(&all, "counter") && has(&all, "state"), "{all:#?}");
+    let quiet = logged(&["--log-without", "counter"]);
+    assert!(!has(&quiet, "counter") && has(&quiet, "state"), "{quiet:#?}");
+    let quiet = logged(&["--log-without", "counter", "--log-without", "state"]);
+    assert!(!has(&quiet, "counter") && !has(&quiet, "state"), "{quiet:#?}");
+    // All stay in PREOP, with frames going round, until the application gives outputs.
+    let folder = TempDir::new().unwrap();
+    let plant = folder.path().join("plant.toml");
+    fs::write(&plant, PLANT).unwrap();
+    let mut line = linesman::open(&format!("sim:{}", plant.display())).unwrap();
+    let plan = line.scan().unwrap().plan().unwrap();
+    let (mut calls, mut waiting, mut toggles, mut ready_at) = (0, Vec::new(), 0, None);
+    let mut last = None;
+    let cycle = linesman::Cycle::us(1_000).wait_for_outputs();
+    line.run(plan, cycle, |io| {
+        calls += 1;
+        let states = [0, 1, 2].map(|id| io.state(linesman::DeviceId(id)).0 & 0xF);
+        let toggle = io.frame_status(0, 0).unwrap().input_toggle;
+        toggles += u32::from(last.replace(toggle) != Some(toggle));
+        if calls < 3_000 {
+            waiting.push(states);
+            io.outputs_are_old();
+        } else if states == [8; 3] {
+            ready_at.get_or_insert(calls);
+        }
+        if calls < 5_000 { linesman::Next::Continue } else { linesman::Next::Stop }
+    })
+    .unwrap();
+    assert_eq!(waiting.last(), Some(&[2; 3]), "PREOP for three seconds");
+    assert!(waiting.iter().flatten().all(|state| *state <= 2), "never further");
+    assert!(ready_at.is_some_and(|at| at < 4_000), "{ready_at:?}");
+    assert!(toggles > 4_000, "the inputs' toggle turns over: {toggles}");
+}

@@ -97,6 +97,37 @@ fn a_wrong_counter_keeps_or_clears_the_inputs_of_the_whole_network_or_of_one() {
     assert_eq!(while_bad_as(|project| project.replacen("type = \"EL1008\"\n", one, 1)), [0].into());
 }
 
+// S0 L1386-1396: inputs are handed on when the counter is right, and discarded when it is not: the old ones
+// stay, though the frames go on bringing others.
+// proves: FRM-17
+#[test]
+fn inputs_come_with_a_right_counter_only_and_the_old_ones_stay_till_then() {
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"O1.B-I2.A\"\nfrom_ms = 1500\nto_ms = 2500\n";
+    let place = Place::new(&format!("{LINE}{cut}"), |project| project);
+    // What is set changes with every cycle, and comes back with the next frames.
+    let (mut calls, mut set) = (0, 0_u8);
+    let (mut last, mut changes, mut bad, mut kept, mut after) = (None, 0, 0, 0, 0);
+    let report = place.run(Cycle::us(250), |io| {
+        calls += 1;
+        let value = io.inputs()[io.plan().unwrap().devices[1].inputs.start];
+        if io.quality(DeviceId(1)).valid {
+            changes += u32::from(last.replace(value) != Some(value));
+            after += u32::from(bad > 0);
+        } else if last.is_some() {
+            bad += 1;
+            kept += u32::from(last == Some(value));
+        }
+        set = set.wrapping_add(1);
+        io.outputs_mut().fill(set);
+        if calls < 16_000 { Next::Continue } else { Next::Stop }
+    });
+    // Once when it is cut, and once when the others are back.
+    assert!(bad >= 2, "{bad} cycles with a wrong counter");
+    assert_eq!(kept, bad, "not one of the values that came meanwhile");
+    assert!(changes > 10_000 && after > 5_000, "{changes} values, {after} after it");
+    assert!(report.counts.working_counter_errors >= u64::from(bad));
+}
+
 // proves: FRM-30 partial: two tasks in one network as a program runs them
 #[test]
 fn tasks_have_cycle_times_of_their_own() {

@@ -72,6 +72,53 @@ fn a_log_is_read_filtered_and_exported() {
     assert!(runs.stdout.contains("2016-11-17 10:00:00.000"), "{}", runs.stdout);
 }
 
+// S0 L2272-2390, S1 L975-1006: 2,630 of 38,332 events are those of one source, found and exported after the
+// program that wrote them has ended. That the log of the system has them, too, is in `beside_programs.rs`.
+// proves: SW-07
+#[test]
+fn of_38332_events_the_2630_of_one_source_are_filtered_and_exported() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("log.sqlite");
+    let mut log = EventLog::create(&path).unwrap();
+    let began = UnixTime::parse("2016-11-17T10:00:00Z").unwrap();
+    let run = log.begin(began, "eth0", "plant", "linesman 0.1.0").unwrap();
+    // Those of the source are spread over all.
+    let mut of_source = 0;
+    let entries: Vec<StoredEntry> = (0..38_332_u64)
+        .map(|number| {
+            let is_one = number * 2_630 / 38_332 != (number + 1) * 2_630 / 38_332;
+            of_source += u32::from(is_one);
+            StoredEntry {
+                run,
+                at: began + linesman::Span::ms(number),
+                severity: if is_one { Severity::Error } else { Severity::Info },
+                kind: if is_one { EntryKind::AbnormalState } else { EntryKind::Counter },
+                device_no: Some(if is_one { 14 } else { 3 }),
+                device_name: Some(if is_one { "Term 14" } else { "Term 3" }.to_owned()),
+                text: format!("event {number}"),
+            }
+        })
+        .collect();
+    assert_eq!(of_source, 2_630);
+    log.append(&entries).unwrap();
+    drop(log);
+    let file = path.to_str().unwrap();
+    for filter in [["--device", "Term 14"], ["--kind", "abnormal-state"], ["--severity", "error"]] {
+        let shown = linesman(["log", file, filter[0], filter[1]]);
+        assert!(
+            shown.stdout.contains("2630 of 38332 entries"),
+            "{}",
+            &shown.stdout[shown.stdout.len() - 200..]
+        );
+        let csv = linesman(["log", file, filter[0], filter[1], "--csv"]);
+        assert_eq!(csv.stdout.lines().count(), 2_631, "with the headings");
+        let json = linesman(["log", file, filter[0], filter[1], "--json"]).json();
+        assert_eq!(json["of"], 38_332);
+        let all = json["entries"].as_array().unwrap();
+        assert!(all.len() == 2_630 && all.iter().all(|entry| entry["no"] == 14));
+    }
+}
+
 #[test]
 fn what_is_no_log_or_no_time_is_refused_with_the_next_step() {
     let folder = TempDir::new().unwrap();

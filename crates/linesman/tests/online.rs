@@ -344,3 +344,41 @@ fn who_leaves_op_by_itself_is_counted_with_the_reason() {
     assert!(detail.contains("OP to SAFEOP, 0x001B"), "{detail}");
     running.until("comes back", |report| report["devices"][2]["state"]["word"] == 8);
 }
+
+/// A ring whose cables to the cards are cut for a while, one after the other.
+const RING: &str = "\
+[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+[[device]]\nname = \"T2\"\ntype = \"EL3104\"\non = \"K1.B\"\n\
+[[device]]\nname = \"K3\"\ntype = \"EK1100\"\non = \"K1.C\"\n\
+[ring]\ncloses_at = \"K3.C\"\n\
+[[fault]]\nkind = \"link-open\"\nat = \"maindevice.A-K1.A\"\nfrom_ms = 2500\nto_ms = 5500\n\
+[[fault]]\nkind = \"link-open\"\nat = \"K3.C-maindevice.B\"\nfrom_ms = 8000\nto_ms = 11000\n";
+
+// S0 L2573-2593: what is wrong with the network, a bit for each; 0 is well.
+// proves: PLC-07 partial: the bits that a line can bring about; clocks are in clocks.rs, locks and resets of the I/O are not ours
+#[test]
+fn the_word_of_the_network_says_what_is_wrong() {
+    let running = Running::start(RING);
+    let word = |report: &Value| number(&report["state"]["word"]);
+    let has = |bits: u64, words: &str| {
+        let report = running.until(words, |report| word(report) & bits == bits);
+        let text = report["state"]["text"].as_str().unwrap();
+        assert!(text.starts_with("Not OK") && text.contains(words), "{text}");
+    };
+    has(0x0001, "link error");
+    has(0x0008, "one frame missing (redundancy)");
+    has(0x0004, "link error of the redundancy adapter");
+    running.until("is whole again", |report| word(report) == 0 && report["state"]["text"] == "OK");
+    for (state, bit, words) in [
+        ("preop", 0x0200, "at least one device in PREOP"),
+        ("safeop", 0x0400, "at least one device in SAFEOP"),
+        ("init", 0x0100, "at least one device in INIT"),
+    ] {
+        let asked = linesman(["state", &running.socket(), "2", "--to", state]);
+        assert_eq!(asked.status, 0, "{}", asked.all());
+        has(bit, words);
+    }
+    let asked = linesman(["state", &running.socket(), "2", "--to", "op"]);
+    assert_eq!(asked.status, 0, "{}", asked.all());
+    running.until("is well", |report| word(report) == 0);
+}

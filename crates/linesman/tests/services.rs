@@ -178,6 +178,7 @@ fn what_cannot_be_asked_is_refused_with_what_would_be_right() {
         ("sdo", &["M1", "write", "0x8010:01", "70000"], "0 to 65535"),
         ("reg", &["A1", "read", "no-register"], "0x0130"),
         ("reg", &["A1", "write", "0x0010", "70000"], "does not fit"),
+        ("reg", &["A1", "write", "dl-control", "0", "--len", "2"], "--force"),
         ("foe", &["C1", "write", "a.efw", "/nowhere/a.efw"], "/nowhere/a.efw"),
         ("sii", &["A1", "verify", "/nowhere/image"], "/nowhere/image"),
     ] {
@@ -208,6 +209,29 @@ fn registers_are_read_with_their_meaning() {
     assert_eq!(many["registers"][0]["name"], "ESC type", "{many}");
     let wrote = plant.json("reg", &["A1", "write", "0x0F80", "01 02 03 04"], "registers", 0);
     assert_eq!(wrote["bytes"], "01 02 03 04");
+}
+
+// S3 L81: what nobody took is sent again, and its fate is told; so is what was lost on the way.
+// proves: FRM-21
+#[test]
+fn acyclic_datagrams_are_sent_again_and_their_fate_is_told() {
+    let plant = Plant::new();
+    // Nobody can write there: the working counter stays 0, however often it is sent.
+    let write = ["A1", "write", "al-status", "1", "--force"];
+    let refused = plant.json("reg", &write, "error", 2);
+    let reason = refused["reason"].as_str().unwrap();
+    assert!(reason.contains("2 (A1): FPWR 0x1002:0x0130, 2 bytes"), "{reason}");
+    assert!(reason.contains("working counter 0, expected 1, sent 4 times"), "{reason}");
+    // Every frame is lost for a while now and then: all that is asked is answered all the same.
+    let whole = plant.json("sii", &["M1", "read", "--whole"], "sii", 0);
+    let drops = "[[fault]]\nkind = \"host-drops\"\nfrom_ms = 0\nto_ms = 2000\nhits = 66\n";
+    let lossy = Plant::with(&format!("{PLANT}{drops}"));
+    let same = lossy.json("sii", &["M1", "read", "--whole"], "sii", 0);
+    assert_eq!(same["image"], whole["image"]);
+    let on = format!("sim:{}", lossy.path("plant.toml").display());
+    let run = linesman(["run", "--on", &on, "--seconds", "2", "--no-diagnosis", "--json"]).json();
+    assert!(run["counts"]["repeats"].as_u64().unwrap() >= 1, "{}", run["counts"]);
+    assert!(!run["reached_ns"].is_null(), "every start-up request was carried out: {run}");
 }
 
 // proves: SW-11, SW-14 partial: files both ways, every error named; in BOOT no firmware is taken

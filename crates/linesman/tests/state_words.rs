@@ -6,6 +6,10 @@ use linesman::prelude::*;
 use linesman::{DeviceId, DeviceState};
 use tempfile::TempDir;
 
+#[allow(dead_code, unreachable_pub, reason = "it is a program of its own, too")]
+#[path = "../examples/watched.rs"]
+mod watched;
+
 /// Three terminals share one datagram; the last one loses its supply after a second.
 const PLANT: &str = "\
 [[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
@@ -64,4 +68,24 @@ fn the_counter_accuses_all_and_the_state_the_one() {
     assert_eq!(states.map(|state| state.to_string()), ["OP", "OP LNK_MIS B", "INIT NO_COMM"]);
     assert_eq!(states[1].0, 0x2408);
     assert_eq!(network, 0x0900, "one in INIT, one in error");
+}
+
+// S0 L2504: the least that a program should watch is WcState and State of every SubDevice; the example does
+// that, and it is enough to know that data are missing and who is to blame.
+// proves: PLC-18
+#[test]
+fn the_example_tells_by_the_two_words_that_data_are_missing_and_who_is_to_blame() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("plant.toml");
+    std::fs::write(&file, PLANT).unwrap();
+    let mut told = Vec::new();
+    watched::watch(&format!("sim:{}", file.display()), |line| told.push(line)).unwrap();
+    // First all that share the datagram, then the one, and its neighbour at whose port it was.
+    for terminal in ["2 (EL1008)", "3 (EL1008)", "4 (EL1008)"] {
+        assert!(told.contains(&format!("{terminal}: data missing, OP")), "{told:#?}");
+    }
+    let last = |name: &str| told.iter().rfind(|line| line.starts_with(name)).unwrap().as_str();
+    assert_eq!(last("2 (EL1008)"), "2 (EL1008): data good, OP");
+    assert_eq!(last("3 (EL1008)"), "3 (EL1008): data good, OP LNK_MIS B");
+    assert_eq!(last("4 (EL1008)"), "4 (EL1008): data missing, INIT NO_COMM");
 }

@@ -247,6 +247,66 @@ fn devices_are_put_into_sync_units_by_name() {
     assert!(rows.contains(&(0, json!(["LRW", 282, 9, "RemovableBranch"]))), "{rows:?}");
 }
 
+// S0 L1252-1278: the columns of the source's table: device, sync unit, repeat, task.
+// proves: FRM-24
+#[test]
+fn devices_are_put_into_sync_units_by_name_task_and_repetition() {
+    let mut text =
+        "name = \"units\"\n[[task]]\nname = \"NC-Task 1 SAF\"\ncycle_us = 2000\nrepeats = 1\n\
+                    [[task]]\nname = \"Task 2\"\ncycle_us = 10000\n\
+                    [[device]]\nname = \"Coupler\"\non = \"maindevice\"\n[device.description]\n"
+            .to_owned();
+    let mut on = "Coupler.B".to_owned();
+    for (name, choices) in [
+        ("Drive 1", "sync_unit = \"Axes\"\nframe_repeat = true\n"),
+        ("Drive 2", "sync_unit = \"Axes\"\nframe_repeat = true\n"),
+        ("Box 10", "sync_unit = \"RemovableBranch\"\ntask = \"Task 2\"\n"),
+        ("Box 11", "sync_unit = \"RemovableBranch\"\ntask = \"Task 2\"\n"),
+        ("Term 5", "task = \"Task 2\"\n"),
+    ] {
+        write!(
+            text,
+            "[[device]]\nname = \"{name}\"\non = \"{on}\"\n{choices}[device.description]\ninputs_bits = 16\n"
+        )
+        .unwrap();
+        on = format!("{name}.B");
+    }
+    let bench = Bench::new(&text, "");
+    let plan = bench.plan();
+    let tasks: Vec<Value> = plan["tasks"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|task| {
+            let frames = task["frames"].as_array().unwrap();
+            let rows = frames.iter().flat_map(|frame| {
+                let rows = frame["datagrams"].as_array().unwrap().iter();
+                rows.filter(|row| !row["sync_unit"].is_null()).map(move |row| {
+                    json!([row["sync_unit"], row["len"], row["wkc"], frame["copies"]])
+                })
+            });
+            json!([task["name"], rows.collect::<Vec<_>>()])
+        })
+        .collect();
+    // The default unit comes first or last, as its devices do.
+    assert_eq!(tasks[0], json!(["NC-Task 1 SAF", [["Axes", 4, 2, 2]]]), "sent twice: {plan}");
+    let second = tasks[1][1].as_array().unwrap();
+    assert_eq!((&tasks[1][0], second.len()), (&json!("Task 2"), 2), "{plan}");
+    assert!(second.contains(&json!(["RemovableBranch", 4, 2, 1])), "{plan}");
+    assert!(second.contains(&json!(["<default>", 2, 1, 1])), "{plan}");
+    // A task that is not there is refused by name.
+    let wrong = text.replace("task = \"Task 2\"", "task = \"Task 9\"");
+    fs::write(&bench.project, wrong).unwrap();
+    let refused = linesman(["plan", bench.project.to_str().unwrap()]);
+    assert_eq!(refused.status, 2);
+    assert!(refused.stderr.contains("Task 9"), "{}", refused.stderr);
+    // On the line: each unit gets its data in its own cycle.
+    fs::write(&bench.project, &text).unwrap();
+    let report = bench.run("1");
+    assert_eq!(report["counts"]["working_counter_errors"], 0, "{report}");
+    assert!(report["devices"].as_array().unwrap().iter().all(|device| device["valid"] == true));
+}
+
 // S0 L131-137, L2741-2747.
 // proves: FRM-10 partial: without the map id of the vendor's tool, FRM-11, FRM-16
 #[test]

@@ -154,6 +154,26 @@ pub enum Event {
         /// How long it was waited for.
         patience: Span,
     },
+    /// How far the clock of a SubDevice with SyncSignals is off the reference clock (0x092C). Told when it
+    /// leaves the window, when it is well within it again, and now and then in between.
+    ClockDifference {
+        /// Which.
+        id: DeviceId,
+        /// How far it is off, in whichever direction.
+        difference: Span,
+        /// How far it may be.
+        window: Span,
+        /// It has left the window, and is not well within it again.
+        apart: bool,
+    },
+    /// How far the time of the network, that of the reference clock, is ahead of the host's: of
+    /// [`Options::clock_epoch`](crate::Options::clock_epoch) and what has passed since. Told now and then.
+    NetworkTime {
+        /// Whose clock is the reference.
+        id: DeviceId,
+        /// By how many ns; negative: it is behind.
+        ahead_ns: i64,
+    },
     /// A SubDevice has left the state in which it was, on its own.
     AbnormalState {
         /// Which.

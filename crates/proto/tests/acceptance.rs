@@ -263,3 +263,60 @@ fn a_frame_without_room_for_a_header_takes_no_empty_datagram() {
         assert_eq!(builder.finish(), 1514 - left);
     }
 }
+
+/// The frame of 516 bytes of the sources as it came back: each command, its address, length and working counter.
+const SEVEN: [(Command, u32, usize, u16); 7] = [
+    (Command::Nop, 0x0900_0000, 4, 0),
+    (Command::Armw, 0x0910_001B, 4, 46),
+    (Command::Lrd, 0x0900_0000, 3, 18),
+    (Command::Lrw, 0x0100_0000, 150, 21),
+    (Command::Lwr, 0x0100_0800, 33, 17),
+    (Command::Lrd, 0x0100_1000, 220, 19),
+    (Command::Brd, 0x0130_002E, 2, 46),
+];
+
+// S0 L2712-2751: NOP with Len 4, Adp 0, Ado 0x0900; not the last, never round the line, no interrupt.
+// proves: FRM-06
+#[test]
+fn every_field_of_the_headers_of_the_frame_of_516_bytes_is_read() {
+    // As the hex dump begins: Ethernet header, length 500 and type 1.
+    let mut bytes = vec![2, 0, 0, 0, 0, 0, 1, 1, 5, 1, 0, 0, 0x88, 0xA4, 0xF4, 0x11];
+    for (number, (command, address, len, wkc)) in SEVEN.into_iter().enumerate() {
+        let is_last = number + 1 == SEVEN.len();
+        // The last has been round the line once too often, and somebody asks for attention.
+        let flags: u16 = if is_last { 0x4000 } else { 0x8000 };
+        bytes.extend([command.code(), 0xB0 + number as u8]);
+        bytes.extend(address.to_le_bytes());
+        bytes.extend((len as u16 | flags).to_le_bytes());
+        bytes.extend(if is_last { 0x1234_u16 } else { 0 }.to_le_bytes());
+        bytes.extend((0..len).map(|byte| byte as u8));
+        bytes.extend(wkc.to_le_bytes());
+    }
+    assert_eq!(bytes.len(), 516);
+    let view = FrameView::parse(&bytes).unwrap();
+    assert_eq!(view.announced_len(), 500);
+    assert_eq!(view.source(), MacAddress([1, 1, 5, 1, 0, 0]));
+    assert_eq!(view.destination(), MacAddress([2, 0, 0, 0, 0, 0]));
+    let datagrams: Vec<_> = view.datagrams().map(Result::unwrap).collect();
+    assert_eq!(datagrams.len(), 7);
+    let mut offset = 16;
+    for (number, (datagram, (command, address, len, wkc))) in
+        datagrams.iter().zip(SEVEN).enumerate()
+    {
+        let is_last = number == 6;
+        assert_eq!((datagram.command(), datagram.code()), (Some(command), command.code()));
+        assert_eq!(datagram.index(), 0xB0 + number as u8);
+        assert_eq!(datagram.logical(), LogicalAddress(address));
+        assert_eq!((datagram.adp(), datagram.ado().0), (address as u16, (address >> 16) as u16));
+        assert_eq!((datagram.data_len(), datagram.data().len()), (len, len));
+        assert!(datagram.data().iter().enumerate().all(|(at, byte)| *byte == at as u8));
+        assert_eq!((datagram.circulated(), datagram.more_follow()), (is_last, !is_last));
+        assert_eq!(datagram.irq(), if is_last { 0x1234 } else { 0 });
+        assert_eq!(datagram.wkc().0, wkc);
+        assert_eq!(datagram.offset(), offset);
+        assert_eq!(datagram.data_range(), offset + 10..offset + 10 + len);
+        offset += 12 + len;
+    }
+    assert_eq!((datagrams[0].adp(), datagrams[0].ado()), (0, RegisterAddress(0x0900)));
+    assert_eq!(datagrams.iter().map(|one| one.data_len()).sum::<usize>(), 416);
+}

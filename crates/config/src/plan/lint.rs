@@ -5,7 +5,7 @@ use linesman_proto::register::SmDirection;
 use linesman_proto::sii::PortKind;
 use linesman_proto::time::Span;
 
-use super::{DevicePlan, IoAt, Plan, Task};
+use super::{DevicePlan, IoAt, Plan, Task, reference};
 
 /// Share of the wire's time that cyclic frames should leave to others, in percent.
 const MUCH_LOAD: f64 = 80.0;
@@ -225,12 +225,11 @@ impl Plan {
     fn reference(&self, doubts: &mut Vec<Doubt>) {
         let reference = self.reference_clock().and_then(|id| self.device(id));
         let Some(device) = reference else { return };
-        let Some(since) = super::reference::since(&device.type_name) else { return };
-        let revision = device.identity.revision >> 16;
-        // Without a revision in the plan any may be there.
-        if device.identity.revision == 0 || revision >= u32::from(since) {
+        let revision = device.identity.revision;
+        if reference::is_possible(&device.type_name, revision) {
             return;
         }
+        let (revision, since) = (revision >> 16, reference::since(&device.type_name).unwrap_or(0));
         doubts.push(Doubt {
             severity: Severity::Warning,
             name: "reference-clock",

@@ -80,6 +80,9 @@ pub struct Plan {
     pub variables: Vec<Variable>,
     /// The shift of the outputs, where it was chosen; see [`Plan::outputs_shift`].
     pub outputs_shift: Option<Span>,
+    /// How far a clock may be off the reference clock (0x092C) before that is told (DC-21); `None`: as far as
+    /// the MainDevice lets it be before OP.
+    pub sync_window: Option<Span>,
 }
 
 /// What one SubDevice is set up with.
@@ -164,6 +167,7 @@ impl Plan {
             inputs_len: 0,
             variables: Vec::new(),
             outputs_shift: None,
+            sync_window: None,
         }
     }
 

@@ -37,6 +37,11 @@ pub struct Network {
     /// From the frames to SYNC0, in µs; 30 % of the cycle unless said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outputs_shift_us: Option<u32>,
+    /// How far a clock may be off the reference clock before that is told and the network counts as out of
+    /// step, in ns; 1000 unless said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1))]
+    pub sync_window_ns: Option<u32>,
 }
 
 impl Default for Network {
@@ -52,6 +57,7 @@ impl Default for Network {
             reinitialise: true,
             clear_counters: true,
             outputs_shift_us: None,
+            sync_window_ns: None,
         }
     }
 }
@@ -107,6 +113,7 @@ impl Network {
             clock_datagrams: true,
             mailbox_states: self.mailbox_states,
             outputs_shift: self.outputs_shift_us.map(|us| Span::us(u64::from(us))),
+            sync_window: self.sync_window_ns.map(|ns| Span::ns(u64::from(ns))),
             ..PlanOptions::default()
         }
     }

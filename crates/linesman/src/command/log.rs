@@ -57,7 +57,8 @@ fn severity(word: &str) -> Result<Severity, String> {
     Severity::from_name(word).ok_or_else(|| format!("expected one of {words}"))
 }
 
-fn kind(word: &str) -> Result<EntryKind, String> {
+/// A kind of entries by its name.
+pub(super) fn kind(word: &str) -> Result<EntryKind, String> {
     let words = EntryKind::ALL.map(EntryKind::name).join(", ");
     EntryKind::from_name(word).ok_or_else(|| format!("expected one of {words}"))
 }

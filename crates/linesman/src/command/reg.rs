@@ -1,10 +1,11 @@
 //! `linesman reg`: registers of a SubDevice's controller, and the memory behind them.
 
+mod consent;
 mod dump;
 
 use linesman_maindevice::service::Service;
 use linesman_proto::address::{DeviceId, RegisterAddress};
-use linesman_proto::register::{by_name, describe, pieces};
+use linesman_proto::register::{address_by_name, describe, pieces};
 use serde::Serialize;
 
 use super::sdo::value::{bytes, hex, whole};
@@ -49,7 +50,8 @@ enum Action {
         #[arg(long, value_name = "BYTES", default_value_t = 0x0500, value_parser = clap::value_parser!(u16).range(2..=0x1000))]
         len: u16,
     },
-    /// Write a register: at once, whatever it does
+    /// Write a register: at once. What takes a SubDevice off the line, out of its state or away from its
+    /// process data is written only with --force
     Write {
         /// Its address (0x0010) or name (configured-station-alias)
         #[arg(value_parser = register)]
@@ -59,13 +61,16 @@ enum Action {
         /// How many bytes; those of the register unless said
         #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..=8))]
         len: Option<u16>,
+        /// Whatever it does to the line
+        #[arg(long)]
+        force: bool,
     },
 }
 
-/// `0x0130`, `130`, `al-status`.
+/// `0x0130`, `130`, `al-status`; of a family also `rx-error-counter-port-b` and `fmmu-2`.
 fn register(text: &str) -> Result<RegisterAddress, String> {
-    if let Some(register) = by_name(text) {
-        return Ok(register.address);
+    if let Some(address) = address_by_name(text) {
+        return Ok(address);
     }
     u16::from_str_radix(text.trim_start_matches("0x"), 16).map(RegisterAddress).map_err(|_| {
         format!("`{text}`: expected an address in hexadecimal (0x0130), or a name (al-status)")
@@ -112,7 +117,13 @@ struct PieceReport {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     // A value that cannot be written is refused before anything is sent.
     let data = match &arguments.action {
-        Action::Write { address, value, len } => Some(value_bytes(*address, value, *len)?),
+        Action::Write { address, value, len, force } => {
+            let data = value_bytes(*address, value, *len)?;
+            if let Some(objection) = consent::objection(*address, &data).filter(|_| !force) {
+                return Err(objection);
+            }
+            Some(data)
+        }
         Action::Read { .. } | Action::Dump { .. } => None,
     };
     let mut session = Session::open(&arguments.place.line)?;

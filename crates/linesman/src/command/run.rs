@@ -13,6 +13,7 @@ use linesman_diagnosis::Setup;
 use linesman_diagnosis::report::Verdict;
 use linesman_link::clock::HostClock;
 use linesman_link::socket::Bell;
+use linesman_maindevice::watch::EntryKind;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
@@ -86,6 +87,9 @@ pub(crate) struct Arguments {
     /// How many cycles in a row that program may give no outputs before they are withheld
     #[arg(long, value_name = "N", default_value_t = 10, requires = "image")]
     misses: u32,
+    /// Leave all SubDevices in PREOP until that program gives outputs for the first time
+    #[arg(long, requires = "image")]
+    wait_for_outputs: bool,
     /// Open a socket for service commands beside the run; it is there once the line is being driven
     #[arg(long, value_name = "SOCKET")]
     control: Option<PathBuf>,
@@ -95,6 +99,10 @@ pub(crate) struct Arguments {
     /// Keep what happens in an event log, for `linesman log`; runs are added to a file that is there
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    /// Tell and log nothing of this kind (as in `linesman log --kind`): counter, link, state and others; may be
+    /// given several times
+    #[arg(long, value_name = "KIND", value_parser = super::log::kind)]
+    log_without: Vec<EntryKind>,
     /// Tell the log of the system, too: `journalctl SYSLOG_IDENTIFIER=linesman`
     #[arg(long)]
     system_log: bool,
@@ -143,6 +151,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         lasts,
         real_time: None,
         allowed_misses: arguments.image.is_some().then_some(arguments.misses),
+        hold: arguments.wait_for_outputs,
         diagnose: setup,
     };
     let wanted = match source {
@@ -168,7 +177,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         true => Some(SystemLog::open(&arguments.on).map_err(no_journal)?),
         false => None,
     };
-    let logs = Logs { file: log, system: system_log };
+    let without = arguments.log_without.clone();
+    let logs = Logs { file: log, system: system_log, without };
     let teller = Teller::new(arguments.json, began, logs, board.clone());
     let application = arguments.image.clone();
     let stop = driven::stop()?;

@@ -26,11 +26,26 @@ impl Running {
     /// Runs a plant, and waits until all SubDevices are in OP.
     #[track_caller]
     pub(crate) fn start(plant: &str) -> Self {
+        Self::with(plant, &[])
+    }
+
+    /// The same of a plant of this project, with these files beside it.
+    #[track_caller]
+    pub(crate) fn with(plant: &str, files: &[(&str, &str)]) -> Self {
         let folder = TempDir::new().unwrap();
         let file = folder.path().join("plant.toml");
         std::fs::write(&file, plant).unwrap();
+        let mut project = None;
+        for (name, text) in files {
+            let file = folder.path().join(name);
+            std::fs::write(&file, text).unwrap();
+            // The project is a TOML file; what it names comes beside it.
+            project = project.or(name.ends_with(".toml").then_some(file));
+        }
         let child = Command::new(PROGRAM)
-            .args(["run", "--on", &format!("sim:{}", file.display()), "--control"])
+            .arg("run")
+            .args(project)
+            .args(["--on", &format!("sim:{}", file.display()), "--control"])
             .arg(folder.path().join("socket"))
             .stdout(Stdio::null())
             .stderr(Stdio::null())

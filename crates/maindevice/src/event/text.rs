@@ -121,6 +121,8 @@ impl Event {
             | Self::CountersCleared { .. }
             | Self::Identified { .. }
             | Self::Links { .. }
+            | Self::ClockDifference { .. }
+            | Self::NetworkTime { .. }
             | Self::WorkingCounter { .. }
             | Self::WorkingCounterGood { .. }
             | Self::CyclicFramesLost { .. }

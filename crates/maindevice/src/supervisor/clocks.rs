@@ -130,7 +130,10 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
         }
     }
     // The cycle follows from now on.
-    lock(&context.line).set_clock_epoch(epoch);
+    let mut line = lock(&context.line);
+    line.set_clock_epoch(epoch);
+    line.set_reference_clock(reference);
+    drop(line);
     Ok(reference)
 }
 
@@ -173,7 +176,9 @@ pub(super) async fn settle(context: &Context, id: DeviceId) -> Result<(), StepEr
     if device.settings.clock.is_none_or(|clock| clock.assign_activate == 0) {
         return Ok(());
     }
-    let (limit, patience) = (context.options.clock_limit, context.options.clock_patience);
+    let (most, patience) = (context.options.clock_limit, context.options.clock_patience);
+    // Whoever is out of the window in OP is told of: it does not begin there.
+    let limit = context.plan.sync_window.map_or(most, |window| window.min(most));
     let until = context.wire.now() + patience;
     loop {
         let difference = clock::difference(&context.wire, device.station).await?;

@@ -8,6 +8,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::drive::Failed;
 use super::times::Phase;
+use super::watched_clock::WatchedClock;
 use super::{CALM, Context, Found, lose};
 use crate::event::Event;
 use crate::exchange::{Reply, Target};
@@ -45,6 +46,7 @@ pub(super) struct Keeper<'a> {
     pub(super) context: &'a Context,
     pub(super) device: &'a DevicePlan,
     known: Known,
+    clock: WatchedClock,
     backoff: Span,
     /// How often a state had been asked for when it was lost.
     requests_at_loss: u32,
@@ -58,6 +60,7 @@ pub(crate) async fn keep(context: Context, id: DeviceId) {
         context: &context,
         device,
         known: Known::default(),
+        clock: WatchedClock::default(),
         backoff: Span::ZERO,
         requests_at_loss: 0,
     };
@@ -286,7 +289,12 @@ impl Keeper<'_> {
         let al = wire.read(target, register::AL_STATUS.address, AL_LEN);
         let dl = wire.read(target, register::DL_STATUS.address, register::DL_STATUS.len);
         let counters = wire.read(target, ErrorCounters::START, ErrorCounters::LEN as u16);
+        // In the same frame as the others.
+        let clock = self.clock.look(self.context, self.device);
         let (al, dl, counters) = (al.await, dl.await, counters.await);
+        if let Some(clock) = clock {
+            self.clock.tell(self.context, self.device, clock.await);
+        }
         let answered = |reply: &Reply| reply.wkc.0 > 0;
         let (al, dl, counters) =
             (al.ok().filter(answered), dl.ok().filter(answered), counters.ok().filter(answered));

@@ -10,7 +10,7 @@ use std::task::{Context, Poll, Waker};
 
 use linesman_config::plan::expect::{Presence, Served};
 use linesman_config::plan::{DevicePlan, Plan};
-use linesman_proto::address::{DeviceId, Path, WorkingCounter};
+use linesman_proto::address::{DeviceId, Path, StationAddress, WorkingCounter};
 use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, OredStates};
 use linesman_proto::time::{DcTime, Instant, Span};
@@ -85,6 +85,8 @@ pub(crate) struct Line {
     /// How often clocks were set, and the system time at the start of the run.
     clock_base: Option<(u32, DcTime)>,
     clocks_ready: bool,
+    /// Whom all other clocks follow.
+    reference: Option<StationAddress>,
 }
 
 impl Line {
@@ -265,6 +267,16 @@ impl Line {
     /// How often clocks were set, and the system time at the start of the run.
     pub(crate) fn clock_base(&self) -> Option<(u32, DcTime)> {
         self.clock_base
+    }
+
+    /// Whose clock all others follow.
+    pub(crate) fn set_reference_clock(&mut self, station: StationAddress) {
+        self.reference = Some(station);
+    }
+
+    /// Whose clock all others follow; `None` before clocks were set.
+    pub(crate) fn reference_clock(&self) -> Option<StationAddress> {
+        self.reference
     }
 
     /// Clocks were set for the first time, or there are none to be set.

@@ -16,6 +16,7 @@ mod modules;
 mod shortest_cycle;
 mod start_up;
 pub(crate) mod times;
+mod watched_clock;
 
 use std::sync::{Arc, Mutex};
 

@@ -8,7 +8,7 @@ use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{AlStatus, DlStatus};
 use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode, DeviceState, StateValue};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::CounterTotals;
 use crate::event::Event;
@@ -46,6 +46,8 @@ pub struct WatchedDevice {
     abnormal: u64,
     not_present: u64,
     history: VecDeque<AbnormalChange>,
+    /// How far its clock was off when it was told last, and whether that is out of the window.
+    clock: Option<(Span, bool)>,
 }
 
 impl WatchedDevice {
@@ -67,6 +69,7 @@ impl WatchedDevice {
             abnormal: 0,
             not_present: 1,
             history: VecDeque::new(),
+            clock: None,
         }
     }
 
@@ -173,6 +176,19 @@ impl WatchedDevice {
         self.not_present
     }
 
+    /// How far its clock is off the reference clock, as it was told last; `None`: it has none that is in use,
+    /// or is that itself.
+    #[must_use]
+    pub fn clock_difference(&self) -> Option<Span> {
+        self.clock.map(|(difference, _)| difference)
+    }
+
+    /// Whether its clock is out of the window (DC-21).
+    #[must_use]
+    pub fn is_clock_apart(&self) -> bool {
+        self.clock.is_some_and(|(_, apart)| apart)
+    }
+
     /// The last abnormal changes, the oldest first, with the reasons that it gave.
     pub fn history(&self) -> impl Iterator<Item = &AbnormalChange> {
         self.history.iter()
@@ -218,6 +234,7 @@ impl WatchedDevice {
                 }
                 self.present = Some(false);
                 self.links = None;
+                self.clock = None;
             }
             Event::DeviceBack { restarted, .. } => {
                 self.present = Some(true);
@@ -240,6 +257,9 @@ impl WatchedDevice {
             }
             Event::Counters { counters, .. } => {
                 self.counters.record(counters);
+            }
+            Event::ClockDifference { difference, apart, .. } => {
+                self.clock = Some((*difference, *apart));
             }
             Event::CountersCleared { counters, .. } => {
                 self.counters.record(counters);
@@ -274,6 +294,7 @@ pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
         | Event::WrongDevice { id, .. }
         | Event::Counters { id, .. }
         | Event::CountersCleared { id, .. }
+        | Event::ClockDifference { id, .. }
         | Event::Identified { id, .. }
         | Event::Links { id, .. }
         | Event::Emergency { id, .. }

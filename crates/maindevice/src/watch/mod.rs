@@ -114,13 +114,6 @@ impl Watch {
         self.standing.set(NetworkState::OUT_OF_SEND_RESOURCES, failing);
     }
 
-    /// The clocks are further apart than the window allows, or are not any more.
-    pub fn handle_clocks(&mut self, now: Instant, apart: bool) {
-        if self.standing.set(NetworkState::CLOCKS_APART, apart) {
-            self.push(wording::clocks(now, apart));
-        }
-    }
-
     /// Time has passed: what was waited with is told.
     pub fn handle_timeout(&mut self, now: Instant) {
         if now >= self.lost_at + LOST_TOGETHER {

@@ -20,6 +20,8 @@ pub struct Standing {
     /// Bits that do not follow from the SubDevices.
     own: NetworkState,
     responding: Option<WorkingCounter>,
+    /// Whose clock is the reference, and how far it is ahead of the host's, in ns.
+    network_time: Option<(DeviceId, i64)>,
 }
 
 impl Standing {
@@ -27,7 +29,7 @@ impl Standing {
     #[must_use]
     pub fn new(plan: &Plan) -> Self {
         let devices = plan.devices.iter().map(|device| WatchedDevice::new(plan, device)).collect();
-        Self { devices, own: NetworkState::default(), responding: None }
+        Self { devices, own: NetworkState::default(), responding: None, network_time: None }
     }
 
     /// What is known of each SubDevice, by [`DeviceId`].
@@ -57,6 +59,9 @@ impl Standing {
                 }
             };
             word = word.with(bit, true);
+            if device.is_clock_apart() {
+                word = word.with(NetworkState::CLOCKS_APART, true);
+            }
             if device.has_error() {
                 word = word.with(NetworkState::SOME_ERROR, true);
             }
@@ -68,6 +73,13 @@ impl Standing {
     #[must_use]
     pub fn responding(&self) -> Option<WorkingCounter> {
         self.responding
+    }
+
+    /// Whose clock is the reference clock, and how far the network's time is ahead of the host's, in ns
+    /// (DC-09), as it was told last; negative: it is behind. `None`: no clock is in use.
+    #[must_use]
+    pub fn network_time(&self) -> Option<(DeviceId, i64)> {
+        self.network_time
     }
 
     /// How many SubDevices are there, of those that are planned (PLC-08).
@@ -98,6 +110,7 @@ impl Standing {
             Event::Ring { intact } => {
                 self.set(NetworkState::REDUNDANCY_FRAME_MISSING, !intact);
             }
+            Event::NetworkTime { id, ahead_ns } => self.network_time = Some((*id, *ahead_ns)),
             Event::OutputsWithheld { .. } => {
                 self.set(NetworkState::WATCHDOG, true);
             }

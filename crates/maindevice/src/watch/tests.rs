@@ -236,9 +236,19 @@ fn the_network_word_sums_up() {
     watch.handle_carrier(at(3), Path::A, true);
     watch.handle_event(at(3), &Event::Ring { intact: true });
     watch.handle_event(at(3), &Event::OutputsWithheld { task: 0 });
-    watch.handle_clocks(at(3), true);
+    let clock = |difference, apart| {
+        let (id, window) = (DeviceId(2), Span::us(1));
+        Event::ClockDifference { id, difference, window, apart }
+    };
+    watch.handle_event(at(3), &clock(Span::us(2), true));
     watch.handle_send_failure(true);
     assert_eq!(watch.standing().network_state().0, 0x1C30);
+    watch.handle_event(at(4), &clock(Span::ns(300), false));
+    assert_eq!(watch.standing().network_state().0, 0x0C30);
+    assert_eq!(
+        watch.standing().device(DeviceId(2)).unwrap().clock_difference(),
+        Some(Span::ns(300))
+    );
 }
 
 // proves: DIA-09 partial: totals, HW-19 partial: totals

@@ -102,41 +102,56 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
             let severity = if is_own { Severity::Warning } else { Severity::Info };
             vec![about(*id, severity, EntryKind::Counter, text)]
         }
+        Event::ClockDifference { id, difference, window, apart } => {
+            let before = standing.device(*id).is_some_and(super::WatchedDevice::is_clock_apart);
+            let (severity, how) = match (before, *apart) {
+                (false, true) => (Severity::Warning, "has left the sync window"),
+                (true, false) => (Severity::Info, "is within the sync window again"),
+                (false, false) | (true, true) => return Vec::new(),
+            };
+            let text = format!(
+                ": its clock {how}: {difference} off the reference clock, {window} allowed"
+            );
+            vec![about(*id, severity, EntryKind::Clock, text)]
+        }
         Event::WorkingCounter { task, frame, datagram, expected, received } => vec![line(
             Severity::Warning,
             EntryKind::WorkingCounter,
             format!(
-                "working counter of task {task}, frame {frame}, datagram {datagram}: {received} received and {expected} expected"
+                "working counter of {}, frame {frame}, datagram {datagram}: {received} received and {expected} expected",
+                named(plan, *task)
             ),
         )],
         Event::WorkingCounterGood { task, frame, datagram } => vec![line(
             Severity::Info,
             EntryKind::WorkingCounter,
             format!(
-                "working counter of task {task}, frame {frame}, datagram {datagram} is right again"
+                "working counter of {}, frame {frame}, datagram {datagram} is right again",
+                named(plan, *task)
             ),
         )],
         Event::CyclicFramesLost { task } => vec![line(
             Severity::Error,
             EntryKind::Frames,
-            format!("frames of task {task} do not come back"),
+            format!("frames of {} do not come back", named(plan, *task)),
         )],
         Event::CyclicFramesBack { task, lost } => vec![line(
             Severity::Info,
             EntryKind::Frames,
-            format!("frames of task {task} come back; missed {lost} times"),
+            format!("frames of {} come back; missed {lost} times", named(plan, *task)),
         )],
         Event::OutputsWithheld { task } => vec![line(
             Severity::Error,
             EntryKind::Host,
             format!(
-                "the application is late: outputs of task {task} are withheld, so that watchdogs can expire"
+                "the application is late: outputs of {} are withheld, so that watchdogs can expire",
+                named(plan, *task)
             ),
         )],
         Event::OutputsResumed { task } => vec![line(
             Severity::Info,
             EntryKind::Host,
-            format!("the application is back: outputs of task {task} are sent again"),
+            format!("the application is back: outputs of {} are sent again", named(plan, *task)),
         )],
         Event::Emergency { id, emergency } => {
             let text = format!(
@@ -185,15 +200,6 @@ pub(super) fn carrier(at: Instant, card: Path, carrier: bool) -> LogEntry {
     LogEntry { at, severity, kind: EntryKind::Host, device: None, text }
 }
 
-/// The window of the clocks.
-pub(super) fn clocks(at: Instant, apart: bool) -> LogEntry {
-    let (severity, text) = match apart {
-        true => (Severity::Warning, "the clocks of the SubDevices have left the sync window"),
-        false => (Severity::Info, "the clocks of the SubDevices are within the sync window"),
-    };
-    LogEntry { at, severity, kind: EntryKind::Clock, device: None, text: text.into() }
-}
-
 /// What [`Event::state_lines`] has words for.
 fn states(
     at: Instant,
@@ -205,6 +211,14 @@ fn states(
 ) -> Vec<LogEntry> {
     let lines = event.state_lines(|id| name(plan, id));
     lines.into_iter().map(|text| LogEntry { at, severity, kind, device, text }).collect()
+}
+
+/// `task 'motion'`.
+fn named(plan: &Plan, task: usize) -> String {
+    match plan.tasks.get(task).map(|task| task.name.as_str()) {
+        Some(name) if !name.is_empty() => format!("task '{name}'"),
+        Some(_) | None => format!("task {}", task + 1),
+    }
 }
 
 /// `'Term 5 (EL3154)' (1005)`.

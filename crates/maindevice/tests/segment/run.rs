@@ -397,3 +397,43 @@ fn a_plan_can_be_started_over_and_over() {
     }
     assert_eq!(bench.state("T8"), "OP");
 }
+
+// S0 L108-113, S3 L17: behind the registers lies memory for process data and mailboxes, which MainDevice and
+// SubDevice both read and write.
+// proves: ESC-10
+#[test]
+fn process_data_and_mailboxes_lie_behind_the_registers_and_both_sides_use_them() {
+    let device = |name: &str, kind: &str, on: &str| {
+        format!("[[device]]\nname = \"{name}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    };
+    let plant = device("K1", "EK1100", "maindevice")
+        + &device("A1", "EL3102", "K1.B")
+        + &device("O1", "EL4102", "A1.B");
+    let mut bench = Bench::new(&plant);
+    let plan = bench.start(AlState::Op);
+    for name in ["A1", "O1"] {
+        let device = plan.device(bench.id(name)).unwrap();
+        let managers = device.sync_managers.iter().map(|(_, manager)| manager.start.0);
+        let areas = device.mailbox.as_ref().unwrap().areas;
+        let mailboxes = [areas.receive.offset.0, areas.send.offset.0];
+        let starts: Vec<u16> = managers.chain(mailboxes).collect();
+        assert!(starts.len() >= 3 && starts.iter().all(|start| *start >= 0x1000), "{starts:04X?}");
+    }
+    // What the SubDevice puts there the MainDevice reads.
+    let (inputs, outputs) = (bench.id("A1"), bench.id("O1"));
+    let place = plan.device(inputs).unwrap().inputs.clone();
+    let seen = |bench: &Bench| bench.device.inputs()[place.clone()].to_vec();
+    let before = seen(&bench);
+    let signal = bench.segment.inputs(inputs)[0];
+    bench.segment.signals_mut().set(signal, 0x1234);
+    bench.run_for(Span::ms(50));
+    assert_ne!(seen(&bench), before);
+    // What the MainDevice puts there the SubDevice reads.
+    let place = plan.device(outputs).unwrap().outputs.clone();
+    let signal = bench.segment.outputs(outputs)[0];
+    let driven = |bench: &Bench| bench.segment.signals().value(signal);
+    assert_eq!(driven(&bench), 0);
+    bench.device.outputs_mut()[place].fill(0x11);
+    bench.run_for(Span::ms(50));
+    assert_eq!(driven(&bench), 0x1111);
+}

@@ -69,10 +69,26 @@ pub fn describe(address: RegisterAddress) -> Option<Description> {
 /// `AL status`, `al-status` and `AL_STATUS` are the same.
 #[must_use]
 pub fn by_name(name: &str) -> Option<&'static Register> {
-    fn letters(name: &str) -> impl Iterator<Item = u8> {
-        name.bytes().filter(u8::is_ascii_alphanumeric).map(|byte| byte.to_ascii_lowercase())
-    }
     ALL.iter().find(|register| letters(register.name).eq(letters(name)))
+}
+
+/// The address of the register with this name, as [`by_name`] takes it. One of a family is named by its
+/// title, `RX error counter, port B` or `FMMU 2`; the name of the family alone is its first one.
+#[must_use]
+pub fn address_by_name(name: &str) -> Option<RegisterAddress> {
+    if let Some(register) = by_name(name) {
+        return Some(register.address);
+    }
+    let members = ALL.iter().filter(|register| register.count() > 1).flat_map(|register| {
+        (0..register.count()).map(move |index| Description { register, index, offset: 0 })
+    });
+    let mut named = members.filter(|member| letters(&member.title()).eq(letters(name)));
+    named.next().map(|member| member.start())
+}
+
+/// What of a name counts.
+fn letters(name: &str) -> impl Iterator<Item = u8> {
+    name.bytes().filter(u8::is_ascii_alphanumeric).map(|byte| byte.to_ascii_lowercase())
 }
 
 /// One field of a register and what it reads.

@@ -25,7 +25,9 @@ pub mod watchdog;
 
 pub use al::{AlControl, AlStatus};
 pub use counter::{Difference, Total};
-pub use describe::{Description, Piece, Reading, by_name, decode, describe, pieces, summary};
+pub use describe::{
+    Description, Piece, Reading, address_by_name, by_name, decode, describe, pieces, summary,
+};
 pub use dl_control::{DlControl, LoopMode};
 pub use dl_status::{DlStatus, PortState};
 pub use entry::{Access, Field, Form, Register, Repeat, Unit};

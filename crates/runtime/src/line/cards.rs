@@ -8,7 +8,7 @@ use linesman_link::socket::{
 };
 use linesman_maindevice::Options;
 use linesman_proto::address::Path;
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::time::{DcTime, Instant, Span};
 
 use super::{Arrived, Intake, Line};
 use crate::host_watch::HostWatch;
@@ -89,7 +89,11 @@ impl Cards {
 
 impl Line for Cards {
     fn options(&self) -> Options {
-        Options { ring: self.cards.len() > 1, ..Options::default() }
+        // The network's time begins as the host's, so that times of both can be compared.
+        let unix = self.clock.started_at().as_nanos();
+        let epoch = unix - i128::from(DcTime::UNIX_EPOCH_OFFSET_S) * 1_000_000_000;
+        let clock_epoch = DcTime(u64::try_from(epoch).unwrap_or(0));
+        Options { ring: self.cards.len() > 1, clock_epoch, ..Options::default() }
     }
 
     #[inline]

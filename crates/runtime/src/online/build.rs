@@ -12,9 +12,9 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use super::report::{
-    Count, FrameCounts, MailboxTrouble, Neighbour, OddFrames, OnlineChange, OnlineDevice,
-    OnlineFrame, OnlineIdentity, OnlineMailbox, OnlinePort, OnlineReport, OnlineSyncUnit, SCHEMA,
-    Word,
+    Count, FrameCounts, MailboxTrouble, Neighbour, OddFrames, OnlineChange, OnlineClock,
+    OnlineDevice, OnlineFrame, OnlineIdentity, OnlineMailbox, OnlinePort, OnlineReport,
+    OnlineSyncUnit, SCHEMA, Word,
 };
 use super::snapshot::Snapshot;
 
@@ -79,6 +79,9 @@ pub(super) fn known(plan: &Plan, standing: &Standing, now: Instant) -> OnlineRep
         planned: plan.devices.len() as u32,
         present: standing.present() as u32,
         responding: standing.responding().map(|count| count.0),
+        clock: standing
+            .network_time()
+            .map(|(id, ahead_ns)| OnlineClock { reference: id.no(), ahead_ns }),
         devices: devices.map(|(planned, watched)| device(plan, planned, watched)).collect(),
         ..OnlineReport::default()
     }
@@ -110,6 +113,8 @@ fn device(plan: &Plan, planned: &DevicePlan, watched: &WatchedDevice) -> OnlineD
         al_code_text: meaning(watched.code()),
         planned: identity(&planned.identity),
         found: watched.found().and_then(identity),
+        clock_difference_ns: watched.clock_difference().map(Span::as_nanos),
+        clock_apart: watched.is_clock_apart(),
         dl_status: watched.links().map(|status| status.0),
         ports: Port::ALL.into_iter().map(|one| port(plan, planned.id, watched, one)).collect(),
         processing_unit: count(totals, ErrorCounter::ProcessingUnit),

@@ -26,6 +26,9 @@ pub struct OnlineReport {
     pub present: u32,
     /// How many answered the last broadcast read; `null`: there was none.
     pub responding: Option<u16>,
+    /// The time of the network; `null`: no clocks are in use.
+    #[serde(default)]
+    pub clock: Option<OnlineClock>,
     /// The SubDevices, by number.
     pub devices: Vec<OnlineDevice>,
     /// The cyclic frames, task by task.
@@ -40,6 +43,19 @@ pub struct OnlineReport {
     pub odd: OddFrames,
     /// The network cards, that of path A first.
     pub cards: Vec<Card>,
+}
+
+/// The time of the network: that of the reference clock.
+#[derive(
+    Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(deny_unknown_fields)]
+pub struct OnlineClock {
+    /// Whose clock is the reference, by number.
+    pub reference: u32,
+    /// By how many ns it is ahead of the host's time; negative: it is behind. Read once a second, by a frame
+    /// whose way there is not known better than to some µs.
+    pub ahead_ns: i64,
 }
 
 /// A state word with its text.
@@ -91,6 +107,13 @@ pub struct OnlineDevice {
     pub found: Option<OnlineIdentity>,
     /// Its DL status register (0x0110); `null` before it was read, and while it does not answer.
     pub dl_status: Option<u16>,
+    /// How far its clock is off the reference clock, in ns (0x092C); `null`: none is in use, or it is that
+    /// itself.
+    #[serde(default)]
+    pub clock_difference_ns: Option<u64>,
+    /// Whether that is further than the sync window allows.
+    #[serde(default)]
+    pub clock_apart: bool,
     /// Its ports, A to D.
     pub ports: Vec<OnlinePort>,
     /// Frames that its processing unit refused (0x030C).

@@ -55,6 +55,8 @@ pub struct RunOptions {
     /// Cycles in a row in which the application may be late before outputs are withheld; `None`: as
     /// many as it likes.
     pub allowed_misses: Option<u32>,
+    /// SubDevices stay in PREOP until the application gives outputs for the first time (SW-16).
+    pub hold: bool,
     /// How the line is judged while it runs; `None`: it is not.
     pub diagnose: Option<Setup>,
 }
@@ -118,6 +120,8 @@ pub struct Operator<A> {
     ended: bool,
     leaving: bool,
     withheld: bool,
+    /// SubDevices wait in PREOP for the first outputs.
+    held: bool,
     scan_until: Instant,
     desk: Option<ServiceDesk>,
     /// Notes for which there was no room.
@@ -239,6 +243,9 @@ impl<A: Application> Operator<A> {
         }
         if !io.old && !self.application.is_idle() {
             main.outputs_mut();
+            if std::mem::take(&mut self.held) {
+                main.release(now);
+            }
         }
     }
 }
@@ -381,7 +388,8 @@ pub fn run<L: Line, A: Application>(
     // Threads started from here on would be real-time ones.
     let granted = options.real_time.map(RealTime::ask).unwrap_or_default();
     let allowed_misses = options.allowed_misses.filter(|_| !application.is_idle());
-    let settings = Options { allowed_misses, ..line.options() };
+    let hold_at = options.hold.then_some(AlState::PreOp);
+    let settings = Options { allowed_misses, hold_at, ..line.options() };
     let mut driver = Driver::new(line, settings);
     let begun = driver.now();
     let mut operator = Operator {
@@ -399,6 +407,7 @@ pub fn run<L: Line, A: Application>(
         ended: false,
         leaving: false,
         withheld: false,
+        held: options.hold,
         scan_until: Instant::MAX,
         desk,
         untold: Cell::new(0),

@@ -1,5 +1,6 @@
 //! `emergency`: a device finds an error in itself or in what is wired to it, and reports it through
-//! its mailbox. When the fault ends, it reports that the error is gone.
+//! its mailbox. When the fault ends, it reports that the error is gone. Code 0xFF00 is a message of its own
+//! diagnosis history (0x10F3): the data are severity (0 information, 1 warning, 2 error) and number of the text.
 //!
 //! Reference: ETG.1000.6, Emergency; codes as in CiA 301.
 

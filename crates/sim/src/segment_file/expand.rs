@@ -336,16 +336,14 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
                 from_kind: kind_name(from_kind),
                 to: format!("{}.A", passive.name),
                 to_kind: kind_name(PortKind::Ebus),
+                instead: instead(parent_of(&by_name, &on), PortKind::Ebus),
             });
         }
     }
     for controller in planned {
         let from_kind = kind_at(&controller.on)?;
         let to_kind = has_port(controller, controller.entry)?;
-        let parent = match &controller.on {
-            Attachment::Device { name, .. } => by_name.get(name.as_str()).copied(),
-            Attachment::MainDevice(_) => None,
-        };
+        let parent = parent_of(&by_name, &controller.on);
         check_cable(parent, controller, to_kind)?;
         if from_kind != to_kind {
             return Err(SegmentFileError::Kinds {
@@ -353,6 +351,7 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
                 from_kind: kind_name(from_kind),
                 to: format!("{}.{}", controller.name, controller.entry),
                 to_kind: kind_name(to_kind),
+                instead: instead(parent, to_kind),
             });
         }
     }
@@ -364,10 +363,30 @@ fn check_ports(file: &SegmentFile, planned: &[Planned]) -> Result<(), SegmentFil
                 from_kind: kind_name(kind),
                 to: "maindevice.B".to_owned(),
                 to_kind: kind_name(PortKind::Mii),
+                instead: instead(parent_of(&by_name, &ring.closes_at), PortKind::Mii),
             });
         }
     }
     Ok(())
+}
+
+/// Whose port something hangs on; `None` for the MainDevice's.
+fn parent_of<'a>(by_name: &BTreeMap<&str, &'a Planned>, on: &Attachment) -> Option<&'a Planned> {
+    match on {
+        Attachment::Device { name, .. } => by_name.get(name.as_str()).copied(),
+        Attachment::MainDevice(_) => None,
+    }
+}
+
+/// Which other port of the parent would be of the kind that is needed; empty when none is.
+fn instead(parent: Option<&Planned>, needed: PortKind) -> String {
+    let Some(parent) = parent else { return String::new() };
+    let fits = parent.ports.iter().filter(|(port, kind)| **kind == needed && *port != parent.entry);
+    let ports: Vec<String> = fits.map(|(port, _)| format!("{}.{port}", parent.name)).collect();
+    match ports.is_empty() {
+        true => String::new(),
+        false => format!("; {} would be {}", ports.join(" or "), kind_name(needed)),
+    }
 }
 
 /// Fast Hot Connect is at both ends of a cable or at none.

@@ -310,7 +310,7 @@ pub enum SegmentFileError {
         kind: &'static str,
     },
     /// Two ports of different kinds are wired to each other.
-    #[error("{from} is {from_kind}, but {to} is {to_kind}: no cable fits both")]
+    #[error("{from} is {from_kind}, but {to} is {to_kind}: no cable fits both{instead}")]
     Kinds {
         /// One end.
         from: String,
@@ -320,6 +320,8 @@ pub enum SegmentFileError {
         to: String,
         /// What it is.
         to_kind: &'static str,
+        /// Which port would fit, if one would.
+        instead: String,
     },
     /// Something that does not go where it is put.
     #[error("device `{device}`: {why}")]

@@ -131,6 +131,35 @@ fn mistakes_are_named() {
 }
 
 #[test]
+fn a_port_that_does_not_fit_is_told_with_the_ones_that_do() {
+    let plant = |on: &str, kind: &str| {
+        format!(
+            "[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+             [[device]]\nname = \"J1\"\ntype = \"EK1122\"\non = \"K1.B\"\n\
+             [[device]]\nname = \"T1\"\ntype = \"{kind}\"\non = \"{on}\"\n"
+        )
+    };
+    assert!(SegmentFile::parse(&plant("J1.C", "EL1008")).is_ok());
+    for (on, kind, expected) in [
+        // The terminal behind a junction is at its port C, not B.
+        (
+            "J1.B",
+            "EL1008",
+            "J1.B is a 100 Mbit/s port, but T1.A is an E-bus contact: no cable fits both; J1.C would be an \
+             E-bus contact",
+        ),
+        ("J1.C", "EK1100", "no cable fits both; J1.B or J1.D would be a 100 Mbit/s port"),
+    ] {
+        let error = SegmentFile::parse(&plant(on, kind)).expect_err(on).to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+    // Where there is none, none is told.
+    let terminal = "[[device]]\nname = \"T1\"\ntype = \"EL1008\"\non = \"maindevice\"\n";
+    let error = SegmentFile::parse(terminal).unwrap_err().to_string();
+    assert!(error.ends_with("no cable fits both"), "{error}");
+}
+
+#[test]
 fn the_project_is_what_was_planned() {
     let mut file = SegmentFile::parse(PLANT).unwrap();
     file.faults = vec![

@@ -58,6 +58,8 @@ pub struct PlanOptions {
     pub mailbox_states: bool,
     /// The shift of the outputs: from the frames to SYNC0. `None`: 30 % of the cycle (SYN-11).
     pub outputs_shift: Option<Span>,
+    /// How far a clock may be off the reference clock before that is told, where that is chosen.
+    pub sync_window: Option<Span>,
 }
 
 impl Default for PlanOptions {
@@ -71,6 +73,7 @@ impl Default for PlanOptions {
             clock_datagrams: false,
             mailbox_states: false,
             outputs_shift: None,
+            sync_window: None,
         }
     }
 }
@@ -185,6 +188,7 @@ impl Plan {
         let mut plan = Self {
             devices: devices.iter().zip(0..).map(|(planned, id)| device(planned, id)).collect(),
             outputs_shift: options.outputs_shift,
+            sync_window: options.sync_window,
             ..Self::empty(tree)
         };
         let tasks = match options.tasks.as_slice() {

@@ -57,6 +57,11 @@ fn devices(report: &OnlineReport, last: Option<&OnlineReport>, paint: Paint) -> 
     if report.driven {
         headings.push("WC");
     }
+    // A column that nobody needs is left out.
+    let clocked = report.devices.iter().any(|device| device.clock_difference_ns.is_some());
+    if clocked {
+        headings.push("clock off");
+    }
     headings.extend(["errors A/B/C/D", "forwarded", "lost links", "changes"]);
     if report.driven {
         headings.push("mailbox");
@@ -78,6 +83,9 @@ fn devices(report: &OnlineReport, last: Option<&OnlineReport>, paint: Paint) -> 
                 Some(true) => paint.bad("wrong"),
             });
         }
+        if clocked {
+            row.push(clock(device, report, paint));
+        }
         row.push(errors(device, old, paint));
         row.push(ports(device, |port| port.forwarded));
         row.push(ports(device, |port| port.lost_links));
@@ -88,6 +96,18 @@ fn devices(report: &OnlineReport, last: Option<&OnlineReport>, paint: Paint) -> 
         table.row(row);
     }
     table.render()
+}
+
+/// `35 ns`; of the reference clock, to whom the others are compared, `reference`.
+fn clock(device: &OnlineDevice, report: &OnlineReport, paint: Paint) -> String {
+    match device.clock_difference_ns.map(time) {
+        Some(text) if device.clock_apart => paint.bad(&text),
+        Some(text) => text,
+        None if report.clock.is_some_and(|clock| clock.reference == device.no) => {
+            "reference".to_owned()
+        }
+        None => "-".to_owned(),
+    }
 }
 
 /// `OP`, `ERR SAFEOP (0x001B sync manager watchdog)`.
@@ -167,6 +187,13 @@ fn frames(report: &OnlineReport) -> String {
         text.push_str(&format!(" Of those that came back: {}.", told.join(", ")));
     }
     text.push('\n');
+    if let Some(clock) = report.clock {
+        let (off, reference) = (time(clock.ahead_ns.unsigned_abs()), clock.reference);
+        let how = if clock.ahead_ns < 0 { "behind" } else { "ahead of" };
+        text.push_str(&format!(
+            "The network's time, that of {reference}, is {off} {how} the host's.\n"
+        ));
+    }
     for card in &report.cards {
         let link = match card.carrier {
             Some(false) => "no link",

@@ -52,6 +52,8 @@ pub(super) struct Logs {
     pub(super) file: Option<EventLogWriter>,
     /// The log of the system.
     pub(super) system: Option<SystemLog>,
+    /// Kinds of which nothing is kept, nor told.
+    pub(super) without: Vec<EntryKind>,
 }
 
 impl Teller {
@@ -114,6 +116,9 @@ impl Teller {
 
     fn entries(&mut self, entries: Vec<LogEntry>, output: &mut Output) {
         for entry in entries {
+            if self.logs.without.contains(&entry.kind) {
+                continue;
+            }
             self.tell(&entry, output);
             let name = entry.device.map(|id| self.names.plain(id.no()).to_owned());
             if let Some(log) = &mut self.logs.system {

@@ -1,6 +1,7 @@
 //! A scan as JSON, `linesman.scan/1`.
 
 use linesman_config::inventory::{FoundDevice, Inventory};
+use linesman_config::plan::reference;
 use linesman_diagnosis::report::EndReport;
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
@@ -65,6 +66,9 @@ struct Device {
     al_code: u16,
     /// Whether it has distributed clocks.
     dc: bool,
+    /// Whether its clock can be the reference clock: it has one, and its revision is one from which on its type
+    /// can be that.
+    reference_clock: bool,
     /// Its ports.
     ports: Vec<PortReport>,
 }
@@ -119,8 +123,16 @@ fn device(inventory: &Inventory, found: &FoundDevice) -> Device {
         // Without the error bit the register may hold what is long over.
         al_code: if found.al_status.error() { found.al_code.value() } else { 0 },
         dc: found.information.features.distributed_clocks(),
+        reference_clock: can_be_reference(found),
         ports: ports(found).map(|port| port_report(inventory, found, port)).collect(),
     }
+}
+
+/// Whether its clock can be the one that all others follow.
+pub(super) fn can_be_reference(found: &FoundDevice) -> bool {
+    let revision = found.identity.map_or(0, |identity| identity.revision);
+    found.information.features.distributed_clocks()
+        && reference::is_possible(&found.profile.type_name, revision)
 }
 
 /// The state by name; of a value that is none, the number.

@@ -6,7 +6,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::topology::derive::Doubt;
 
-use super::report::{ports, state_name};
+use super::report::{can_be_reference, ports, state_name};
 use crate::output::{Output, Paint, Table, wrapped};
 use crate::text::quantity::count;
 
@@ -44,7 +44,7 @@ fn details(inventory: &Inventory, paint: Paint) -> String {
         "revision",
         "serial",
         "controller",
-        "DC",
+        "clock",
         "name",
     ];
     let mut table = Table::new(&headings, paint);
@@ -61,11 +61,20 @@ fn details(inventory: &Inventory, paint: Paint) -> String {
             number(|id| id.revision),
             number(|id| id.serial_number),
             found.information.controller.name().to_owned(),
-            if found.information.features.distributed_clocks() { "yes" } else { "no" }.to_owned(),
+            clock_text(found).to_owned(),
             found.profile.name.clone(),
         ]);
     }
     table.render()
+}
+
+/// Whether it has distributed clocks, and can be whom all others follow.
+fn clock_text(found: &FoundDevice) -> &'static str {
+    match (found.information.features.distributed_clocks(), can_be_reference(found)) {
+        (false, _) => "no",
+        (true, true) => "yes",
+        (true, false) => "yes, not as reference",
+    }
 }
 
 /// `OP`, or `PREOP, error 0x001D invalid output configuration`.

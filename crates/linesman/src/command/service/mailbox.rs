@@ -73,8 +73,9 @@ impl Session {
             return Ok(Opened { id, back_to: None });
         }
         let was = status.state().state().unwrap_or(AlState::Init);
-        // OP needs outputs, which nobody sends here.
-        let back_to = if was == AlState::Op { AlState::SafeOp } else { was };
+        // OP needs outputs, which nobody sends here unless the line is driven.
+        let driven = self.inventory().is_none();
+        let back_to = if was == AlState::Op && !driven { AlState::SafeOp } else { was };
         let way = if back_to == AlState::Init { "back" } else { "through INIT" };
         output.warn(&format!(
             "{label} is taken from {status} to BOOT for this, then {way} to {back_to}"

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
+use linesman_proto::sii::Identity;
 use linesman_proto::time::Span;
 use linesman_runtime::service;
 
@@ -34,14 +35,29 @@ pub(super) fn open(place: &str) -> Result<(Driven, Vec<Known>), Failure> {
         let reason = format!("{place}: the MainDevice does not know its SubDevices yet");
         return Err(Failure::new(reason, "ask again in a moment"));
     }
-    let known = |device: &linesman_runtime::run::report::DeviceReport| Known {
-        id: DeviceId(device.no.saturating_sub(1)),
-        station: device.station,
-        alias: 0,
-        name: Some(device.name.clone()),
-        type_name: String::new(),
-        identity: None,
-        mailbox: true,
+    // Who they are stands in what is seen online; without it they are served all the same.
+    let online = service::online(&path).ok().and_then(|answer| answer.online);
+    let seen = |no: u32| {
+        let devices = online.iter().flat_map(|report| &report.devices);
+        devices.into_iter().find(|device| device.no == no)
+    };
+    let known = |device: &linesman_runtime::run::report::DeviceReport| {
+        let seen = seen(device.no);
+        let identity = seen.and_then(|seen| seen.found.or(seen.planned));
+        Known {
+            id: DeviceId(device.no.saturating_sub(1)),
+            station: device.station,
+            alias: 0,
+            name: Some(device.name.clone()),
+            type_name: seen.map_or_else(String::new, |seen| seen.r#type.clone()),
+            identity: identity.map(|one| Identity {
+                vendor_id: one.vendor_id,
+                product_code: one.product_code,
+                revision: one.revision,
+                serial_number: one.serial,
+            }),
+            mailbox: true,
+        }
     };
     Ok((Driven { path }, run.devices.iter().map(known).collect()))
 }

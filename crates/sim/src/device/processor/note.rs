@@ -75,17 +75,28 @@ impl Processor {
         parameters: &[Parameter<'_>],
         pdi: &Pdi<'_>,
     ) {
-        let product = self.dictionary.number_at(ObjectAddress::new(0x1018, 2)) as u32;
-        let code = product & 0xFFFF_0000 | u32::from(DiagnosisMessage::VENDOR);
-        let note = Note { severity, code, text, parameters };
         let flags = self.dictionary.number_at(ObjectAddress { index: HISTORY, subindex: FLAGS });
-        let kept = self.history.note(note, stamp(pdi), &mut self.dictionary);
+        let kept = self.note(severity, text, parameters, pdi);
         if kept && flags & SENDS_EMERGENCIES != 0 {
             let [low, high] = text.to_le_bytes();
             let data = [severity.code(), low, high, 0, 0];
             let register = ErrorRegister(self.error_register());
             self.mailbox.report(Emergency { code: DEVICE_SPECIFIC, register, data });
         }
+    }
+
+    /// Notes something of the vendor's own; false when it is not kept.
+    fn note(
+        &mut self,
+        severity: Severity,
+        text: u16,
+        parameters: &[Parameter<'_>],
+        pdi: &Pdi<'_>,
+    ) -> bool {
+        let product = self.dictionary.number_at(ObjectAddress::new(0x1018, 2)) as u32;
+        let code = product & 0xFFFF_0000 | u32::from(DiagnosisMessage::VENDOR);
+        let note = Note { severity, code, text, parameters };
+        self.history.note(note, stamp(pdi), &mut self.dictionary)
     }
 
     fn error_register(&self) -> u8 {
@@ -99,6 +110,14 @@ impl Processor {
             let register = ObjectAddress { index: ObjectIndex::ERROR_REGISTER, subindex: 0 };
             if let Some(register) = self.dictionary.find(register) {
                 self.dictionary.set_number(register, u64::from(emergency.register.0));
+            }
+            if emergency.code == DEVICE_SPECIFIC {
+                // A message of the history that is sent as well: severity and text are in its data.
+                let [severity, low, high, ..] = emergency.data;
+                let text = u16::from_le_bytes([low, high]);
+                self.note(Severity::from_code(severity), text, &[], pdi);
+                self.mailbox.report(emergency);
+                continue;
             }
             let (code, sorts) = (emergency.code.to_le_bytes(), [emergency.register.0]);
             let parameters = [
