@@ -365,8 +365,7 @@ impl Walk<'_, '_> {
         // Somebody who looks for the place where all of them vanish does so in a silence, not in noise.
         let was_searched =
             line.hole.is_some_and(|hole| first <= hole.since.at && hole.since.at <= last);
-        let is_explained =
-            is_first || was_searched || self.survey.any_link_changed(first, last);
+        let is_explained = is_first || was_searched || self.survey.any_link_changed(first, last);
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,
             card,
