@@ -2,7 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
+use std::sync::{Arc, Mutex};
+
 use linesman_config::fault::FaultName;
+use linesman_diagnosis::observe::{Direction, FrameSeen};
+use linesman_diagnosis::{Engine, Setup};
 use linesman_lab::lab::Lab;
 use linesman_lab::options::LabOptions;
 use linesman_lab::verdict::{Claim, Site};
@@ -26,6 +30,7 @@ device = [
 "#;
 const K1: u32 = 0;
 const K2: u32 = 3;
+const K3: u32 = 5;
 
 fn up() -> Lab {
     let file: SegmentFile = toml::from_str(PLANT).unwrap();
@@ -76,6 +81,48 @@ fn a_false_link_is_found_by_closing_ports_and_all_registers_are_as_before() {
     lab.heal(fault);
     run(&mut lab, 3_000);
     assert_eq!(registers(&lab), before);
+}
+
+/// The same from the recording alone, which knows neither directions nor the card's link; not while nobody
+/// searches.
+#[test]
+fn a_recording_of_the_search_names_the_same_link() {
+    for (at, active, site) in [
+        ("K1.C-K2.A", true, Some(hole(K1, K2))),
+        ("K2.C>K3.A", true, Some(hole(K2, K3))),
+        ("K1.C-K2.A", false, None),
+        // Nothing helps against a hole before the first SubDevice, nor against a cable that is out there.
+        ("maindevice-K1.A", true, None),
+    ] {
+        let file: SegmentFile = toml::from_str(PLANT).unwrap();
+        let mut lab = Lab::new(&file, LabOptions { active, ..LabOptions::default() }).unwrap();
+        let recording = Arc::new(Mutex::new(Engine::new(Setup::default())));
+        let reader = Arc::clone(&recording);
+        lab.set_tap(Box::new(move |seen| {
+            let frame = FrameSeen { path: None, direction: Direction::Unknown, ..*seen };
+            reader.lock().unwrap().handle_frame(&frame);
+        }));
+        lab.wait_up(Span::s(10)).unwrap();
+        run(&mut lab, 1_500);
+        let fault = lab.inject(&FaultEntry::new(FaultName::FalseLink).at(at.to_owned())).unwrap();
+        run(&mut lab, 2_500);
+        let said = |lab: &Lab| {
+            let mut engine = recording.lock().unwrap().clone();
+            engine.finish(lab.now(), true);
+            let claim = Claim::of(&engine.diagnosis().findings[0]);
+            (claim.cause, claim.site)
+        };
+        let expected = site.map(|site| (FaultName::FalseLink, site));
+        match expected {
+            Some(expected) => assert_eq!(said(&lab), expected, "{at}, while it lasts"),
+            None => assert_ne!(said(&lab).0, FaultName::FalseLink, "{at}, while it lasts"),
+        }
+        lab.heal(fault);
+        run(&mut lab, 3_000);
+        if let Some(expected) = expected {
+            assert_eq!(said(&lab), expected, "{at}, when it is over");
+        }
+    }
 }
 
 #[test]

@@ -10,9 +10,10 @@ use linesman_proto::address::{DeviceId, Network, RegisterAddress};
 use linesman_proto::port::Port;
 use linesman_proto::register::{DlControl, LoopMode, table};
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::{End, Tree};
+use linesman_proto::topology::End;
 
 use super::{Asked, Probe, ProbeEffect};
+use crate::line::search::behind;
 use crate::line::{Device, HoleSearch, Line, Seen};
 
 /// So long nothing must have come back before ports are closed.
@@ -130,14 +131,6 @@ fn end(line: &mut Line, found: Option<usize>, now: Instant) {
         hole.ended = Some(now);
     }
     line.touch();
-}
-
-/// A link and all behind it.
-fn behind(tree: &Tree, link: usize) -> Vec<usize> {
-    let Some(node) = tree.links().get(link).and_then(|link| link.downstream.node()) else {
-        return vec![link];
-    };
-    tree.subtree(node).iter().filter_map(|node| tree.link_above(*node)).collect()
 }
 
 /// The port before a link, with how DL control of its controller stands.

@@ -12,7 +12,7 @@ use linesman_proto::frame::{FrameError, FrameView};
 use linesman_proto::time::{Instant, Span};
 
 use crate::finding::{Book, Finding, Severity};
-use crate::line::{Line, Seen};
+use crate::line::{Line, Seen, search};
 use crate::observe::{
     Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome,
 };
@@ -221,6 +221,7 @@ impl Engine {
     fn judge(&mut self) {
         self.next_judgement = self.now + JUDGE_EVERY;
         let (now, has_ended) = (self.now, self.has_ended);
+        let is_active = self.setup.probes && self.setup.active;
         for watched in &mut self.networks {
             if !watched.is_due(now) {
                 continue;
@@ -231,6 +232,10 @@ impl Engine {
             if watched.learner.is_settled() {
                 watched.line.derive_tree();
             }
+            if !is_active {
+                // Somebody else may have searched.
+                watched.line.hole = search::seen(&watched.line);
+            }
             watched.judged = watched.line.revision();
             watched.judged_alarms = watched.alarms();
             watched.conditions.clear();
@@ -238,7 +243,6 @@ impl Engine {
             for rule in RULES {
                 (rule.judge)(&view, &mut watched.conditions);
             }
-            let is_active = self.setup.probes && self.setup.active;
             let is_curious = is_active && (watched.bisect.is_some() || watched.lacks_controls());
             let is_watched = (watched.is_watched(now) || is_curious) && !has_ended;
             watched.again = is_watched.then_some(now + JUDGE_AGAIN);

@@ -13,6 +13,7 @@ pub mod dl_history;
 pub mod host;
 pub mod learn;
 pub mod mailbox;
+pub mod search;
 pub mod sii_image;
 pub mod traffic;
 pub mod trip;
@@ -35,6 +36,7 @@ pub use device::{Absence, Device, Planned, SeenIdentity, SharedAddress, SharedBy
 pub use dl_history::{DlChange, DlHistory};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
+pub use search::LoopWrite;
 pub use sii_image::{Power, SiiImage};
 pub use traffic::{Silence, Traffic};
 pub use trip::Trips;
@@ -103,6 +105,8 @@ pub struct Line {
     last_errors: Option<Instant>,
     /// The search for the place where frames vanish, going on or done.
     pub hole: Option<HoleSearch>,
+    /// DL control as it was written for temporary use, in the order of time.
+    pub loop_writes: VecDeque<LoopWrite>,
     revision: u64,
     /// From how many controllers and receive times the tree was derived.
     tree_basis: (usize, usize),
@@ -113,6 +117,12 @@ impl Line {
     #[must_use]
     pub fn new(network: Network) -> Self {
         Self { network, ..Self::default() }
+    }
+
+    /// Loops of a controller were written for a moment.
+    pub fn note_loops(&mut self, write: LoopWrite) {
+        search::note(&mut self.loop_writes, write);
+        self.touch();
     }
 
     /// A network as it was planned: names, identities and wiring. A plan whose wiring contradicts

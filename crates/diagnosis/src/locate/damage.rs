@@ -373,7 +373,10 @@ impl Walk<'_, '_> {
         // Counters that were read before the frame was missed say nothing of it.
         let is_read = self.is_read && self.horizon >= first;
         let is_first = line.traffic.first.is_some_and(|begin| last < begin + COMING_UP);
-        let is_explained = is_first || self.survey.any_link_changed(first, last);
+        // Somebody who looks for the place where all of them vanish does so in a silence, not in noise.
+        let was_searched =
+            line.hole.is_some_and(|hole| first <= hole.since.at && hole.since.at <= last);
+        let is_explained = is_first || was_searched || self.survey.any_link_changed(first, last);
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,
             card,

@@ -13,7 +13,7 @@
 //! single frames among others that came back it is damage (`H110`, `H112`), for a long silence a false
 //! link. Where it was, a recording cannot say; `diagnose --active` can while it lasts: it closes ports one after the
 //! other, for temporary use (0x0100 bit 1), so that each opens by itself after a second, and sees when frames
-//! come back.
+//! come back. What was recorded meanwhile tells the same.
 //! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
 //! every frame; which link it is, no counter can be asked.
 //!
@@ -101,7 +101,8 @@ fn searched(line: &Line, silence: &Silence) -> Silence {
 
 /// The link behind which frames vanish, if it was looked for in this silence and found.
 fn found_hole(line: &Line, silence: &Silence) -> Option<Seen<usize>> {
-    let has_link = line.host.card(Path::A).carrier.is_some_and(|carrier| carrier.value);
+    // Where nobody tells, frames that came back meanwhile have shown that the card has one.
+    let has_link = line.host.card(Path::A).carrier.is_none_or(|carrier| carrier.value);
     line.hole.filter(|hole| hole.since == silence.since && has_link)?.found
 }
 

@@ -29,7 +29,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{AlError, Beat, Device, Line, Pause};
+use crate::line::{AlError, Beat, Device, HoleSearch, Line, Pause};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -182,6 +182,14 @@ fn stalled(line: &Line) -> Option<Condition> {
         .into_iter()
         .find(|(one, ended)| one.frames >= SEVERAL && ended.since(one.since.at) >= STALLED)?;
     let pause = Pause { from: silence.since.at, to: ended };
+    // Frames that come back when a port is closed had left, and others come in.
+    let vanished = |hole: HoleSearch| {
+        let until = hole.ended.map_or(Instant::MAX, |ended| ended + READ_WITHIN);
+        hole.found.is_some() && hole.since.at <= pause.to && pause.from <= until
+    };
+    if line.hole.is_some_and(vanished) {
+        return None;
+    }
     // Only counters that were read since then can say that nothing was counted.
     let were_read = line.devices.iter().any(|device| {
         let mut tracks = device.counters.tracks();

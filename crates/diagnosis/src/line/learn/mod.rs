@@ -17,7 +17,7 @@ use linesman_proto::time::Instant;
 
 pub use address::Addresses;
 
-use super::{Cyclic, Line, Seen, SharedBy};
+use super::{Cyclic, Device, Line, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
 
 /// Registers from here on are optional: without so many FMMUs and SyncManagers, without distributed
@@ -393,6 +393,20 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
             if let Some(cyclic) = line.cyclic.iter_mut().find(same) {
                 cyclic.sent.tick(request.time);
                 cyclic.returned.skip();
+            }
+        }
+        if addressing == Some(Addressing::Station)
+            && datagram.command().is_some_and(|command| command.effect().writes)
+        {
+            // It may have been written all the same: who lies before the place where frames vanish gets them.
+            let (station, seen) =
+                (datagram.adp(), Seen::new((), request.time, Some(request.number)));
+            let is_it = |device: &&Device| device.station.is_some_and(|own| own.0 == station);
+            let write = line.devices.iter().find(is_it).and_then(|device| {
+                registers::loop_write(device, (datagram.ado(), datagram.data()), seen)
+            });
+            if let Some(write) = write {
+                line.note_loops(write);
             }
         }
         let traffic = &mut line.traffic;

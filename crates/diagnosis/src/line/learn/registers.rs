@@ -11,7 +11,7 @@ use linesman_proto::time::DcTime32;
 
 use super::{Answer, part, word_at};
 use crate::line::clock::ClockDifference;
-use crate::line::{Device, Line, Seen};
+use crate::line::{Device, Line, LoopWrite, Seen};
 
 const ALIAS: u16 = 0x0012;
 const DL_CONTROL: u16 = 0x0100;
@@ -86,6 +86,10 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
 pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     let Some(device) = line.devices.get_mut(id.index()) else { return };
     let is_news = write(device, answer);
+    let seen = Seen::new((), answer.sent_at.unwrap_or(answer.at), Some(answer.frame));
+    if let Some(write) = loop_write(device, (answer.ado, answer.written()), seen) {
+        line.note_loops(write);
+    }
     if touches(answer.ado, answer.written(), CLOCK_SETTING) {
         for reference in line.references.iter_mut().filter(|one| one.device == id) {
             reference.set(answer.at);
@@ -97,6 +101,16 @@ pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     if is_news {
         line.touch();
     }
+}
+
+/// Whether DL control is written for temporary use: then by this write.
+pub(super) fn loop_write(
+    device: &Device,
+    (start, data): (RegisterAddress, &[u8]),
+    seen: Seen<()>,
+) -> Option<LoopWrite> {
+    let bytes = part(data, start, DL_CONTROL, 2)?.first_chunk()?;
+    LoopWrite::of(device, *bytes, seen)
 }
 
 /// A request for a state was not taken by a controller that has answered before. Says whether it was one.

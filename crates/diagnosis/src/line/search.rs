@@ -1,0 +1,113 @@
+//! A search for the place where frames vanish, as frames show it: ports that somebody closes for a moment,
+//! and whether frames come back meanwhile.
+//!
+//! While nothing comes back, what is written still reaches all that lie before the hole. Who closes a port
+//! for temporary use (DL control, 0x0100 bit 1) and sees frames again knows that the hole lies behind it;
+//! where nothing changes it does not. A recording of such a search tells the same. Reference: S2 2.4.1.
+
+use std::collections::VecDeque;
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::port::Port;
+use linesman_proto::register::{DlControl, LoopMode};
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::{End, Tree};
+
+use super::{Device, HoleSearch, Line, Seen};
+
+/// Writes that are kept: a search among 200 SubDevices takes some 20, each sent anew a few times.
+const KEPT: usize = 128;
+/// Writes of one search follow each other within this time: a port that was closed opens by itself after it.
+const TOGETHER: Span = Span::s(1);
+/// A port that is closed shows within this time whether that helps.
+const PATIENCE: Span = Span::ms(100);
+
+/// DL control of a controller was written for temporary use, whether or not the frame came back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LoopWrite {
+    /// Whose.
+    pub device: DeviceId,
+    /// The port that it closes; `None` when all are as they usually are.
+    pub closed: Option<Port>,
+    /// When it was sent, in which frame.
+    pub seen: Seen<()>,
+}
+
+impl LoopWrite {
+    /// What the first two bytes of DL control mean for a controller.
+    #[must_use]
+    pub fn of(device: &Device, bytes: [u8; 2], seen: Seen<()>) -> Option<Self> {
+        let written = DlControl::from_bytes([bytes[0], bytes[1], 0, 0]);
+        let stands = device.dl_control.unwrap_or(DlControl::RESET);
+        let is_closed = |port: &Port| {
+            written.loop_mode(*port) == LoopMode::Closed
+                && stands.loop_mode(*port) != LoopMode::Closed
+        };
+        let closed = Port::ALL.into_iter().find(is_closed);
+        written.temporary().then_some(Self { device: device.id, closed, seen })
+    }
+}
+
+/// Notes a write. What was lost is heard of later than what came back.
+pub(super) fn note(writes: &mut VecDeque<LoopWrite>, write: LoopWrite) {
+    let at = writes.partition_point(|known| known.seen.at <= write.seen.at);
+    writes.insert(at, write);
+    if writes.len() > KEPT {
+        writes.pop_front();
+    }
+}
+
+/// The latest search that was seen, and what it has found. That the hole is before the first SubDevice no
+/// search shows: nothing helps then, as it would with a cable that is out.
+#[must_use]
+pub fn seen(line: &Line) -> Option<HoleSearch> {
+    let tree = line.tree.as_ref().filter(|tree| tree.closes_at().is_none())?;
+    let writes: Vec<&LoopWrite> = line.loop_writes.iter().collect();
+    let is_apart = |pair: &[&LoopWrite]| pair[0].seen.at + TOGETHER < pair[1].seen.at;
+    let first = writes.windows(2).rposition(is_apart).map_or(0, |before| before + 1);
+    let mut writes = writes[first..].to_vec();
+    let last = writes.last()?.seen;
+    // What does not come back is sent again.
+    writes.dedup_by_key(|write| (write.device, write.closed));
+    let begin = writes.iter().find(|write| write.closed.is_some())?.seen.at;
+    let silences = &line.traffic.silences;
+    let silence = silences.iter().rev().find(|silence| {
+        silence.since.at <= begin && silence.ended.is_none_or(|ended| ended > begin)
+    })?;
+    let came_back = |from: Instant, to: Instant| {
+        silences.iter().filter_map(|one| one.ended).any(|ended| from < ended && ended <= to)
+    };
+    let mut left: Vec<usize> = (0..tree.links().len()).collect();
+    let mut has_helped = false;
+    for (index, write) in writes.iter().enumerate() {
+        let Some(link) = write.closed.and_then(|port| link_at(tree, write.device, port)) else {
+            continue;
+        };
+        let from = write.seen.at;
+        let next = writes.get(index + 1).map_or(Instant::MAX, |next| next.seen.at);
+        let helps = came_back(from, next.min(from + PATIENCE));
+        let behind = behind(tree, link);
+        left.retain(|one| behind.contains(one) == helps);
+        has_helped |= helps;
+    }
+    let found = match left[..] {
+        [only] if has_helped => Some(Seen::new(only, last.at, last.frame)),
+        _ => None,
+    };
+    Some(HoleSearch { since: silence.since, found, ended: Some(last.at + PATIENCE) })
+}
+
+/// The link at a port that leads away from the MainDevice.
+fn link_at(tree: &Tree, device: DeviceId, port: Port) -> Option<usize> {
+    let near = End::Controller(device.index(), port);
+    tree.links().iter().position(|link| link.upstream == near)
+}
+
+/// A link and all behind it.
+#[must_use]
+pub fn behind(tree: &Tree, link: usize) -> Vec<usize> {
+    let Some(node) = tree.links().get(link).and_then(|link| link.downstream.node()) else {
+        return vec![link];
+    };
+    tree.subtree(node).iter().filter_map(|node| tree.link_above(*node)).collect()
+}
