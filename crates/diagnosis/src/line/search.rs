@@ -88,7 +88,8 @@ pub fn seen(line: &Line) -> Option<HoleSearch> {
         let helps = came_back(from, next.min(from + PATIENCE));
         let behind = behind(tree, link);
         left.retain(|one| behind.contains(one) == helps);
-        has_helped |= helps;
+        // It was the port, if they vanish again when that is open: a hole may also have gone by itself.
+        has_helped |= helps && silences.iter().any(|silence| silence.since.at > from);
     }
     let found = match left[..] {
         [only] if has_helped => Some(Seen::new(only, last.at, last.frame)),
