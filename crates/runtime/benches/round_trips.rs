@@ -299,7 +299,7 @@ impl Audience for Keeping {
     }
 
     fn room(&mut self, now: Instant) -> Option<&mut [u8]> {
-        self.tap.as_mut().map(|tap| tap.room(now))
+        self.tap.as_mut().map(|tap| &mut tap.room(now)[..])
     }
 
     fn keep(&mut self, sent: &Passed, len: usize) {

@@ -104,11 +104,6 @@ impl Application {
         let changed = before != self.withheld;
         Some(Judged { missed: !fresh, withheld: self.withheld, changed })
     }
-
-    #[inline]
-    pub(super) const fn is_withheld(&self) -> bool {
-        self.withheld
-    }
 }
 
 #[cfg(test)]
@@ -125,7 +120,6 @@ mod tests {
         assert_eq!(withheld, [false, false, false, true, true]);
         let back = application.begin_cycle(1);
         assert_eq!(back, Some(Judged { missed: false, withheld: false, changed: true }));
-        assert!(!application.is_withheld());
     }
 
     #[test]
@@ -133,6 +127,5 @@ mod tests {
         let mut application = Application::new(None);
         application.give();
         assert!((0..100).all(|_| application.begin_cycle(0).is_none()));
-        assert!(!application.is_withheld());
     }
 }

@@ -3,6 +3,7 @@
 use linesman_config::plan::expect::{PathView, Presence, expect};
 use linesman_config::plan::{DatagramPlan, OnWrongCounter, Plan, Role};
 use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::frame::WKC_LEN;
 use linesman_proto::sii::Direction;
 use linesman_proto::time::Instant;
 
@@ -19,7 +20,7 @@ pub(super) struct Datagram {
     /// How many bytes they are.
     pub(super) len: usize,
     /// Where its working counter is in the frame.
-    wkc_at: usize,
+    wkc_at: u32,
     /// What it must come back with: as planned, and with its outputs withheld.
     expected: [Expected; 2],
     /// The same, where it carries process data and came back so the last time; else nothing fits.
@@ -32,10 +33,10 @@ pub(super) struct Datagram {
     cleared: Runs,
     /// Whether it came back as it should the last time.
     pub(super) good: bool,
-    /// When that was last the case.
-    pub(super) good_at: Option<Instant>,
-    /// How often it was.
+    /// How often it did.
     pub(super) receipts: u64,
+    /// When it did last, if ever.
+    good_at: Instant,
     /// The wrong counter that was last told of; `None` when all is well.
     pub(super) told: Option<WorkingCounter>,
 }
@@ -113,15 +114,15 @@ impl Datagram {
             role: datagram.role,
             data_at,
             len: datagram.len,
-            wkc_at: data_at + datagram.len,
+            wkc_at: (data_at + datagram.len) as u32,
             expected: [Expected::default(); 2],
             usual: [Usual::NONE; 2],
             without_outputs: differs.then(|| DatagramPlan { command, ..datagram.clone() }),
             inputs: Runs::with_room(most.sum()),
             cleared,
             good: false,
-            good_at: None,
             receipts: 0,
+            good_at: Instant::ZERO,
             told: None,
         }
     }
@@ -150,10 +151,16 @@ impl Datagram {
         };
     }
 
+    /// When it came back as it should the last time; `None`: it never did.
+    pub(super) fn good_at(&self) -> Option<Instant> {
+        (self.receipts > 0).then_some(self.good_at)
+    }
+
     /// The working counter in a frame that came back.
     #[inline]
     pub(super) fn counter(&self, frame: &[u8]) -> Option<WorkingCounter> {
-        let bytes = frame.get(self.wkc_at..)?.first_chunk()?;
+        let at = self.wkc_at as usize;
+        let bytes = frame.get(at..at + WKC_LEN)?.first_chunk()?;
         Some(WorkingCounter(u16::from_le_bytes(*bytes)))
     }
 
@@ -172,7 +179,7 @@ impl Datagram {
     #[inline]
     pub(super) fn take(&mut self, now: Instant, frame: &[u8], inputs: &mut [u8]) {
         self.good = true;
-        self.good_at = Some(now);
+        self.good_at = now;
         self.receipts += 1;
         self.inputs.take(frame, inputs);
     }

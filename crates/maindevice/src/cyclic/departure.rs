@@ -1,14 +1,11 @@
-//! Frames of a task that leave together, and how a task fares with what comes back.
+//! Frames of a task that leave together, and whether they are back.
 
 use std::ops::Range;
-use std::sync::Mutex;
 
+use linesman_config::plan::Plan;
 use linesman_proto::time::{Instant, Span};
 
 use super::application::Application;
-use crate::event::Event;
-use crate::executor::lock;
-use crate::supervisor::Line;
 
 /// So many cyclic frames lost in a row are more than an accident.
 pub(super) const LOST_IS_NEWS: u64 = 3;
@@ -16,31 +13,84 @@ pub(super) const LOST_IS_NEWS: u64 = 3;
 /// Frames of a task that leave together.
 #[derive(Debug)]
 pub(super) struct Departure {
-    pub(super) task: usize,
     pub(super) next_at: Instant,
     pub(super) cycle: Span,
-    /// The cycle of the task begins with it.
-    pub(super) begins: bool,
-    /// Their places in the order of departures.
+    /// Their places among all frames.
     pub(super) frames: Range<usize>,
-}
-
-#[derive(Debug)]
-pub(super) struct TaskState {
-    /// Frames lost in a row.
-    pub(super) lost: u64,
-    /// Frames that are on their way.
-    pub(super) out: u32,
+    /// How many of those that left last, or are to leave, are not back.
+    out: usize,
     /// The last of them has come back, or was given up.
     pub(super) exchanged: bool,
+    /// The cycle of the task begins with it.
+    pub(super) begins: bool,
+    pub(super) task: usize,
+    /// The application of the task, where its cycle begins.
     pub(super) application: Application,
 }
 
+/// A frame in the order of departures.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Departing {
+    pub(super) departure: usize,
+    pub(super) task: usize,
+    /// Its number within the task, and among those of all tasks.
+    pub(super) number: usize,
+    pub(super) planned: usize,
+}
+
+/// Which frames of a plan leave together when it begins at `now`, and all of them in that order.
+pub(super) fn departing(
+    plan: &Plan,
+    application: Application,
+    now: Instant,
+) -> (Vec<Departure>, Vec<Departing>) {
+    let (mut departures, mut order) = (Vec::<Departure>::new(), Vec::new());
+    let mut planned = 0;
+    for (task, one) in plan.tasks.iter().enumerate() {
+        let first = one.frames.iter().map(|frame| frame.ahead).max().unwrap_or_default();
+        let last = one.frames.iter().map(|frame| frame.ahead).min().unwrap_or_default();
+        for (number, frame) in one.frames.iter().enumerate() {
+            let next_at = now + first.saturating_sub(frame.ahead);
+            let same = |one: &Departure| one.task == task && one.next_at == next_at;
+            let departure = departures.iter().position(same).unwrap_or_else(|| {
+                departures.push(Departure {
+                    next_at,
+                    cycle: one.cycle.max(Span::ns(1)),
+                    frames: 0..0,
+                    out: 0,
+                    exchanged: false,
+                    begins: frame.ahead == last,
+                    task,
+                    application,
+                });
+                departures.len() - 1
+            });
+            order.push(Departing { departure, task, number, planned });
+            planned += 1;
+        }
+    }
+    order.sort_by_key(|one| one.departure);
+    for (at, one) in order.iter().enumerate() {
+        let Range { start, end } = &mut departures[one.departure].frames;
+        if start == end {
+            *start = at;
+        }
+        *end = at + 1;
+    }
+    (departures, order)
+}
+
+/// When the first of them is due; [`Instant::MAX`]: there is none.
+pub(super) fn earliest(departures: &[Departure]) -> Instant {
+    departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX)
+}
+
 impl Departure {
-    /// It is due at `now`: the next time is a cycle later. Cycles that were slept through are left
-    /// out, not caught up: the grid stays. Gives how many.
+    /// It is due at `now`: its frames leave, and again a cycle later. Cycles that were slept through are
+    /// left out, not caught up: the grid stays. Gives how many.
     #[inline]
-    pub(super) fn advance(&mut self, now: Instant) -> u64 {
+    pub(super) fn depart(&mut self, now: Instant) -> u64 {
+        self.out = self.frames.end - self.frames.start;
         self.next_at += self.cycle;
         if self.next_at <= now { self.catch_up(now) } else { 0 }
     }
@@ -51,30 +101,17 @@ impl Departure {
         self.next_at += self.cycle * behind;
         behind
     }
-}
 
-impl TaskState {
-    /// Its frames come back again.
-    #[cold]
-    pub(super) fn found(
-        &mut self,
-        task: usize,
-        line: &Mutex<Line>,
-        events: &mut impl FnMut(Event),
-    ) {
-        let lost = std::mem::take(&mut self.lost);
-        if lost >= LOST_IS_NEWS {
-            events(Event::CyclicFramesBack { task, lost });
-            lock(line).alert();
-        }
+    /// One of its frames is on its way no longer: it is back, was given up, or did not leave. Says
+    /// whether it was the last.
+    #[inline]
+    pub(super) fn came(&mut self) -> bool {
+        let Some(out) = self.out.checked_sub(1) else { return false };
+        self.out = out;
+        out == 0
     }
 
-    /// One of its frames is on its way no longer; whether more leave in the same cycle.
-    #[inline]
-    pub(super) fn came(&mut self, out: &mut bool, more: bool) {
-        if std::mem::replace(out, false) {
-            self.out = self.out.wrapping_sub(1);
-            self.exchanged |= self.out == 0 && !more;
-        }
+    pub(super) const fn is_out(&self) -> bool {
+        self.out > 0
     }
 }

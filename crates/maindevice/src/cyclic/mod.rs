@@ -6,13 +6,17 @@
 //! SyncManagers are on before it gives data. Until it has arrived the expectation is a range, so that
 //! one SubDevice that comes back, or is stuck, does not stop the inputs of all others.
 //!
-//! [`send`] sends, [`run`] copies, [`datagram`] judges, [`quality`] tells how good and how old data are,
-//! [`application`] sees to it that old outputs are not sent as fresh ones.
+//! [`send`] sends, [`receive`] takes in, [`run`] copies, [`datagram`] judges, [`quality`] tells how good
+//! and how old data are, [`application`] sees to it that old outputs are not sent as fresh ones.
+//!
+//! A frame that leaves or comes back is found once: all that sending and receiving need of it is in its
+//! [`Frame`], all that is shared with those that leave together in their [`Departure`].
 
 mod application;
 mod datagram;
 mod departure;
 mod quality;
+mod receive;
 mod run;
 mod send;
 mod steer;
@@ -22,24 +26,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::expect::Presence;
-use linesman_config::plan::{Plan, Role};
+use linesman_config::plan::{FramePlan, Plan};
 use linesman_proto::address::WorkingCounter;
 use linesman_proto::sii::Direction;
-use linesman_proto::state::{AlState, OredStates};
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::time::Instant;
 
 use self::application::Application;
-use self::datagram::{Datagram, Place, clear_lost};
-use self::departure::{Departure, LOST_IS_NEWS, TaskState};
+use self::datagram::{Datagram, clear_lost};
+use self::departure::{Departing, Departure, departing, earliest};
 use self::quality::Share;
 use self::run::Runs;
 use self::steer::Steer;
-use crate::event::Event;
 use crate::exchange::Exchange;
-use crate::exchange::prebuilt::data_offsets;
+use crate::exchange::prebuilt::{Prebuilt, data_offsets};
 use crate::executor::lock;
 use crate::mailbox::{MailboxBits, Queues};
-use crate::statistics::Statistics;
 use crate::supervisor::Line;
 
 pub use self::quality::{FrameStatus, Quality};
@@ -47,20 +48,26 @@ pub use self::quality::{FrameStatus, Quality};
 /// One frame of the plan.
 #[derive(Debug)]
 struct Frame {
-    task: usize,
-    /// Its number within the task.
-    number: usize,
+    prebuilt: Prebuilt,
     /// Where outputs go into it.
     outputs: Runs,
+    /// Its outputs are withheld, as those of its whole task.
+    withheld: bool,
+    /// What [`FrameStatus::not_sent`] is when it is sent: the datagrams whose outputs are withheld.
+    not_sent: u16,
     datagrams: Vec<Datagram>,
     /// Bits of the datagrams that carry outputs, and of all.
     carries: u16,
     all: u16,
     /// Which version of the line's state its expectations are made of.
     version: u64,
-    /// It is on its way.
-    out: bool,
     status: FrameStatus,
+    /// With which frames it leaves.
+    departure: usize,
+    task: usize,
+    /// Its number within the task, and among those of all tasks.
+    number: usize,
+    planned: usize,
 }
 
 /// The engine.
@@ -70,20 +77,23 @@ pub(crate) struct Cyclic {
     line: Arc<Mutex<Line>>,
     /// The version of the line's state, to be looked at without a lock.
     live: Arc<AtomicU64>,
-    tasks: Vec<TaskState>,
     departures: Vec<Departure>,
+    /// In the order of departures.
     frames: Vec<Frame>,
+    /// When the next frame is due: now or before while some that leave together are left, else with the
+    /// first departure.
+    due: Instant,
     /// When the first departure is due.
     next_at: Instant,
-    /// The departure whose frames leave now, and which of them are left, as places in the order.
-    leaving: usize,
+    /// The frames that leave now.
     left: Range<usize>,
-    /// The frames in the order of departures, by their indices among those of all tasks.
-    order: Vec<u32>,
     /// When they are given up.
     deadline: Instant,
     /// How often the application has given the outputs of all tasks.
     given: u64,
+    /// Frames lost in a row, by task; whether there are any.
+    lost: Vec<u64>,
+    losing: bool,
     /// Who surely serves process data, and who may.
     least: Presence,
     most: Presence,
@@ -107,59 +117,30 @@ impl Cyclic {
         allowed_misses: Option<u32>,
         now: Instant,
     ) -> Self {
-        exchange.prebuild(plan.tasks.iter().flat_map(|task| task.frames.iter().cloned()));
-        let (mut frames, mut departures) = (Vec::new(), Vec::<(Departure, Vec<u32>)>::new());
-        for (index, task) in plan.tasks.iter().enumerate() {
-            let earliest = task.frames.iter().map(|frame| frame.ahead).max().unwrap_or_default();
-            let latest = task.frames.iter().map(|frame| frame.ahead).min().unwrap_or_default();
-            for (number, planned) in task.frames.iter().enumerate() {
-                let next_at = now + earliest.saturating_sub(planned.ahead);
-                let same = |(one, _): &&mut (Departure, Vec<u32>)| {
-                    one.task == index && one.next_at == next_at
-                };
-                match departures.iter_mut().find(same) {
-                    Some((_, leaving)) => leaving.push(frames.len() as u32),
-                    None => {
-                        let cycle = task.cycle.max(Span::ns(1));
-                        let begins = planned.ahead == latest;
-                        let departure =
-                            Departure { task: index, next_at, cycle, begins, frames: 0..0 };
-                        departures.push((departure, vec![frames.len() as u32]));
-                    }
-                }
-                frames.push(Frame::new(&plan, index, number));
-            }
-        }
-        let mut order = Vec::new();
-        let place = |(mut departure, leaving): (Departure, Vec<u32>)| {
-            let first = order.len();
-            order.extend(leaving);
-            departure.frames = first..order.len();
-            departure
+        let (departures, order) = departing(&plan, Application::new(allowed_misses), now);
+        let planned = |one: &Departing| plan.tasks[one.task].frames[one.number].clone();
+        let prebuilt = exchange.prebuild(order.iter().map(planned));
+        let frame = |(one, prebuilt): (&Departing, Prebuilt)| {
+            Frame::new(&plan, one, &plan.tasks[one.task].frames[one.number], prebuilt)
         };
-        let departures: Vec<Departure> = departures.into_iter().map(place).collect();
-        let task = |_| TaskState {
-            lost: 0,
-            out: 0,
-            exchanged: false,
-            application: Application::new(allowed_misses),
-        };
+        let frames: Vec<Frame> = order.iter().zip(prebuilt).map(frame).collect();
+        let next_at = earliest(&departures);
         let live = lock(&line).live_version();
         let mut cyclic = Self {
-            tasks: plan.tasks.iter().map(task).collect(),
             departures,
             frames,
-            next_at: now,
-            leaving: 0,
+            due: next_at,
+            next_at,
             left: 0..0,
-            order,
             deadline: now,
             given: 0,
+            lost: vec![0; plan.tasks.len()],
+            losing: false,
             least: Presence::none(plan.devices.len()),
             most: Presence::none(plan.devices.len()),
             version: u64::MAX,
             responding: None,
-            shares: quality::shares(&plan),
+            shares: quality::shares(&plan, &order),
             steer: Steer::default(),
             mailboxes: MailboxBits::default(),
             outputs: vec![0; plan.outputs_len],
@@ -168,8 +149,6 @@ impl Cyclic {
             line,
             live,
         };
-        cyclic.next_at =
-            cyclic.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
         cyclic.refresh();
         cyclic
     }
@@ -198,14 +177,17 @@ impl Cyclic {
     /// When the next frames are due; [`Instant::MAX`]: never.
     #[inline]
     pub(crate) fn next_at(&self) -> Instant {
-        self.next_at
+        self.due
     }
 
     /// The application gives its outputs: all of them, or those of one task.
     #[inline]
     pub(crate) fn give_outputs(&mut self, task: Option<usize>) {
         match task {
-            Some(task) => self.tasks.get_mut(task).into_iter().for_each(|t| t.application.give()),
+            Some(task) => {
+                let mine = |one: &&mut Departure| one.task == task && one.begins;
+                self.departures.iter_mut().filter(mine).for_each(|one| one.application.give());
+            }
             None => self.given += 1,
         }
     }
@@ -213,7 +195,8 @@ impl Cyclic {
     /// Whether all frames of a task have come back, or were given up, since this was asked last.
     #[inline]
     pub(crate) fn take_exchanged(&mut self, task: usize) -> bool {
-        self.tasks.get_mut(task).is_some_and(|task| std::mem::replace(&mut task.exchanged, false))
+        let mine = self.departures.iter_mut().filter(|one| one.task == task);
+        mine.fold(false, |any, one| any | std::mem::replace(&mut one.exchanged, false))
     }
 
     /// When the next cycle of a task begins.
@@ -225,165 +208,7 @@ impl Cyclic {
     /// Whether a frame leaves at `now`.
     #[inline]
     pub(crate) fn is_due(&self, now: Instant) -> bool {
-        !self.left.is_empty() || self.next_at <= now
-    }
-
-    /// A frame came back.
-    #[inline]
-    pub(crate) fn received(
-        &mut self,
-        now: Instant,
-        index: u32,
-        withheld: bool,
-        reply: &[u8],
-        statistics: &mut Statistics,
-        events: &mut impl FnMut(Event),
-    ) {
-        let live = self.live.load(Ordering::Relaxed);
-        if self.frames.get(index as usize).is_none_or(|frame| frame.version != live) {
-            self.catch_up(index);
-        }
-        let more = !self.left.is_empty() && self.is_leaving(index);
-        let Some(frame) = self.frames.get_mut(index as usize) else { return };
-        let Some(state) = self.tasks.get_mut(frame.task) else { return };
-        state.came(&mut frame.out, more);
-        if state.lost > 0 {
-            state.found(frame.task, &self.line, events);
-        }
-        if let [only] = frame.datagrams.as_mut_slice()
-            && let Some(wkc) = only.counter(reply)
-            && only.is_usual(withheld, wkc)
-        {
-            frame.status.wrong_counter = 0;
-            frame.status.input_toggle ^= frame.all;
-            only.take(now, reply, &mut self.inputs);
-            return;
-        }
-        let mut datagrams = frame.datagrams.iter_mut();
-        while let Some(datagram) = datagrams.next() {
-            let Some(wkc) = datagram.counter(reply) else { return };
-            if !datagram.is_usual(withheld, wkc) {
-                let behind = datagrams.len();
-                let at = frame.datagrams.len() - 1 - behind;
-                return self
-                    .received_otherwise(now, index, at, withheld, reply, statistics, events);
-            }
-            datagram.take(now, reply, &mut self.inputs);
-        }
-        frame.status.wrong_counter = 0;
-        frame.status.input_toggle ^= frame.all;
-    }
-
-    /// A frame's expectations are made anew, of who is present now.
-    #[cold]
-    fn catch_up(&mut self, index: u32) {
-        self.refresh();
-        let Self { plan, least, most, shares, inputs, version, .. } = self;
-        if let Some(frame) = self.frames.get_mut(index as usize)
-            && frame.version != *version
-        {
-            frame.version = *version;
-            frame.take_over(plan, index, least, most, shares, inputs);
-        }
-    }
-
-    /// The datagrams from `first` on: those before it were as they should be.
-    #[inline(never)]
-    #[allow(clippy::too_many_arguments, reason = "what is known of a frame that came back")]
-    fn received_otherwise(
-        &mut self,
-        now: Instant,
-        index: u32,
-        first: usize,
-        withheld: bool,
-        reply: &[u8],
-        statistics: &mut Statistics,
-        events: &mut impl FnMut(Event),
-    ) {
-        let Some(frame) = self.frames.get_mut(index as usize) else { return };
-        let mut toggled = FrameStatus::before(first);
-        let (mut wrong, mut moved) = (0, 0);
-        for (at, datagram) in frame.datagrams.iter_mut().enumerate().skip(first) {
-            let bit = FrameStatus::bit(at);
-            let Some(wkc) = datagram.counter(reply) else { return };
-            if datagram.is_usual(withheld, wkc) {
-                datagram.take(now, reply, &mut self.inputs);
-                toggled |= bit;
-            } else if datagram.role == Role::ProcessData {
-                let place = Place { task: frame.task, frame: frame.number, datagram: at };
-                if datagram.expected(withheld).fits(wkc) {
-                    datagram.take(now, reply, &mut self.inputs);
-                    toggled |= bit;
-                    datagram.tell_good(place, events);
-                } else {
-                    wrong |= bit;
-                    datagram.refuse(&mut self.inputs);
-                    statistics.working_counter_errors += 1;
-                    if datagram.told != Some(wkc) {
-                        datagram.tell_wrong(place, withheld, wkc, events);
-                        lock(&self.line).alert();
-                    }
-                }
-            } else {
-                datagram.good = true;
-                toggled |= bit;
-                let data = reply.get(datagram.data_at..).unwrap_or_default();
-                let seen = Some((wkc, data.first().copied().unwrap_or(0)));
-                let role = datagram.role;
-                if role == Role::Presence {
-                    if self.responding != seen {
-                        self.responding = seen;
-                        watch_line(&self.line, seen, events);
-                    }
-                } else if role == Role::ReferenceClock && wkc.0 > 0 {
-                    let cycle = self.plan.tasks.get(frame.task).map(|task| task.cycle);
-                    moved += self.steer.correction(now, data, cycle.unwrap_or_default());
-                } else if role == Role::MailboxStates && wkc.0 > 0 {
-                    let data = data.get(..datagram.len).unwrap_or_default();
-                    self.mailboxes.take(index as usize, at, data);
-                }
-            }
-        }
-        frame.status.wrong_counter = wrong;
-        frame.status.input_toggle ^= toggled;
-        if moved != 0 {
-            self.shift(moved);
-        }
-    }
-
-    /// Whether frames of the same task leave after this one in the same cycle.
-    #[cold]
-    fn is_leaving(&self, index: u32) -> bool {
-        let task = self.frames.get(index as usize).map(|frame| frame.task);
-        self.departures.get(self.leaving).map(|departure| departure.task) == task
-    }
-
-    /// Moves all departures, by ns.
-    fn shift(&mut self, by: i64) {
-        for departure in &mut self.departures {
-            let span = Span::ns(by.unsigned_abs());
-            departure.next_at =
-                if by < 0 { departure.next_at.before(span) } else { departure.next_at + span };
-        }
-        self.next_at = self.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
-    }
-
-    /// A frame did not come back.
-    pub(crate) fn lost(&mut self, index: u32, events: &mut impl FnMut(Event)) {
-        let more = !self.left.is_empty() && self.is_leaving(index);
-        let Some(frame) = self.frames.get_mut(index as usize) else { return };
-        frame.status.wrong_counter = FrameStatus::WHOLE;
-        for datagram in &mut frame.datagrams {
-            datagram.refuse(&mut self.inputs);
-        }
-        let task = frame.task;
-        let Some(state) = self.tasks.get_mut(task) else { return };
-        state.came(&mut frame.out, more);
-        state.lost += 1;
-        if state.lost == LOST_IS_NEWS {
-            events(Event::CyclicFramesLost { task });
-            lock(&self.line).alert();
-        }
+        self.due <= now
     }
 
     /// Whether the last answer of a frame was not as it should be.
@@ -398,8 +223,7 @@ impl Cyclic {
 }
 
 impl Frame {
-    fn new(plan: &Plan, task: usize, number: usize) -> Self {
-        let planned = &plan.tasks[task].frames[number];
+    fn new(plan: &Plan, one: &Departing, planned: &FramePlan, prebuilt: Prebuilt) -> Self {
         let (mut outputs, mut datagrams, mut carries) = (Runs::default(), Vec::new(), 0);
         for (at, (one, data_at)) in planned.datagrams.iter().zip(data_offsets(planned)).enumerate()
         {
@@ -410,16 +234,27 @@ impl Frame {
             datagrams.push(Datagram::new(plan, one, data_at));
         }
         Self {
-            task,
-            number,
+            prebuilt,
             outputs,
+            withheld: false,
+            not_sent: 0,
             datagrams,
             carries,
             all: FrameStatus::before(planned.datagrams.len()),
             version: u64::MAX,
-            out: false,
             status: FrameStatus::default(),
+            departure: one.departure,
+            task: one.task,
+            number: one.number,
+            planned: one.planned,
         }
+    }
+
+    /// Its outputs must not be sent as fresh ones from now on, or may again.
+    fn withhold(&mut self, withheld: bool) {
+        self.withheld = withheld;
+        self.prebuilt.withhold(withheld);
+        self.not_sent = if withheld { self.carries } else { 0 };
     }
 
     /// Takes over who serves process data.
@@ -436,7 +271,7 @@ impl Frame {
         let planned = plan.tasks.get(self.task).and_then(|task| task.frames.get(self.number));
         let Some(planned) = planned else { return };
         for (at, (datagram, one)) in self.datagrams.iter_mut().zip(&planned.datagrams).enumerate() {
-            let last = Some((datagram.good_at, datagram.receipts));
+            let last = Some((datagram.good_at(), datagram.receipts));
             for owned in &one.ownership {
                 let Some(share) = shares.get_mut(owned.device.index()) else { continue };
                 // Who has inputs is told by the first datagram with some; who has none, by any.
@@ -449,20 +284,6 @@ impl Frame {
             }
             datagram.refresh(one, least, most);
         }
-    }
-}
-
-/// The broadcast read of the AL status tells how many are there and whether all is as it shall be.
-#[cold]
-fn watch_line(
-    line: &Mutex<Line>,
-    seen: Option<(WorkingCounter, u8)>,
-    events: &mut impl FnMut(Event),
-) {
-    let Some((now, states)) = seen else { return };
-    let states: OredStates = AlState::from_or(states);
-    if let Some(before) = lock(line).broadcast(now, states) {
-        events(Event::Responding { before, now });
     }
 }
 

@@ -7,6 +7,7 @@ use linesman_proto::sii::Direction;
 use linesman_proto::time::{Instant, Span};
 
 use super::Cyclic;
+use super::departure::Departing;
 
 /// The process data of one SubDevice as the application sees them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -62,7 +63,7 @@ impl Cyclic {
         let Some(share) = self.shares.get(id.index()) else { return Quality::default() };
         share.quality(&self.least, id, |frame, at| {
             let datagram = self.frames.get(frame).and_then(|frame| frame.datagrams.get(at));
-            datagram.map_or((false, None, 0), |one| (one.good, one.good_at, one.receipts))
+            datagram.map_or((false, None, 0), |one| (one.good, one.good_at(), one.receipts))
         })
     }
 
@@ -76,7 +77,7 @@ impl Cyclic {
 /// What is remembered of each SubDevice beside its datagrams.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Share {
-    /// The datagrams with its data, by frame and place, and whether inputs are among them.
+    /// The datagrams with its data, by frame and place in it, and whether inputs are among them.
     pub(super) datagrams: Vec<(usize, usize, bool)>,
     /// When its inputs were last good before it stopped to give any.
     frozen_at: Option<Instant>,
@@ -85,11 +86,14 @@ pub(super) struct Share {
     serving: bool,
 }
 
-/// Who has a share in which datagrams, by [`DeviceId`].
-pub(super) fn shares(plan: &Plan) -> Vec<Share> {
+/// Who has a share in which datagrams of the frames in this order, by [`DeviceId`].
+pub(super) fn shares(plan: &Plan, order: &[Departing]) -> Vec<Share> {
     let mut shares = vec![Share::default(); plan.devices.len()];
-    let frames = plan.tasks.iter().flat_map(|task| &task.frames);
-    for (frame, planned) in frames.enumerate() {
+    // The first datagram with inputs is that of the first frame as planned.
+    let mut frames: Vec<(usize, &Departing)> = order.iter().enumerate().collect();
+    frames.sort_by_key(|(_, one)| one.planned);
+    for (frame, one) in frames {
+        let planned = &plan.tasks[one.task].frames[one.number];
         for (at, datagram) in planned.datagrams.iter().enumerate() {
             for owned in &datagram.ownership {
                 let Some(share) = shares.get_mut(owned.device.index()) else { continue };

@@ -119,14 +119,15 @@ impl Runs {
     }
 
     /// Copies inputs out of a frame.
-    #[inline]
+    #[inline(always)]
     pub(super) fn take(&self, frame: &[u8], image: &mut [u8]) {
-        let (from, to) = (frame.get(self.first.frame()), image.get_mut(self.first.image()));
-        if let (Some(from), Some(to)) = (from, to) {
-            copy_whole(from, to);
-        }
         if !self.others.is_empty() {
             self.take_others(frame, image);
+        }
+        if let Some(from) = frame.get(self.first.frame())
+            && let Some(to) = image.get_mut(self.first.image())
+        {
+            copy_whole(from, to);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use linesman_proto::time::Instant;
 
+use super::departure::{Departure, earliest};
 use super::{Cyclic, FrameStatus};
 use crate::event::Event;
 use crate::exchange::{Exchange, Order};
@@ -9,7 +10,7 @@ use crate::statistics::Statistics;
 
 impl Cyclic {
     /// Sends the next frame of those whose cycle has begun: it is written into `buffer`. Gives its
-    /// length; `None` when all have left.
+    /// length; `None` when all have left. To be asked when [`Cyclic::is_due`].
     #[inline]
     pub(crate) fn send_next(
         &mut self,
@@ -20,50 +21,72 @@ impl Cyclic {
         buffer: &mut [u8],
     ) -> Option<usize> {
         if self.left.is_empty() {
-            if now < self.next_at {
-                return None;
-            }
             self.depart(now, statistics, events)?;
         }
-        let index = *self.order.get(self.left.start)?;
-        self.left.start += 1;
-        let frame = self.frames.get_mut(index as usize)?;
-        let task = self.tasks.get_mut(frame.task)?;
-        let withheld = task.application.is_withheld();
-        let was_out = std::mem::replace(&mut frame.out, true);
-        task.out += u32::from(!was_out);
-        frame.status.not_sent = if withheld { frame.carries } else { 0 };
-        let order = Order { deadline: self.deadline, withheld };
-        let (runs, outputs) = (&frame.outputs, &self.outputs);
-        let fill = |bytes: &mut [u8]| match withheld {
-            false => runs.fill(outputs, bytes),
-            true => runs.clear_frame(bytes),
-        };
-        let sent = exchange.send_cyclic(index, order, fill, buffer);
-        if sent.is_none() {
-            if !was_out {
-                frame.out = false;
-                task.out -= 1;
-            }
-            self.left.start -= 1;
-            self.leave_out(statistics);
+        if exchange.is_next_taken() {
+            return self.send_past_taken(exchange, statistics, buffer);
         }
-        sent
+        self.send(exchange, statistics, buffer)
+    }
+
+    /// Sends the next frame of those that are left, in the slot whose turn it is.
+    #[inline(always)]
+    fn send(
+        &mut self,
+        exchange: &mut Exchange,
+        statistics: &mut Statistics,
+        buffer: &mut [u8],
+    ) -> Option<usize> {
+        let index = self.left.start;
+        let frame = self.frames.get_mut(index)?;
+        let Some(sent) = buffer.get_mut(..frame.prebuilt.len()) else {
+            return self.leave_out(statistics);
+        };
+        let order =
+            Order { frame: index as u32, deadline: self.deadline, withheld: frame.withheld };
+        let number = exchange.begin_cyclic(order, &frame.prebuilt);
+        self.left.start = index + 1;
+        if self.left.is_empty() {
+            self.due = self.next_at;
+        }
+        frame.status.not_sent = frame.not_sent;
+        frame.prebuilt.write(number, sent);
+        match frame.withheld {
+            false => frame.outputs.fill(&self.outputs, sent),
+            true => frame.outputs.clear_frame(sent),
+        }
+        if frame.prebuilt.is_copied() {
+            exchange.keep_copies(index as u32, number, sent);
+        }
+        Some(sent.len())
+    }
+
+    /// The slot whose turn it is still waits for its answer: the frame takes the next one that is free.
+    #[cold]
+    fn send_past_taken(
+        &mut self,
+        exchange: &mut Exchange,
+        statistics: &mut Statistics,
+        buffer: &mut [u8],
+    ) -> Option<usize> {
+        match exchange.skip_taken() {
+            true => self.send(exchange, statistics, buffer),
+            false => self.leave_out(statistics),
+        }
     }
 
     /// Too many frames are out: those that were to leave do not.
     #[cold]
-    fn leave_out(&mut self, statistics: &mut Statistics) {
-        let Some(departure) = self.departures.get(self.leaving) else { return };
-        for index in self.order.get(self.left.clone()).unwrap_or_default() {
-            let Some(frame) = self.frames.get_mut(*index as usize) else { continue };
+    fn leave_out(&mut self, statistics: &mut Statistics) -> Option<usize> {
+        for index in std::mem::take(&mut self.left) {
+            let Some(frame) = self.frames.get_mut(index) else { continue };
             frame.status.not_sent = FrameStatus::WHOLE;
             statistics.cyclic_unsent += 1;
+            let departure = frame.departure;
+            self.came_of(departure);
         }
-        if let Some(task) = self.tasks.get_mut(departure.task) {
-            task.exchanged |= task.out == 0;
-        }
-        self.left = 0..0;
+        self.due = self.next_at;
+        None
     }
 
     /// The first departure that is due: its frames leave from now on.
@@ -74,16 +97,14 @@ impl Cyclic {
         statistics: &mut Statistics,
         events: &mut impl FnMut(Event),
     ) -> Option<()> {
-        let (at, behind) = match self.departures.as_mut_slice() {
+        let (departure, behind) = match self.departures.as_mut_slice() {
             [only] => {
-                let behind = only.advance(now);
+                let behind = only.depart(now);
                 self.next_at = only.next_at;
-                (0, behind)
+                (only, behind)
             }
-            _ => self.first_due(now),
+            several => first_due(several, now, &mut self.next_at)?,
         };
-        let departure = self.departures.get(at)?;
-        self.leaving = at;
         self.left = departure.frames.clone();
         self.deadline = now + departure.cycle;
         if departure.begins {
@@ -91,22 +112,34 @@ impl Cyclic {
             if behind > 0 {
                 statistics.cycles_missed += behind;
             }
-            let task = departure.task;
-            let application = self.tasks.get_mut(task).map(|task| &mut task.application);
-            if let Some(judged) = application.and_then(|one| one.begin_cycle(self.given)) {
+            if let Some(judged) = departure.application.begin_cycle(self.given) {
+                let task = departure.task;
                 judged.tell(task, statistics, events);
+                if judged.changed {
+                    self.withhold(task, judged.withheld);
+                }
             }
         }
         Some(())
     }
 
-    /// Which of several departures is due, and how many cycles of it were slept through. There is one:
-    /// [`Cyclic::next_at`] has come.
-    #[inline(never)]
-    fn first_due(&mut self, now: Instant) -> (usize, u64) {
-        let at = self.departures.iter().position(|one| one.next_at <= now).unwrap_or(usize::MAX);
-        let behind = self.departures.get_mut(at).map_or(0, |one| one.advance(now));
-        self.next_at = self.departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX);
-        (at, behind)
+    /// Outputs of a task must not be sent as fresh ones from now on, or may again.
+    #[cold]
+    fn withhold(&mut self, task: usize, withheld: bool) {
+        let mine = self.frames.iter_mut().filter(|frame| frame.task == task);
+        mine.for_each(|frame| frame.withhold(withheld));
     }
+}
+
+/// Which of several departures is due, and how many cycles of it were slept through.
+#[inline(never)]
+fn first_due<'a>(
+    departures: &'a mut [Departure],
+    now: Instant,
+    next_at: &mut Instant,
+) -> Option<(&'a mut Departure, u64)> {
+    let at = departures.iter().position(|one| one.next_at <= now)?;
+    let behind = departures[at].depart(now);
+    *next_at = earliest(departures);
+    Some((&mut departures[at], behind))
 }

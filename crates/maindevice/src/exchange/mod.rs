@@ -52,9 +52,11 @@ pub struct Transmit {
     pub len: usize,
 }
 
-/// How a cyclic frame is to be sent.
+/// How a cyclic frame is sent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Order {
+    /// Which of the prebuilt ones it is.
+    pub(crate) frame: u32,
     /// When it is given up.
     pub(crate) deadline: Instant,
     /// Its outputs are not to be taken for fresh.
@@ -72,7 +74,7 @@ pub(crate) struct Exchange {
     ring: bool,
     /// As many as an index byte can name.
     slots: Box<[Slot; SLOTS]>,
-    /// The frames of the running plan.
+    /// The frames of the running plan, for what comes back otherwise than nearly always, and for copies.
     cyclic: Vec<Prebuilt>,
     /// How many slots are waiting.
     waiting: usize,
@@ -166,42 +168,58 @@ impl Exchange {
         self.wait_until(deadline);
     }
 
-    /// Takes over the frames of a plan. Those of the last one must have been abandoned.
-    pub(crate) fn prebuild(&mut self, frames: impl Iterator<Item = FramePlan>) {
+    /// Takes over the frames of a plan, and gives them to those who send them. Those of the last one must
+    /// have been abandoned.
+    pub(crate) fn prebuild(&mut self, frames: impl Iterator<Item = FramePlan>) -> Vec<Prebuilt> {
         let (source, ring) = (self.sources[0], self.ring);
-        self.cyclic = frames.map(|frame| Prebuilt::new(&frame, source, ring)).collect();
+        self.cyclic =
+            (0..).zip(frames).map(|(at, one)| Prebuilt::new(at, &one, source, ring)).collect();
+        self.cyclic.clone()
     }
 
-    /// Sends a prebuilt frame, with the outputs that `fill` puts into it, by all cards, as often as is
-    /// planned. Its first copy is written into `buffer` and leaves at once; the others wait to be
-    /// fetched by [`Exchange::poll_transmit`], which must have given all it had. Gives the frame's
-    /// length; `None`: all slots are taken, and it does not go.
+    /// Whether the slot of the next number still waits for its answer. [`Exchange::skip_taken`] finds
+    /// another.
     #[inline]
-    pub(crate) fn send_cyclic(
-        &mut self,
-        frame: u32,
-        order: Order,
-        fill: impl FnOnce(&mut [u8]),
-        buffer: &mut [u8],
-    ) -> Option<usize> {
-        let (at, number) = self.free_slot()?;
-        let prebuilt = self.cyclic.get_mut(frame as usize)?;
-        let sent = buffer.get_mut(..prebuilt.len())?;
+    pub(crate) fn is_next_taken(&self) -> bool {
+        let [at, ..] = self.number.to_le_bytes();
+        self.slot(at).state == SlotState::Waiting
+    }
+
+    /// Passes over numbers whose slots still wait for their answers; false when all do.
+    #[cold]
+    pub(crate) fn skip_taken(&mut self) -> bool {
+        let found = self.free_slot();
+        found.is_some_and(|(_, number)| {
+            self.number = number;
+            true
+        })
+    }
+
+    /// A prebuilt frame goes out, at once: gives its number, whose slot must be free.
+    /// [`Exchange::poll_transmit`] must have given all it had.
+    #[inline]
+    pub(crate) fn begin_cyclic(&mut self, order: Order, prebuilt: &Prebuilt) -> u32 {
+        let Order { frame, deadline, withheld } = order;
+        let number = self.number;
+        let [at, ..] = number.to_le_bytes();
         let slot = &mut self.slots[usize::from(at)];
         slot.number = number;
-        slot.withheld = order.withheld;
-        slot.begin(Purpose::Cyclic { frame }, order.deadline, prebuilt.copies());
-        slot.awaited = if self.ring { Slot::NONE } else { frame };
-        self.waiting += 1;
-        self.earliest = self.earliest.min(order.deadline);
-        prebuilt.write(number, order.withheld, sent);
-        fill(sent);
-        if prebuilt.copies().unsent > 0 {
-            // They are the same, outputs and all.
-            prebuilt.keep(sent);
-            self.outgoing.push(at);
-        }
-        Some(sent.len())
+        slot.withheld = withheld;
+        slot.begin(Purpose::Cyclic { frame }, deadline, prebuilt.copies());
+        slot.awaited = prebuilt.awaited();
+        self.number = number.wrapping_add(1);
+        self.wait_until(deadline);
+        number
+    }
+
+    /// The same frame is to be sent by other cards, or again: these copies, outputs and all, wait to be
+    /// fetched by [`Exchange::poll_transmit`].
+    #[cold]
+    pub(crate) fn keep_copies(&mut self, frame: u32, number: u32, sent: &[u8]) {
+        let Some(prebuilt) = self.cyclic.get_mut(frame as usize) else { return };
+        prebuilt.keep(sent);
+        let [at, ..] = number.to_le_bytes();
+        self.outgoing.push(at);
     }
 
     /// One more slot waits.
@@ -212,18 +230,8 @@ impl Exchange {
     }
 
     /// A slot that is free, and the number of the frame in it.
-    #[inline]
+    #[inline(never)]
     fn free_slot(&mut self) -> Option<(u8, u32)> {
-        let number = self.number;
-        let [at, ..] = number.to_le_bytes();
-        if self.slots[usize::from(at)].state == SlotState::Waiting {
-            return self.next_free_slot();
-        }
-        self.number = number.wrapping_add(1);
-        Some((at, number))
-    }
-
-    fn next_free_slot(&mut self) -> Option<(u8, u32)> {
         for _ in 0..SLOTS {
             let number = self.number;
             self.number = number.wrapping_add(1);

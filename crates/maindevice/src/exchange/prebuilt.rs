@@ -14,17 +14,25 @@ use linesman_proto::ethernet::{HEADER_LEN, MAX_LEN, MacAddress};
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, FrameBuilder};
 use linesman_proto::sii::Direction;
 
-use super::slot::Copies;
+use super::slot::{Copies, Slot};
 
 /// Bits of the first eight header bytes that come back as they were sent: all but the round-trip
 /// bit, which a controller may set.
 const SAME: u64 = !(0x4000_u64 << 48);
+/// The index byte.
+const INDEX: u64 = 0xFF << 8;
 /// The ADP field: controllers count it up in position and broadcast commands.
 const ADP: u64 = 0xFFFF_u64 << 16;
 
 /// Where the first datagram begins, and its index byte.
 pub(super) const FIRST_HEADER: usize = HEADER_LEN + ETHERCAT_HEADER_LEN;
 pub(super) const FIRST_INDEX: usize = FIRST_HEADER + 1;
+/// What of a datagram header is compared.
+const HEAD_LEN: usize = 8;
+/// All that is before the first of them, and it.
+pub(super) const FIRST_HEAD_END: usize = FIRST_HEADER + HEAD_LEN;
+/// Where the data of the first datagram begin.
+const FIRST_DATA: usize = FIRST_HEADER + DATAGRAM_HEADER_LEN;
 
 /// One datagram of a prebuilt frame.
 #[derive(Clone, Copy, Debug)]
@@ -37,27 +45,59 @@ struct Shape {
     masks: [u64; 2],
 }
 
+impl Shape {
+    /// No datagram.
+    const NONE: Self = Self { at: FIRST_HEADER, heads: [0; 2], masks: [u64::MAX; 2] };
+
+    #[inline]
+    fn head(&self, index: u8, withheld: bool) -> u64 {
+        self.heads[usize::from(withheld)] | u64::from(index) << 8
+    }
+
+    /// Whether a head is that of this datagram, whatever its index.
+    #[inline]
+    fn is_like(&self, head: u64, withheld: bool) -> bool {
+        let variant = usize::from(withheld);
+        (head ^ self.heads[variant]) & self.masks[variant] & !INDEX == 0
+    }
+}
+
 /// Outputs of fewer bytes are copied twice: one long copy is cheaper than many short ones.
 const LONG: usize = 128;
 /// Where what follows the addresses of a frame begins.
 const BEHIND_ADDRESSES: usize = 12;
 
-/// A cyclic frame as card A sends it.
-#[derive(Debug)]
+/// A piece of a frame that is the same each time.
+#[derive(Clone, Debug)]
+enum Piece {
+    /// Zeros: what is read, and working counters.
+    Zeros(Range<usize>),
+    /// Anything else.
+    Bytes(Range<usize>),
+}
+
+/// A cyclic frame as card A sends it. Who sends it has it at hand beside what else there is to it; the
+/// exchange has another for what comes back otherwise than nearly always.
+#[derive(Clone, Debug)]
 pub(crate) struct Prebuilt {
-    /// With index 0 and without outputs; where copies follow, the one that was sent last.
+    /// Without outputs; in the exchange, where copies follow, the one that was sent last.
     bytes: Vec<u8>,
-    /// What of these bytes is copied into a frame that is sent: so many from the beginning, and these.
-    beginning: usize,
-    others: Vec<Range<usize>>,
-    /// What comes back as it was sent if nobody had a hand in it.
+    /// What of these bytes, behind the first head, is copied into a frame that is sent; empty: all.
+    pieces: Vec<Piece>,
+    /// All that is before the data of the first datagram.
+    beginning: [u8; FIRST_DATA],
+    /// What comes back as it was sent if nobody had a hand in it, but for what
+    /// [`Prebuilt::matches`] compares.
     fixed: Vec<Range<usize>>,
     /// What becomes of the copies behind the first.
     copies: Copies,
+    /// Which of the plan's it is, where its only answer is waited for; else [`Slot::NONE`].
+    awaited: u32,
+    /// The first datagram, at hand, and all of them.
+    first: Shape,
     shapes: Vec<Shape>,
     /// Bytes that a whole reply has at least.
     len: usize,
-    withheld: bool,
 }
 
 /// What a datagram becomes when its outputs must not be taken for fresh: what is read goes on.
@@ -83,7 +123,7 @@ pub(crate) const fn withheld(command: Command) -> Command {
 
 impl Prebuilt {
     /// The frame of a plan. What does not fit, which no plan has, is left out.
-    pub(crate) fn new(plan: &FramePlan, source: MacAddress, ring: bool) -> Self {
+    pub(crate) fn new(index: u32, plan: &FramePlan, source: MacAddress, ring: bool) -> Self {
         let mut bytes = vec![0; MAX_LEN];
         let mut builder = FrameBuilder::new(&mut bytes, source);
         let mut at = FIRST_HEADER;
@@ -123,58 +163,92 @@ impl Prebuilt {
         let whole = outputs().filter(|(own, _)| own.is_bytewise());
         let mut long = joined(whole.map(|(_, range)| range));
         long.retain(|range| range.len() >= LONG);
-        let mut others = gaps(0..len, long);
-        // No output lies in the headers.
-        let beginning = if others.is_empty() { 0 } else { others.remove(0).end };
-        let indices = shapes.iter().map(|shape| shape.at + 1..shape.at + 2);
-        let moving = joined(outputs().map(|(_, range)| range).chain(indices));
+        let pieces = match long.is_empty() {
+            true => Vec::new(),
+            false => {
+                let gaps = gaps(FIRST_DATA..len, long);
+                gaps.into_iter().flat_map(|gap| pieces(&bytes, gap)).collect()
+            }
+        };
+        let beginning = bytes.first_chunk().copied().unwrap_or([0; FIRST_DATA]);
+        // Command and index are compared anyway.
+        let heads = shapes.iter().map(|shape| shape.at..shape.at + 2);
+        let moving = joined(outputs().map(|(_, range)| range).chain(heads));
         let fixed = gaps(BEHIND_ADDRESSES..len, moving);
         let mut copies = Copies::new(plan.repeats.saturating_add(1), ring);
         copies.unsent -= 1;
-        Self { shapes, bytes, beginning, others, fixed, copies, len: at, withheld: false }
+        let awaited = if ring { Slot::NONE } else { index };
+        let first = shapes.first().copied().unwrap_or(Shape::NONE);
+        Self { bytes, pieces, beginning, fixed, copies, awaited, first, shapes, len: at }
     }
 
     /// How many bytes it has.
     #[inline]
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.bytes.len()
     }
 
     /// Puts the frame with this number together in `sent`, which is as long, but for its outputs, of
     /// which only those are zero that are short.
     #[inline]
-    pub(super) fn write(&mut self, number: u32, withheld: bool, sent: &mut [u8]) {
-        if self.withheld != withheld {
-            self.withhold(withheld);
-        }
-        let beginning = (sent.get_mut(..self.beginning), self.bytes.get(..self.beginning));
-        if let (Some(to), Some(from)) = beginning {
-            to.copy_from_slice(from);
-        }
+    pub(crate) fn write(&mut self, number: u32, sent: &mut [u8]) {
         let [first, ..] = number.to_le_bytes();
-        if let Some(index) = sent.get_mut(FIRST_INDEX) {
-            *index = first;
+        if self.pieces.is_empty() && sent.len() == self.bytes.len() {
+            if let Some(index) = self.bytes.get_mut(FIRST_INDEX) {
+                *index = first;
+            }
+            sent.copy_from_slice(&self.bytes);
+        } else {
+            self.beginning[FIRST_INDEX] = first;
+            self.write_pieces(sent);
         }
-        if self.shapes.len() > 1 || !self.others.is_empty() {
+        if self.shapes.len() > 1 {
             self.write_others(number, sent);
         }
     }
 
-    /// What is behind the first datagram, and behind long outputs.
-    #[inline(never)]
-    fn write_others(&self, number: u32, sent: &mut [u8]) {
-        for range in &self.others {
-            if let (Some(to), Some(from)) =
-                (sent.get_mut(range.clone()), self.bytes.get(range.clone()))
-            {
-                to.copy_from_slice(from);
+    #[inline]
+    fn write_pieces(&self, sent: &mut [u8]) {
+        if let Some(beginning) = sent.first_chunk_mut() {
+            *beginning = self.beginning;
+        }
+        for piece in &self.pieces {
+            match piece {
+                Piece::Zeros(range) => {
+                    if let Some(to) = sent.get_mut(range.clone()) {
+                        to.fill(0);
+                    }
+                }
+                Piece::Bytes(range) => {
+                    if let (Some(to), Some(from)) =
+                        (sent.get_mut(range.clone()), self.bytes.get(range.clone()))
+                    {
+                        to.copy_from_slice(from);
+                    }
+                }
             }
         }
+    }
+
+    /// Index bytes of the datagrams behind the first.
+    #[inline(never)]
+    fn write_others(&self, number: u32, sent: &mut [u8]) {
         let [_, others, ..] = number.to_le_bytes();
         for shape in self.shapes.iter().skip(1) {
             if let Some(index) = sent.get_mut(shape.at + 1) {
                 *index = others;
             }
+        }
+    }
+
+    /// Turns datagrams that carry outputs into such that do not, or back.
+    #[cold]
+    pub(crate) fn withhold(&mut self, withheld: bool) {
+        for shape in &self.shapes {
+            self.bytes[shape.at] = shape.head(0, withheld).to_le_bytes()[0];
+        }
+        if let Some(beginning) = self.bytes.first_chunk() {
+            self.beginning = *beginning;
         }
     }
 
@@ -184,9 +258,20 @@ impl Prebuilt {
         self.bytes.copy_from_slice(sent);
     }
 
+    /// Whether copies of it are to follow.
+    #[inline]
+    pub(crate) const fn is_copied(&self) -> bool {
+        self.copies.unsent > 0
+    }
+
     #[inline]
     pub(super) const fn copies(&self) -> &Copies {
         &self.copies
+    }
+
+    #[inline]
+    pub(super) const fn awaited(&self) -> u32 {
+        self.awaited
     }
 
     /// Whether a frame with the datagrams that were sent is as it left the card: nobody had a hand in it.
@@ -199,28 +284,14 @@ impl Prebuilt {
         &self.bytes
     }
 
-    /// Turns datagrams that carry outputs into such that do not, or back.
-    #[cold]
-    fn withhold(&mut self, withheld: bool) {
-        self.withheld = withheld;
-        for shape in &self.shapes {
-            self.bytes[shape.at] = shape.heads[usize::from(withheld)].to_le_bytes()[0];
-        }
-    }
-
-    /// The same as [`Prebuilt::matches`] telling that it is as sent, quicker for one datagram.
+    /// The same as [`Prebuilt::matches`] telling that it is as sent, quicker for one datagram. That the
+    /// first index byte names the slot of this number is known.
     #[inline]
-    pub(super) fn is_like(&self, reply: &[u8], number: u32, withheld: bool) -> bool {
-        let head = reply.get(FIRST_HEADER..).and_then(|rest| rest.first_chunk());
-        let (Some(head), [shape, others @ ..]) = (head, self.shapes.as_slice()) else {
-            return false;
-        };
-        let variant = usize::from(withheld);
-        let [index, ..] = number.to_le_bytes();
-        let expected = shape.heads[variant] | u64::from(index) << 8;
-        (u64::from_le_bytes(*head) ^ expected) & shape.masks[variant] == 0
+    pub(crate) fn is_like(&self, reply: &[u8], number: u32, withheld: bool) -> bool {
+        let head = reply.get(FIRST_HEADER..FIRST_HEAD_END).and_then(|rest| rest.first_chunk());
+        head.is_some_and(|head| self.first.is_like(u64::from_le_bytes(*head), withheld))
             && reply.len() >= self.len
-            && (others.is_empty() || self.matches(reply, number, withheld) == Shaped::AsSent)
+            && (self.shapes.len() == 1 || self.matches(reply, number, withheld) == Shaped::AsSent)
     }
 
     /// Whether a reply has the datagrams that were sent with this number.
@@ -232,7 +303,7 @@ impl Prebuilt {
             let Some(head) = reply.get(shape.at..).and_then(|rest| rest.first_chunk()) else {
                 return Shaped::CutOff;
             };
-            let expected = shape.heads[variant] | u64::from(index) << 8;
+            let expected = shape.head(index, withheld);
             if (u64::from_le_bytes(*head) ^ expected) & shape.masks[variant] != 0 {
                 return Shaped::Otherwise;
             }
@@ -278,6 +349,17 @@ fn gaps(all: Range<usize>, taken: Vec<Range<usize>>) -> Vec<Range<usize>> {
         at = at.max(range.end);
     }
     gaps
+}
+
+/// A gap between long outputs as pieces: its zeros, as far as they are many, and the bytes before them.
+/// What is read lies behind the outputs, and a working counter behind that.
+fn pieces(bytes: &[u8], gap: Range<usize>) -> impl Iterator<Item = Piece> {
+    let same = bytes.get(gap.clone()).unwrap_or_default();
+    let zeros = same.iter().rev().take_while(|byte| **byte == 0).count();
+    let split = if zeros >= LONG { gap.end - zeros } else { gap.end };
+    let (before, behind) = (gap.start..split, split..gap.end);
+    let before = (!before.is_empty()).then_some(Piece::Bytes(before));
+    before.into_iter().chain((!behind.is_empty()).then_some(Piece::Zeros(behind)))
 }
 
 /// Where the data of each datagram of a plan's frame begin, in order.

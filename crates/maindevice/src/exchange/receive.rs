@@ -4,7 +4,7 @@ use linesman_proto::address::Path;
 use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, MAX_LEN, MacAddress, SOURCE_MARK};
 use linesman_proto::time::Instant;
 
-use super::prebuilt::{FIRST_HEADER, FIRST_INDEX, Shaped};
+use super::prebuilt::{FIRST_HEAD_END, FIRST_INDEX, Shaped};
 use super::{Exchange, Purpose, Slot, SlotState, merge};
 
 /// Offset of the source address in a frame.
@@ -37,6 +37,19 @@ pub(crate) enum Received {
     Foreign,
 }
 
+/// A cyclic frame that seems to have come back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Awaited {
+    /// Its slot.
+    pub(crate) slot: u8,
+    /// Which of the prebuilt ones is waited for there; [`Slot::NONE`]: none.
+    pub(crate) frame: u32,
+    /// Its number.
+    pub(crate) number: u32,
+    /// Its outputs were withheld.
+    pub(crate) withheld: bool,
+}
+
 /// Source address and EtherType of a frame as one number.
 pub(super) type Origin = u64;
 
@@ -52,30 +65,31 @@ pub(super) fn origin(source: MacAddress) -> Origin {
 }
 
 impl Exchange {
-    /// Takes a frame if it is what comes back nearly always, without a ring: a cyclic frame that is
-    /// waited for, whole, and marked by the line. Gives which of the prebuilt ones it is, and whether
-    /// its outputs were withheld. For anything else `None`, and nothing has changed:
-    /// [`Exchange::receive`] tells what it is.
+    /// What a frame is, if it looks like what comes back nearly always, without a ring: a cyclic frame
+    /// that is waited for, marked by the line. It is that when its datagrams are, too
+    /// ([`Prebuilt::is_like`](super::prebuilt::Prebuilt::is_like)); then [`Exchange::answered`] takes
+    /// it. For anything else `None`: [`Exchange::receive`] tells what it is.
     #[inline]
-    pub(crate) fn receive_usual(&mut self, frame: &[u8]) -> Option<(u32, bool)> {
-        let head: &[u8; FIRST_HEADER + 8] = frame.first_chunk()?;
-        let slot = &mut self.slots[usize::from(head[FIRST_INDEX])];
-        let index = slot.awaited;
-        let prebuilt = self.cyclic.get(index as usize)?;
+    pub(crate) fn awaited(&self, frame: &[u8]) -> Option<Awaited> {
+        let head: &[u8; FIRST_HEAD_END] = frame.first_chunk()?;
+        let at = head[FIRST_INDEX];
         let origin = head[SOURCE_AT..].first_chunk().map(|word| u64::from_le_bytes(*word));
-        if origin != Some(self.marked)
-            || head[TYPE_AT] >> 4 != DATAGRAMS
-            || frame.len() > MAX_LEN
-            || !prebuilt.is_like(frame, slot.number, slot.withheld)
-        {
+        if origin != Some(self.marked) || head[TYPE_AT] >> 4 != DATAGRAMS || frame.len() > MAX_LEN {
             return None;
         }
+        let slot = self.slot(at);
+        let Slot { awaited, number, withheld, .. } = *slot;
+        Some(Awaited { slot: at, frame: awaited, number, withheld })
+    }
+
+    /// The frame that a slot has waited for is back.
+    #[inline]
+    pub(crate) fn answered(&mut self, at: u8) {
+        let slot = &mut self.slots[usize::from(at)];
         slot.awaited = Slot::NONE;
         slot.copies.arrived[0] = true;
         slot.state = SlotState::Answered;
-        let withheld = slot.withheld;
         self.waits_no_longer();
-        Some((index, withheld))
     }
 
     /// Takes a frame that arrived at card `path`.

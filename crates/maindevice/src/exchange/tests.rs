@@ -209,8 +209,19 @@ fn in_a_broken_ring_each_card_has_positions_of_its_own() {
     assert_eq!(exchange.ring_intact(), Some(false));
 }
 
-/// An exchange with one cyclic frame on its way, and that frame: an LRW and a broadcast read.
-fn with_cyclic(number: u32) -> (Exchange, Vec<u8>) {
+/// Takes a cyclic frame the short way.
+fn receive_usual(exchange: &mut Exchange, frames: &[Prebuilt], back: &[u8]) -> Option<u32> {
+    let awaited = exchange.awaited(back)?;
+    let prebuilt = frames.get(awaited.frame as usize)?;
+    prebuilt.is_like(back, awaited.number, awaited.withheld).then(|| {
+        exchange.answered(awaited.slot);
+        awaited.frame
+    })
+}
+
+/// An exchange with one cyclic frame on its way, and that frame, prebuilt and sent: an LRW and a
+/// broadcast read.
+fn with_cyclic(number: u32) -> (Exchange, Vec<Prebuilt>, Vec<u8>) {
     let mut exchange = exchange(false);
     exchange.number = number;
     let datagram = |command, address, len, role| DatagramPlan {
@@ -234,13 +245,13 @@ fn with_cyclic(number: u32) -> (Exchange, Vec<u8>) {
         image_at: 0,
         masks: Ownership::WHOLE,
     });
-    exchange.prebuild(std::iter::once(FramePlan::new(datagrams)));
-    let order = Order { deadline: NOW + Span::ms(1), withheld: false };
-    let mut buffer = vec![0; MAX_LEN];
-    let fill = |bytes: &mut [u8]| bytes[26..30].copy_from_slice(&[1, 2, 3, 4]);
-    let len = exchange.send_cyclic(0, order, fill, &mut buffer).unwrap();
-    buffer.truncate(len);
-    (exchange, buffer)
+    let mut frames = exchange.prebuild(std::iter::once(FramePlan::new(datagrams)));
+    let order = Order { frame: 0, deadline: NOW + Span::ms(1), withheld: false };
+    let number = exchange.begin_cyclic(order, &frames[0]);
+    let mut sent = vec![0xEE; frames[0].len()];
+    frames[0].write(number, &mut sent);
+    sent[26..30].copy_from_slice(&[1, 2, 3, 4]);
+    (exchange, frames, sent)
 }
 
 proptest! {
@@ -253,8 +264,8 @@ proptest! {
         marked in prop::bool::weighted(0.9),
         len in prop_oneof![3 => Just(60_usize), 1 => 0_usize..1_600],
     ) {
-        let (mut short, sent) = with_cyclic(number);
-        let (mut long, _) = with_cyclic(number);
+        let (mut short, frames, sent) = with_cyclic(number);
+        let (mut long, ..) = with_cyclic(number);
         let mut back = sent;
         back[6] |= if marked { SOURCE_MARK } else { 0 };
         back.resize(len, 0);
@@ -263,14 +274,14 @@ proptest! {
                 *place = byte;
             }
         }
-        let usual = short.receive_usual(&back);
+        let usual = receive_usual(&mut short, &frames, &back);
         let told = long.receive(NOW, Path::A, &back);
         let [at, ..] = number.to_le_bytes();
         if usual.is_some() {
-            prop_assert_eq!((usual, told), (Some((0, false)), Received::Complete(at)));
+            prop_assert_eq!((usual, told), (Some(0), Received::Complete(at)));
             prop_assert_eq!(short.slot(at).state, SlotState::Answered);
             prop_assert_eq!(short.earliest(), Instant::MAX);
-            prop_assert_eq!(short.receive_usual(&back), None, "once only");
+            prop_assert_eq!(receive_usual(&mut short, &frames, &back), None, "once only");
             prop_assert_eq!(short.receive(NOW, Path::A, &back), Received::Duplicate);
         } else {
             prop_assert_eq!(short.slot(at).state, SlotState::Waiting);
@@ -281,10 +292,59 @@ proptest! {
 
 #[test]
 fn an_answer_with_data_and_counters_goes_the_short_way() {
-    let (mut exchange, mut back) = with_cyclic(0x0305);
+    let (mut exchange, frames, mut back) = with_cyclic(0x0305);
     back[6] |= SOURCE_MARK;
     back[32..40].copy_from_slice(&[0x55; 8]);
     // Logical data end at 38; position counters of broadcasts and the round-trip bit change too.
     back[42] = 7;
-    assert_eq!(exchange.receive_usual(&back), Some((0, false)));
+    assert_eq!(receive_usual(&mut exchange, &frames, &back), Some(0));
+}
+
+#[test]
+fn long_outputs_are_left_to_who_fills_them_and_all_else_is_as_planned() {
+    let datagram = |command, address, len, role, outputs: Vec<Ownership>| DatagramPlan {
+        command,
+        address,
+        len,
+        role,
+        sync_unit: None,
+        ownership: outputs,
+    };
+    let outputs = |range: std::ops::Range<usize>| Ownership {
+        device: DeviceId(0),
+        direction: Direction::Outputs,
+        image_at: range.start,
+        range,
+        masks: Ownership::WHOLE,
+    };
+    let logical = |at| DatagramAddress::Logical(LogicalAddress(at));
+    let status = DatagramAddress::Physical(0, RegisterAddress(0x0130));
+    // Where long outputs begin the data, and where they do not; data behind them, and none.
+    for (first, second) in [(0..200, 0..300), (40..240, 300..440), (0..440, 10..150)] {
+        let (one, two) = (vec![outputs(first.clone())], vec![outputs(second.clone())]);
+        let plan = FramePlan::new(vec![
+            datagram(Command::Lrw, logical(0x1_0000), 440, Role::ProcessData, one),
+            datagram(Command::Lrw, logical(0x2_0000), 440, Role::ProcessData, two),
+            datagram(Command::Brd, status, 2, Role::Presence, Vec::new()),
+        ]);
+        let mut frame = Prebuilt::new(0, &plan, SOURCES[0], false);
+        let at = prebuilt::data_offsets(&plan).collect::<Vec<_>>();
+        for (number, withheld) in [(0x0201, false), (0x0403, true), (0x0605, false)] {
+            let mut planned = vec![0; MAX_LEN];
+            let mut builder = FrameBuilder::new(&mut planned, SOURCES[0]);
+            for (place, one) in plan.datagrams.iter().enumerate() {
+                let index = if place == 0 { number as u8 } else { (number >> 8) as u8 };
+                let command = if withheld { prebuilt::withheld(one.command) } else { one.command };
+                builder.push(command, index, one.address, one.len).unwrap();
+            }
+            let len = builder.finish();
+            let mut sent = vec![0xEE; frame.len()];
+            frame.withhold(withheld);
+            frame.write(number, &mut sent);
+            for (data, range) in at.iter().zip([&first, &second]) {
+                sent[data + range.start..data + range.end].fill(0);
+            }
+            assert_eq!(sent, planned[..len]);
+        }
+    }
 }

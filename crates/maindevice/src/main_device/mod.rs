@@ -101,12 +101,10 @@ impl MainDevice {
     /// The next frame to be sent, written into `buffer`, which must hold 1514 bytes.
     #[inline]
     pub fn poll_transmit(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
-        if let Some(running) = &self.running
-            && running.cyclic.is_due(now)
-            && !self.exchange.has_outgoing()
-            && let Some(sent) = self.transmit_cyclic(now, buffer)
+        if !self.exchange.has_outgoing()
+            && let Some(len) = self.transmit_cyclic(now, buffer)
         {
-            return Some(sent);
+            return Some(Transmit { at: now, path: Path::A, len });
         }
         if self.executor.has_news() || self.exchange.has_any() {
             return self.transmit_other(now, buffer);
@@ -123,17 +121,20 @@ impl MainDevice {
             || self.exchange.has_any()
     }
 
-    /// The next frame of those whose cycle has begun.
+    /// The next frame of those whose cycle has begun: its length.
     #[inline(never)]
-    fn transmit_cyclic(&mut self, now: Instant, buffer: &mut [u8]) -> Option<Transmit> {
+    fn transmit_cyclic(&mut self, now: Instant, buffer: &mut [u8]) -> Option<usize> {
         let Self { running, exchange, statistics, executor, .. } = self;
-        let emit = &mut |event| executor.emit(event);
         let cyclic = &mut running.as_mut()?.cyclic;
+        if !cyclic.is_due(now) {
+            return None;
+        }
+        let emit = &mut |event| executor.emit(event);
         let len = cyclic.send_next(now, exchange, statistics, emit, buffer)?;
         self.acyclic_left = self.options.frames_at_once;
         self.statistics.frames_sent += 1;
         self.statistics.cyclic_sent += 1;
-        Some(Transmit { at: now, path: Path::A, len })
+        Some(len)
     }
 
     /// A further copy of a cyclic frame, or a frame of procedures.
@@ -203,14 +204,21 @@ impl MainDevice {
     #[inline(never)]
     pub fn handle_frame(&mut self, now: Instant, path: Path, frame: &[u8]) {
         self.executor.advance(now);
-        match self.exchange.receive_usual(frame) {
-            Some((index, withheld)) => {
-                self.statistics.frames_received += 1;
-                self.take_cyclic(now, index, withheld, frame);
-            }
-            None => self.receive_unusual(now, path, frame),
+        if self.receive_cyclic(now, frame) {
+            self.statistics.frames_received += 1;
+        } else {
+            self.receive_unusual(now, path, frame);
         }
         self.work();
+    }
+
+    /// Takes a frame if it is a cyclic one as it comes back nearly always.
+    #[inline]
+    fn receive_cyclic(&mut self, now: Instant, frame: &[u8]) -> bool {
+        let Some(Running { cyclic, .. }) = &mut self.running else { return false };
+        let (executor, statistics) = (&self.executor, &mut self.statistics);
+        let emit = &mut |event| executor.emit(event);
+        cyclic.receive(now, frame, &mut self.exchange, statistics, emit)
     }
 
     /// Time has come to `now`. Hand over frames that have arrived first: whatever is overdue then is
@@ -250,15 +258,6 @@ impl MainDevice {
         if let Some(running) = &mut self.running {
             running.cyclic.refresh();
         }
-    }
-
-    /// The whole answer of a cyclic frame.
-    #[inline]
-    fn take_cyclic(&mut self, now: Instant, index: u32, withheld: bool, reply: &[u8]) {
-        let Some(running) = &mut self.running else { return };
-        let (executor, statistics) = (&self.executor, &mut self.statistics);
-        let emit = &mut |event| executor.emit(event);
-        running.cyclic.received(now, index, withheld, reply, statistics, emit);
     }
 
     /// All that comes back of a frame is back; `last` is what came back last.

@@ -57,8 +57,12 @@ impl MainDevice {
     /// One more copy of a cyclic frame: taken only when the first was not good.
     fn complete_spare(&mut self, now: Instant, slot: u8, last: &[u8]) {
         let Purpose::Cyclic { frame } = self.exchange.slot(slot).purpose else { return };
-        if !self.options.ring && self.running.as_ref().is_some_and(|one| one.cyclic.is_bad(frame)) {
-            self.complete(now, slot, last);
+        let Some(running) = &mut self.running else { return };
+        if !self.options.ring && running.cyclic.is_bad(frame) {
+            let withheld = self.exchange.slot(slot).withheld;
+            let (executor, statistics) = (&self.executor, &mut self.statistics);
+            let emit = &mut |event| executor.emit(event);
+            running.cyclic.judge(now, frame, withheld, last, statistics, emit);
         }
     }
 }

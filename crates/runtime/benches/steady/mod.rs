@@ -84,26 +84,22 @@ pub struct Answer {
     pub bytes: Vec<u8>,
     /// Where index bytes are: with each cycle they are others.
     pub indices: Vec<usize>,
-    /// A byte of process data, an input: with each cycle it is another.
-    pub input: usize,
 }
 
-/// What comes back of a frame: as the one before it, with the marks of this one and other inputs.
-#[inline(never)]
+/// What comes back of a frame: as the one before it, with the marks of this one.
+#[inline]
 pub fn scripted<'a>(answers: &'a mut [Answer], frame: &[u8]) -> &'a [u8] {
     let Some(answer) = answers.iter_mut().find(|one| one.bytes.len() == frame.len()) else {
         return &[];
     };
-    let bytes = &mut answer.bytes[..frame.len()];
     for at in &answer.indices {
-        bytes[*at] = frame[*at];
+        answer.bytes[*at] = frame[*at];
     }
-    bytes[answer.input] = bytes[answer.input].wrapping_add(1);
-    bytes
+    &answer.bytes
 }
 
 /// What a card does with a frame that it receives: it puts it where it is wanted. Gives its length.
-#[inline(never)]
+#[inline]
 pub fn received(frame: &[u8], room: &mut [u8]) -> usize {
     room[..frame.len()].copy_from_slice(frame);
     frame.len()
@@ -123,7 +119,7 @@ pub fn answers(plan: &Plan) -> Vec<Answer> {
         let len = builder.finish();
         bytes.truncate(len);
         bytes[6] |= linesman_proto::ethernet::SOURCE_MARK;
-        let (mut at, mut indices, mut input) = (16, Vec::new(), 0);
+        let (mut at, mut indices) = (16, Vec::new());
         for datagram in &frame.datagrams {
             let wkc = expect(datagram, &all, PathView::Merged).0;
             let data_at = at + DATAGRAM_HEADER_LEN;
@@ -133,12 +129,13 @@ pub fn answers(plan: &Plan) -> Vec<Answer> {
             let wkc_at = data_at + datagram.len;
             bytes[wkc_at..wkc_at + 2].copy_from_slice(&wkc.to_le_bytes());
             if datagram.role == Role::ProcessData {
-                input = wkc_at - 1;
+                // Inputs, at the end.
+                bytes[wkc_at - 1] = 0x5A;
             }
             indices.push(at + 1);
             at += datagram.len + DATAGRAM_OVERHEAD;
         }
-        Answer { bytes, indices, input }
+        Answer { bytes, indices }
     };
     plan.tasks[0].frames.iter().map(answer).collect()
 }

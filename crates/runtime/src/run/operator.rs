@@ -260,7 +260,7 @@ impl<A: Application> Audience for Operator<A> {
 
     #[inline]
     fn room(&mut self, now: Instant) -> Option<&mut [u8]> {
-        self.tap.as_mut().map(|tap| tap.room(now))
+        self.tap.as_mut().map(|tap| &mut tap.room(now)[..])
     }
 
     #[inline]

@@ -5,7 +5,10 @@
 //! full or old log is handed over as a whole to the thread that judges, and an empty one taken in
 //! return. When that thread does not keep up, frames are left out and counted: the cycle never waits.
 
-use std::sync::mpsc::{self, Receiver, SyncSender, TrySendError};
+use std::sync::atomic::{Ordering, fence};
+use std::sync::mpsc::{self, Receiver, SyncSender, TryRecvError, TrySendError};
+use std::sync::{Arc, OnceLock};
+use std::thread::{self, Thread};
 
 use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
 use linesman_proto::address::{Network, Path};
@@ -20,6 +23,8 @@ pub const FRAME_ROOM: usize = 1_536;
 const HEAD: usize = 24;
 /// What a frame takes at most.
 const ENTRY: usize = HEAD + FRAME_ROOM;
+/// A log with more bytes than this is full: one of the longest has no room any more.
+const FULL: usize = ROOM - ENTRY;
 /// Logs on their way: so far may the judging thread fall behind.
 const LOGS: usize = 8;
 /// A log that is older than this is handed over although it is not full.
@@ -30,16 +35,17 @@ const PAUSE: Span = Span::ms(5);
 
 /// Frames and what the host noticed, in order of time.
 pub struct Log {
-    /// The entries one behind the other, and how many bytes they take. There is room for another as
-    /// long as one of the longest fits.
-    bytes: Box<[u8]>,
+    /// The entries one behind the other, and how many bytes they take.
+    bytes: Box<[u8; ROOM]>,
     len: usize,
     host: Vec<HostObservation>,
 }
 
 impl Log {
-    fn new(bytes: usize) -> Self {
-        Self { bytes: vec![0; bytes].into(), len: 0, host: Vec::new() }
+    fn new() -> Self {
+        // Not on the stack.
+        let bytes = vec![0; ROOM].into_boxed_slice().try_into();
+        Self { bytes: bytes.unwrap_or_else(|_| Box::new([0; ROOM])), len: 0, host: Vec::new() }
     }
 
     fn clear(&mut self) {
@@ -47,10 +53,26 @@ impl Log {
         self.host.clear();
     }
 
-    /// Where the next entry goes; `None`: the log is full.
+    /// Whether there is no room for another entry.
     #[inline]
-    fn next(&mut self) -> Option<&mut [u8; ENTRY]> {
-        self.bytes.get_mut(self.len..)?.first_chunk_mut()
+    const fn is_full(&self) -> bool {
+        self.len > FULL
+    }
+
+    /// Where the next frame goes.
+    #[inline]
+    fn room(&mut self) -> Option<&mut [u8; FRAME_ROOM]> {
+        self.bytes.get_mut(self.len + HEAD..)?.first_chunk_mut()
+    }
+
+    /// The frame there, so many bytes, is one more entry.
+    #[inline]
+    fn keep(&mut self, passed: &Passed, len: usize) {
+        let Some(head) = self.bytes.get_mut(self.len..).and_then(<[u8]>::first_chunk_mut) else {
+            return;
+        };
+        passed.write(len, head);
+        self.len += HEAD + len;
     }
 
     /// The frames, oldest first.
@@ -158,15 +180,39 @@ pub struct Tap {
     /// Frames that were left out.
     left_out: u64,
     /// Where they go.
-    nowhere: Box<[u8; ENTRY]>,
+    nowhere: Box<[u8; FRAME_ROOM]>,
     /// Wait for the other side rather than leave anything out.
     waits: bool,
+    /// Behind `full`, so that it rings once more when that is gone.
+    bell: Bell,
+}
+
+/// Wakes the thread that judges when there is a log for it. A channel would do that, too, but under a
+/// lock, for which the cycle would have to wait.
+struct Bell(Arc<OnceLock<Thread>>);
+
+impl Bell {
+    fn ring(&self) {
+        // Either it finds what was sent before this, or its name is found behind it.
+        fence(Ordering::SeqCst);
+        if let Some(thread) = self.0.get() {
+            thread.unpark();
+        }
+    }
+}
+
+impl Drop for Bell {
+    fn drop(&mut self) {
+        self.ring();
+    }
 }
 
 /// The end of the thread that judges.
 pub struct Listener {
     full: Receiver<Log>,
     empty: SyncSender<Log>,
+    /// Its thread, from when it first asks.
+    thread: Arc<OnceLock<Thread>>,
 }
 
 /// Both ends. In virtual time a tap may wait; on a real line it must not.
@@ -177,19 +223,21 @@ pub fn tap(waits: bool) -> (Tap, Listener) {
     let (to_cycle, empty) = mpsc::sync_channel(LOGS + 1);
     for _ in 0..LOGS {
         // There is room for all of them.
-        let _ = to_cycle.try_send(Log::new(ROOM));
+        let _ = to_cycle.try_send(Log::new());
     }
+    let thread = Arc::default();
     let tap = Tap {
-        log: Log::new(ROOM),
+        log: Log::new(),
         due: Instant::ZERO,
         full_until: Instant::ZERO,
         full,
         empty,
         left_out: 0,
-        nowhere: Box::new([0; ENTRY]),
+        nowhere: Box::new([0; FRAME_ROOM]),
         waits,
+        bell: Bell(Arc::clone(&thread)),
     };
-    (tap, Listener { full: from_cycle, empty: to_cycle })
+    (tap, Listener { full: from_cycle, empty: to_cycle, thread })
 }
 
 impl Tap {
@@ -206,23 +254,20 @@ impl Tap {
     /// Room for a frame that passes about `now`. [`Tap::keep`] says that it did, else it is as if
     /// nothing had been written.
     #[inline]
-    pub fn room(&mut self, now: Instant) -> &mut [u8] {
-        if self.log.next().is_none() {
-            self.next_log(now);
+    pub fn room(&mut self, now: Instant) -> &mut [u8; FRAME_ROOM] {
+        if self.log.is_full() {
+            return self.other_room(now);
         }
-        let (_, room) = self.log.next().unwrap_or(&mut self.nowhere).split_at_mut(HEAD);
-        room
+        self.log.room().unwrap_or(&mut self.nowhere)
     }
 
     /// The frame that was written into [`Tap::room`] has passed; it has so many bytes.
     #[inline]
     pub fn keep(&mut self, passed: &Passed, len: usize) {
-        let Some(entry) = self.log.next() else { return self.leave_out() };
-        let len = len.min(FRAME_ROOM);
-        if let Some(head) = entry.first_chunk_mut() {
-            passed.write(len, head);
+        if self.log.is_full() {
+            return self.leave_out();
         }
-        self.log.len += HEAD + len;
+        self.log.keep(passed, len.min(FRAME_ROOM));
     }
 
     #[cold]
@@ -232,11 +277,12 @@ impl Tap {
 
     /// The log is full: the next one takes the frame, if there is one.
     #[cold]
-    fn next_log(&mut self, now: Instant) {
+    fn other_room(&mut self, now: Instant) -> &mut [u8; FRAME_ROOM] {
         // Asking again and again costs more than the frames are worth.
         if now >= self.full_until && !self.hand_over() {
             self.full_until = now + PAUSE;
         }
+        self.log.room().unwrap_or(&mut self.nowhere)
     }
 
     /// The host noticed something.
@@ -277,21 +323,21 @@ impl Tap {
         next.clear();
         let log = std::mem::replace(&mut self.log, next);
         match self.full.try_send(log) {
-            Ok(()) => true,
+            Ok(()) => self.bell.ring(),
             // As many logs as there is room for: it cannot be full.
             Err(TrySendError::Full(log) | TrySendError::Disconnected(log)) => {
                 self.log = log;
                 self.log.clear();
-                true
             }
         }
+        true
     }
 }
 
 impl Drop for Tap {
     fn drop(&mut self) {
         // Nobody may listen any more.
-        let _ = self.full.try_send(std::mem::replace(&mut self.log, Log::new(0)));
+        let _ = self.full.try_send(std::mem::replace(&mut self.log, Log::new()));
     }
 }
 
@@ -302,7 +348,18 @@ impl Listener {
             // The run may have ended.
             let _ = self.empty.try_send(done);
         }
-        self.full.recv().ok()
+        if self.thread.get().is_none() {
+            // Once: nobody else asks.
+            let _ = self.thread.set(thread::current());
+            fence(Ordering::SeqCst);
+        }
+        loop {
+            match self.full.try_recv() {
+                Ok(log) => return Some(log),
+                Err(TryRecvError::Disconnected) => return None,
+                Err(TryRecvError::Empty) => thread::park(),
+            }
+        }
     }
 }
 
@@ -345,5 +402,28 @@ mod tests {
         }
         assert!(left_out > 0, "nobody listened");
         assert_eq!(seen + left_out, sent);
+    }
+
+    #[test]
+    fn who_judges_is_woken_for_each_log_and_at_the_end() {
+        let (mut tap, listener) = tap(true);
+        let judge = std::thread::spawn(move || {
+            let (mut seen, mut done) = (0, None);
+            while let Some(log) = listener.next(done.take()) {
+                seen += log.frames().count() as u64;
+                done = Some(log);
+            }
+            seen
+        });
+        // Every third frame finds the log old, so that it is handed over with hardly anything in it.
+        let sent = 3_000;
+        for number in 0..sent {
+            let time = Instant::ZERO + Span::ms(20) * number;
+            tap.frame(&FrameSeen { time, ..frame(number, &[0; 60]) });
+            tap.turn(time);
+        }
+        assert_eq!(tap.left_out(), 0);
+        drop(tap);
+        assert_eq!(judge.join().unwrap(), sent);
     }
 }
