@@ -8,7 +8,8 @@
 //! **What it means.** `X510`: frames came back well and were thrown away by the computer; they look like
 //! lost frames, and no cable is to blame. `X511`: the computer did not begin its cycles in time: another
 //! program, power saving, a kernel without real-time scheduling. SubDevices that expect frames in
-//! time may lose synchronisation, and watchdogs may expire. `X512`: frames did not even leave.
+//! time may lose synchronisation, and watchdogs may expire. `X512`: frames did not even leave; where that was so for
+//! a while and then no more, the computer or its driver stood still, else the card may be damaged.
 //!
 //! **What to do.** Give the program real-time priority, a CPU of its own and locked memory; switch off
 //! power saving; use a card with a driver of its own and larger buffers.
@@ -100,9 +101,17 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         if let Some((first, last)) = span(&card.send_failures).filter(|_| carrier) {
             let text =
                 format!("{} frames could not be sent by card {path}", card.send_failures.sum);
-            let condition = begin(view, &SENDING, FaultName::NicDamaged, first, last)
+            // Who refuses frames for a while and then takes all of them stood still; damage comes again.
+            let returned = view.line.traffic.latest_returned.map(|seen| seen.at);
+            let stood_still = last.since(first) <= QUIET && returned.is_some_and(|at| at > last);
+            let (cause, other) = match stood_still {
+                true => (FaultName::WatchdogStarved, FaultName::NicDamaged),
+                false => (FaultName::NicDamaged, FaultName::WatchdogStarved),
+            };
+            let condition = begin(view, &SENDING, cause, first, last)
                 .confidence(0.5)
-                .or(FaultName::HostDrops, 0.3)
+                .or(other, 0.25)
+                .or(FaultName::HostDrops, 0.1)
                 .shown_by(Evidence::host(Some(last), text))
                 .explaining([Symptom::FramesLost])
                 .about([Symptom::NobodyAnswers])
