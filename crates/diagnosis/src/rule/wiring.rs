@@ -24,22 +24,22 @@
 //! **What to do.** Compare the cables at the named ports with the drawing, in the named order. IN is port A,
 //! the upper socket (X1) of most couplers. Where the wiring is what is wanted, scan anew and save the project.
 
-use linesman_config::compare::{
-    Comparison, Difference, Side, There, Unlike, Wanted, compare, unlike,
-};
+mod found;
+
+use linesman_config::compare::{Comparison, Difference, There, Unlike, Wanted};
 use linesman_config::fault::{Class, FaultName};
 use linesman_config::identity;
-use linesman_proto::address::{DeviceId, Path, Position};
+use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::table;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::derive::EntryBasis;
-use linesman_proto::topology::{End, Reconstruction, Tree};
+use linesman_proto::topology::{End, Tree};
 
 use super::identity::{EXTRA, MISSING, WRONG};
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, Line, Seen};
+use crate::line::{Line, Seen};
 
 /// Plugged otherwise.
 pub const PLUGGED: RulePage = RulePage {
@@ -101,105 +101,6 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 impl<'a> Found<'a> {
-    fn of(line: &'a Line) -> Option<Self> {
-        let planned = line.tree.as_ref().filter(|_| line.tree_is_planned)?;
-        if planned.closes_at().is_some() || !line.devices.iter().any(is_known_to_plan) {
-            // In a ring receive times and open ports say something else.
-            return None;
-        }
-        let mut ids: Vec<DeviceId> =
-            planned.order().iter().map(|node| DeviceId(*node as u32)).collect();
-        ids.extend(
-            line.devices.iter().map(|device| device.id).filter(|id| id.index() >= planned.len()),
-        );
-        let count = usize::from(line.traffic.positions_seen);
-        if count == 0 || count > ids.len() {
-            return None;
-        }
-        ids.truncate(count);
-        // Where positions have moved, their station addresses tell whose answers they are taken for.
-        let placed = (0..line.traffic.positions_seen).map(|at| line.by_position(Position(at)));
-        if let Some(placed) = placed.collect::<Option<Vec<DeviceId>>>() {
-            ids = placed;
-        }
-        let devices: Vec<&Device> = ids.iter().filter_map(|id| line.device(*id)).collect();
-        let is_whole = devices.len() == count
-            && devices
-                .iter()
-                .all(|device| device.dl.first.is_some() && device.identity.identity().is_some());
-        if !is_whole {
-            return None;
-        }
-        let seen: Vec<_> = devices.iter().map(|device| device.as_first_seen()).collect();
-        let Reconstruction { tree, entry_basis, errors, .. } = Reconstruction::of(Path::A, &seen);
-        if !errors.is_empty() || tree.detached().next().is_some() {
-            return None;
-        }
-        let wanted = (0..planned.len()).map(|node| wanted(line.devices.get(node))).collect();
-        let there = devices.iter().map(|device| There {
-            identity: device.identity.identity(),
-            alias: device.alias.map(|alias| alias.value()),
-        });
-        let latest = devices.iter().filter_map(|device| device.identity.product_code);
-        let latest = latest.max_by_key(|seen| seen.at);
-        Some(Self {
-            line,
-            planned,
-            wanted,
-            there: there.collect(),
-            tree,
-            basis: entry_basis,
-            ids,
-            at: latest.map_or(Instant::ZERO, |seen| seen.at),
-            frame: latest.and_then(|seen| seen.frame),
-        })
-    }
-
-    fn compare(&self) -> Comparison {
-        if self.is_as_planned() {
-            return Comparison::default();
-        }
-        compare(
-            Side { tree: self.planned, nodes: &self.wanted },
-            Side { tree: &self.tree, nodes: &self.there },
-        )
-    }
-
-    /// The cheap answer for a line that is well.
-    fn is_as_planned(&self) -> bool {
-        self.tree.len() == self.planned.len()
-            && self.ids.iter().enumerate().all(|(node, id)| {
-                let wanted = id.index();
-                self.tree.entry(node) == self.planned.entry(wanted)
-                    && Port::ALL.into_iter().all(|port| {
-                        self.tree.is_open(node, port) == self.planned.is_open(wanted, port)
-                    })
-                    && unlike(&self.wanted[wanted], &self.there[node]).is_none()
-            })
-    }
-
-    /// Whether a comparison says anything that can be relied on.
-    fn tells(&self, comparison: &Comparison) -> bool {
-        let is_gone = |difference: &Difference| {
-            matches!(difference, Difference::Missing { planned, all }
-                if all.len() == self.planned.subtree(*planned).len())
-        };
-        let is_seen = |found: &usize| {
-            matches!(
-                self.basis.get(*found),
-                Some(EntryBasis::ReceiveTimes | EntryBasis::OnlyPlace | EntryBasis::OnlyPort)
-            )
-        };
-        let is_guessed = |difference: &Difference| matches!(difference, Difference::Reversed { found, .. } if !is_seen(found));
-        // Too much that differs is another line, and not this one with a fault.
-        let most = 2 + self.planned.len() / 4;
-        let differences = &comparison.differences;
-        !differences.is_empty()
-            && differences.len() <= most
-            && !differences.iter().all(is_gone)
-            && !differences.iter().any(is_guessed)
-    }
-
     fn condition(&self, difference: &Difference) -> Condition {
         match difference {
             Difference::Missing { planned, all } => self.missing(*planned, all.len()),
@@ -217,10 +118,9 @@ impl<'a> Found<'a> {
 
     fn missing(&self, planned: usize, count: usize) -> Condition {
         let label = self.label(planned);
-        let text = if count == 1 {
-            format!("{label} is not in the line; its neighbours are wired to each other")
-        } else {
-            format!("{label} and {} behind it are not in the line", count - 1)
+        let text = match count {
+            1 => format!("{label} is not in the line; its neighbours are wired to each other"),
+            _ => format!("{label}{} are not in the line", and_behind(count)),
         };
         let equals = if count == 1 { self.equals_in_a_row(planned) } else { Vec::new() };
         let sure = 0.85 / (1 + equals.len()) as f64;
@@ -255,7 +155,7 @@ impl<'a> Found<'a> {
 
     fn extra(&self, found: usize, count: usize, on: Option<End>) -> Condition {
         let (what, at) = (self.kind(found), self.found_end(on));
-        let more = if count == 1 { String::new() } else { format!(" and {} behind it", count - 1) };
+        let more = and_behind(count);
         let text =
             format!("{what}{more} at {at} is in no plan; all behind are further on than planned");
         let id = self.ids.get(found).copied().unwrap_or_default();
@@ -332,7 +232,7 @@ impl<'a> Found<'a> {
     ) -> Condition {
         let label = self.label(planned);
         let count = self.planned.subtree(planned).len();
-        let more = if count == 1 { String::new() } else { format!(" and {} behind it", count - 1) };
+        let more = and_behind(count);
         let (at, right) = (self.found_end(on), self.planned_end(wanted));
         let text = format!("{label}{more} hang on {at}; planned was {right}");
         let mut condition = self
@@ -465,17 +365,8 @@ impl<'a> Found<'a> {
     }
 }
 
-fn is_known_to_plan(device: &Device) -> bool {
-    device.planned.is_some_and(|planned| planned.identity.is_some())
-}
-
-fn wanted(device: Option<&Device>) -> Wanted {
-    let planned = device.and_then(|device| device.planned);
-    planned.map_or_else(Wanted::default, |planned| Wanted {
-        identity: planned.identity,
-        rule: planned.rule,
-        alias: planned.alias,
-    })
+fn and_behind(count: usize) -> String {
+    if count == 1 { String::new() } else { format!(" and {} behind it", count - 1) }
 }
 
 fn ports(tree: &Tree, node: usize) -> String {

@@ -176,7 +176,7 @@ impl Cyclic {
 
     /// When the next frames are due; [`Instant::MAX`]: never.
     #[inline]
-    pub(crate) fn next_at(&self) -> Instant {
+    pub(crate) fn due(&self) -> Instant {
         self.due
     }
 

@@ -128,7 +128,7 @@ impl Fixture {
 
     /// A cycle begins; the frame as it is sent.
     fn send(&mut self) -> Vec<u8> {
-        assert!(self.cyclic.next_at() <= self.now);
+        assert!(self.cyclic.due() <= self.now);
         let sent = self.send_one().unwrap();
         assert_eq!(self.send_one(), None, "one frame a cycle");
         self.now += Span::ms(1);
@@ -219,11 +219,11 @@ fn inputs_of_one_flow_while_the_other_is_on_its_way() {
 fn cycles_slept_through_are_left_out_on_the_grid() {
     let mut fixture = Fixture::new();
     fixture.cycle([0, 0], 0);
-    assert_eq!(fixture.cyclic.next_at(), Instant::ZERO + Span::ms(1));
+    assert_eq!(fixture.cyclic.due(), Instant::ZERO + Span::ms(1));
     fixture.now = Instant::ZERO + Span::us(4_300);
     fixture.cycle([0, 0], 0);
     assert_eq!(fixture.statistics.cycles_missed, 3);
-    assert_eq!(fixture.cyclic.next_at(), Instant::ZERO + Span::ms(5));
+    assert_eq!(fixture.cyclic.due(), Instant::ZERO + Span::ms(5));
 }
 
 // proves: FRM-18 partial: per SubDevice
@@ -324,7 +324,7 @@ fn a_frame_for_which_all_slots_are_taken_is_left_out_and_counted() {
     }
     assert_eq!((fixture.send_one(), fixture.statistics.cyclic_unsent), (None, 1));
     assert_eq!(fixture.cyclic.frame_status(0, 0).unwrap().not_sent, FrameStatus::WHOLE);
-    assert!(fixture.cyclic.next_at() > fixture.now, "it is not tried again in this cycle");
+    assert!(fixture.cyclic.due() > fixture.now, "it is not tried again in this cycle");
     fixture.now += Span::ms(1);
     fixture.lose();
     fixture.send();

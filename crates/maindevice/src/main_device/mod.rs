@@ -165,7 +165,7 @@ impl MainDevice {
         let settled = |running: &&Running| lock(&running.line).all_have_been_reached();
         if let Some(running) = self.running.as_ref().filter(settled) {
             let Some(left) = self.acyclic_left.checked_sub(1) else { return };
-            let until = running.cyclic.next_at().since(now).as_nanos() / BYTE_NS;
+            let until = running.cyclic.due().since(now).as_nanos() / BYTE_NS;
             room = usize::try_from(until).unwrap_or(MAX_LEN);
             room = room.saturating_sub(WIRE_OVERHEAD).min(MAX_LEN);
             // Too late in this cycle, unless the cycle is too short for any frame at all.
@@ -324,7 +324,7 @@ impl MainDevice {
     #[inline]
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let cycle = self.running.as_ref().map_or(Instant::MAX, |running| running.cyclic.next_at());
+        let cycle = self.running.as_ref().map_or(Instant::MAX, |running| running.cyclic.due());
         let first = cycle.min(self.exchange.earliest()).min(self.executor.first_timer());
         (first != Instant::MAX).then_some(first)
     }
@@ -333,7 +333,7 @@ impl MainDevice {
     #[inline]
     #[must_use]
     pub fn poll_cycle_timeout(&self) -> Option<Instant> {
-        let next = self.running.as_ref()?.cyclic.next_at();
+        let next = self.running.as_ref()?.cyclic.due();
         (next != Instant::MAX).then_some(next)
     }
 

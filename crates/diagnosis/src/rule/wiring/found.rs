@@ -1,0 +1,125 @@
+//! What was found of a line, and whether a comparison with the plan says anything.
+
+use linesman_config::compare::{Comparison, Difference, Side, There, Wanted, compare, unlike};
+use linesman_proto::address::{DeviceId, Path, Position};
+use linesman_proto::port::Port;
+use linesman_proto::time::Instant;
+use linesman_proto::topology::Reconstruction;
+use linesman_proto::topology::derive::EntryBasis;
+
+use super::Found;
+use crate::line::{Device, Line};
+
+impl<'a> Found<'a> {
+    pub(super) fn of(line: &'a Line) -> Option<Self> {
+        let planned = line.tree.as_ref().filter(|_| line.tree_is_planned)?;
+        if planned.closes_at().is_some() || !line.devices.iter().any(is_known_to_plan) {
+            // In a ring receive times and open ports say something else.
+            return None;
+        }
+        let mut ids: Vec<DeviceId> =
+            planned.order().iter().map(|node| DeviceId(*node as u32)).collect();
+        ids.extend(
+            line.devices.iter().map(|device| device.id).filter(|id| id.index() >= planned.len()),
+        );
+        let count = usize::from(line.traffic.positions_seen);
+        if count == 0 || count > ids.len() {
+            return None;
+        }
+        ids.truncate(count);
+        // Where positions have moved, their station addresses tell whose answers they are taken for.
+        let placed = (0..line.traffic.positions_seen).map(|at| line.by_position(Position(at)));
+        if let Some(placed) = placed.collect::<Option<Vec<DeviceId>>>() {
+            ids = placed;
+        }
+        let devices: Vec<&Device> = ids.iter().filter_map(|id| line.device(*id)).collect();
+        let is_whole = devices.len() == count
+            && devices
+                .iter()
+                .all(|device| device.dl.first.is_some() && device.identity.identity().is_some());
+        if !is_whole {
+            return None;
+        }
+        let seen: Vec<_> = devices.iter().map(|device| device.as_first_seen()).collect();
+        let Reconstruction { tree, entry_basis, errors, .. } = Reconstruction::of(Path::A, &seen);
+        if !errors.is_empty() || tree.detached().next().is_some() {
+            return None;
+        }
+        let wanted = (0..planned.len()).map(|node| wanted(line.devices.get(node))).collect();
+        let there = devices.iter().map(|device| There {
+            identity: device.identity.identity(),
+            alias: device.alias.map(|alias| alias.value()),
+        });
+        let latest = devices.iter().filter_map(|device| device.identity.product_code);
+        let latest = latest.max_by_key(|seen| seen.at);
+        Some(Self {
+            line,
+            planned,
+            wanted,
+            there: there.collect(),
+            tree,
+            basis: entry_basis,
+            ids,
+            at: latest.map_or(Instant::ZERO, |seen| seen.at),
+            frame: latest.and_then(|seen| seen.frame),
+        })
+    }
+
+    pub(super) fn compare(&self) -> Comparison {
+        if self.is_as_planned() {
+            return Comparison::default();
+        }
+        compare(
+            Side { tree: self.planned, nodes: &self.wanted },
+            Side { tree: &self.tree, nodes: &self.there },
+        )
+    }
+
+    /// The cheap answer for a line that is well.
+    fn is_as_planned(&self) -> bool {
+        self.tree.len() == self.planned.len()
+            && self.ids.iter().enumerate().all(|(node, id)| {
+                let wanted = id.index();
+                self.tree.entry(node) == self.planned.entry(wanted)
+                    && Port::ALL.into_iter().all(|port| {
+                        self.tree.is_open(node, port) == self.planned.is_open(wanted, port)
+                    })
+                    && unlike(&self.wanted[wanted], &self.there[node]).is_none()
+            })
+    }
+
+    /// Whether a comparison says anything that can be relied on.
+    pub(super) fn tells(&self, comparison: &Comparison) -> bool {
+        let is_gone = |difference: &Difference| {
+            matches!(difference, Difference::Missing { planned, all }
+                if all.len() == self.planned.subtree(*planned).len())
+        };
+        let is_seen = |found: &usize| {
+            matches!(
+                self.basis.get(*found),
+                Some(EntryBasis::ReceiveTimes | EntryBasis::OnlyPlace | EntryBasis::OnlyPort)
+            )
+        };
+        let is_guessed = |difference: &Difference| matches!(difference, Difference::Reversed { found, .. } if !is_seen(found));
+        // Too much that differs is another line, and not this one with a fault.
+        let most = 2 + self.planned.len() / 4;
+        let differences = &comparison.differences;
+        !differences.is_empty()
+            && differences.len() <= most
+            && !differences.iter().all(is_gone)
+            && !differences.iter().any(is_guessed)
+    }
+}
+
+fn is_known_to_plan(device: &Device) -> bool {
+    device.planned.is_some_and(|planned| planned.identity.is_some())
+}
+
+fn wanted(device: Option<&Device>) -> Wanted {
+    let planned = device.and_then(|device| device.planned);
+    planned.map_or_else(Wanted::default, |planned| Wanted {
+        identity: planned.identity,
+        rule: planned.rule,
+        alias: planned.alias,
+    })
+}
