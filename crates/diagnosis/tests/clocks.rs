@@ -5,13 +5,13 @@
 mod support;
 
 use linesman_config::fault::FaultName;
-use linesman_diagnosis::report::{PlaceReport, Severity};
+use linesman_diagnosis::report::{AlternativeReport, Diagnosis, PlaceReport, Severity};
 use linesman_diagnosis::{Asked, Direction, Setup};
-use linesman_proto::address::RegisterAddress;
+use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::command::Command;
 use linesman_proto::mailbox::coe::ObjectAddress;
-use support::plant::{PROCESS, Plant, codes, plant};
-use support::script::{Datagram, Script, brd, fpwr, frame, lrw};
+use support::plant::{PROCESS, Plant, codes, frmw, plant};
+use support::script::{Datagram, Script, brd, fprd, fpwr, frame, lrw};
 use support::text;
 
 fn is_device(place: &PlaceReport, number: u32) -> bool {
@@ -72,6 +72,38 @@ fn clocks_that_stay_near_or_are_set_are_no_finding() {
     assert_eq!(codes(&report), <[&str; 0]>::default(), "{}", text(&report));
 }
 
+/// The clock of a SubDevice is near, then 20 µs off; before that it may have been gone for a while.
+fn pulled_in(was_gone: bool) -> Diagnosis {
+    let mut plant = plant();
+    plant.ahead(0x1003, 40);
+    if was_gone {
+        for _ in 0..40 {
+            let gone = Datagram { wkc: 0, ..fprd(0x1003, 0x0130, &[0; 6]) };
+            plant.script.exchange(&[gone]);
+            plant.cycles(5);
+        }
+        plant.read(0x1003, 0x0130, &[8, 0, 0, 0, 0, 0]);
+    }
+    plant.cycles(100);
+    plant.ahead(0x1003, 4_000);
+    plant.cycles(100);
+    for ns in [20_000, 22_000, 19_000] {
+        plant.ahead(0x1003, ns);
+        plant.cycles(100);
+    }
+    plant.report()
+}
+
+// fires: T420
+// silent: T420
+#[test]
+fn a_clock_that_is_pulled_in_after_its_device_was_gone_does_not_drift() {
+    let report = pulled_in(false);
+    assert_eq!(codes(&report), ["T420"], "{}", text(&report));
+    let report = pulled_in(true);
+    assert!(!codes(&report).contains(&"T420"), "{}", text(&report));
+}
+
 // fires: T421
 #[test]
 fn a_reference_clock_that_stands_is_lost_and_leads_all_others_astray() {
@@ -89,6 +121,22 @@ fn a_reference_clock_that_stands_is_lost_and_leads_all_others_astray() {
     assert_eq!(finding.consequences[0].code, "T400", "{}", text(&report));
 }
 
+// silent: T421
+#[test]
+fn a_reference_clock_of_32_bits_comes_round() {
+    let mut plant = plant();
+    for station in [0x1001, 0x1002, 0x1003] {
+        plant.script.exchange(&[fpwr(station, 0x0920, &[0; 8])]);
+    }
+    plant.time = (1 << 32) - 50_500_000;
+    plant.cycles(50);
+    plant.time = plant.time.wrapping_sub(1 << 32);
+    plant.cycles(50);
+    assert!(plant.time < 50_000_000, "it has come round");
+    let report = plant.report();
+    assert_eq!(codes(&report), <[&str; 0]>::default(), "{}", text(&report));
+}
+
 #[test]
 fn a_reference_clock_that_goes_back_is_lost() {
     let mut plant = plant();
@@ -97,6 +145,157 @@ fn a_reference_clock_that_goes_back_is_lost() {
     let report = plant.report();
     assert_eq!(codes(&report), ["T421"], "{}", text(&report));
     assert!(report.findings[0].evidence[0].text.contains("went back"), "{}", text(&report));
+}
+
+/// How far a clock goes off, in ns, and whether that is told, where nobody steered it for 400 ms: sound quartzes
+/// are off by 300 parts per million at most.
+const ALONE: [(u32, bool); 2] = [(80_000, false), (400_000, true)];
+
+/// 0x092C of a SubDevice, which is ahead by so many ns.
+fn ahead(station: u16, ns: u32) -> Datagram {
+    fprd(station, 0x092C, &(ns | 1 << 31).to_le_bytes())
+}
+
+// fires: T420
+// silent: T420
+#[test]
+fn a_clock_that_no_frame_steers_is_well_as_long_as_it_goes_off_no_faster_than_a_quartz() {
+    for (ns, is_told) in ALONE {
+        // No frame hands a time round here: who steers the clocks is not known.
+        let mut script = Script::scanned(3);
+        for _ in 0..500 {
+            script.exchange(&[lrw(PROCESS, 2, 2)]);
+        }
+        script.exchange(&[ahead(0x1002, 60)]);
+        for _ in 0..5_000 {
+            script.vanish(&[lrw(PROCESS, 2, 2)]);
+        }
+        for _ in 0..100 {
+            script.exchange(&[lrw(PROCESS, 2, 2)]);
+        }
+        script.exchange(&[ahead(0x1002, ns)]);
+        script.finish();
+        let report = script.engine.diagnosis();
+        assert_eq!(codes(&report).contains(&"T420"), is_told, "{ns}: {}", text(&report));
+    }
+}
+
+// fires: T420
+// silent: T420
+#[test]
+fn a_clock_to_which_nobody_hands_a_time_is_well_likewise() {
+    for (ns, is_told) in ALONE {
+        let mut plant = plant();
+        plant.ahead(0x1002, 60);
+        for _ in 0..400 {
+            plant.time += plant.pace;
+            plant.next += 1_000_000;
+            plant.script.now = plant.next;
+            plant.script.exchange(&[lrw(PROCESS, 2, 2)]);
+        }
+        plant.cycles(20);
+        plant.ahead(0x1002, ns);
+        plant.cycles(100);
+        let report = plant.report();
+        assert_eq!(codes(&report).contains(&"T420"), is_told, "{ns}: {}", text(&report));
+    }
+}
+
+// silent: T420
+#[test]
+fn clocks_that_go_off_when_the_reference_does_not_answer_were_led_astray() {
+    for is_silent in [false, true] {
+        let mut plant = plant();
+        plant.ahead(0x1002, 60);
+        if is_silent {
+            for _ in 0..5 {
+                plant.script.exchange(&[fprd(0x1001, 0x0130, &[0; 6]).wkc(0)]);
+                plant.cycles(20);
+            }
+        }
+        plant.ahead(0x1002, 900_000);
+        plant.cycles(100);
+        let report = plant.report();
+        assert_eq!(codes(&report).contains(&"T420"), !is_silent, "{}", text(&report));
+    }
+}
+
+/// A ring in halves: each copy comes back to its card. The first two SubDevices are in the half of card A.
+fn halves(script: &mut Script, datagrams: &[Datagram], other_half: &[Datagram]) {
+    for (path, datagrams) in [(Path::A, datagrams), (Path::B, other_half)] {
+        script.path = Some(path);
+        script.send(datagrams);
+        script.now -= 79_999;
+    }
+    for (path, datagrams) in [(Path::A, datagrams), (Path::B, other_half)] {
+        script.path = Some(path);
+        script.give_back(datagrams);
+    }
+    script.index = script.index.wrapping_add(datagrams.len() as u8);
+    script.path = None;
+}
+
+// fires: T420
+// silent: T420
+#[test]
+fn who_is_in_the_other_half_of_a_ring_gets_no_time_and_is_well_likewise() {
+    for (ns, is_told) in ALONE {
+        let mut plant = plant();
+        plant.ahead(0x1003, 60);
+        for _ in 0..400 {
+            plant.time += plant.pace;
+            plant.next += 1_000_000;
+            plant.script.now = plant.next;
+            let time = frmw(plant.time).wkc(2);
+            let none = Datagram { back: time.sent.clone(), ..frmw(0).wkc(1) };
+            let here = [brd(0x0130, &[8, 0], 2), time];
+            halves(&mut plant.script, &here, &[brd(0x0130, &[8, 0], 1), none]);
+        }
+        let there = ahead(0x1003, ns);
+        halves(&mut plant.script, &[there.clone().wkc(0)], &[there]);
+        let report = plant.report();
+        assert_eq!(codes(&report).contains(&"T420"), is_told, "{ns}: {}", text(&report));
+    }
+}
+
+// fires: T420
+// silent: T420
+#[test]
+fn a_reference_that_goes_otherwise_than_a_clock_that_is_set_right_runs_wrong() {
+    // Parts per million; whether somebody is known to follow; whether it is told.
+    for (ppm, is_followed, is_told) in
+        [(400, true, false), (400, false, true), (700, true, true), (200, false, false)]
+    {
+        let mut plant = plant();
+        if is_followed {
+            plant.ahead(0x1002, 60);
+        }
+        plant.pace = 1_000_000 + ppm;
+        plant.cycles(3_000);
+        let report = plant.report();
+        let told: &[&str] = if is_told { &["T420"] } else { &[] };
+        assert_eq!(codes(&report), told, "{ppm}, {is_followed}: {}", text(&report));
+        for finding in &report.findings {
+            assert!(is_device(&finding.place, 1), "{}", text(&report));
+            let host = |other: &AlternativeReport| other.place == Some(PlaceReport::Host);
+            assert!(finding.alternatives.iter().any(host), "{}", text(&report));
+        }
+    }
+}
+
+/// Nothing else happens on this line that would have it judged anew.
+#[test]
+fn live_a_reference_that_runs_wrong_is_told_as_soon_as_its_speed_is_known() {
+    let mut plant = plant();
+    plant.pace = 1_001_000;
+    let mut told = None;
+    for cycle in 0..3_000 {
+        plant.cycles(1);
+        let event = std::iter::from_fn(|| plant.script.engine.poll_event()).next();
+        told = told.or(event.filter(|event| event.finding.code == "T420").map(|_| cycle));
+    }
+    // Four stretches of 200 ms.
+    assert!(told.is_some_and(|cycle| cycle < 1_000), "{told:?}");
 }
 
 #[test]

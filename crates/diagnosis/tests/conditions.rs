@@ -10,6 +10,7 @@ use linesman_diagnosis::{Asked, EventKind, HostEvent, HostObservation};
 use linesman_proto::address::{LogicalAddress, Network, Path, RegisterAddress};
 use linesman_proto::register::FmmuConfig;
 use linesman_proto::time::{Instant, Span};
+use support::plant::Plant;
 use support::script::{Script, brd, fprd, fpwr, lrw};
 use support::text;
 
@@ -230,6 +231,41 @@ fn probes_are_asked_for_once_something_is_wrong() {
     assert_eq!(probes.len(), 2 * 3);
     let counters = Asked::Register { address: RegisterAddress(0x0300), len: 20 };
     assert!(probes.iter().any(|probe| probe.what == counters));
+}
+
+/// Who is asked for counters how often in 100 ms, after these two stations counted symbols at port A.
+fn asked_for_counters(noisy: &[u16]) -> Vec<(u16, usize)> {
+    let setup = linesman_diagnosis::Setup { probes: true, ..linesman_diagnosis::Setup::default() };
+    let mut plant = Plant::new(setup);
+    for symbols in [0, 3] {
+        for station in 0x1001..=0x1003 {
+            let mut data = [0; 20];
+            data[1] = if noisy.contains(&station) { symbols } else { 0 };
+            plant.read(station, 0x0300, &data);
+        }
+        plant.cycles(10);
+    }
+    while plant.script.engine.poll_probe().is_some() {}
+    plant.cycles(100);
+    let counters = Asked::Register { address: RegisterAddress(0x0300), len: 20 };
+    let mut asked = std::collections::BTreeMap::new();
+    while let Some(probe) = plant.script.engine.poll_probe() {
+        assert_eq!(probe.effect, linesman_diagnosis::ProbeEffect::Reads);
+        if probe.what == counters {
+            *asked.entry(probe.station.0).or_default() += 1;
+        }
+    }
+    asked.into_iter().collect()
+}
+
+// proves: FRM-19 partial, FRM-29 partial
+#[test]
+fn counters_of_two_noisy_links_are_read_closely_and_those_of_one_are_not() {
+    let asked = asked_for_counters(&[0x1002, 0x1003]);
+    let stations: Vec<u16> = asked.iter().map(|(station, _)| *station).collect();
+    assert_eq!(stations, [0x1002, 0x1003]);
+    assert!(asked.iter().all(|(_, times)| (15..=21).contains(times)), "{asked:?}");
+    assert_eq!(asked_for_counters(&[0x1002]), []);
 }
 
 fn host(script: &mut Script, what: HostEvent) {

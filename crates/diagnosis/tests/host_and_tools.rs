@@ -148,6 +148,30 @@ fn a_card_that_cannot_send_is_told() {
     assert_eq!(codes(&report), ["X512"], "{}", text(&report));
 }
 
+/// Who refuses frames for a while and then takes all of them stood still; damage comes again, or stays.
+#[test]
+fn what_kept_a_card_from_sending_is_told_by_whether_it_comes_again() {
+    // Between the first refusal and the last, in ms; whether frames come back behind it.
+    let table = [
+        (0, true, FaultName::WatchdogStarved),
+        (1_500, true, FaultName::WatchdogStarved),
+        (1_500, false, FaultName::NicDamaged),
+        (2_500, true, FaultName::NicDamaged),
+    ];
+    for (apart_ms, is_back, cause) in table {
+        let mut script = running();
+        host(&mut script, HostEvent::SendFailures(3));
+        cycles(&mut script, apart_ms * 10);
+        host(&mut script, HostEvent::SendFailures(1));
+        if is_back {
+            cycles(&mut script, 100);
+        }
+        let report = report(&mut script);
+        assert_eq!(codes(&report), ["X512"], "{}", text(&report));
+        assert_eq!(report.findings[0].cause, cause, "{apart_ms} ms, {is_back}: {}", text(&report));
+    }
+}
+
 // silent: X512
 #[test]
 fn a_card_without_a_cable_need_not_send() {

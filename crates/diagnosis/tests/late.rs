@@ -6,6 +6,7 @@
 mod support;
 
 use linesman_config::fault::FaultName;
+use linesman_diagnosis::Setup;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, Severity};
 use support::plant::{Plant, codes, plant};
 use support::script::{Script, fpwr, lrw};
@@ -147,6 +148,19 @@ fn frames_that_all_stay_away_while_nothing_moves_on_the_line_did_not_leave() {
 }
 
 // silent: X513
+// fires: H100
+#[test]
+fn a_card_that_is_watched_and_refused_nothing_sent_them_and_nobody_answered() {
+    let mut plant = Plant::new(Setup { host_counters: true, ..Setup::default() });
+    counters(&mut plant, 0);
+    plant.lost_cycles(40);
+    plant.cycles(50);
+    counters(&mut plant, 0);
+    let report = plant.report();
+    assert_eq!(codes(&report), ["H100"], "{}", text(&report));
+}
+
+// silent: X513
 #[test]
 fn with_a_link_that_was_lost_meanwhile_it_is_not_the_computer() {
     let mut plant = plant();
@@ -158,18 +172,51 @@ fn with_a_link_that_was_lost_meanwhile_it_is_not_the_computer() {
     assert!(!codes(&report).contains(&"X513"), "{}", text(&report));
 }
 
+/// A frame that was just being sent on when a link behind opened is cut off: who comes next counts it.
+#[test]
+fn a_frame_cut_off_by_a_link_that_opens_is_no_damage_of_the_next_link() {
+    for is_lost in [true, false] {
+        let mut plant = plant();
+        counters(&mut plant, 0);
+        let value: u16 = if is_lost { 0x5617 } else { 0x5A37 };
+        plant.read(0x1002, 0x0110, &value.to_le_bytes());
+        plant.lost_cycles(1);
+        plant.cycles(20);
+        for station in 0x1001..=0x1003 {
+            let mut data = [0; 20];
+            match station {
+                // An invalid frame at port B, which faces the second.
+                0x1001 => data[2] = 1,
+                0x1002 => data[17] = u8::from(is_lost),
+                _ => {}
+            }
+            plant.read(station, 0x0300, &data);
+            plant.cycles(10);
+        }
+        plant.read(0x1002, 0x0110, &0x5A37_u16.to_le_bytes());
+        plant.cycles(50);
+        let report = plant.report();
+        let damage = codes(&report).iter().any(|code| code.starts_with("H11"));
+        assert_eq!(damage, !is_lost, "{}", text(&report));
+    }
+}
+
 /// The link between the second and the third SubDevice is lost for a while; so many frames vanish when it is
 /// back.
 fn link_lost_and_back(vanish: usize) -> Plant {
     let mut plant = plant();
+    lose_link(&mut plant, vanish);
+    plant
+}
+
+fn lose_link(plant: &mut Plant, vanish: usize) {
     let status = |plant: &mut Plant, value: u16| plant.read(0x1002, 0x0110, &value.to_le_bytes());
-    status(&mut plant, 0x5617);
+    status(plant, 0x5617);
     plant.cycles(30);
     plant.lost_cycles(vanish);
     plant.cycles(10);
-    status(&mut plant, 0x5A37);
+    status(plant, 0x5A37);
     plant.cycles(100);
-    plant
 }
 
 // fires: H103
@@ -189,4 +236,25 @@ fn a_link_that_is_lost_and_carries_frames_at_once_is_just_lost() {
     let mut plant = link_lost_and_back(1);
     let report = plant.report();
     assert_eq!(codes(&report), ["H101"], "{}", text(&report));
+}
+
+// silent: H103
+#[test]
+fn frames_that_were_damaged_elsewhere_were_not_swallowed_by_a_link() {
+    let mut plant = plant();
+    let counters = |plant: &mut Plant, frames: u8| {
+        for station in 0x1001..=0x1003 {
+            let mut data = [0; 20];
+            // Port A of the second one: frames and symbols.
+            data[..2].fill(if station == 0x1002 { frames } else { 0 });
+            plant.read(station, 0x0300, &data);
+        }
+    };
+    counters(&mut plant, 0);
+    lose_link(&mut plant, 20);
+    counters(&mut plant, 20);
+    plant.cycles(100);
+    counters(&mut plant, 20);
+    let report = plant.report();
+    assert_eq!(codes(&report), ["H101", "H110"], "{}", text(&report));
 }

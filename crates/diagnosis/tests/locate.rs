@@ -259,6 +259,27 @@ fn without_the_cards_counters_the_last_hop_is_a_set() {
     assert_eq!(bench.conditions().len(), 0);
 }
 
+#[test]
+fn copies_that_a_card_of_a_ring_misses_are_lost_on_its_last_hop_whatever_was_lost_before() {
+    let wired = [Wired { on: End::MainDevice(Path::A), entry: A }, on(1, B), on(2, B)];
+    let ring = Tree::from_wiring(&wired, Some((2, B))).unwrap();
+    let mut bench = Bench::new(ring, vec![(true, false); 3]);
+    bench.line.traffic.first = Some(bench.now);
+    // Two frames while the line came up; then those alone that come back to card A.
+    bench.line.traffic.lost.add(1, bench.now);
+    bench.line.traffic.lost.add(1, bench.now + Span::ms(1));
+    bench.read_all();
+    bench.now += Span::s(2);
+    for _ in 0..9 {
+        bench.line.traffic.copies_lost[Path::A.index()].add(1, bench.now);
+        bench.now += Span::ms(7);
+    }
+    bench.read_all();
+    let found = bench.located(false).last_hops;
+    let card = found.iter().map(LastHop::card).collect::<Vec<_>>();
+    assert_eq!((card, found[0].frames()), (vec![Path::A], 9));
+}
+
 // proves: HW-26 partial, HW-27 partial
 #[test]
 fn clean_symbols_point_inside_a_device_and_several_links_to_interference() {
@@ -292,6 +313,103 @@ fn clean_symbols_point_inside_a_device_and_several_links_to_interference() {
     // One leads, the others follow from it.
     assert!(!conditions[0].explains.is_empty());
     assert!(conditions[1].symptoms.iter().all(|s| conditions[0].explains.contains(s)));
+}
+
+/// What is said of two noisy links: symbols by reading, at port A of SubDevice 5 and at port C of SubDevice 1.
+fn two_noisy(every: Span, readings: &[(u64, u64)]) -> Vec<FaultName> {
+    let mut bench = Bench::new(fifteen(), vec![(true, false); 15]);
+    for (one, other) in readings {
+        bench.noise(4, A, *one);
+        bench.noise(0, C, *other);
+        bench.now += every;
+        bench.read_all();
+    }
+    bench.now += every;
+    bench.read_all();
+    bench.conditions().iter().map(|condition| condition.cause).collect()
+}
+
+/// Hits in the readings of these numbers.
+fn hits_at(readings: u64, numbers: &[u64]) -> Vec<u64> {
+    (0..readings).map(|number| u64::from(numbers.contains(&number))).collect()
+}
+
+// proves: HW-26 partial
+#[test]
+fn seldom_hits_of_two_links_at_the_same_moments_are_interference() {
+    let one = hits_at(60, &[0, 7, 16, 31, 40, 52]);
+    let other = hits_at(60, &[7, 16, 40, 59]);
+    let readings: Vec<_> = one.into_iter().zip(other).collect();
+    assert_eq!(two_noisy(Span::ms(5), &readings), [FaultName::EmcNoise; 2]);
+}
+
+// proves: HW-26 partial
+#[test]
+fn hits_of_two_links_each_in_its_own_time_are_two_faults() {
+    let one = hits_at(60, &[0, 7, 16, 31, 40, 52]);
+    let other = hits_at(60, &[3, 16, 24, 47, 59]);
+    let readings: Vec<_> = one.into_iter().zip(other).collect();
+    assert_eq!(two_noisy(Span::ms(5), &readings), [FaultName::CableDegraded; 2]);
+    // Both all the time: nothing tells, but that one of them began later and ended earlier.
+    let steady: Vec<_> = (0..60).map(|at| (2, if (9..50).contains(&at) { 3 } else { 0 })).collect();
+    assert!(!two_noisy(Span::ms(5), &steady).contains(&FaultName::EmcNoise));
+}
+
+// proves: HW-26 partial
+#[test]
+fn noise_of_two_links_that_begins_and_ends_together_is_interference() {
+    let mut readings = vec![(0, 0), (0, 0)];
+    readings.extend([(9, 4); 30]);
+    assert_eq!(two_noisy(Span::ms(5), &readings), [FaultName::EmcNoise; 2]);
+}
+
+// proves: HW-26 partial
+#[test]
+fn a_link_that_falls_together_with_one_of_several_belongs_to_all() {
+    let mut bench = Bench::new(fifteen(), vec![(true, false); 15]);
+    // The first and the last never meet; the one between them meets both.
+    for at in 0..80_u64 {
+        let hit = |numbers: &[u64]| u64::from(numbers.contains(&at));
+        bench.noise(4, A, hit(&[2, 9, 23, 31, 40]));
+        bench.noise(10, A, hit(&[9, 23, 40, 52, 66, 71]));
+        bench.noise(0, C, hit(&[52, 66, 71, 78]));
+        bench.now += Span::ms(5);
+        bench.read_all();
+    }
+    let conditions = bench.conditions();
+    let causes: Vec<_> = conditions.iter().map(|condition| condition.cause).collect();
+    assert_eq!(causes, [FaultName::EmcNoise; 3]);
+    let leaders = conditions.iter().filter(|condition| !condition.explains.is_empty());
+    assert_eq!(leaders.count(), 1);
+}
+
+// proves: HW-28 partial
+#[test]
+fn symbols_made_anew_come_with_bad_frames_and_others_are_damage_of_their_own() {
+    let tree = fifteen();
+    let route = Route::intact(&tree);
+    let hop = route.hop_from(3, B).unwrap();
+    for is_later in [false, true] {
+        let mut bench = Bench::new(tree.clone(), vec![(true, false); 15]);
+        bench.hit(hop, 3, true);
+        if is_later {
+            bench.read_all();
+            bench.read_all();
+        }
+        // As many symbols at another port that the bad frames pass.
+        bench.noise(6, A, 3);
+        bench.read_all();
+        bench.read_all();
+        let found = bench.located(false).hops;
+        let nodes: Vec<_> = found.iter().filter_map(|damage| damage.hop.to.node()).collect();
+        assert_eq!(nodes, if is_later { vec![4, 6] } else { vec![4] });
+    }
+}
+
+// proves: HW-26 partial
+#[test]
+fn one_reading_after_a_long_time_says_nothing_of_the_same_moment() {
+    assert!(!two_noisy(Span::s(10), &[(9, 4)]).contains(&FaultName::EmcNoise));
 }
 
 // proves: HW-23 partial

@@ -2,7 +2,8 @@
 //!
 //! The line runs in virtual time, with the MainDevice's own reads and the probes of a diagnosis; all that
 //! passes is kept. Then a fresh engine takes it in, as the thread beside a real cycle does, and the time on
-//! a processor is measured per second of the line: healthy, with error counters that move, and after a cut.
+//! a processor is measured per second of the line: healthy, with error counters that move, those of
+//! several links, and after a cut.
 //!
 //! `cargo bench -p linesman-lab --bench diagnosis_cost` prints it as a share of a core. For instructions,
 //! which are steadier: `valgrind --tool=callgrind BENCH count CASE SECONDS` for two lengths; the difference
@@ -32,9 +33,15 @@ const SECONDS: u64 = 4;
 const MOST_PERCENT: f64 = 5.0;
 
 /// What is put in, half a second after the line is up.
-const CASES: [(&str, &str); 3] = [
+const CASES: [(&str, &str); 4] = [
     ("healthy", ""),
     ("counters", "kind = 'cable-degraded'\nat = 'D16.C-D32.A'\nhits_per_s = 200\nmovement_ms = 50"),
+    // On several links at once: then their counters are read closely.
+    (
+        "interference",
+        "kind = 'emc-noise'\nat = ['D0.C-D16.A', 'D16.C-D32.A', 'D32.C-D48.A', 'D64.C-D80.A']\n\
+         hits_per_s = 200\nbursts_per_s = 20",
+    ),
     ("cut", "kind = 'device-off'\ndevice = 'D70'"),
 ];
 

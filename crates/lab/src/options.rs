@@ -27,6 +27,8 @@ pub struct LabOptions {
     pub host_counters: bool,
     /// Whether the diagnosis is given the project, as planned.
     pub project: bool,
+    /// Whether the project knows serial numbers, where the segment file gives them.
+    pub serials: bool,
     /// Whether the diagnosis may ask for registers by itself.
     pub probes: bool,
     /// Whether it may write what restores itself, to find where frames vanish.
@@ -46,6 +48,7 @@ impl Default for LabOptions {
             cycle: Span::ms(2),
             host_counters: true,
             project: true,
+            serials: true,
             probes: true,
             active: false,
             clocks: false,

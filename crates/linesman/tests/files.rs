@@ -101,3 +101,34 @@ fn what_is_wrong_is_told_with_file_and_reason() {
         assert!(run.stderr.contains("plant.toml"), "{lamp}: {}", run.stderr);
     }
 }
+
+// A terminal takes frames in by port 0 and passes them on by 1, a junction by 3 as well; who has but one port ends
+// the line.
+// proves: JCT-09
+#[test]
+fn a_device_with_a_single_port_ends_the_line() {
+    let directory = TempDir::new().expect("a temporary directory");
+    // The lamp with an entry and no exit.
+    let maker = MAKER.replace("Physics=\"KK\"", "Physics=\"K\"");
+    fs::write(directory.path().join("maker.xml"), maker).expect("a file can be written");
+    let device = |name: &str, kind: &str, on: &str| {
+        format!("[[device]]\nname = \"{name}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    };
+    let line = "name = \"single\"\n".to_owned()
+        + &device("K", "EK1100", "maindevice")
+        + &device("J", "EK1122", "K.B")
+        + &device("L", "EK1100", "J.D")
+        + &device("T", "EL1008", "L.B")
+        + &device("E", "esi:maker.xml#LAMP-4", "T.B");
+    let scan = |text: &str| {
+        let path = directory.path().join("plant.toml");
+        fs::write(&path, text).expect("a file can be written");
+        linesman(["scan", &format!("sim:{}", path.display()), "--json"])
+    };
+    let whole = scan(&line);
+    assert_eq!(whole.status, 0, "{}", whole.stderr);
+    assert_eq!(whole.json()["devices"].as_array().map(Vec::len), Some(5), "{}", whole.stdout);
+    let beyond = scan(&(line + &device("X", "EL1008", "E.B")));
+    assert_eq!(beyond.status, 2, "{}", beyond.stdout);
+    assert!(beyond.stderr.contains("`E` has no port B: a LAMP-4 has A"), "{}", beyond.stderr);
+}

@@ -55,6 +55,40 @@ fn a_sample_tells_what_changed_since_the_one_before() {
     });
 }
 
+// proves: HW-30 partial: a link that comes or goes is told without being asked for
+#[test]
+fn a_link_that_comes_or_goes_is_told_at_once() {
+    with_cable(|| {
+        ip("link add wa type veth peer name wb");
+        let clock = HostClock::start();
+        let mut sampler = HostSampler::open("va", &clock).unwrap();
+        let is_told_soon = |sampler: &mut HostSampler| {
+            // A change that follows another within a second may be told at its end.
+            let until = clock.now() + Span::ms(1_500);
+            while clock.now() < until {
+                if sampler.has_news().unwrap() {
+                    return true;
+                }
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+            false
+        };
+        // What came with the making of the cable.
+        while is_told_soon(&mut sampler) {}
+        ip("link set wa up");
+        assert!(!is_told_soon(&mut sampler), "that was another one");
+        ip("link set vb down");
+        assert!(is_told_soon(&mut sampler));
+        let down = sampler.sample(SocketCounters::default()).unwrap();
+        assert_eq!((down.carrier, down.carrier_changes), (false, 1));
+        ip("link set vb up");
+        assert!(is_told_soon(&mut sampler));
+        let up = sampler.sample(SocketCounters::default()).unwrap();
+        assert_eq!((up.carrier, up.carrier_changes), (true, 1));
+        assert_eq!(up.operational, OperationalState::Up, "and lets frames through");
+    });
+}
+
 #[test]
 fn a_sample_is_cheap_enough_for_ten_a_second() {
     with_cable(|| {

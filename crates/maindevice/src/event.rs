@@ -6,6 +6,7 @@ use linesman_config::start_up::StartUpCommand;
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias, WorkingCounter};
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
+use linesman_proto::port::Port;
 use linesman_proto::register::{AlStatus, DlStatus, ErrorCounters};
 use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode};
@@ -264,6 +265,13 @@ pub enum Event {
         id: DeviceId,
         /// As they stand.
         status: DlStatus,
+    },
+    /// A port whose link is back was ordered to open: the section behind it is prepared.
+    PortOpened {
+        /// Whose.
+        id: DeviceId,
+        /// Which.
+        port: Port,
     },
     /// A cyclic datagram came back with another working counter than expected. Told when it begins
     /// and when the number changes; [`Event::WorkingCounterGood`] ends it.

@@ -10,6 +10,9 @@ use linesman_proto::time::{Instant, Span};
 
 /// How often the card is asked.
 const EVERY: Span = Span::ms(100);
+/// How often it is looked whether the kernel tells of the card by itself: a link that came or went is known so
+/// exactly.
+const NEWS: Span = Span::ms(1);
 
 /// Asks the host about a card from time to time.
 pub struct HostWatch {
@@ -17,6 +20,7 @@ pub struct HostWatch {
     path: Path,
     carrier: Option<bool>,
     next: Instant,
+    next_news: Instant,
 }
 
 impl HostWatch {
@@ -26,13 +30,23 @@ impl HostWatch {
     /// When it is missing or the kernel does not answer.
     pub fn open(interface: &str, path: Path, clock: &HostClock) -> Result<Self, LinkError> {
         let sampler = HostSampler::open(interface, clock)?;
-        Ok(Self { sampler, path, carrier: None, next: clock.now() })
+        let now = clock.now();
+        Ok(Self { sampler, path, carrier: None, next: now, next_news: now })
     }
 
-    /// When to ask next.
-    #[must_use]
-    pub const fn due(&self) -> Instant {
-        self.next
+    /// Whether the card is to be asked now: its time has come, or the kernel has told of it.
+    ///
+    /// # Errors
+    /// When the kernel refuses to tell.
+    pub fn is_due(&mut self, now: Instant) -> Result<bool, LinkError> {
+        if now >= self.next {
+            return Ok(true);
+        }
+        if now < self.next_news {
+            return Ok(false);
+        }
+        self.next_news = now + NEWS;
+        self.sampler.has_news()
     }
 
     /// Notes that the thread woke so late for a deadline.
@@ -40,7 +54,7 @@ impl HostWatch {
         self.sampler.note_wake(late);
     }
 
-    /// Asks, when it is time; `socket` is what the socket on this card has counted up to now.
+    /// Asks, whatever the [time](Self::is_due); `socket` is what the socket on this card has counted up to now.
     ///
     /// # Errors
     /// When the interface vanished or the kernel does not answer.
@@ -49,9 +63,6 @@ impl HostWatch {
         now: Instant,
         socket: SocketCounters,
     ) -> Result<Vec<HostObservation>, LinkError> {
-        if now < self.next {
-            return Ok(Vec::new());
-        }
         self.next = now + EVERY;
         let sample = self.sampler.sample(socket)?;
         let events = events(&sample, self.carrier);

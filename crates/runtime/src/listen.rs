@@ -114,8 +114,12 @@ impl Ears {
                     bytes: frame.bytes,
                 }));
             }
+            let now = clock.now();
+            if !card.watch.is_due(now)? {
+                continue;
+            }
             let counters = card.listener.counters()?;
-            for observation in card.watch.poll(clock.now(), counters)? {
+            for observation in card.watch.poll(now, counters)? {
                 sink(Heard::Host(observation));
             }
         }

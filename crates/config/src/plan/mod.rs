@@ -83,6 +83,8 @@ pub struct Plan {
     /// How far a clock may be off the reference clock (0x092C) before that is told (DC-21); `None`: as far as
     /// the MainDevice lets it be before OP.
     pub sync_window: Option<Span>,
+    /// Ports whose link was lost stay closed until they are ordered to open (JCT-12).
+    pub ports_open_by_order: bool,
 }
 
 /// What one SubDevice is set up with.
@@ -168,6 +170,7 @@ impl Plan {
             variables: Vec::new(),
             outputs_shift: None,
             sync_window: None,
+            ports_open_by_order: false,
         }
     }
 

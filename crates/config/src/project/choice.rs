@@ -42,6 +42,9 @@ pub struct Network {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
     pub sync_window_ns: Option<u32>,
+    /// A port whose link was lost stays closed when the link is back, until the MainDevice has prepared the
+    /// section behind it and orders it to open; else it opens by itself, at once.
+    pub ports_open_by_order: bool,
 }
 
 impl Default for Network {
@@ -58,6 +61,7 @@ impl Default for Network {
             clear_counters: true,
             outputs_shift_us: None,
             sync_window_ns: None,
+            ports_open_by_order: false,
         }
     }
 }
@@ -114,6 +118,7 @@ impl Network {
             mailbox_states: self.mailbox_states,
             outputs_shift: self.outputs_shift_us.map(|us| Span::us(u64::from(us))),
             sync_window: self.sync_window_ns.map(|ns| Span::ns(u64::from(ns))),
+            ports_open_by_order: self.ports_open_by_order,
             ..PlanOptions::default()
         }
     }

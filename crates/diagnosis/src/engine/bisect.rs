@@ -5,6 +5,9 @@
 //! 0x0101), for temporary use (0x0100 bit 1): after about a second the controller itself goes back to what
 //! was, whatever happens to us (S2 2.4.1). If frames come back, the hole lies behind that port; if not, it
 //! does not. Each try halves what is left.
+//!
+//! In a ring it is the frames of card A that are followed: they are processed on their way. Those of card B may
+//! still come round untouched, if the hole takes one direction only, or lies beside the ring.
 
 use linesman_proto::address::{DeviceId, Network, RegisterAddress};
 use linesman_proto::port::Port;
@@ -50,11 +53,13 @@ pub(super) const CONTROL: (RegisterAddress, u16) = (table::DL_CONTROL.address, 4
 impl Bisect {
     /// Begins a search, if the line has gone silent though the card has a link, and enough is known of it.
     pub(super) fn begin(line: &mut Line, now: Instant) -> Option<Self> {
-        let silence = line.traffic.silences.back().filter(|silence| silence.ended.is_none())?;
+        let traffic = &line.traffic;
+        let latest = [traffic.silences.back(), traffic.swallowed.back()];
+        let silence = latest.into_iter().flatten().find(|silence| silence.ended.is_none())?;
         let since = silence.since;
         let card = line.host.card(linesman_proto::address::Path::A);
         let has_link = card.carrier.is_some_and(|carrier| carrier.value);
-        let tree = line.tree.as_ref().filter(|tree| tree.closes_at().is_none())?;
+        let tree = line.tree.as_ref()?;
         let was_searched =
             line.hole.and_then(|hole| hole.ended).is_some_and(|ended| since.at < ended + AGAIN);
         if now < since.at + SILENT || !has_link || was_searched || line.traffic.answered == 0 {
@@ -67,7 +72,7 @@ impl Bisect {
 
     /// Goes on. Gives what is to be written next; the search is over when the line says so.
     pub(super) fn go_on(&mut self, line: &mut Line, now: Instant) -> Option<Probe> {
-        let came_back = line.traffic.latest_returned.map(|seen| seen.at);
+        let came_back = line.traffic.latest_processed;
         match self.step {
             // The request may be sent again for a while: what is written before that is over would be undone.
             Step::Closed(_, at) if now < at + PATIENCE => None,

@@ -1,6 +1,7 @@
 //! The whole of diagnosis: frames and host observations in, findings out.
 
 mod bisect;
+mod close;
 mod setup;
 mod survey;
 mod watched;
@@ -128,8 +129,9 @@ impl Engine {
             (Some(one), Some(other)) => Some(one.min(other)),
             (one, other) => one.or(other),
         };
-        let surveys = self.networks.iter().filter_map(|watched| watched.survey.next());
-        let survey = surveys.min().filter(|_| self.setup.probes && !self.has_ended);
+        let surveys =
+            self.networks.iter().flat_map(|watched| [watched.survey.next(), watched.close.next()]);
+        let survey = surveys.flatten().min().filter(|_| self.setup.probes && !self.has_ended);
         [lost, judgement, survey].into_iter().flatten().min()
     }
 
@@ -304,7 +306,10 @@ impl Engine {
         let now = self.now;
         for watched in &mut self.networks {
             let is_searching = watched.bisect.is_some();
-            for (device, (address, len)) in watched.survey.turn(&watched.line, now) {
+            let closely = watched.close.turn(&watched.line, now);
+            for (device, (address, len)) in
+                watched.survey.turn(&watched.line, now).into_iter().chain(closely)
+            {
                 // While nothing comes back, questions only stand in the way of a search.
                 if is_searching {
                     continue;

@@ -4,9 +4,10 @@ use linesman_proto::time::{Instant, Span};
 
 use super::Probe;
 use super::bisect::{self, Bisect};
+use super::close::CloseWatch;
 use super::survey::Survey;
 use crate::finding::Condition;
-use crate::line::{Learner, Line};
+use crate::line::{Learner, Line, Silence};
 use crate::observe::Pairing;
 
 /// For so long after its last rise a counter is watched in this way.
@@ -40,6 +41,7 @@ pub(super) struct Watched {
     /// When controllers were last asked how DL control stands.
     pub(super) controls_asked: Option<Instant>,
     pub(super) survey: Survey,
+    pub(super) close: CloseWatch,
 }
 
 impl Watched {
@@ -58,6 +60,7 @@ impl Watched {
             bisect: None,
             controls_asked: None,
             survey: Survey::default(),
+            close: CloseWatch::default(),
         }
     }
 
@@ -82,8 +85,9 @@ impl Watched {
     /// Whether nothing comes back at the moment.
     pub(super) fn is_silent(&self) -> bool {
         let latest = self.line.traffic.silences.back();
-        latest.is_some_and(|silence| silence.ended.is_none() && silence.frames >= FEW_LOST)
-            || self.bisect.is_some()
+        let swallowed = self.line.traffic.swallowed.back();
+        let lasts = |silence: &Silence| silence.ended.is_none() && silence.frames >= FEW_LOST;
+        latest.is_some_and(lasts) || swallowed.is_some_and(lasts) || self.bisect.is_some()
     }
 
     /// Whether it is not known of all that answer how DL control stands.

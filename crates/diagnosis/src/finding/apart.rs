@@ -22,6 +22,12 @@ fn step(one: FaultName, other: FaultName) -> Option<&'static str> {
         (LinkOpen, RingOpen) => "whether all others still answer, through the other card",
         (LinkOpen, FalseLink) => "the link lamps at both ends",
         (LinkFlapping, CableDegraded) => "the symbol errors between two openings",
+        (DeviceMissing, LinkOpen | DeviceOff | SupplyOff) => {
+            "a look whether the device is there, and at its lamps"
+        }
+        (WatchdogStarved, FalseLink) => {
+            "the computer's own count of frames that its card did not take"
+        }
         (DeviceOff, SupplyOff) => "whether other devices of the same supply are dark, too",
         (EbusOverload, BrownOut | DeviceOff | SupplyOff) => {
             "the sum of the E-bus currents against what the coupler supplies, and the E-bus voltage \

@@ -17,19 +17,6 @@ const KEPT: usize = 16;
 /// Readings that are closer together say nothing of the speed.
 const SPEED_FROM: Span = Span::ms(50);
 
-/// Register 0x092C: the magnitude, and the sign in the highest bit (S1 9.1.3).
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct ClockDifference(pub u32);
-
-impl ClockDifference {
-    /// In ns; positive while the clock is ahead.
-    #[must_use]
-    pub const fn ns(self) -> i64 {
-        let magnitude = (self.0 & 0x7FFF_FFFF) as i64;
-        if self.0 >> 31 == 1 { magnitude } else { -magnitude }
-    }
-}
-
 /// How far a clock is off the reference clock, over time.
 #[derive(Clone, Default, Debug)]
 pub struct ClockHistory {
@@ -125,7 +112,9 @@ impl Passed {
     /// every 4.3 s: then that is meant which is nearest to what passed for the sender.
     const fn since(&self, earlier: &Self) -> i64 {
         let passed = self.time.wrapping_sub(earlier.time);
-        if !(self.is_short || earlier.is_short) {
+        // A clock of 32 bits answers the upper half with zeros.
+        let are_low = (self.time | earlier.time) >> 32 == 0;
+        if !(self.is_short || earlier.is_short || are_low) {
             return passed as i64;
         }
         let expected = self.sent.as_nanos().wrapping_sub(earlier.sent.as_nanos());
@@ -143,6 +132,8 @@ pub struct Reference {
     pub device: DeviceId,
     /// The latest frame that took its time along, since it was set.
     last: Option<Seen<Passed>>,
+    /// When the latest frame was sent that did, whether it was set since or not.
+    handed: Option<Instant>,
     /// When it was set anew, since it stood or went backwards.
     pub mended: Option<Instant>,
     /// When it stood: from the first frame to the last that found it so; the latest time only.
@@ -160,6 +151,17 @@ pub struct Reference {
     begun: Instant,
     /// The best of each of the latest stretches.
     marks: VecDeque<Passed>,
+    /// The latest times in which no frame handed its time round: whoever follows it was left alone.
+    gaps: VecDeque<Gap>,
+}
+
+/// A time in which frames did not hand the reference's time round.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Gap {
+    /// The last frame before that did.
+    from: Instant,
+    /// The first that did again.
+    to: Instant,
 }
 
 /// A time in which the reference clock stood.
@@ -181,6 +183,10 @@ impl Reference {
     const BACK: i64 = 10_000_000;
     /// Frames that are sent closer together than this say nothing.
     const APART: Span = Span::us(50);
+    /// In less time no sound quartz goes from near to far.
+    const GAP: Span = Span::ms(50);
+    /// Such times that are kept.
+    const GAPS: usize = 32;
     /// So many frames in a row that found it standing are no accident.
     const SURE: u32 = 3;
     /// Its speed is taken between marks: of each stretch of this length the frame that was least late.
@@ -195,6 +201,7 @@ impl Reference {
         Self {
             device,
             last: Some(seen),
+            handed: Some(seen.value.sent),
             mended: None,
             stood: None,
             went_back: None,
@@ -203,6 +210,7 @@ impl Reference {
             best: None,
             begun: Instant::ZERO,
             marks: VecDeque::new(),
+            gaps: VecDeque::new(),
         }
     }
 
@@ -211,6 +219,7 @@ impl Reference {
         if self.last.is_some_and(|last| seen.value.sent < last.value.sent + Self::APART) {
             return false;
         }
+        self.note_gap(seen.value.sent);
         let Some(before) = self.last.replace(seen) else { return false };
         let went = seen.value.since(&before.value);
         if went < -Self::BACK {
@@ -243,6 +252,28 @@ impl Reference {
             return true;
         }
         self.mark(seen.value)
+    }
+
+    /// A frame hands its time round that was sent at `sent`.
+    fn note_gap(&mut self, sent: Instant) {
+        let Some(from) = self.handed.replace(sent).filter(|from| *from + Self::GAP <= sent) else {
+            return;
+        };
+        if self.gaps.len() == Self::GAPS {
+            self.gaps.pop_front();
+        }
+        self.gaps.push_back(Gap { from, to: sent });
+    }
+
+    /// For how long its time was not handed round before a difference that was read at `far`. What was read at
+    /// `near` within such a time is from before it: 0x092C changes with each frame that hands a time round.
+    #[must_use]
+    pub fn withheld(&self, near: Instant, far: Instant) -> Span {
+        let now = self.handed.map(|from| Gap { from, to: far }).filter(|gap| gap.from < far);
+        let now = now.filter(|gap| gap.from + Self::GAP <= gap.to);
+        let meanwhile = self.gaps.iter().copied().chain(now);
+        let meanwhile = meanwhile.filter(|gap| gap.to >= near && gap.from <= far);
+        Span::ns(meanwhile.map(|gap| gap.to.min(far).since(gap.from).as_nanos()).sum())
     }
 
     /// It was set at `at`: that its time jumps then means nothing.
@@ -308,12 +339,6 @@ mod tests {
     }
 
     #[test]
-    fn the_sign_is_the_highest_bit() {
-        assert_eq!(ClockDifference(0x8000_0078).ns(), 120);
-        assert_eq!(ClockDifference(0x0000_0078).ns(), -120);
-    }
-
-    #[test]
     fn a_clock_goes_astray_only_from_near_and_until_it_is_set() {
         let mut clock = ClockHistory::default();
         assert!(!read(&mut clock, 0, 900_000), "it was never near");
@@ -372,6 +397,19 @@ mod tests {
         assert_eq!(reference.went_back, None);
         assert!(reference.record(short(7_202, 7_101_001_000)));
         assert!(reference.went_back.is_some_and(|seen| seen.value < -90_000_000));
+    }
+
+    #[test]
+    fn times_in_which_nobody_was_given_the_time_are_known() {
+        let mut reference = running();
+        let end = 7_000_000_000 + 1_000 * 1_001_000;
+        assert_eq!(reference.withheld(at(0), at(1_020)), Span::ms(0), "a few frames");
+        assert_eq!(reference.withheld(at(0), at(1_400)), Span::ms(400), "none since");
+        pass(&mut reference, 1_500, end + 500_000_000);
+        assert_eq!(reference.withheld(at(900), at(1_540)), Span::ms(500));
+        assert_eq!(reference.withheld(at(1_300), at(1_540)), Span::ms(500), "read within it");
+        assert_eq!(reference.withheld(at(1_501), at(1_600)), Span::ms(100), "none since");
+        assert_eq!(reference.withheld(at(100), at(900)), Span::ms(0), "before it");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use linesman_proto::time::Instant;
 use super::Seen;
 
 /// How many rises of one counter are kept; older ones are forgotten, the total stays.
-pub const RISES_KEPT: usize = 32;
+pub const RISES_KEPT: usize = 256;
 
 /// All counters of one controller.
 #[derive(Clone, Default, Debug)]

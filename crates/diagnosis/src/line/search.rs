@@ -13,7 +13,7 @@ use linesman_proto::register::{DlControl, LoopMode};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
-use super::{Device, HoleSearch, Line, Seen};
+use super::{Device, HoleSearch, Line, Seen, Silence};
 
 /// Writes that are kept: a search among 200 SubDevices takes some 20, each sent anew a few times.
 const KEPT: usize = 128;
@@ -21,6 +21,9 @@ const KEPT: usize = 128;
 const TOGETHER: Span = Span::s(1);
 /// A port that is closed shows within this time whether that helps.
 const PATIENCE: Span = Span::ms(100);
+
+/// Whoever has a link when a silence begins searches within this time.
+pub const BEGINS_WITHIN: Span = Span::ms(300);
 
 /// DL control of a controller was written for temporary use, whether or not the frame came back.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -61,7 +64,7 @@ pub(super) fn note(writes: &mut VecDeque<LoopWrite>, write: LoopWrite) {
 /// search shows: nothing helps then, as it would with a cable that is out.
 #[must_use]
 pub fn seen(line: &Line) -> Option<HoleSearch> {
-    let tree = line.tree.as_ref().filter(|tree| tree.closes_at().is_none())?;
+    let tree = line.tree.as_ref()?;
     let writes: Vec<&LoopWrite> = line.loop_writes.iter().collect();
     let is_apart = |pair: &[&LoopWrite]| pair[0].seen.at + TOGETHER < pair[1].seen.at;
     let first = writes.windows(2).rposition(is_apart).map_or(0, |before| before + 1);
@@ -70,17 +73,19 @@ pub fn seen(line: &Line) -> Option<HoleSearch> {
     // What does not come back is sent again.
     writes.dedup_by_key(|write| (write.device, write.closed));
     let begin = writes.iter().find(|write| write.closed.is_some())?.seen.at;
-    let silences = &line.traffic.silences;
-    let silence = silences.iter().rev().find(|silence| {
+    let traffic = &line.traffic;
+    let silences = || traffic.silences.iter().chain(&traffic.swallowed);
+    let is_on = |silence: &&Silence| {
         silence.since.at <= begin && silence.ended.is_none_or(|ended| ended > begin)
-    })?;
+    };
+    let silence = silences().filter(is_on).max_by_key(|silence| silence.since.at)?;
     let came_back = |from: Instant, to: Instant| {
-        silences.iter().filter_map(|one| one.ended).any(|ended| from < ended && ended <= to)
+        silences().filter_map(|one| one.ended).any(|ended| from < ended && ended <= to)
     };
     let mut left: Vec<usize> = (0..tree.links().len()).collect();
     let mut has_helped = false;
     for (index, write) in writes.iter().enumerate() {
-        let Some(link) = write.closed.and_then(|port| link_at(tree, write.device, port)) else {
+        let Some(link) = write.closed.and_then(|port| link_below(tree, write.device, port)) else {
             continue;
         };
         let from = write.seen.at;
@@ -89,7 +94,7 @@ pub fn seen(line: &Line) -> Option<HoleSearch> {
         let behind = behind(tree, link);
         left.retain(|one| behind.contains(one) == helps);
         // It was the port, if they vanish again when that is open: a hole may also have gone by itself.
-        has_helped |= helps && silences.iter().any(|silence| silence.since.at > from);
+        has_helped |= helps && silences().any(|silence| silence.since.at > from);
     }
     let found = match left[..] {
         [only] if has_helped => Some(Seen::new(only, last.at, last.frame)),
@@ -98,17 +103,42 @@ pub fn seen(line: &Line) -> Option<HoleSearch> {
     Some(HoleSearch { since: silence.since, found, ended: Some(last.at + PATIENCE) })
 }
 
-/// The link at a port that leads away from the MainDevice.
-fn link_at(tree: &Tree, device: DeviceId, port: Port) -> Option<usize> {
-    let near = End::Controller(device.index(), port);
-    tree.links().iter().position(|link| link.upstream == near)
+/// When ports were first closed in a silence, to find the place where frames vanish: whoever does so has a link,
+/// and begins a tenth of a second after the silence, or as soon as the link is there.
+#[must_use]
+pub fn began(line: &Line, silence: &Silence) -> Option<Seen<()>> {
+    let is_in =
+        |at: Instant| at >= silence.since.at && silence.ended.is_none_or(|ended| at < ended);
+    let mut writes = line.loop_writes.iter();
+    writes.find(|write| write.closed.is_some() && is_in(write.seen.at)).map(|write| write.seen)
 }
 
-/// A link and all behind it.
+/// The link at a port that leads away from the MainDevice.
+fn link_below(tree: &Tree, device: DeviceId, port: Port) -> Option<usize> {
+    let near = End::Controller(device.index(), port);
+    tree.link_at(near).filter(|link| tree.links()[*link].upstream == near)
+}
+
+/// Whether somebody searched as soon as there was a silence about a stretch of time: then there was a link all the
+/// time, since nobody searches without one.
+#[must_use]
+pub fn began_at_once(line: &Line, (from, to): (Instant, Instant)) -> bool {
+    let ended = |silence: &Silence| silence.ended.unwrap_or(Instant::MAX);
+    let mut silences = line.traffic.silences.iter().rev();
+    let about = silences.find(|silence| silence.since.at <= to && ended(silence) >= from);
+    about.is_some_and(|silence| {
+        began(line, silence).is_some_and(|began| began.at.since(silence.since.at) < BEGINS_WITHIN)
+    })
+}
+
+/// A link and all behind it, as frames of card A go: in a ring the way on to card B, too.
 #[must_use]
 pub fn behind(tree: &Tree, link: usize) -> Vec<usize> {
     let Some(node) = tree.links().get(link).and_then(|link| link.downstream.node()) else {
         return vec![link];
     };
-    tree.subtree(node).iter().filter_map(|node| tree.link_above(*node)).collect()
+    let closes = |(last, _): &(usize, Port)| tree.subtree(node).contains(last);
+    let to_card_b = tree.closes_at().filter(closes).and_then(|_| tree.ring_link());
+    let above = tree.subtree(node).iter().filter_map(|node| tree.link_above(*node));
+    above.chain(to_card_b).collect()
 }

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use linesman_proto::address::Path;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
 
@@ -23,7 +24,30 @@ pub struct Silence {
     pub frames: u64,
     /// When something came back again.
     pub ended: Option<Instant>,
+    /// When the two requests before the latest one were sent, the earlier one first.
+    before_last: [Instant; 2],
     returns_before: u64,
+}
+
+impl Silence {
+    /// Of one request so far.
+    const fn begin(seen: Seen<()>, ended: Option<Instant>, returns_before: u64) -> Self {
+        let before_last = [seen.at; 2];
+        Self { since: seen, last: seen, frames: 1, ended, before_last, returns_before }
+    }
+
+    /// One more request is lost.
+    const fn goes_on(&mut self, seen: Seen<()>) {
+        self.before_last = [self.before_last[1], self.last.at];
+        self.last = seen;
+        self.frames += 1;
+    }
+
+    /// Whether its latest three requests, at least, were sent from `from` on.
+    #[must_use]
+    pub fn has_three_since(&self, from: Instant) -> bool {
+        self.frames >= 3 && self.before_last[0] >= from
+    }
 }
 
 /// With fewer requests than this it is no silence.
@@ -70,6 +94,11 @@ pub struct Traffic {
     pub latest_returned: Option<Seen<()>>,
     /// When nothing at all came back, oldest first, at most [`SILENCES_KEPT`].
     pub silences: VecDeque<Silence>,
+    /// In a ring, when what card B had sent came round untouched, and nothing of what card A had sent came back:
+    /// oldest first, at most [`SILENCES_KEPT`].
+    pub swallowed: VecDeque<Silence>,
+    /// The latest time at which a frame came back that somebody had processed.
+    pub latest_processed: Option<Instant>,
     recent_returns: RecentReturns,
     /// Who sent requests, at most four.
     pub senders: Vec<Sender>,
@@ -105,14 +134,16 @@ pub struct Traffic {
     pub broadcast_answers: u16,
     /// The working counter of the latest broadcast read, with when it last changed.
     pub broadcast_now: Option<Seen<u16>>,
-    /// In a ring, the latest broadcast read whose copies were both processed by somebody: by how many
-    /// each, in the order in which they came back.
+    /// In a ring, the latest broadcast read ever whose copies were both processed by somebody: by how many
+    /// each, in the order in which they came back. Who is reached by card B alone gets no time of a reference
+    /// clock that card A reaches.
     pub broadcast_split: Option<Seen<(u16, u16)>>,
-    /// When that was so the last time: who is reached by card B alone gets no time of a reference clock that
-    /// card A reaches.
-    pub latest_split: Option<Instant>,
     /// Whether a broadcast read came back in two copies, and one of them alone was processed by anybody.
     pub was_processed_by_one: bool,
+    /// The latest broadcast read whose copies both came back, and of which one alone was processed by anybody:
+    /// the card that had sent that one. In a closed ring that is card A, unless all are plugged in the wrong
+    /// way round.
+    pub processed_alone: Option<Seen<Path>>,
     /// The first broadcast read that fewer controllers answered than one before.
     pub broadcast_first_low: Option<Seen<u16>>,
     /// Most controllers that a frame passed, by what they add to positions.
@@ -135,8 +166,7 @@ impl Traffic {
         let ended = self.return_after(returns_before, at);
         if let Some(silence) = self.silences.back_mut() {
             if silence.returns_before == returns_before {
-                silence.last = seen;
-                silence.frames += 1;
+                silence.goes_on(seen);
                 silence.ended = ended;
                 return;
             }
@@ -147,8 +177,34 @@ impl Traffic {
                 self.silences.pop_front();
             }
         }
-        let silence = Silence { since: seen, last: seen, frames: 1, ended, returns_before };
-        self.silences.push_back(silence);
+        self.silences.push_back(Silence::begin(seen, ended, returns_before));
+    }
+
+    /// In a ring, of a request the copy alone came back that nobody had processed.
+    pub fn record_swallowed(&mut self, at: Instant, frame: u64) {
+        let seen = Seen::new((), at, Some(frame));
+        if let Some(silence) = self.swallowed.back_mut() {
+            if silence.ended.is_none_or(|ended| ended >= at) {
+                silence.goes_on(seen);
+                return;
+            }
+            if silence.frames < SHORT {
+                self.swallowed.pop_back();
+            } else if self.swallowed.len() == SILENCES_KEPT {
+                self.swallowed.pop_front();
+            }
+        }
+        // That it is lost is known some time later only.
+        let ended = self.latest_processed.filter(|processed| *processed > at);
+        self.swallowed.push_back(Silence::begin(seen, ended, self.returned));
+    }
+
+    /// A frame came back that somebody had processed.
+    pub fn record_processed(&mut self, at: Instant) {
+        self.latest_processed = Some(at);
+        if let Some(silence) = self.swallowed.back_mut() {
+            silence.ended.get_or_insert(at);
+        }
     }
 
     /// A frame that is not EtherCAT was seen. Says whether it is news.

@@ -28,8 +28,12 @@ const SLOWLY: u64 = 256;
 const OTHER_WAY: usize = 8;
 /// How alike they are then, in ns.
 const ALIKE: u64 = 5_000;
-/// When so many frames of a hundred are late, it is a queue …
-const MOST: u64 = 30;
+/// And so long they do: frames that leave together wait for the same.
+const LASTING: Span = Span::ms(5);
+/// What comes between frames that are late does not tell what this host does anyway, until so many in a row were in time.
+const CALM: u64 = 16;
+/// When two of three frames are late, it is a queue, in percent …
+const MOST: u64 = 66;
 /// … if there were so many at all.
 const SEVERAL: u64 = 8;
 /// Late frames that are kept.
@@ -61,6 +65,8 @@ pub struct Trips {
     busy_until: Instant,
     /// Frames that came back.
     frames: u64,
+    /// Those since the latest late one; all, if none was.
+    in_time: u64,
     /// The latest of the first ones, in ns.
     worst_learnt: u64,
     /// Late ones in a row, as long as they may be on another way.
@@ -87,7 +93,7 @@ struct Usual {
 
 impl Usual {
     /// A frame took so long: by how much it is late, if it is.
-    fn take(&mut self, took: u64, least: u64) -> Option<u64> {
+    fn take(&mut self, took: u64, least: u64, is_calm: bool) -> Option<u64> {
         self.count += 1;
         if self.count == 1 {
             (self.shortest, self.next_shortest) = (took, took);
@@ -100,7 +106,7 @@ impl Usual {
         let longer = took - self.shortest.min(took);
         let limit = (self.wanders * WORSE).max(least);
         let is_late = self.count > KNOWN && longer > limit;
-        if !is_late {
+        if !is_late && is_calm {
             self.wanders = (self.wanders * (SLOWLY - 1) + longer) / SLOWLY;
         }
         is_late.then_some(longer)
@@ -118,8 +124,10 @@ impl Trips {
             return false;
         }
         let least = LEAST.max(self.worst_learnt * WORST);
-        let late = self.usual.entry(len).or_default().take(took, least);
+        let is_calm = self.late_count == 0 || self.in_time >= CALM;
+        let late = self.usual.entry(len).or_default().take(took, least, is_calm);
         self.frames += 1;
+        self.in_time = if late.is_some() { 0 } else { self.in_time + 1 };
         if self.frames <= LEARNT_FROM {
             self.worst_learnt = self.worst_learnt.max(late.unwrap_or(0));
             return false;
@@ -136,7 +144,8 @@ impl Trips {
             self.settle();
         }
         self.alike.push(late);
-        if self.alike.len() >= OTHER_WAY {
+        let lasted = self.alike.first().map_or(Span::ZERO, |first| sent.since(first.sent));
+        if self.alike.len() >= OTHER_WAY && lasted >= LASTING {
             self.alike.clear();
             self.usual.clear();
         }

@@ -245,16 +245,8 @@ fn share_source(survey: &Survey<'_>, mut links: Vec<Group>) -> Vec<Suspicion> {
             continue;
         }
         let leader = &links[index];
-        let together: Vec<usize> = order[at + 1..]
-            .iter()
-            .copied()
-            .filter(|other| {
-                !taken[*other]
-                    && leader.has_symbols()
-                    && links[*other].has_symbols()
-                    && falls_together(survey, &leader.damages, &links[*other].damages)
-            })
-            .collect();
+        let others = order[at + 1..].iter().copied().filter(|other| !taken[*other]);
+        let together = with_same_source(survey, &links, index, others);
         let mut members: Vec<&Group> = vec![leader];
         members.extend(together.iter().map(|other| &links[*other]));
         let common = (members.len() > 1).then(|| common_device(&members)).flatten();
@@ -271,6 +263,33 @@ fn share_source(survey: &Survey<'_>, mut links: Vec<Group>) -> Vec<Suspicion> {
         all.push(lead);
     }
     all
+}
+
+/// Those of the `others` that are hit together with the first link, or with one that is.
+fn with_same_source(
+    survey: &Survey<'_>,
+    links: &[Group],
+    first: usize,
+    others: impl Iterator<Item = usize>,
+) -> Vec<usize> {
+    if !links[first].has_symbols() {
+        return Vec::new();
+    }
+    let mut left: Vec<usize> = others.filter(|other| links[*other].has_symbols()).collect();
+    let mut found = Vec::new();
+    let mut one = first;
+    for next in 0.. {
+        let (together, apart) = left.into_iter().partition(|other: &usize| {
+            falls_together(survey, &links[one].damages, &links[*other].damages)
+        });
+        left = apart;
+        found.extend::<Vec<usize>>(together);
+        match found.get(next) {
+            Some(following) => one = *following,
+            None => break,
+        }
+    }
+    found
 }
 
 /// The device at whose ports all damage is sent, or all is received.

@@ -12,6 +12,7 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Hop, Route};
 
+use super::spells::Spells;
 use super::survey::Survey;
 use crate::line::{CounterTrack, Rise};
 
@@ -278,8 +279,11 @@ impl Walk<'_, '_> {
         // Some controllers make a symbol error anew when they send a bad frame on: then the symbols
         // go with the bad frames that came, one each.
         let goes_with_frames = physical.settled <= bad && physical.settled * 2 >= bad;
-        let is_remade = frames == 0 && before.frames > 0 && goes_with_frames;
-        let symbols = if is_remade { 0 } else { physical.settled };
+        let remade = match frames == 0 && before.frames > 0 && goes_with_frames {
+            true => self.counted_with_frames(node, port),
+            false => 0,
+        };
+        let symbols = physical.settled.saturating_sub(remade);
         let symbols = symbols.saturating_sub(physical.excused);
 
         self.carried.frames = before.frames.max(invalid.total + forwarded.total);
@@ -290,6 +294,22 @@ impl Walk<'_, '_> {
             is_physical_read.then_some(symbols),
             is_lower_bound,
         ))
+    }
+
+    /// How many symbol errors of a port came with bad frames. A reading may come between the symbol and the end of
+    /// its frame: then the one shows in this reading, the other in the next.
+    fn counted_with_frames(&self, node: usize, port: Port) -> u64 {
+        let rises = |counter| {
+            let track = self.survey.track(node, counter);
+            track.into_iter().flat_map(|track| self.survey.rises(track))
+        };
+        let bad = [ErrorCounter::InvalidFrame(port), ErrorCounter::Forwarded(port)];
+        let frames: Spells =
+            bad.into_iter().flat_map(rises).map(|rise| (rise.after_time, rise.at)).collect();
+        let with_frames = rises(ErrorCounter::PhysicalLayer(port)).filter(|rise| {
+            frames.meet((rise.after_time.before(Span::ns(1)), rise.at + Span::ns(1)))
+        });
+        with_frames.map(|rise| u64::from(rise.difference.rise)).sum()
     }
 
     fn read(&self, hop: Hop, track: &CounterTrack) -> Reading {
@@ -365,9 +385,10 @@ impl Walk<'_, '_> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
         let line = self.survey.line();
-        // In a ring one of the two copies is lost at a time.
+        // In a ring one of the two copies is lost at a time; a few whole ones were lost while it came up.
         let copies = line.traffic.copies_lost[card.index()];
-        let lost = if line.traffic.lost.of_spell() == 0 { copies } else { line.traffic.lost };
+        let whole = line.traffic.lost;
+        let lost = if copies.of_spell() > whole.of_spell() { copies } else { whole };
         let (first, last) = (lost.first_of_spell?, lost.last?);
         let is_silent = self.carried.frames == 0 && !line.host.is_watched;
         // Counters that were read before the frame was missed say nothing of it.

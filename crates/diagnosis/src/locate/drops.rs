@@ -123,6 +123,13 @@ impl Drops {
         Some(back.map_or(self.last, |back| back.max(self.last)))
     }
 
+    /// Whether link status of an end showed one of these losses. Of a loss that both ends showed, the list
+    /// names one.
+    #[must_use]
+    pub fn is_shown_by(&self, line: &Line, end: End) -> bool {
+        status_drops(line, end).iter().any(|drop| drop.at >= self.first)
+    }
+
     /// Whether both were lost at the same time, at least once.
     #[must_use]
     pub fn falls_with(&self, other: &Self) -> bool {

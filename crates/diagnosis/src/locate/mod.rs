@@ -11,9 +11,11 @@ pub mod cause;
 pub mod damage;
 pub mod drops;
 mod rhythm;
+pub mod spells;
 pub mod survey;
 
 pub use cause::{Suspect, Suspicion};
 pub use damage::{Damage, LastHop, Located};
 pub use drops::{Drop, Drops};
+pub use spells::Spells;
 pub use survey::Survey;

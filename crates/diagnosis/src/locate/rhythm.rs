@@ -1,40 +1,71 @@
 //! How errors come in time: two places in step, or one place steadily.
 
 use linesman_proto::register::ErrorCounter;
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::time::Span;
 use linesman_proto::topology::End;
 
 use super::damage::Damage;
+use super::spells::{Spell, Spells, meet};
 use super::survey::Survey;
 use crate::line::Rise;
 
-/// Damage from one source begins within the time in which all counters are read once or twice.
-const SAME_START: Span = Span::ms(500);
+/// Readings further apart than this say nothing of what came at the same moment.
+const CLOSE_READING: Span = Span::ms(150);
 
-/// Rises read so close together belong to one round of reading.
-const SAME_READING: Span = Span::ms(60);
+/// So many times one series is moved against the other, to see how often they meet by chance.
+const MOVES: u64 = 40;
 
-/// With fewer readings chance alone may look like a common source.
-const ENOUGH_READINGS: usize = 10;
+/// After so few of all moves they may meet as often, if it is not to be chance.
+const BY_CHANCE: usize = 1;
 
-/// Two series that go together so closely have one source: by chance one pair of ten readings in
-/// thirty does.
-const RELATED: f64 = 0.6;
+/// A single meeting is none.
+const ENOUGH_MEETINGS: usize = 2;
 
-/// Whether the damage at two places began together and swell and fade together, as the bursts of one source make
-/// them. Two faults of their own may last at the same time, but each goes its own way.
+/// Whether the damage at two places has one source: its bursts hit both at the same moments, and both begin
+/// and end with it. Two faults of their own may last at the same time, but each goes its own way.
+///
+/// Whether they meet more often than by chance is seen from the same two series, moved against each other in
+/// circles: each keeps its own rhythm, and how often places are hit and read does not matter.
 pub(super) fn falls_together(survey: &Survey<'_>, a: &[Damage], b: &[Damage]) -> bool {
-    let first = |damages: &[Damage]| damages.iter().map(|damage| damage.first).min();
-    let (Some(one), Some(other)) = (first(a), first(b)) else { return false };
-    if one.max(other).since(one.min(other)) > SAME_START {
+    let (a, b) = (hits(survey, a), hits(survey, b));
+    let ends = |hits: &[Spell]| Some((*hits.first()?, *hits.last()?));
+    let (Some((a_first, a_last)), Some((b_first, b_last))) = (ends(&a), ends(&b)) else {
+        return false;
+    };
+    if meet(a_first, b_first) && meet(a_last, b_last) {
+        return true;
+    }
+    let both = (a_first.0.max(b_first.0), a_last.1.min(b_last.1));
+    let within = |hits: &[Spell]| -> Vec<Spell> {
+        hits.iter().copied().filter(|hit| meet(*hit, both)).collect()
+    };
+    let (a, b) = (within(&a), Spells::from_iter(within(&b)));
+    let met = a.iter().filter(|hit| b.meet(**hit)).count();
+    let around = both.1.since(both.0).as_nanos();
+    if met < ENOUGH_MEETINGS || around == 0 {
         return false;
     }
-    let of = |damages: &[Damage]| -> Vec<(Instant, f64)> {
-        let rises = damages.iter().flat_map(|damage| rises(survey, damage));
-        rises.map(|rise| (rise.at, f64::from(rise.difference.rise))).collect()
+    let moved = |(begin, end): Spell, by: u64| {
+        let moved = both.0 + Span::ns((begin.since(both.0).as_nanos() + by) % around);
+        (moved, moved + end.since(begin))
     };
-    let readings = side_by_side(&of(a), &of(b));
-    readings.len() >= ENOUGH_READINGS && correlation(&readings) >= RELATED
+    let as_often = (1..MOVES).filter(|at| {
+        let by = around / MOVES * at;
+        a.iter().filter(|hit| b.meet(moved(**hit, by))).count() >= met
+    });
+    as_often.count() <= BY_CHANCE
+}
+
+/// When a place was hit, in order, as far as it was read closely: a hit lies between the reading before a rise
+/// and the reading that shows it.
+fn hits(survey: &Survey<'_>, damages: &[Damage]) -> Vec<Spell> {
+    let rises = damages.iter().flat_map(|damage| rises(survey, damage));
+    let between = rises.map(|rise| (rise.after_time, rise.at));
+    let mut hits: Vec<Spell> =
+        between.filter(|(begin, end)| end.since(*begin) <= CLOSE_READING).collect();
+    hits.sort_unstable();
+    hits.dedup();
+    hits
 }
 
 /// Whether errors come in nearly each reading, as a damaged part makes them, and not in bursts.
@@ -62,41 +93,4 @@ fn rises<'a>(survey: &Survey<'a>, damage: &Damage) -> Vec<&'a Rise> {
         .filter_map(|counter| survey.track(node, counter))
         .flat_map(|track| survey.rises(track))
         .collect()
-}
-
-/// Rises of two groups by the reading in which they were seen; 0 where only the other one rose.
-fn side_by_side(a: &[(Instant, f64)], b: &[(Instant, f64)]) -> Vec<(f64, f64)> {
-    let mut all: Vec<(Instant, f64, f64)> = Vec::with_capacity(a.len() + b.len());
-    all.extend(a.iter().map(|(at, by)| (*at, *by, 0.0)));
-    all.extend(b.iter().map(|(at, by)| (*at, 0.0, *by)));
-    all.sort_by_key(|(at, ..)| *at);
-    let mut readings: Vec<(f64, f64)> = Vec::with_capacity(all.len());
-    let mut began: Option<Instant> = None;
-    for (at, one, other) in all {
-        match (began, readings.last_mut()) {
-            (Some(from), Some(last)) if at.since(from) <= SAME_READING => {
-                last.0 += one;
-                last.1 += other;
-            }
-            (Some(_) | None, _) => {
-                readings.push((one, other));
-                began = Some(at);
-            }
-        }
-    }
-    readings
-}
-
-/// Correlation of two series, -1 to 1; 0 where one of them never changes.
-fn correlation(series: &[(f64, f64)]) -> f64 {
-    let len = series.len() as f64;
-    let (sum_a, sum_b) = series.iter().fold((0.0, 0.0), |(a, b), pair| (a + pair.0, b + pair.1));
-    let (mean_a, mean_b) = (sum_a / len, sum_b / len);
-    let (mut both, mut own_a, mut own_b) = (0.0, 0.0, 0.0);
-    for (a, b) in series {
-        both += (a - mean_a) * (b - mean_b);
-        own_a += (a - mean_a) * (a - mean_a);
-        own_b += (b - mean_b) * (b - mean_b);
-    }
-    if own_a > 0.0 && own_b > 0.0 { both / (own_a * own_b).sqrt() } else { 0.0 }
 }

@@ -171,7 +171,8 @@ fn changes(line: &Line, tree: &Tree, link: usize) -> Vec<(Instant, Instant)> {
                 changes.extend(moved.map(|change| around(change.at, change.at)));
                 let lost = device.counters.track(ErrorCounter::LostLink(port));
                 let rises = lost.into_iter().flat_map(|track| &track.rises);
-                changes.extend(rises.map(|rise| (rise.after_time, rise.at)));
+                // What was lost for a moment is back soon; readings may come between.
+                changes.extend(rises.map(|rise| around(rise.after_time, rise.at)));
             }
         }
     }

@@ -38,6 +38,8 @@ pub struct Exchange<'a> {
     pub is_part: bool,
     /// The card to which its copy did not come, though those of others before and after it did.
     pub copy_lost: Option<Path>,
+    /// The card by which the copy that came back had gone out; `None` where that is not known.
+    pub sent_by: Option<Path>,
 }
 
 impl Exchange<'_> {

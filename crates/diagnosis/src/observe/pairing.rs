@@ -13,6 +13,7 @@
 //! backwards, many do.
 
 mod loss;
+mod sent_by;
 
 use std::collections::VecDeque;
 
@@ -96,7 +97,7 @@ struct Pending {
     number: u64,
     path: Option<Path>,
     source: MacAddress,
-    /// Who sent the same at the same time: the other card of a ring, where cards are not told apart.
+    /// Who sent the same at the same time: the other card of a ring.
     copy_by: Option<MacAddress>,
     /// Whether it is a copy for the other card with less in it.
     is_part: bool,
@@ -159,6 +160,7 @@ impl Pairing {
                 is_cut_off: false,
                 is_part: false,
                 copy_lost: None,
+                sent_by: None,
             });
             self.returns += 1;
             return Outcome::ReturnAlone;
@@ -270,6 +272,7 @@ impl Pairing {
                         is_cut_off: false,
                         is_part: false,
                         copy_lost: None,
+                        sent_by: None,
                     });
                     self.returns += 1;
                     self.mistaken += 1;
@@ -304,6 +307,7 @@ impl Pairing {
             })
         {
             pending.sent[path.index()] = true;
+            pending.copy_by = Some(source);
             pending.out += 1;
             return Outcome::RequestCopy;
         }
@@ -406,6 +410,7 @@ impl Pairing {
         view: &FrameView<'_>,
         settle: &mut impl FnMut(&Exchange<'_>),
     ) {
+        let sent_by = self.sent_by(&self.pending[found], view.source());
         let pending = &mut self.pending[found];
         pending.out -= 1;
         let is_last = pending.out == 0;
@@ -427,6 +432,7 @@ impl Pairing {
             is_cut_off: false,
             is_part: pending.is_part,
             copy_lost: None,
+            sent_by,
         });
         if is_last {
             self.remove(found);

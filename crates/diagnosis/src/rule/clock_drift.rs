@@ -9,8 +9,9 @@
 //! gives goes faster or slower than the clock of the computer by more than any sound quartz.
 //!
 //! Nobody reads these registers all the time: live, the diagnosis asks for them by turns. A clock that goes off
-//! while no frame comes round, by no more than a sound quartz does in that time, was left alone and is well; so is
-//! one that goes off when the reference clock does not answer, or is in the other half of a ring.
+//! while no frame comes round, or none that hands the time of the reference round, by no more than a sound quartz
+//! does in that time, was left alone and is well; so is one that goes off when the reference clock does not
+//! answer, or is in the other half of a ring.
 //!
 //! **What it means.** Control in the controller follows quartzes that are off by some hundreds of parts per
 //! million, and sound ones are off by fifty at most. Heat and damage make it more. The SYNC signals of the
@@ -22,12 +23,12 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, RegisterAddress};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View, reference_clock};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::line::clock::{Astray, Reference};
-use crate::line::{Device, Line};
+use crate::line::{Absence, Device, Line};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -68,10 +69,18 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
 }
 
-/// Whether the SubDevice was gone, or started anew, meanwhile: then its clock had to be set again.
+/// So long after it answers again a clock that nobody steered is on its way back.
+const PULLED_IN: Span = Span::s(2);
+
+/// Whether the SubDevice was gone, or started anew, meanwhile or just before: then its clock had to be set or
+/// pulled in again.
 fn was_gone(device: &Device, astray: &Astray) -> bool {
     let is_within = |at| at >= astray.near.at && at <= astray.far.at;
-    device.absences.iter().any(|absence| is_within(absence.since.at))
+    let was_away = |absence: &Absence| {
+        let is_over = absence.ended.is_some_and(|ended| ended + PULLED_IN < astray.near.at);
+        absence.since.at <= astray.far.at && !is_over
+    };
+    device.absences.iter().any(was_away)
         || device.al.changes.iter().any(|change| change.is_own_fall() && is_within(change.at))
 }
 
@@ -84,13 +93,18 @@ fn was_silent(device: &Device, astray: &Astray) -> bool {
         })
 }
 
-/// Whether no frame came round meanwhile, or the ring was in halves, so that nobody was steered, and the clock
-/// went off by no more than a sound quartz does in such a time.
+/// Whether no frame came round meanwhile, or none with the time of the reference, or the ring was in halves, so
+/// that nobody was steered, and the clock went off by no more than a sound quartz does in such a time.
 fn was_left_alone(line: &Line, astray: &Astray) -> bool {
-    let alone = line.traffic.silences.iter().map(|silence| {
+    let silent = line.traffic.silences.iter().map(|silence| {
         let ended = silence.ended.unwrap_or(line.now).min(astray.far.at);
         ended.since(silence.since.at.max(astray.near.at).min(ended)).as_nanos()
     });
+    // Frames may go round without a time, too.
+    let withheld = line.references.iter();
+    let withheld = withheld.map(|reference| reference.withheld(astray.near.at, astray.far.at));
+    let withheld = withheld.min().unwrap_or_default().as_nanos();
+    let alone = silent.sum::<u64>().max(withheld);
     // Where the reference does not answer, nobody puts its time into the frame, and the others take what is there.
     let without_reference = line.references.iter().any(|reference| {
         line.device(reference.device).is_some_and(|device| was_silent(device, astray))
@@ -98,14 +112,14 @@ fn was_left_alone(line: &Line, astray: &Astray) -> bool {
     if without_reference {
         return true;
     }
-    let is_in_halves = line.traffic.latest_split.is_some_and(|split| split >= astray.near.at);
+    let is_in_halves = line.traffic.broadcast_split.is_some_and(|split| split.at >= astray.near.at);
     if is_in_halves && astray.ppm.unsigned_abs() <= Reference::SOUND.unsigned_abs() {
         return true;
     }
     let off = u128::from(
         astray.worst.value.unsigned_abs().saturating_sub(astray.near.value.unsigned_abs()),
     );
-    off * 1_000_000 <= alone.map(u128::from).sum::<u128>() * Reference::SOUND as u128
+    off * 1_000_000 <= u128::from(alone) * Reference::SOUND as u128
 }
 
 /// The reference clock, if it is that which runs wrong.

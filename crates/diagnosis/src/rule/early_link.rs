@@ -4,8 +4,10 @@
 //!
 //! **How it is found.** A link was lost, once, and is back (0x0110, 0x0310 to 0x0313). While it was down the rest of
 //! the line answered; with the link up again nothing came back at all, from nobody, for several frames, and then
-//! everything did. On the cable of the card itself it shows when the card had its link back and frames still
-//! went missing for a tenth of a second or more.
+//! everything did. On the cable of the card itself it shows when the card had its link back, which the system
+//! tells to the millisecond, and several frames that it sent from then on still went missing. A recording does
+//! not tell when the card had a link; but whoever searches for the place where frames vanish has one, and begins
+//! as soon as it has.
 //!
 //! **What it means.** Ports open their loops as soon as they have a link. A switch, a media converter or a slow
 //! device in between that shows its link before it forwards swallows every frame of the line meanwhile, not
@@ -22,8 +24,8 @@ use linesman_proto::topology::{End, Tree};
 
 use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Line, Silence};
-use crate::locate::Drops;
+use crate::line::{Line, Silence, search};
+use crate::locate::{Drops, LastHop, Located, Survey};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -43,8 +45,8 @@ const SEVERAL: u64 = 3;
 const BLIND: Span = Span::ms(5);
 /// The loss of a link is read so long after it at most, or before it is counted.
 const AROUND: Span = Span::s(1);
-/// The state of the card's link is looked at from time to time.
-const CARRIER: Span = Span::ms(120);
+/// Counters are read so long after they counted.
+const COUNTED: Span = Span::ms(250);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
@@ -90,14 +92,50 @@ fn behind_link<'a>(line: &'a Line, drops: &Drops) -> Option<(&'a Silence, Instan
     if fell {
         return None;
     }
-    silences(line).find(|(silence, _)| is_then(silence.since.at))
+    silences(line).find(|(silence, ended)| {
+        is_then(silence.since.at) && !were_damaged(line, drops.link, silence, *ended)
+    })
 }
 
-/// The card had its link again, and still nothing came back.
+/// Whether as many frames were damaged elsewhere meanwhile: those are lost, too, but somebody counts them. What
+/// a link swallows that carries nothing yet is counted by nobody.
+fn were_damaged(line: &Line, link: usize, silence: &Silence, ended: Instant) -> bool {
+    let Some(survey) = Survey::of(line, true) else { return false };
+    let located = Located::on(&survey);
+    let is_then =
+        |first: Instant, last: Instant| first <= ended + COUNTED && last >= silence.since.at;
+    let hops = located
+        .hops
+        .iter()
+        .filter(|damage| damage.hop.link != link && is_then(damage.first, damage.last));
+    let cards = located
+        .last_hops
+        .iter()
+        .filter(|hop| matches!(hop, LastHop::Damaged { .. }) && is_then(hop.first(), hop.last()));
+    let frames =
+        hops.map(|damage| damage.frames).sum::<u64>() + cards.map(LastHop::frames).sum::<u64>();
+    frames >= silence.frames
+}
+
+/// The card had its link again, and still nothing came back of what it sent from then on. When the link came is
+/// known a little late at most: what was lost later was lost with the link up.
 fn behind_card(line: &Line, card: Path) -> Option<(&Silence, Instant)> {
     let history = line.host.card(card);
-    let up = history.carrier.filter(|carrier| carrier.value && history.carrier_changes > 0)?;
-    silences(line).find(|(silence, ended)| silence.since.at <= up.at && *ended >= up.at + CARRIER)
+    let came = |silence: &Silence| match history.carrier {
+        Some(carrier) => (carrier.value && history.carrier_changes > 0).then_some(carrier.at),
+        // Whoever began to search so late had no link before.
+        None => search::began(line, silence)
+            .map(|began| began.at)
+            .filter(|began| began.since(silence.since.at) >= search::BEGINS_WITHIN),
+    };
+    let is_blind = |silence: &Silence| {
+        came(silence).is_some_and(|came| {
+            silence.since.at <= came
+                && silence.has_three_since(came)
+                && silence.last.at >= came + BLIND
+        })
+    };
+    silences(line).find(|(silence, _)| is_blind(silence))
 }
 
 fn condition(

@@ -16,11 +16,12 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::register::ErrorCounter;
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
-use crate::line::{Device, Line, Rise};
+use crate::line::{CounterHistory, Device, Line, Rise};
+use crate::locate::Spells;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -89,28 +90,33 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 
 /// Who destroyed frames that were not damaged, with the rises that show it.
 fn destroyed(line: &Line) -> Vec<(&Device, Vec<&Rise>)> {
-    let clean = line.devices.iter().map(|device| {
-        let track = device.counters.track(ErrorCounter::ProcessingUnit);
-        let rises = track.into_iter().flat_map(|track| &track.rises);
-        (device, rises.filter(|rise| is_clean(line, rise)).collect::<Vec<_>>())
-    });
+    let found = |device| {
+        let track = CounterHistory::track(device, ErrorCounter::ProcessingUnit);
+        track.into_iter().flat_map(|track| &track.rises)
+    };
+    if line.devices.iter().all(|device| found(&device.counters).next().is_none()) {
+        return Vec::new();
+    }
+    let explained = explained(line);
+    let is_clean =
+        |rise: &&Rise| !explained.meet((rise.after_time.before(AROUND), rise.at + AROUND));
+    let clean = line
+        .devices
+        .iter()
+        .map(|device| (device, found(&device.counters).filter(is_clean).collect::<Vec<_>>()));
     clean.filter(|(_, rises)| !rises.is_empty()).collect()
 }
 
-/// Whether nothing else explains that a processing unit found errors between two readings: damage at a
-/// port anywhere, or a link that came or went.
-fn is_clean(line: &Line, rise: &Rise) -> bool {
-    let (from, to) = (rise.after_time.before(AROUND), rise.at + AROUND);
-    let overlaps = |since: Instant, until: Instant| since <= to && until >= from;
-    line.devices.iter().all(|device| {
-        let tracks = device.counters.tracks().filter(|(counter, _)| {
-            !matches!(counter, ErrorCounter::ProcessingUnit | ErrorCounter::Pdi)
-        });
-        let mut rises = tracks.flat_map(|(_, track)| &track.rises);
-        let mut links = device.dl.changes.iter().map(|change| change.at);
-        !rises.any(|other| overlaps(other.after_time, other.at))
-            && !links.any(|at| overlaps(at, at))
-    })
+/// When processing units find errors for another reason: damage at a port anywhere, or a link that comes or goes.
+fn explained(line: &Line) -> Spells {
+    let devices = || line.devices.iter();
+    let tracks = devices().flat_map(|device| device.counters.tracks()).filter(|(counter, _)| {
+        !matches!(counter, ErrorCounter::ProcessingUnit | ErrorCounter::Pdi)
+    });
+    let rises = tracks.flat_map(|(_, track)| &track.rises).map(|rise| (rise.after_time, rise.at));
+    let links =
+        devices().flat_map(|device| &device.dl.changes).map(|change| (change.at, change.at));
+    rises.chain(links).collect()
 }
 
 fn name(kind: u16) -> String {

@@ -16,7 +16,9 @@
 //! * Bad frames and bad symbols, or symbols alone: the signal suffers between the output of one device
 //!   and the input of the next. Cable, plug, contact, interference, or one of the two port circuits.
 //!   Both directions of one link point to the cable; several links at the same moments to interference;
-//!   one direction that counts steadily to the sender's output or the receiver's input.
+//!   one direction that counts steadily to the sender's output or the receiver's input. While several
+//!   links count, a live diagnosis reads the counters of those devices every 5 ms: one source hits them in
+//!   the same bursts, and begins and ends for all of them together; two faults each go their own way.
 //! * Bad frames with clean symbols (`H111`): the device before the port spoils frames inside, before
 //!   they are coded. Changing the cable will not help.
 //! * The way from the first SubDevice back to the card is checked by nobody but the card. If its own
@@ -100,11 +102,6 @@ fn add(
         (None, _) | (_, None) => return,
     };
     let is_unknown = matches!(suspicion.last_hop, Some(LastHop::Unknown { .. }));
-    // Ports were closed one after the other until frames came back: they were lost where that search ended.
-    let was_found = view.line.hole.and_then(|hole| hole.found);
-    if is_unknown && was_found.is_some_and(|found| first <= found.at) {
-        return;
-    }
     let page = match (is_unknown, most_likely.spot) {
         (true, _) => &LAST_HOP,
         (false, Spot::Link(..)) => &ON_LINK,

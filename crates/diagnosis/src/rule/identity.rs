@@ -20,11 +20,11 @@
 use linesman_config::fault::{Class, FaultName};
 use linesman_config::identity::{self, Mismatch, mismatch};
 use linesman_proto::address::DeviceId;
-use linesman_proto::port::Port;
 use linesman_proto::register::table;
 use linesman_proto::sii::Identity;
 use linesman_proto::time::Instant;
 
+use super::wiring::displaced;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::line::{Device, Line, Planned, Seen};
@@ -185,15 +185,7 @@ fn moved(line: &Line, slots: &[Slot]) -> Option<Condition> {
 /// last planned ones never answer.
 fn shifted(slots: &[Slot], first: usize) -> Vec<Symptom> {
     let first = first.saturating_sub(1);
-    let behind = slots[first..].iter().map(|slot| slot.id);
-    behind
-        .flat_map(|id| {
-            let down = Port::ALL.into_iter().flat_map(move |port| {
-                [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
-            });
-            down.chain([Symptom::Silent(id), Symptom::WorkingCounter(id)])
-        })
-        .collect()
+    displaced(slots[first..].iter().map(|slot| slot.id)).collect()
 }
 
 fn wrong(

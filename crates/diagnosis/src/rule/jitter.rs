@@ -115,9 +115,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         Some(Verdict::Bad) => Severity::Error,
         None => return,
     };
-    // Single frames are kept back by the computer, most of them by a queue.
-    let is_single = view.line.trips.late_count > 0 && !view.line.trips.is_queue();
-    let (cause, other) = if spell.at_sending || is_single {
+    // Single frames are kept back by the computer, most of them by a queue; who waits for those that are out sends
+    // unevenly, too.
+    let trips = &view.line.trips;
+    let is_single = spell.at_sending || trips.late_count > 0;
+    let (cause, other) = if is_single && !trips.is_queue() {
         (FaultName::HostJitter, FaultName::LateFrames)
     } else {
         (FaultName::LateFrames, FaultName::HostJitter)

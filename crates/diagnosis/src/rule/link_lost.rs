@@ -14,6 +14,8 @@
 //!   INIT, with its address and counters cleared, it was the supply.
 //! * One end has lost the link, the other has not: one pair of wires is broken, or something between the two,
 //!   such as a media converter, shows a link whatever happens behind it.
+//!   In a ring such an end closes no port, so that all on its side fall silent; it stays in use as long as it
+//!   shows a link.
 //! * The link comes and goes: a contact is loose, a plug not locked, a cable broken inside.
 //!
 //! What follows (SubDevices that do not answer, working counters, watchdogs) is listed beneath.
@@ -21,18 +23,22 @@
 //! **What to do.** Look at the lamps on both sides. Seat the plug, exchange the cable; on the terminal
 //! bus press the terminals together and look at the contacts. Measure the supply of the device behind.
 
+mod never_seen;
+mod swallowed_half;
+
 use std::collections::BTreeSet;
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::{ErrorCounter, table};
+use linesman_proto::sii::PortKind;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Line, Seen};
+use crate::line::{Line, Seen, search};
 use crate::locate::{Drop, Drops};
 
 /// The page.
@@ -51,6 +57,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const SHORT: Span = Span::s(1);
 /// What was on its way when a link was lost comes back by then.
 const ANSWERS_LATE: Span = Span::ms(100);
+/// A counter that rose in a silence is read so long after it at most.
+const READ_WITHIN: Span = Span::ms(1_500);
 /// Cards are looked at now and then only.
 const CARRIER_LATE: Span = Span::ms(300);
 /// A link that was lost again, before it was mended, comes and goes.
@@ -251,8 +259,7 @@ type Causes = (FaultName, f64, Vec<(FaultName, Option<usize>, f64)>);
 
 fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Causes {
     use FaultName::{
-        BrownOut, CableDegraded, DeviceMissing, DeviceOff, FalseLink, LinkFlapping, LinkOpen,
-        RingOpen, SupplyOff,
+        BrownOut, CableDegraded, DeviceOff, FalseLink, LinkFlapping, LinkOpen, RingOpen, SupplyOff,
     };
     if drops.count < OFTEN && is_one_sided(line, tree, drops) {
         // Nothing that shows a link by itself can be between two terminals.
@@ -261,9 +268,11 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
             false => (FalseLink, 0.5, vec![(LinkOpen, None, 0.35)]),
         };
     }
-    if let Some(node) = behind.filter(|node| never_was_there(line, tree, drops, *node)) {
-        let device = Some(node);
-        return (LinkOpen, 0.3, vec![(DeviceMissing, device, 0.45), (DeviceOff, device, 0.15)]);
+    if let Some(near) = swallowed_half::near_end(line, tree, drops) {
+        return (FalseLink, 0.6, vec![(RingOpen, None, 0.2), (DeviceOff, Some(near), 0.1)]);
+    }
+    if let Some(never) = never_seen::causes(line, tree, drops) {
+        return never;
     }
     let is_repeated = drops.count >= AGAIN;
     let sure = if drops.count >= OFTEN { 0.75 } else { 0.6 };
@@ -294,24 +303,12 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
     }
 }
 
-/// Whether a planned device never answered, and the port before it never had a link since its controller was
-/// switched on: its counter of lost links is 0.
-fn never_was_there(line: &Line, tree: &Tree, drops: &Drops, node: usize) -> bool {
-    let End::Controller(near, port) = tree.links()[drops.link].upstream else { return false };
-    let lost = line.devices[near].counters.track(ErrorCounter::LostLink(port));
-    let is_from_start = matches!(drops.seen[..], [drop] if drop.frame.is_some());
-    line.tree_is_planned
-        && line.devices[node].answered.is_none()
-        && is_from_start
-        && lost.is_some_and(|track| track.last.value == 0)
-}
-
 /// Whether one end has lost the link while the other one had it all the time: one pair of wires, or
 /// something between that shows a link by itself. Only where both were read afterwards.
 pub(super) fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
     let link = tree.links()[drops.link];
     let saw = |end: End| -> Option<bool> {
-        let seen = drops.seen.iter().any(|drop| drop.end == end);
+        let seen = drops.is_shown_by(line, end);
         match end {
             End::Controller(node, port) => {
                 let device = line.devices.get(node)?;
@@ -324,7 +321,10 @@ pub(super) fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
                 (seen || has_risen || was_read).then_some(seen || has_risen)
             }
             End::MainDevice(path) => {
-                let carrier = line.host.card(path).carrier?;
+                let Some(carrier) = line.host.card(path).carrier else {
+                    let about = (drops.first.before(READ_WITHIN), drops.last);
+                    return search::began_at_once(line, about).then_some(false);
+                };
                 let has_changed = !carrier.value || carrier.at >= drops.first.before(CARRIER_LATE);
                 (seen || drops.last + CARRIER_LATE < line.now)
                     .then_some(seen || (has_changed && line.host.card(path).carrier_changes > 0))
@@ -334,16 +334,22 @@ pub(super) fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
     matches!((saw(link.upstream), saw(link.downstream)), (Some(one), Some(other)) if one != other)
 }
 
-/// Whether a device hangs on the terminal bus, as far as its type and the one before it tell: there a contact and the device
+/// Whether a device hangs on the terminal bus, as far as its EEPROM, its type and the one before it tell: there a contact and the device
 /// behind it fail alike.
 pub(super) fn is_on_terminal_bus(line: &Line, node: usize) -> bool {
+    let tree = line.tree.as_ref().filter(|tree| node < tree.len());
+    // What its EEPROM says of the port by which frames come in.
+    match tree.and_then(|tree| Some(line.devices[node].sii.power()?.ports[tree.entry(node)])) {
+        Some(PortKind::EBus) => return true,
+        Some(PortKind::Mii | PortKind::FastHotConnect) => return false,
+        Some(PortKind::None | PortKind::Other(_)) | None => {}
+    }
     let type_of = |node: usize| line.devices[node].type_name.as_deref().unwrap_or_default();
     let is_of = |node: usize, families: &[&str]| {
         families.iter().any(|family| type_of(node).starts_with(family))
     };
     // Junctions and extensions are called like couplers; but port B of a coupler is the bus, whoever is there.
-    let above =
-        line.tree.as_ref().filter(|tree| node < tree.len()).and_then(|tree| tree.upstream(node));
+    let above = tree.and_then(|tree| tree.upstream(node));
     let is_behind_coupler =
         matches!(above, Some(End::Controller(near, Port::B)) if is_of(near, &["EK"]));
     is_of(node, &["EL", "ES", "EJ", "EM", "KM"]) || is_behind_coupler

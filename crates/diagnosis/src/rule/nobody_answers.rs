@@ -16,6 +16,9 @@
 //! come back. What was recorded meanwhile tells the same.
 //! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
 //! every frame; which link it is, no counter can be asked.
+//! In a ring the frames of card B may come round untouched while those of card A, which SubDevices process,
+//! vanish: no link is down, or the ring would have opened; something takes the frames of one direction, or those
+//! that go into a branch.
 //!
 //! **What to do.** Look at the LED of the card and of the IN port of the first SubDevice, then at
 //! supply, cable and the choice of the card, in this order.
@@ -30,7 +33,7 @@ use linesman_proto::topology::End;
 use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, LinkEnd, Place, Severity, Symptom};
-use crate::line::{Device, Line, Seen, Silence};
+use crate::line::{Device, Line, Seen, Silence, search};
 use crate::locate::Survey;
 
 /// The page.
@@ -51,6 +54,8 @@ const CERTAIN: u64 = 8;
 const LONG: u64 = 32;
 /// How likely it is the card.
 const CARD: f64 = 0.1;
+/// How likely a first device that nobody ever saw is not there, or has a supply that failed with others'.
+const NEVER_SEEN: f64 = 0.08;
 /// Cards are looked at now and then only: a silence must last so long before their link proves anything.
 const CARRIER_LATE: Span = Span::ms(300);
 /// The watchdog of a SyncManager expired. Reference: ETG.1000.6, AL status codes.
@@ -71,9 +76,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     // One condition: the latest silence, or the one that lasts.
     let is_long =
         |silence: &&Silence| silence.frames >= CERTAIN || (silence.frames >= FEW && view.has_ended);
-    if let Some(silence) = traffic.silences.iter().rev().find(is_long) {
+    let swallowed = traffic.swallowed.iter().rev().find(|silence| silence.frames >= CERTAIN);
+    let silence = traffic.silences.iter().rev().find(is_long);
+    if let Some(silence) = silence.into_iter().chain(swallowed).max_by_key(|one| one.since.at) {
+        let is_swallowed = swallowed.is_some_and(|one| one.since == silence.since);
         let silence = &searched(line, silence);
-        let is_hole = nothing_was_cut(view, silence);
+        let is_hole = is_swallowed || nothing_was_cut(view, silence);
         let was_searched = line.hole.is_some_and(|hole| hole.since == silence.since);
         if is_hole && !was_searched && is_among_others(line, silence) {
             // Frames are lost here and there: damage, which other rules place.
@@ -140,7 +148,13 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
     let was_answered = line.traffic.answered > 0;
     let carrier = carrier_during(line, silence);
     let since = silence.since;
-    let text = if was_answered {
+    let is_swallowed = line.traffic.swallowed.iter().any(|one| one.since == since);
+    let text = if is_swallowed {
+        format!(
+            "from here on {} requests in a row came round as card B had sent them, and not as card A had",
+            silence.frames
+        )
+    } else if was_answered {
         format!("from here on {} requests in a row did not come back", silence.frames)
     } else {
         format!("first of {} requests; none came back", silence.frames)
@@ -173,8 +187,13 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         }
     }
     if let Some(carrier) = carrier {
-        let text = if carrier { "card A has a link" } else { "card A had no link meanwhile" };
-        let at = line.host.card(Path::A).carrier.map(|carrier| carrier.at);
+        let told = line.host.card(Path::A).carrier.map(|carrier| carrier.at);
+        let text = match (carrier, told) {
+            (true, Some(_)) => "card A has a link",
+            (true, None) => "ports were closed meanwhile to find the place: who does so has a link",
+            (false, _) => "card A had no link meanwhile",
+        };
+        let at = told.or_else(|| search::began(line, silence).map(|began| began.at));
         condition = condition.shown_by(Evidence::host(at, text));
     }
     if silence.frames >= CERTAIN || view.has_ended {
@@ -242,7 +261,14 @@ fn cut(line: &Line, at: Instant, carrier: Option<bool>) -> Condition {
         Some(false) => condition,
         Some(true) | None => condition.or(FaultName::FalseLink, dead_link),
     };
-    condition.or_at(FaultName::NicDamaged, Place::Host, CARD)
+    let condition = condition.or_at(FaultName::NicDamaged, Place::Host, CARD);
+    // Who was never seen may not be there at all.
+    match first_device(line).filter(|_| line.tree_is_planned && line.traffic.answered == 0) {
+        Some(id) => condition
+            .or_at(FaultName::DeviceMissing, Place::device(line.network, id), NEVER_SEEN)
+            .or_at(FaultName::SupplyOff, Place::device(line.network, id), NEVER_SEEN),
+        None => condition,
+    }
 }
 
 /// Where frames vanish was found by closing ports.
@@ -335,10 +361,13 @@ fn spoiling(line: &Line, at: Instant) -> Condition {
         .or_at(FaultName::NicDamaged, Place::Host, CARD)
 }
 
-/// Whether the card had a link during a silence; `None` when the host does not say.
+/// Whether the card had a link during a silence; `None` when neither the host says so nor anybody who searched
+/// for the place, which nobody does without one.
 fn carrier_during(line: &Line, silence: &Silence) -> Option<bool> {
     let card = line.host.card(Path::A);
-    let carrier = card.carrier?;
+    let Some(carrier) = card.carrier else {
+        return search::began(line, silence).map(|_| true);
+    };
     let came_back = carrier.value && card.carrier_changes > 0 && carrier.at >= silence.since.at;
     Some(carrier.value && !came_back)
 }
@@ -393,7 +422,7 @@ fn first_end(line: &Line) -> Option<LinkEnd> {
 }
 
 /// From the card to the first controller, whose end is not known before it was seen.
-fn first_link(line: &Line) -> Place {
+pub(super) fn first_link(line: &Line) -> Place {
     let a: LinkEnd = End::MainDevice(Path::A);
     Place::Link { network: line.network, a, b: first_end(line), direction: None }
 }

@@ -228,7 +228,8 @@ fn stalled(line: &Line) -> Option<Condition> {
         let text = format!("card {card} had a link and took no frames meanwhile");
         condition = condition.shown_by(Evidence::host(Some(pause.from), text));
     } else {
-        condition = condition.or(FaultName::FalseLink, 0.2);
+        let link = super::nobody_answers::first_link(line);
+        condition = condition.or_at(FaultName::FalseLink, link, 0.2);
     }
     let follows = line.devices.iter().flat_map(|device| {
         let id = device.id;

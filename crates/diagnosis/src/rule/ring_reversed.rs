@@ -3,17 +3,18 @@
 //! A controller processes what comes in at its port A. In a closed ring all do so with the frames of card A,
 //! and those of card B come round untouched. One whose IN and OUT are exchanged, and what hangs on it beside
 //! the ring, is processed by the frames of card B instead: a broadcast read is answered in both copies,
-//! though no link is open.
+//! though no link is open. Where the copy of card B alone is answered, by all, everybody is entered from the
+//! other side: the cables of the two cards are exchanged.
 
 use linesman_config::fault::FaultName;
 use linesman_config::identity::mismatch;
-use linesman_proto::address::DeviceId;
+use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::register::table;
 use linesman_proto::topology::Tree;
 
-use super::wiring::PLUGGED;
+use super::wiring::{PLUGGED, displaced};
 use super::{Rule, View};
-use crate::finding::{Condition, Evidence, Place, Symptom};
+use crate::finding::{Condition, Evidence, Place};
 use crate::line::{Device, Line, Seen};
 
 /// The rule.
@@ -28,26 +29,43 @@ struct Reversed {
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
-    let Some((tree, split)) = split(line) else { return };
-    if let Some(reversed) = find(line, tree, split.value) {
+    let Some(tree) = ring(line) else { return };
+    if let Some(exchanged) = exchanged(line, tree) {
+        conditions.push(cards_exchanged(line, tree, exchanged));
+    } else if let Some(split) = split(line, tree)
+        && let Some(reversed) = find(line, tree, split.value)
+    {
         conditions.push(condition(line, tree, &reversed, split));
     }
 }
 
 /// Whether somebody is plugged in the wrong way round, so that positions mean others than planned.
 pub(super) fn judges(line: &Line) -> bool {
-    split(line).is_some_and(|(tree, split)| find(line, tree, split.value).is_some())
+    let split = ring(line).and_then(|tree| Some((tree, split(line, tree)?)));
+    split.is_some_and(|(tree, split)| find(line, tree, split.value).is_some())
 }
 
-/// The planned ring, if both copies of a broadcast are processed although it is closed.
-fn split(line: &Line) -> Option<(&Tree, Seen<(u16, u16)>)> {
-    let tree = line.tree.as_ref().filter(|_| line.tree_is_planned)?;
-    let split = line.traffic.broadcast_split?;
+/// The planned ring.
+fn ring(line: &Line) -> Option<&Tree> {
+    line.tree.as_ref().filter(|tree| line.tree_is_planned && tree.closes_at().is_some())
+}
+
+/// How many have processed either copy of a broadcast, if both were processed although the ring is closed.
+fn split(line: &Line, tree: &Tree) -> Option<Seen<(u16, u16)>> {
+    // Not one that fewer, or more, have answered to since.
+    let changed = line.traffic.broadcast_now.map(|now| now.at);
+    let split = line.traffic.broadcast_split.filter(|split| changed <= Some(split.at))?;
     let (one, other) = split.value;
     let is_whole = usize::from(one) + usize::from(other) == tree.len();
     // Nobody is turned round while a line runs.
-    let was_well = line.traffic.was_processed_by_one || tree.closes_at().is_none();
-    (is_whole && !was_well && !is_open(line, tree)).then_some((tree, split))
+    (is_whole && !line.traffic.was_processed_by_one && !is_open(line, tree)).then_some(split)
+}
+
+/// The broadcast of which all have processed the copy of card B, and nobody that of card A, though that one
+/// went round, too.
+fn exchanged(line: &Line, tree: &Tree) -> Option<Seen<Path>> {
+    let is_whole = usize::from(line.traffic.broadcast_answers) == tree.len();
+    line.traffic.processed_alone.filter(|seen| seen.value == Path::B && is_whole)
 }
 
 /// Whether the ring is open somewhere: both its ends have a link less than planned. Whose answers are taken
@@ -137,15 +155,29 @@ fn condition(line: &Line, tree: &Tree, reversed: &Reversed, split: Seen<(u16, u1
         condition = condition.or_at(cause_of(*other), place(*other), sure);
     }
     // Positions mean others than planned, so whatever is said of single ones follows from this.
-    let follows = line.devices.iter().flat_map(|device| {
-        let id = device.id;
-        let ports = linesman_proto::port::Port::ALL
-            .into_iter()
-            .flat_map(move |port| [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]);
-        ports.chain([Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)])
-    });
+    let follows = displaced(line.devices.iter().map(|device| device.id));
     condition
         .explaining(follows)
         .advise(format!("Exchange the cables at the IN and OUT ports of {label}."))
         .advise("In a ring frames of card A come in at IN (port A) of each SubDevice.")
+}
+
+fn cards_exchanged(line: &Line, tree: &Tree, seen: Seen<Path>) -> Condition {
+    let first =
+        tree.ring_nodes().first().map_or(DeviceId::default(), |node| DeviceId(*node as u32));
+    let label = line.label(first);
+    let text = format!(
+        "the ring is closed, and all {} SubDevices process what card B sends, none what card A sends: \
+         frames of card B come in at port A of {label}",
+        tree.len()
+    );
+    let shown = Evidence::register(first, table::AL_STATUS.address, &seen, text);
+    let place = Place::device(line.network, first);
+    Condition::new(&PLUGGED, place, FaultName::MainDeviceWrongPort, seen.at)
+        .confidence(0.9)
+        .or(FaultName::PortsSwapped, 0.05)
+        .shown_by(shown)
+        .confirmed(seen.at)
+        .advise("Exchange the cables of the two cards of the MainDevice.")
+        .advise(format!("Card A belongs at the IN port (port A) of {label}."))
 }

@@ -40,11 +40,16 @@ const CYCLES: u64 = 4;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
-    let Some(usual) = line.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min() else {
-        return;
-    };
+    let cycles = || line.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle());
+    let (Some(usual), Some(longest)) = (cycles().min(), cycles().max()) else { return };
     for device in &line.devices {
-        if device.al.highest < Some(AlState::SafeOp) {
+        // Whose outputs come with which datagram takes long to find out: only where it matters.
+        let settings = [device.watchdog.setting, device.watchdog.former];
+        let is_held_long = settings
+            .into_iter()
+            .flatten()
+            .all(|setting| setting.span.is_none_or(|span| span >= longest * CYCLES));
+        if device.al.highest < Some(AlState::SafeOp) || is_held_long {
             continue;
         }
         let cycle = own_cycle(line, device).unwrap_or(usual);

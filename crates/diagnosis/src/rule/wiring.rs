@@ -15,7 +15,7 @@
 //!   the first one: the MainDevice is plugged into the wrong port. Or a cable leads to another port or
 //!   SubDevice than planned, with all behind it. In a closed ring no receive times tell; there somebody is
 //!   plugged in the wrong way round when both copies of a broadcast are processed, that of card B by him and
-//!   all that hangs on him.
+//!   all that hangs on him. When that of card B alone is processed, by all, it is the cards that are exchanged.
 //! * `C305` two SubDevices of the same kind sit in each other's place; only alias or serial number tell.
 //!
 //! Everything may run all the same. A reversed SubDevice works on what hangs on its port A before itself,
@@ -89,7 +89,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         return;
     }
     for difference in &comparison.differences {
-        let mut condition = found.condition(difference);
+        let mut condition = found.condition(difference, &comparison.pairs);
         if !matches!(difference, Difference::Swapped { .. } | Difference::Wrong { .. }) {
             condition = condition.explaining(found.shifted(&comparison));
         }
@@ -101,10 +101,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 impl<'a> Found<'a> {
-    fn condition(&self, difference: &Difference) -> Condition {
+    fn condition(&self, difference: &Difference, pairs: &[Option<usize>]) -> Condition {
         match difference {
             Difference::Missing { planned, all } => self.missing(*planned, all.len()),
-            Difference::Extra { found, all, on } => self.extra(*found, all.len(), *on),
+            Difference::Extra { found, all, on } => self.extra(*found, all.len(), *on, pairs),
             Difference::Wrong { planned, found, what } => self.wrong(*planned, *found, *what),
             Difference::Swapped { one, other, twins } => self.swapped(*one, *other, *twins),
             Difference::Reversed { planned, found, entry, wanted } => {
@@ -122,7 +122,8 @@ impl<'a> Found<'a> {
             1 => format!("{label} is not in the line; its neighbours are wired to each other"),
             _ => format!("{label}{} are not in the line", and_behind(count)),
         };
-        let equals = if count == 1 { self.equals_in_a_row(planned) } else { Vec::new() };
+        let equals =
+            if count == 1 { equals_in_a_row(self.line, self.planned, planned) } else { Vec::new() };
         let sure = 0.85 / (1 + equals.len()) as f64;
         let mut condition =
             self.begin(&MISSING, self.place(planned), FaultName::DeviceMissing, sure, text);
@@ -143,28 +144,56 @@ impl<'a> Found<'a> {
             .advise("Compare the line around it with the project, label by label.")
     }
 
-    /// The planned ones in a row with one of them that nobody could tell from it.
-    fn equals_in_a_row(&self, planned: usize) -> Vec<usize> {
-        let alike = |other: usize| {
-            let [one, other] = [planned, other].map(|node| &self.wanted[node]);
-            let has_serial = one.identity.is_some_and(|identity| identity.serial_number != 0);
-            one.identity.is_some() && one == other && one.alias.is_none() && !has_serial
-        };
-        self.planned.in_a_row(planned, alike)
-    }
-
-    fn extra(&self, found: usize, count: usize, on: Option<End>) -> Condition {
+    fn extra(
+        &self,
+        found: usize,
+        count: usize,
+        on: Option<End>,
+        pairs: &[Option<usize>],
+    ) -> Condition {
         let (what, at) = (self.kind(found), self.found_end(on));
         let more = and_behind(count);
         let text =
             format!("{what}{more} at {at} is in no plan; all behind are further on than planned");
         let id = self.ids.get(found).copied().unwrap_or_default();
         let place = Place::device(self.line.network, id);
-        self.begin(&EXTRA, place, FaultName::DeviceExtra, 0.85, text)
-            .or(FaultName::DeviceWrong, 0.1)
-            .advise(format!(
-                "Take {what} at {at} out of the line, or scan anew and save the project."
-            ))
+        let equals = if count == 1 { self.equals_found(found, pairs) } else { Vec::new() };
+        let sure = 0.85 / (1 + equals.len()) as f64;
+        let mut condition = self.begin(&EXTRA, place, FaultName::DeviceExtra, sure, text);
+        for equal in &equals {
+            let place = Place::device(self.line.network, *equal);
+            condition = condition.or_at(FaultName::DeviceExtra, place, sure);
+        }
+        if !equals.is_empty() {
+            condition = condition.advise(format!(
+                "{} more of its kind stand in a row with it: it may be any of them. A station alias in the \
+                 project, or a serial number, tells them apart.",
+                equals.len()
+            ));
+        }
+        condition.or(FaultName::DeviceWrong, 0.1).advise(format!(
+            "Take {what} at {at} out of the line, or scan anew and save the project."
+        ))
+    }
+
+    /// Who stands in a row with a found one that nobody planned, and could as well be the one too many: of its
+    /// kind, and the project knows no other name of him.
+    fn equals_found(&self, found: usize, pairs: &[Option<usize>]) -> Vec<DeviceId> {
+        let kind = |node: usize| {
+            let identity = self.there.get(node)?.identity?;
+            Some((identity.vendor_id, identity.product_code, identity.revision))
+        };
+        let alike = |node: usize| {
+            let planned = pairs.iter().position(|pair| *pair == Some(node));
+            let is_named =
+                planned.and_then(|planned| self.wanted.get(planned)).is_some_and(|wanted| {
+                    wanted.alias.is_some()
+                        || wanted.identity.is_none_or(|identity| identity.serial_number != 0)
+                });
+            kind(node).is_some() && kind(node) == kind(found) && !is_named
+        };
+        let row = self.tree.in_a_row(found, alike);
+        row.into_iter().filter_map(|node| self.ids.get(node).copied()).collect()
     }
 
     fn wrong(&self, planned: usize, found: usize, what: Unlike) -> Condition {
@@ -286,7 +315,7 @@ impl<'a> Found<'a> {
             | Difference::Wrong { .. }
             | Difference::Swapped { .. } => None,
         });
-        let concerned = behind.chain(swapped);
+        let concerned = displaced(behind.chain(swapped));
         let ends = comparison.differences.iter().flat_map(|difference| match difference {
             Difference::Reversed { planned, .. } => self.ends_around(*planned),
             Difference::Moved { .. }
@@ -295,13 +324,7 @@ impl<'a> Found<'a> {
             | Difference::Wrong { .. }
             | Difference::Swapped { .. } => Vec::new(),
         });
-        let symptoms = concerned.flat_map(|id| {
-            let ports = Port::ALL.into_iter().flat_map(move |port| {
-                [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
-            });
-            ports.chain([Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)])
-        });
-        symptoms.chain(ends).collect()
+        concerned.chain(ends).collect()
     }
 
     /// The far ends of the cables of a device that sits in the line the other way round: one of its own
@@ -363,6 +386,26 @@ impl<'a> Found<'a> {
             _ => String::new(),
         }
     }
+}
+
+/// The planned ones in a row with one of them that nobody could tell from it.
+pub(super) fn equals_in_a_row(line: &Line, tree: &Tree, planned: usize) -> Vec<usize> {
+    let alike = |other: usize| {
+        let [one, other] = [planned, other].map(|node| found::wanted(line.devices.get(node)));
+        let has_serial = one.identity.is_some_and(|identity| identity.serial_number != 0);
+        one.identity.is_some() && one == other && one.alias.is_none() && !has_serial
+    };
+    tree.in_a_row(planned, alike)
+}
+
+/// What is seen of those whose answers are taken for those of others, since they stand elsewhere than planned:
+/// ports without a link where one belongs, working counters too low, states never reached, silence.
+pub(super) fn displaced(all: impl Iterator<Item = DeviceId>) -> impl Iterator<Item = Symptom> {
+    all.flat_map(|id| {
+        let of_port = move |port| [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)];
+        let own = [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)];
+        Port::ALL.into_iter().flat_map(of_port).chain(own)
+    })
 }
 
 fn and_behind(count: usize) -> String {

@@ -43,6 +43,9 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 /// earlier or later still belongs to the deficit.
 const AROUND: Span = Span::ms(1500);
 
+/// So soon after a deficit states and links have been read anew.
+const ASKED: Span = Span::ms(200);
+
 /// Who did not do his share.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Suspects {
@@ -251,8 +254,12 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
             [(FaultName::DeviceOff, 0.2), (FaultName::ConfigMismatch, 0.2)],
         ),
     };
-    let mut condition =
-        Condition::new(&PAGE, place, cause, since).confidence(confidence).confirmed(since);
+    let mut condition = Condition::new(&PAGE, place, cause, since).confidence(confidence);
+    // Why it is so shows when states and links were read since.
+    let is_sure = known.is_some() || view.has_ended || since + ASKED <= view.now;
+    if is_sure {
+        condition = condition.confirmed(since);
+    }
     for (cause, confidence) in others {
         condition = condition.or(cause, confidence);
     }
@@ -266,7 +273,10 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
         condition =
             condition.about(suspects.devices.iter().map(|device| Symptom::WorkingCounter(*device)));
     }
-    if !lasts && let Some(ended) = ended {
+    if is_sure
+        && !lasts
+        && let Some(ended) = ended
+    {
         condition = condition.ended(ended);
         if total <= 3 {
             condition.severity = Severity::Warning;

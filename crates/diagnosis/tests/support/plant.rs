@@ -59,7 +59,7 @@ impl Plant {
 
     /// The frame of the next cycle; whatever was read meanwhile, that begins in its time.
     fn next_cycle(&mut self) -> [Datagram; 2] {
-        self.time += self.pace;
+        self.time = self.time.wrapping_add(self.pace);
         self.next += 1_000_000;
         assert!(self.script.now <= self.next);
         self.script.now = self.next;

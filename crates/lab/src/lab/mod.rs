@@ -83,7 +83,10 @@ impl Lab {
     /// [`LabError::Segment`] when the file describes no segment.
     pub fn new(file: &SegmentFile, options: LabOptions) -> Result<Self, LabError> {
         let segment = Segment::build(file)?;
-        let project = file.project()?;
+        let mut project = file.project()?;
+        if !options.serials {
+            project.devices.iter_mut().for_each(|device| device.serial = None);
+        }
         let tree = project.tree()?;
         let network = Network(0);
         let paths = if file.ring.is_some() { 2 } else { 1 };
@@ -377,7 +380,8 @@ impl Lab {
         self.receive();
         self.main.handle_timeout(self.now);
         self.engine.handle_timeout(self.now);
-        if self.now >= self.host_next {
+        let has_news = self.cards_have_news();
+        if has_news || self.now >= self.host_next {
             self.host_next = self.now + HOST_INTERVAL;
             self.look_at_cards();
         }

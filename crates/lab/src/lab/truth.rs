@@ -35,6 +35,7 @@ impl Lab {
             && let Some(TruthPlace::Device(missing)) = truth.places.first()
         {
             truth.equals = self.equals_in_a_row(*missing);
+            truth.leaves_nobody = self.segment.tree().is_empty();
         }
         Some(truth)
     }

@@ -9,12 +9,11 @@ use linesman_diagnosis::{Engine, Setup};
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::End;
 use linesman_sim::seed::Stream;
 use linesman_sim::truth::FaultId;
 
 use super::baseline;
-use super::built_in::{Stop, with_built_in};
+use super::built_in::{Stop, around_extra, with_built_in};
 use super::case::{Case, CaseKind, ScoreOptions};
 use super::disturb::disturb;
 use super::draw::{Drawn, Ends, Offer, When, draw};
@@ -354,6 +353,7 @@ impl<'a> Play<'a> {
                     let scene = Scene {
                         tree: self.lab.tree(),
                         host_counters: self.case.host_counters,
+                        is_recorded: false,
                         answered_again: *answered_again,
                     };
                     let fits = matches(truth, &scene, claim);
@@ -374,30 +374,14 @@ impl<'a> Play<'a> {
             truth.name = FaultName::LinkOpen;
         }
         // Who was put in between is also told by whom it has pushed on.
-        let on = active.drawn.choice.entry.parameters.get("on");
         if truth.name == FaultName::DeviceExtra
-            && let Some(on) = on.map(ToString::to_string)
+            && let Some((pushed, equals)) =
+                around_extra(self.lab.project(), self.lab.tree(), &active.drawn.choice.entry)
         {
-            truth.places.extend(self.pushed_on(&on));
+            truth.places.extend(pushed.map(TruthPlace::Device));
+            truth.equals = equals;
         }
         Some(truth)
-    }
-
-    /// The SubDevice that is planned at a port.
-    fn pushed_on(&self, on: &str) -> Option<TruthPlace> {
-        let tree = self.lab.tree();
-        let on = on.trim_matches('"');
-        let end = match on.split_once('.') {
-            None => End::MainDevice(linesman_proto::address::Path::A),
-            Some((name, port)) => {
-                let devices = &self.lab.project().devices;
-                let node = devices.iter().position(|device| device.name == name)?;
-                let port = linesman_proto::port::Port::from_letter(port.chars().next()?)?;
-                End::Controller(node, port)
-            }
-        };
-        let pushed = tree.opposite(end)?.node()?;
-        Some(TruthPlace::Device(DeviceId(pushed as u32)))
     }
 
     fn outcome(
@@ -419,7 +403,8 @@ impl<'a> Play<'a> {
             .collect();
         let tree = self.lab.tree();
         let answered_again = self.lab.reached().len() >= tree.len();
-        let scene = Scene { tree, host_counters: self.case.host_counters, answered_again };
+        let host_counters = self.case.host_counters;
+        let scene = Scene { tree, host_counters, is_recorded: false, answered_again };
         let company = Company::of(self.lab.truth(), record);
         let when = (company, self.case.faults.len().max(1) + self.beside);
         let cycle = self.case.cycle.as_nanos().max(1);
@@ -433,7 +418,7 @@ impl<'a> Play<'a> {
         let as_planned = |id: DeviceId| id;
         let naming: &dyn Fn(DeviceId) -> DeviceId =
             if self.has_project { &as_planned } else { &by_position };
-        let scene = Scene { host_counters: false, ..scene };
+        let scene = Scene { host_counters: false, is_recorded: true, ..scene };
         let capture = judge(recorded, &truth, &all, &scene, when, naming);
         let baseline = baseline::first_counter(&self.lab);
         Some(FaultOutcome {

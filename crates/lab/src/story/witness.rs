@@ -7,7 +7,7 @@ use linesman_diagnosis::observe::{Direction, FrameSeen};
 use linesman_proto::address::{DeviceId, Path, RegisterAddress};
 use linesman_proto::frame::FrameView;
 use linesman_proto::frame::builder::DatagramAddress;
-use linesman_proto::register::{ErrorCounter, SYSTEM_TIME_DIFFERENCE};
+use linesman_proto::register::{ErrorCounter, SYSTEM_TIME_DIFFERENCE, SystemTimeDifference};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::FrameTally;
 
@@ -178,14 +178,12 @@ impl Witness {
                 check(found == *bytes, || format!("{bytes:02X?} in {name}, found {found:02X?}"))
             }
             Ground::Clock { device: name, nanoseconds } => {
-                /// The sign of a difference; the rest is its size.
-                const SIGN: u32 = 1 << 31;
                 let controller = controller(lab, name)?;
                 let start = SYSTEM_TIME_DIFFERENCE.address.0;
-                let bytes = std::array::from_fn(|at| {
+                let bytes: [u8; 4] = std::array::from_fn(|at| {
                     controller.register(RegisterAddress(start + at as u16))
                 });
-                let off = u64::from(u32::from_le_bytes(bytes) & !SIGN);
+                let off = SystemTimeDifference::from(bytes).magnitude().as_nanos();
                 check(nanoseconds.takes(off), || format!("{nanoseconds} ns in {name}, found {off}"))
             }
         }

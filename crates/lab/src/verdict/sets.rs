@@ -28,8 +28,8 @@ pub struct AdmittedSet {
 /// A line that is played once with each cause: what the MainDevice and its computer see is the same.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Proof {
-    /// Whether the card's counters are shown.
-    pub host_counters: bool,
+    /// What is shown of the plays.
+    pub shown: Shown,
     /// How long after the begin of the line nothing tells the plays apart, in ms.
     pub until_ms: u64,
     /// The plays.
@@ -38,13 +38,25 @@ pub struct Proof {
     pub parted: Parted,
 }
 
+/// What a diagnosis is given to see.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Shown {
+    /// Frames, and all that the computer tells of its card.
+    All,
+    /// Without what the card has counted.
+    WithoutCounters,
+    /// Frames alone, as in a recording.
+    FramesAlone,
+}
+
 /// One cause, as it is put into the line of [`super::proof::LINE`].
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Play {
     /// The cause; `None` for a line on which nothing is wrong.
     pub cause: Option<FaultName>,
     /// What is added to the segment file; of a line whose equal devices are exchanged before, if it begins so
-    /// ([`super::proof::EXCHANGED`]).
+    /// ([`super::proof::EXCHANGED`]), or in which another device was planned ([`super::proof::OTHER`]). The fault is there
+    /// from the start if it says so first (`from_ms`).
     pub file: &'static str,
 }
 
@@ -53,8 +65,8 @@ pub struct Play {
 pub enum Parted {
     /// All faults are healed, and the line is watched for another two seconds.
     ByHealing,
-    /// The card's counters are shown.
-    ByHostCounters,
+    /// What the computer tells of its card is shown.
+    ByHost,
     /// The devices tell who they are.
     ByAlias,
     /// By nothing that frames or the host could show: parts are to be exchanged or measured.
@@ -78,7 +90,7 @@ pub static SILENT: AdmittedSet = AdmittedSet {
     why: "whoever hangs behind a cut and whoever has no power are equally silent, and the \
           neighbour's port sees no signal in both cases",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 6_000,
         plays: &[
             Play { cause: Some(LinkOpen), file: "kind = 'link-open'\nat = 'K1.C-K2.A'" },
@@ -100,7 +112,7 @@ pub static ONE_END: AdmittedSet = AdmittedSet {
     why: "with one of two pairs of contacts or fibres open the sender keeps its link and its frames \
           vanish: so they do in something between that shows it one",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 6_000,
         plays: &[
             Play { cause: Some(LinkOpen), file: "kind = 'link-open'\nat = 'K1.B>T1.A'" },
@@ -120,7 +132,7 @@ pub static OVERLOAD: AdmittedSet = AdmittedSet {
     while_so: "terminals of one coupler fall and start anew",
     why: "terminals that lose their E-bus voltage start anew, whether their load took it or a contact",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 8_000,
         plays: &[
             Play {
@@ -144,7 +156,7 @@ pub static SYMBOLS: AdmittedSet = AdmittedSet {
     why: "a receiver sees symbol errors; whether the sender, the cable, the plug, its own input or \
           interference made them is not in the symbols: their rhythm is a hint only",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -172,7 +184,7 @@ pub static BOTH_WAYS: AdmittedSet = AdmittedSet {
     while_so: "both directions of one link are hit",
     why: "a worn cable and interference hit both directions of a link alike: their rhythm is a hint only",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -199,7 +211,7 @@ pub static FIRST_HOP: AdmittedSet = AdmittedSet {
     while_so: "the way from the card to the first SubDevice is hit",
     why: "one direction of a link like any other, but that its transmitter is a part of the card",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -230,7 +242,7 @@ pub static LAST_HOP: AdmittedSet = AdmittedSet {
     while_so: "the way from the first SubDevice to the card is hit",
     why: "one direction of a link like any other, but that its receiver is a part of the card",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -261,7 +273,7 @@ pub static UNCOUNTED: AdmittedSet = AdmittedSet {
     while_so: "frames get lost on the last hop, and the card's counters are not known",
     why: "frames that the card or the computer drops just do not come back, and no SubDevice counts",
     proof: Proof {
-        host_counters: false,
+        shown: Shown::WithoutCounters,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -285,7 +297,7 @@ pub static UNCOUNTED: AdmittedSet = AdmittedSet {
                        at_ms = [0, 30, 70, 110, 130, 180, 250, 300, 330, 390, 440, 500]\nfor_ms = 0.001",
             },
         ],
-        parted: Parted::ByHostCounters,
+        parted: Parted::ByHost,
     },
 };
 
@@ -297,7 +309,7 @@ pub static TWINS: AdmittedSet = AdmittedSet {
     why: "two devices of one type in each other's place are the line that was planned, to everyone who \
           does not know them by name",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 4_000,
         plays: &[
             Play {
@@ -319,7 +331,7 @@ pub static EQUALS: AdmittedSet = AdmittedSet {
     why: "whichever of two equal devices in a row is taken out, one of them is left, and stands at the same \
           place of the line",
     proof: Proof {
-        host_counters: true,
+        shown: Shown::All,
         until_ms: 4_000,
         plays: &[
             Play { cause: Some(DeviceMissing), file: "kind = 'device-missing'\ndevice = 'T4'" },
@@ -333,10 +345,97 @@ pub static EQUALS: AdmittedSet = AdmittedSet {
     },
 };
 
+/// One too many in a row of equal devices.
+pub static EXTRAS: AdmittedSet = AdmittedSet {
+    name: "one-too-many",
+    causes: &[DeviceExtra],
+    while_so: "the extra one stands in a row of equal ones, of which the project knows neither alias nor serial \
+               number",
+    why: "of equal devices in a row there is one more than planned: whichever was put in, the row is the same",
+    proof: Proof {
+        shown: Shown::All,
+        until_ms: 4_000,
+        plays: &[
+            // In the row stand T4, X and T5, one behind the other.
+            Play {
+                cause: Some(DeviceExtra),
+                file: "kind = 'device-extra'\ndevice = 'X'\ntype = 'EL2004'\non = 'T4.B'\nserial = 7",
+            },
+            Play {
+                cause: Some(DeviceExtra),
+                file: "# other T4 X 7\n\
+                       kind = 'device-extra'\ndevice = 'T4'\ntype = 'EL2004'\non = 'K2.B'\nserial = 104",
+            },
+            Play {
+                cause: Some(DeviceExtra),
+                file: "# other T5 X 7\n\
+                       kind = 'device-extra'\ndevice = 'T5'\ntype = 'EL2004'\non = 'X.B'\nserial = 105",
+            },
+        ],
+        parted: Parted::ByAlias,
+    },
+};
+
+/// Nobody there from the start.
+pub static NOBODY: AdmittedSet = AdmittedSet {
+    name: "nobody",
+    causes: &[LinkOpen, DeviceOff, SupplyOff, DeviceMissing],
+    while_so: "the card never had a link, and nothing has ever answered",
+    why: "whoever was never seen may have no power, no cable, or not be there: the card has no link either way",
+    proof: Proof {
+        shown: Shown::All,
+        until_ms: 6_000,
+        plays: &[
+            Play {
+                cause: Some(LinkOpen),
+                file: "# alone\nfrom_ms = 0\nkind = 'link-open'\nat = 'maindevice-K1.A'",
+            },
+            Play {
+                cause: Some(DeviceOff),
+                file: "# alone\nfrom_ms = 0\nkind = 'device-off'\ndevice = 'K1'",
+            },
+            Play {
+                cause: Some(SupplyOff),
+                file: "# alone\nfrom_ms = 0\nkind = 'supply-off'\ndevices = ['K1', 'T1']\nspread_us = 0",
+            },
+            Play {
+                cause: Some(DeviceMissing),
+                file: "# alone\nkind = 'device-missing'\ndevice = 'K1'",
+            },
+        ],
+        parted: Parted::ByExchange,
+    },
+};
+
+/// A line that stood still, in a recording.
+pub static STALLED: AdmittedSet = AdmittedSet {
+    name: "stalled",
+    causes: &[WatchdogStarved, FalseLink],
+    while_so: "in a recording, all frames of a while are lost on their way to the first SubDevice, and come back \
+               again after it",
+    why: "a recording has the frames that a program gave to its card; whether the card took them, or the cable \
+          behind it, only the computer could tell, and no controller saw them",
+    proof: Proof {
+        shown: Shown::FramesAlone,
+        until_ms: 6_000,
+        plays: &[
+            Play {
+                cause: Some(WatchdogStarved),
+                file: "to_ms = 3_300\nkind = 'watchdog-starved'\nat = 'maindevice'\npause_ms = 300",
+            },
+            Play {
+                cause: Some(FalseLink),
+                file: "to_ms = 3_300\nkind = 'false-link'\nat = 'maindevice-K1.A'\nfar = 'with-link'",
+            },
+        ],
+        parted: Parted::ByHost,
+    },
+};
+
 /// All of them.
 pub static ALL: &[&AdmittedSet] = &[
     &SILENT, &ONE_END, &OVERLOAD, &SYMBOLS, &BOTH_WAYS, &FIRST_HOP, &LAST_HOP, &UNCOUNTED, &TWINS,
-    &EQUALS,
+    &EQUALS, &EXTRAS, &NOBODY, &STALLED,
 ];
 
 #[cfg(test)]

@@ -2,6 +2,10 @@
 //!
 //! Reference: rtnetlink(7), netlink(7), `linux/rtnetlink.h`, `linux/if_link.h`. Messages are in the
 //! byte order of the machine and hold attributes: length, type, value, padded to four bytes.
+//!
+//! Whoever joins the group of links is told of each change without asking ([`LinkNews`]): when a carrier came,
+//! that is the moment from which frames are let through to the card again (`net/core/link_watch.c` of Linux).
+//! A change within a second after another may be told up to a second late.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -9,9 +13,11 @@ use std::os::fd::OwnedFd;
 use std::time::Duration;
 
 use linesman_proto::ethernet::MacAddress;
+use rustix::io::Errno;
+use rustix::net::netlink::SocketAddrNetlink;
 use rustix::net::sockopt::{Timeout, set_socket_timeout};
 use rustix::net::{
-    AddressFamily, RecvFlags, SendFlags, SocketFlags, SocketType, recv, send, socket_with,
+    AddressFamily, RecvFlags, SendFlags, SocketFlags, SocketType, bind, recv, send, socket_with,
 };
 
 const HEADER_LEN: usize = 16;
@@ -21,6 +27,8 @@ const LINK_LEN: usize = 16;
 const ADDRESS_LEN: usize = 8;
 /// More than any answer's piece; the kernel fills at most this much at a time.
 const BUFFER_LEN: usize = 64 * 1024;
+/// As much of a message as is looked at when nothing was asked.
+const NEWS_LEN: usize = 256;
 /// Answers come at once; this bounds the wait where something is very wrong.
 const PATIENCE: Duration = Duration::from_secs(5);
 
@@ -151,6 +159,42 @@ impl Netlink {
                 if matches!(asked, Asked::One) {
                     return Ok(());
                 }
+            }
+        }
+    }
+}
+
+/// What the kernel tells of links to all who listen.
+pub(crate) struct LinkNews {
+    socket: OwnedFd,
+    buffer: [u8; NEWS_LEN],
+}
+
+impl LinkNews {
+    /// Begins to listen.
+    pub(crate) fn listen() -> io::Result<Self> {
+        let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+        let socket = socket_with(AddressFamily::NETLINK, SocketType::RAW, flags, None)?;
+        let groups = libc::RTMGRP_LINK.cast_unsigned();
+        bind(&socket, &SocketAddrNetlink::new(0, groups))?;
+        Ok(Self { socket, buffer: [0; NEWS_LEN] })
+    }
+
+    /// Whether an interface was spoken of since it was asked last. Does not wait.
+    pub(crate) fn about(&mut self, index: u32) -> io::Result<bool> {
+        let mut is_told = false;
+        loop {
+            match recv(&self.socket, &mut self.buffer[..], RecvFlags::empty()) {
+                Ok((len, _)) => {
+                    // The head of a message tells of whom it is; its end may be cut off.
+                    let message = &self.buffer[..len];
+                    is_told |= u32_at(message, HEADER_LEN + 4) == Some(index);
+                }
+                Err(Errno::AGAIN) => return Ok(is_told),
+                Err(Errno::INTR) => {}
+                // There was more than fits: some of it may have been about this one.
+                Err(Errno::NOBUFS) => is_told = true,
+                Err(error) => return Err(error.into()),
             }
         }
     }

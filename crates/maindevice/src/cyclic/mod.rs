@@ -7,7 +7,8 @@
 //! one SubDevice that comes back, or is stuck, does not stop the inputs of all others.
 //!
 //! [`send`] sends, [`receive`] takes in, [`run`] copies, [`datagram`] judges, [`quality`] tells how good
-//! and how old data are, [`application`] sees to it that old outputs are not sent as fresh ones.
+//! and how old data are, [`application`] sees to it that old outputs are not sent as fresh ones, [`spread`]
+//! that clocks follow the reference clock and nothing else, [`steer`] that the cycle does.
 //!
 //! A frame that leaves or comes back is found once: all that sending and receiving need of it is in its
 //! [`Frame`], all that is shared with those that leave together in their [`Departure`].
@@ -19,6 +20,7 @@ mod quality;
 mod receive;
 mod run;
 mod send;
+mod spread;
 mod steer;
 
 use std::ops::Range;
@@ -36,6 +38,7 @@ use self::datagram::{Datagram, clear_lost};
 use self::departure::{Departing, Departure, departing, earliest};
 use self::quality::Share;
 use self::run::Runs;
+use self::spread::{ClockDatagram, Spread};
 use self::steer::Steer;
 use crate::exchange::Exchange;
 use crate::exchange::prebuilt::{Prebuilt, data_offsets};
@@ -56,6 +59,10 @@ struct Frame {
     /// What [`FrameStatus::not_sent`] is when it is sent: the datagrams whose outputs are withheld.
     not_sent: u16,
     datagrams: Vec<Datagram>,
+    /// The datagram that hands round the time of the reference clock.
+    clock: Option<ClockDatagram>,
+    /// More is to be done with it before it leaves than with most: it has such a datagram, or copies follow.
+    more: bool,
     /// Bits of the datagrams that carry outputs, and of all.
     carries: u16,
     all: u16,
@@ -102,6 +109,7 @@ pub(crate) struct Cyclic {
     /// What the last broadcast read brought.
     responding: Option<(WorkingCounter, u8)>,
     shares: Vec<Share>,
+    spread: Spread,
     steer: Steer,
     mailboxes: MailboxBits,
     pub(crate) outputs: Vec<u8>,
@@ -141,6 +149,7 @@ impl Cyclic {
             version: u64::MAX,
             responding: None,
             shares: quality::shares(&plan, &order),
+            spread: Spread::default(),
             steer: Steer::default(),
             mailboxes: MailboxBits::default(),
             outputs: vec![0; plan.outputs_len],
@@ -171,7 +180,9 @@ impl Cyclic {
         let mut line = lock(&self.line);
         self.version = line.version();
         line.take_changes(&mut self.least, &mut self.most);
-        self.steer.set_base(line.clock_base());
+        let clock = line.clock();
+        self.spread.learn(clock);
+        self.steer.set_base(clock.base);
     }
 
     /// When the next frames are due; [`Instant::MAX`]: never.
@@ -225,20 +236,25 @@ impl Cyclic {
 impl Frame {
     fn new(plan: &Plan, one: &Departing, planned: &FramePlan, prebuilt: Prebuilt) -> Self {
         let (mut outputs, mut datagrams, mut carries) = (Runs::default(), Vec::new(), 0);
+        let mut clock = None;
         for (at, (one, data_at)) in planned.datagrams.iter().zip(data_offsets(planned)).enumerate()
         {
             for owned in one.ownership.iter().filter(|one| one.direction == Direction::Outputs) {
                 outputs.push(owned, data_at);
                 carries |= FrameStatus::bit(at);
             }
+            clock = clock.or(ClockDatagram::new(one, data_at));
             datagrams.push(Datagram::new(plan, one, data_at));
         }
+        let more = clock.is_some() || prebuilt.is_copied();
         Self {
             prebuilt,
             outputs,
             withheld: false,
             not_sent: 0,
             datagrams,
+            clock,
+            more,
             carries,
             all: FrameStatus::before(planned.datagrams.len()),
             version: u64::MAX,

@@ -10,9 +10,11 @@ use linesman_proto::time::{Instant, Span};
 
 use super::datagram::Place;
 use super::departure::{LOST_IS_NEWS, earliest};
+use super::spread::Brought;
 use super::{Cyclic, FrameStatus};
 use crate::event::Event;
 use crate::exchange::Exchange;
+use crate::exchange::prebuilt::FIRST_INDEX;
 use crate::executor::lock;
 use crate::statistics::Statistics;
 use crate::supervisor::Line;
@@ -180,9 +182,17 @@ impl Cyclic {
                         self.responding = seen;
                         watch_line(&self.line, seen, events);
                     }
-                } else if role == Role::ReferenceClock && wkc.0 > 0 {
+                } else if role == Role::ReferenceClock
+                    && let Some(clock) = frame.clock.filter(|clock| clock.is_at(datagram.data_at))
+                {
+                    let index = reply.get(FIRST_INDEX).copied().unwrap_or_default();
                     let cycle = self.plan.tasks.get(frame.task).map(|task| task.cycle);
-                    moved += self.steer.correction(now, data, cycle.unwrap_or_default());
+                    moved += match self.spread.read(&clock, index, wkc, reply) {
+                        Brought::Time => {
+                            self.steer.correction(now, data, cycle.unwrap_or_default())
+                        }
+                        Brought::Nothing => self.steer.as_before(cycle.unwrap_or_default()),
+                    };
                 } else if role == Role::MailboxStates && wkc.0 > 0 {
                     let data = data.get(..datagram.len).unwrap_or_default();
                     self.mailboxes.take(frame.planned, at, data);

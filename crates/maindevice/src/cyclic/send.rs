@@ -55,10 +55,26 @@ impl Cyclic {
             false => frame.outputs.fill(&self.outputs, sent),
             true => frame.outputs.clear_frame(sent),
         }
+        let len = sent.len();
+        if frame.more {
+            self.complete(index, number, exchange, sent);
+        }
+        Some(len)
+    }
+
+    /// What few frames need: the time of the reference clock, and to be kept for the copies that follow.
+    #[inline(never)]
+    fn complete(&mut self, index: usize, number: u32, exchange: &mut Exchange, sent: &mut [u8]) {
+        let Self { frames, departures, spread, deadline, .. } = self;
+        let Some(frame) = frames.get(index) else { return };
+        let departure = departures.get(frame.departure);
+        if let (Some(clock), Some(departure)) = (&frame.clock, departure) {
+            let [first, ..] = number.to_le_bytes();
+            spread.write(clock, first, deadline.before(departure.cycle), sent);
+        }
         if frame.prebuilt.is_copied() {
             exchange.keep_copies(index as u32, number, sent);
         }
-        Some(sent.len())
     }
 
     /// The slot whose turn it is still waits for its answer: the frame takes the next one that is free.

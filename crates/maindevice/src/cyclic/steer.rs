@@ -21,8 +21,9 @@ const JUMP: i64 = 10;
 pub(super) struct Steer {
     /// How often the reference was set, and the system time at the start of the run.
     base: Option<(u32, DcTime)>,
-    /// The reference's time at the last frame, of which frames bring the low half only.
-    time: Option<i64>,
+    /// The reference's time in the last frame that brought it, of which frames bring the low half only, and
+    /// when that came back.
+    time: Option<(Instant, i64)>,
     /// What the cycle is too short, in 1/512 ns.
     speed: i64,
 }
@@ -41,9 +42,10 @@ impl Steer {
         let (Some((_, epoch)), Some(low)) = (self.base, data.first_chunk()) else { return 0 };
         let low = u32::from_le_bytes(*low);
         // The high half is that of the time it was set to, later that of the time before.
-        let near = self.time.unwrap_or(epoch.0.wrapping_add(now.as_nanos()) as i64);
+        let later = |(at, time): (Instant, i64)| time.wrapping_add(now.since(at).as_nanos() as i64);
+        let near = self.time.map_or(epoch.0.wrapping_add(now.as_nanos()) as i64, later);
         let time = near.wrapping_add(i64::from(low.wrapping_sub(near as u32) as i32));
-        let is_first = self.time.replace(time).is_none();
+        let is_first = self.time.replace((now, time)).is_none();
         let cycle = i64::try_from(cycle.as_nanos()).unwrap_or(i64::MAX).max(1);
         let phase = time.rem_euclid(cycle);
         let error = if phase > cycle / 2 { phase - cycle } else { phase };
@@ -54,6 +56,13 @@ impl Steer {
         let most = cycle / MOST;
         self.speed = (self.speed - error).clamp(-most * INTEGRAL, most * INTEGRAL);
         (self.speed / INTEGRAL - error / PROPORTIONAL).clamp(-most, most)
+    }
+
+    /// The same where a datagram came back without a time: the cycle goes on as fast as it went, as the clocks
+    /// do that have nobody to follow.
+    pub(super) fn as_before(&self, cycle: Span) -> i64 {
+        let most = i64::try_from(cycle.as_nanos()).unwrap_or(i64::MAX) / MOST;
+        if self.time.is_none() { 0 } else { (self.speed / INTEGRAL).clamp(-most, most) }
     }
 }
 

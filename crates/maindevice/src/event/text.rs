@@ -121,6 +121,7 @@ impl Event {
             | Self::CountersCleared { .. }
             | Self::Identified { .. }
             | Self::Links { .. }
+            | Self::PortOpened { .. }
             | Self::ClockDifference { .. }
             | Self::NetworkTime { .. }
             | Self::WorkingCounter { .. }

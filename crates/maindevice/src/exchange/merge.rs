@@ -7,14 +7,15 @@
 //! * broadcast reads are ORed, as the controllers themselves do;
 //! * logical reads are ORed byte by byte: what is read is sent as zeros, so the bytes of a SubDevice
 //!   are zero in the copy that did not reach it, and outputs are the same in both;
-//! * addressed reads come from the copy that was answered.
+//! * addressed reads come from the copy that was answered; what is read from one SubDevice and written to the
+//!   others (ARMW, FRMW), from the copy that met the one that is read.
 
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::{FrameView, WKC_LEN};
 
-/// Merges the datagrams of `second` into `first`. Both are frames that match the one that was sent,
+/// Merges the datagrams of `second` into `first`. Both are frames that match the one that was `sent`,
 /// so that their datagrams lie at the same places.
-pub(crate) fn merge(first: &mut [u8], second: &[u8]) {
+pub(crate) fn merge(first: &mut [u8], second: &[u8], sent: &[u8]) {
     let Ok(view) = FrameView::parse(second) else { return };
     for datagram in view.datagrams().map_while(Result::ok) {
         let data = datagram.data_range();
@@ -37,7 +38,11 @@ pub(crate) fn merge(first: &mut [u8], second: &[u8]) {
             for (mine, other) in first[data.clone()].iter_mut().zip(datagram.data()) {
                 *mine |= other;
             }
-        } else if ours == 0 && theirs > 0 {
+        } else if theirs > 0
+            && (ours == 0
+                || command.is_some_and(hands_round)
+                    && sent.get(data.clone()) == Some(&first[data.clone()]))
+        {
             first[data.clone()].copy_from_slice(datagram.data());
             first[at + 2..at + 4].copy_from_slice(&second[at + 2..at + 4]);
         }
@@ -46,6 +51,44 @@ pub(crate) fn merge(first: &mut [u8], second: &[u8]) {
     }
 }
 
+/// Whether it reads from one SubDevice and writes that to all others: those count, too.
+fn hands_round(command: Command) -> bool {
+    matches!(command, Command::Armw | Command::Frmw)
+}
+
 fn word(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([bytes[at], bytes[at + 1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use linesman_proto::ethernet::MacAddress;
+    use linesman_proto::frame::FrameBuilder;
+    use linesman_proto::frame::builder::DatagramAddress;
+    use linesman_proto::register::SYSTEM_TIME;
+
+    use super::*;
+
+    /// A frame of one FRMW with this time and working counter.
+    fn frame(time: [u8; 4], wkc: u16) -> Vec<u8> {
+        let mut bytes = vec![0; 64];
+        let mut builder = FrameBuilder::new(&mut bytes, MacAddress([2, 0, 0, 0, 0, 1]));
+        let address = DatagramAddress::Physical(0x1001, SYSTEM_TIME.address);
+        builder.push(Command::Frmw, 1, address, 4).unwrap().copy_from_slice(&time);
+        let len = builder.finish();
+        bytes.truncate(len);
+        bytes[30..32].copy_from_slice(&wkc.to_le_bytes());
+        bytes
+    }
+
+    /// In a broken ring the reference is in one half; the other half took what was sent, and counted it.
+    #[test]
+    fn the_reference_time_comes_from_the_half_where_the_reference_is() {
+        let (sent, time) = ([7, 0, 0, 0], [9, 8, 0, 0]);
+        for (first, second) in [((sent, 2), (time, 3)), ((time, 3), (sent, 2))] {
+            let mut merged = frame(first.0, first.1);
+            merge(&mut merged, &frame(second.0, second.1), &frame(sent, 0));
+            assert_eq!(merged[26..32], [9, 8, 0, 0, 5, 0]);
+        }
+    }
 }

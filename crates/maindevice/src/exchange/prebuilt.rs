@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use linesman_config::plan::{DatagramPlan, FramePlan};
+use linesman_config::plan::{DatagramPlan, FramePlan, Role};
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::ethernet::{HEADER_LEN, MAX_LEN, MacAddress};
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, FrameBuilder};
@@ -19,6 +19,8 @@ use super::slot::{Copies, Slot};
 /// Bits of the first eight header bytes that come back as they were sent: all but the round-trip
 /// bit, which a controller may set.
 const SAME: u64 = !(0x4000_u64 << 48);
+/// The command.
+const COMMAND: u64 = 0xFF;
 /// The index byte.
 const INDEX: u64 = 0xFF << 8;
 /// The ADP field: controllers count it up in position and broadcast commands.
@@ -26,7 +28,7 @@ const ADP: u64 = 0xFFFF_u64 << 16;
 
 /// Where the first datagram begins, and its index byte.
 pub(super) const FIRST_HEADER: usize = HEADER_LEN + ETHERCAT_HEADER_LEN;
-pub(super) const FIRST_INDEX: usize = FIRST_HEADER + 1;
+pub(crate) const FIRST_INDEX: usize = FIRST_HEADER + 1;
 /// What of a datagram header is compared.
 const HEAD_LEN: usize = 8;
 /// All that is before the first of them, and it.
@@ -129,15 +131,15 @@ impl Prebuilt {
         let mut at = FIRST_HEADER;
         let mut places = Vec::new();
         for datagram in &plan.datagrams {
-            let DatagramPlan { command, address, len, .. } = datagram;
+            let DatagramPlan { command, address, len, role, .. } = datagram;
             if builder.push(*command, 0, *address, *len).is_ok() {
-                places.push((at, *command));
+                places.push((at, *command, *role));
                 at += len + linesman_proto::frame::DATAGRAM_OVERHEAD;
             }
         }
         let len = builder.finish();
         bytes.truncate(len);
-        let shape = |(header, command): (usize, Command)| {
+        let shape = |(header, command, role): (usize, Command, Role)| {
             let mut head = [0; 8];
             head.copy_from_slice(&bytes[header..header + 8]);
             let variant = |command: Command| {
@@ -149,7 +151,10 @@ impl Prebuilt {
                 Addressing::Position | Addressing::Broadcast => SAME & !ADP,
                 Addressing::Station | Addressing::Logical | Addressing::None => SAME,
             };
-            Shape { at: header, heads: commands.map(variant), masks: commands.map(mask) }
+            // What hands the reference's time round is a mere read at times.
+            let free = if role == Role::ReferenceClock { COMMAND } else { 0 };
+            let masks = commands.map(|command| mask(command) & !free);
+            Shape { at: header, heads: commands.map(variant), masks }
         };
         let shapes: Vec<Shape> = places.into_iter().map(shape).collect();
         let outputs = || {
@@ -173,7 +178,10 @@ impl Prebuilt {
         let beginning = bytes.first_chunk().copied().unwrap_or([0; FIRST_DATA]);
         // Command and index are compared anyway.
         let heads = shapes.iter().map(|shape| shape.at..shape.at + 2);
-        let moving = joined(outputs().map(|(_, range)| range).chain(heads));
+        let clocks = plan.datagrams.iter().zip(data_offsets(plan));
+        let clocks = clocks.filter(|(one, _)| one.role == Role::ReferenceClock);
+        let times = clocks.map(|(one, data)| data..data + one.len);
+        let moving = joined(outputs().map(|(_, range)| range).chain(heads).chain(times));
         let fixed = gaps(BEHIND_ADDRESSES..len, moving);
         let mut copies = Copies::new(plan.repeats.saturating_add(1), ring);
         copies.unsent -= 1;

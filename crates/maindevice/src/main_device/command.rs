@@ -18,7 +18,7 @@ use crate::mailbox::{MailboxRequest, ProtocolError, ProtocolErrors, Queues};
 use crate::procedure::scan::Identified;
 use crate::procedure::{look, scan, state};
 use crate::service::{self, Attended, Servant, Service, ServiceFailure, ServiceTicket};
-use crate::supervisor::{self, Context, Line};
+use crate::supervisor::{self, Context, Line, gates};
 use crate::watch::Standing;
 
 /// One register access beside the cycle, for those who want to know more.
@@ -139,12 +139,19 @@ impl MainDevice {
                         emulated: device.device_emulation,
                     };
                     let target = Target::Station(device.station);
+                    let (plan, id) = (plan.clone(), device.id);
                     // Who does not follow was lost or refuses; the line is left all the same.
-                    wire.clone().spawn(async move { state::request(&wire, target, step).await })
+                    wire.clone().spawn(async move {
+                        let _ = state::request(&wire, target, step).await;
+                        let planned = plan.as_ref().and_then(|plan| Some((plan, plan.device(id)?)));
+                        if let Some((plan, device)) = planned {
+                            gates::release(&wire, plan, device).await;
+                        }
+                    })
                 })
                 .collect();
             for step in steps {
-                let _ = step.await;
+                step.await;
             }
             wire.emit(Event::Stopped);
         });

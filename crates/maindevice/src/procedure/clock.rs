@@ -10,8 +10,8 @@ use linesman_proto::address::{Network, Path, StationAddress};
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::port::{Port, PortMap};
-use linesman_proto::register::{self, DlStatus, EscInformation};
-use linesman_proto::time::{DcTime32, Instant, Span};
+use linesman_proto::register::{self, DlStatus, EscInformation, SystemTimeDifference};
+use linesman_proto::time::{DcTime, DcTime32, Instant, Span};
 use linesman_proto::topology::{DelayError, Delays, Reconstruction, SeenController};
 
 use super::look::{self, LookError};
@@ -23,8 +23,6 @@ use crate::executor::Wire;
 const THROUGH_UNIT: Span = Span::ns(20);
 /// The bandwidth of the time loop (0x0930) that writing it anew resets all filters to.
 const SPEED_START: u16 = 0x1000;
-/// 0x092C without its sign.
-const MAGNITUDE: u32 = 0x7FFF_FFFF;
 /// From one frame that compensates drift to the next, at least.
 const SPACING: Span = Span::us(50);
 
@@ -156,15 +154,19 @@ pub(crate) async fn set(
 }
 
 /// Sends the reference's time to all in `frames` frames of their own, one after another. Closer
-/// together than [`SPACING`] clocks that count in steps of 10 ns learn nothing of their speed.
-pub(crate) async fn compensate(wire: &Wire, reference: StationAddress, frames: u32) {
+/// together than [`SPACING`] clocks that count in steps of 10 ns learn nothing of their speed. What they
+/// carry is the time that the reference was set to, which was `epoch` when the run began: should it not
+/// answer any more, nobody is led further astray than by the jitter of this computer.
+pub(crate) async fn compensate(wire: &Wire, reference: StationAddress, frames: u32, epoch: DcTime) {
     let address = DatagramAddress::Physical(reference.0, register::SYSTEM_TIME.address);
     for _ in 0..frames {
-        let next_at = wire.now() + SPACING;
+        let now = wire.now();
+        let next_at = now + SPACING;
+        let expected = epoch.0.wrapping_add(now.as_nanos());
         let request = Request {
             command: Command::Frmw,
             address,
-            data: DatagramData::from_elem(0, 8),
+            data: DatagramData::from_slice(&expected.to_le_bytes()),
             card: None,
             repeats: 0,
             alone: true,
@@ -185,7 +187,7 @@ pub(crate) async fn difference(
 ) -> Result<Span, ExchangeError> {
     let address = register::SYSTEM_TIME_DIFFERENCE.address;
     let reply = wire.read_one(Target::Station(station), address, 4).await?;
-    Ok(Span::ns(u64::from(u32::from_le_bytes(reply.bytes(0)) & MAGNITUDE)))
+    Ok(SystemTimeDifference::from(reply.bytes(0)).magnitude())
 }
 
 /// A register of eight bytes of the time loop.

@@ -60,7 +60,8 @@ pub(super) async fn set_all(context: &Context) {
     let outcome = set(context, None).await;
     tell(context, &outcome);
     if let Ok(reference) = outcome {
-        clock::compensate(&context.wire, reference, context.options.drift_frames).await;
+        let (frames, epoch) = (context.options.drift_frames, context.options.clock_epoch);
+        clock::compensate(&context.wire, reference, frames, epoch).await;
     }
     context.note(Phase::Clocks, began);
     lock(&context.line).set_clocks_ready();
@@ -100,23 +101,39 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
     let of_reference = clocks.iter().find(found).cloned();
     let of_reference = of_reference.ok_or(ClockError::NoReference("it does not answer"))?;
     let zero = of_reference.delay.unwrap_or_default();
-    // The reference shows the MainDevice's time, unless it runs already.
-    let time =
-        match one.filter(|id| context.plan.device(*id).is_some_and(|it| it.station != reference)) {
-            None => epoch.0.wrapping_add(at.as_nanos()),
-            Some(_) => {
-                let offset = clock::time(wire, reference, &register::SYSTEM_TIME_OFFSET).await?;
-                offset.wrapping_add(of_reference.latched)
-            }
-        };
+    // Who comes before the reference never sees its time.
+    let behind = |clock: &SeenClock| {
+        clock.delay.filter(|delay| *delay >= zero).map(|delay| delay.saturating_sub(zero))
+    };
+    // The reference shows the MainDevice's time, unless it runs already, or others have run on without it.
+    let is_set = |clock: &&SeenClock| {
+        let planned = context.plan.devices.iter().find(|device| device.station == clock.station);
+        clock.has_clock
+            && planned.is_some_and(|device| lock(&context.line).has_clock_set(device.id))
+    };
+    let source = match one {
+        None => None,
+        Some(_) if is_set(&&of_reference) => Some((&of_reference, Span::default())),
+        Some(_) => (clocks.iter().filter(is_set)).find_map(|clock| Some((clock, behind(clock)?))),
+    };
+    let by_host = epoch.0.wrapping_add(at.as_nanos());
+    let time = match source {
+        None => by_host,
+        Some((clock, behind)) => {
+            let offset = clock::time(wire, clock.station, &register::SYSTEM_TIME_OFFSET).await?;
+            let time = offset.wrapping_add(clock.latched).wrapping_sub(behind.as_nanos());
+            // Some clocks have the low half only; the other one is that of the time nearby.
+            let off = time.wrapping_sub(by_host) as u32 as i32;
+            by_host.wrapping_add_signed(off.into())
+        }
+    };
     let setting: Vec<_> = (context.plan.devices.iter())
         .filter(|device| one.is_none_or(|one| one == device.id))
         .filter(|device| matches!(lock(&context.line).found(device.id), Found::There { .. }))
         .filter_map(|device| {
             let station = device.station;
             let clock = clocks.iter().find(|clock| clock.has_clock && clock.station == station)?;
-            // Who comes before the reference never sees its time.
-            let delay = clock.delay.filter(|delay| *delay >= zero)?.saturating_sub(zero);
+            let delay = behind(clock)?;
             let offset = time.wrapping_add(delay.as_nanos()).wrapping_sub(clock.latched);
             let (wire, id) = (wire.clone(), device.id);
             let setting = async move { clock::set(&wire, station, offset, delay).await };
@@ -130,9 +147,10 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
         }
     }
     // The cycle follows from now on.
+    let planned = context.plan.devices.iter().find(|device| device.station == reference);
     let mut line = lock(&context.line);
+    line.set_reference_clock(reference, planned.map(|device| device.id));
     line.set_clock_epoch(epoch);
-    line.set_reference_clock(reference);
     drop(line);
     Ok(reference)
 }

@@ -7,6 +7,7 @@ use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::{Instant, Span};
 
 use super::drive::Failed;
+use super::gates::Gates;
 use super::times::Phase;
 use super::watched_clock::WatchedClock;
 use super::{CALM, Context, Found, lose};
@@ -47,6 +48,7 @@ pub(super) struct Keeper<'a> {
     pub(super) device: &'a DevicePlan,
     known: Known,
     clock: WatchedClock,
+    gates: Gates,
     backoff: Span,
     /// How often a state had been asked for when it was lost.
     requests_at_loss: u32,
@@ -61,11 +63,13 @@ pub(crate) async fn keep(context: Context, id: DeviceId) {
         device,
         known: Known::default(),
         clock: WatchedClock::default(),
+        gates: Gates::new(&context, device),
         backoff: Span::ZERO,
         requests_at_loss: 0,
     };
     loop {
         let restarted = keeper.until_found().await;
+        keeper.gates.forget();
         keeper.while_there(restarted).await;
         keeper.requests_at_loss = lock(&context.line).requests(id);
         lose(&context, id);
@@ -126,6 +130,8 @@ impl Keeper<'_> {
                     continue;
                 }
             };
+            let is_running = reached >= AlState::SafeOp;
+            self.gates.set(self.context, self.device, is_running).await;
             match self.watch(reached).await {
                 Trouble::Lost => return,
                 Trouble::Redirected => {
@@ -312,6 +318,7 @@ impl Keeper<'_> {
             if self.known.dl.replace(status) != Some(status) {
                 self.context.wire.emit(Event::Links { id, status });
             }
+            self.gates.tend(self.context, self.device, status).await;
         }
         let cleared = lock(&self.context.line).clears(id) != clears;
         if let Some(reply) = counters.filter(|_| !cleared) {

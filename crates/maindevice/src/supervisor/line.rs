@@ -61,6 +61,21 @@ struct Live {
     clears: u32,
 }
 
+/// What is known of the clock that all others follow.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct ReferenceClock {
+    /// How often clocks were set, and the system time at the start of the run; `None`: not yet.
+    pub(crate) base: Option<(u32, DcTime)>,
+    /// It is there, and its clock was set since it was last without power; true as long as nobody can know.
+    pub(crate) stands: bool,
+}
+
+impl Default for ReferenceClock {
+    fn default() -> Self {
+        Self { base: None, stands: true }
+    }
+}
+
 /// The SubDevices of a network as they are.
 #[derive(Debug, Default)]
 pub(crate) struct Line {
@@ -85,8 +100,8 @@ pub(crate) struct Line {
     /// How often clocks were set, and the system time at the start of the run.
     clock_base: Option<(u32, DcTime)>,
     clocks_ready: bool,
-    /// Whom all other clocks follow.
-    reference: Option<StationAddress>,
+    /// Whom all other clocks follow: its address, and who it is if the plan has it.
+    reference: Option<(StationAddress, Option<DeviceId>)>,
 }
 
 impl Line {
@@ -264,19 +279,22 @@ impl Line {
         self.version.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How often clocks were set, and the system time at the start of the run.
-    pub(crate) fn clock_base(&self) -> Option<(u32, DcTime)> {
-        self.clock_base
+    /// How the clock is that all others follow.
+    pub(crate) fn clock(&self) -> ReferenceClock {
+        let reference = self.reference.and_then(|(_, id)| self.devices.get(id?.index()));
+        let stands = reference
+            .is_none_or(|live| live.clock_set && matches!(live.found, Found::There { .. }));
+        ReferenceClock { base: self.clock_base, stands }
     }
 
     /// Whose clock all others follow.
-    pub(crate) fn set_reference_clock(&mut self, station: StationAddress) {
-        self.reference = Some(station);
+    pub(crate) fn set_reference_clock(&mut self, station: StationAddress, id: Option<DeviceId>) {
+        self.reference = Some((station, id));
     }
 
     /// Whose clock all others follow; `None` before clocks were set.
     pub(crate) fn reference_clock(&self) -> Option<StationAddress> {
-        self.reference
+        self.reference.map(|(station, _)| station)
     }
 
     /// Clocks were set for the first time, or there are none to be set.

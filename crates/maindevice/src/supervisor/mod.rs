@@ -9,6 +9,7 @@ mod by_alias;
 mod clocks;
 pub(crate) mod counters;
 mod drive;
+pub(crate) mod gates;
 pub(crate) mod keeper;
 pub(crate) mod line;
 mod locate;
@@ -32,7 +33,7 @@ use crate::options::Options;
 use crate::procedure::look::AL_LEN;
 use crate::procedure::scan::Identified;
 
-pub(crate) use line::{Found, Line, Nap};
+pub(crate) use line::{Found, Line, Nap, ReferenceClock};
 pub use start_up::StartUpError;
 pub use times::{BringUpTimes, DeviceTimes, Phase};
 

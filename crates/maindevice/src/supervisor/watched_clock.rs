@@ -6,7 +6,7 @@
 use std::future::Future;
 
 use linesman_config::plan::DevicePlan;
-use linesman_proto::register;
+use linesman_proto::register::{self, SystemTimeDifference};
 use linesman_proto::time::{DcTime, Instant, Span};
 
 use super::Context;
@@ -14,8 +14,6 @@ use crate::event::Event;
 use crate::exchange::{ExchangeError, Reply, Target};
 use crate::executor::lock;
 
-/// 0x092C without its sign.
-const MAGNITUDE: u32 = 0x7FFF_FFFF;
 /// What has not changed is told no more often than this.
 const TOLD_EVERY: Span = Span::s(1);
 
@@ -86,8 +84,7 @@ impl WatchedClock {
             }
             return;
         }
-        let difference = u32::from_le_bytes(reply.bytes(0)) & MAGNITUDE;
-        let difference = Span::ns(u64::from(difference));
+        let difference = SystemTimeDifference::from(reply.bytes(0)).magnitude();
         let window = context.plan.sync_window.unwrap_or(context.options.clock_limit);
         // At the edge of the window it is not told again and again.
         let limit = if self.apart { Span::ns(window.as_nanos() / 2) } else { window };

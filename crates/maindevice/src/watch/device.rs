@@ -297,6 +297,7 @@ pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
         | Event::ClockDifference { id, .. }
         | Event::Identified { id, .. }
         | Event::Links { id, .. }
+        | Event::PortOpened { id, .. }
         | Event::Emergency { id, .. }
         | Event::SdoUploaded { id, .. }
         | Event::SdoDownloaded { id, .. } => Some(*id),

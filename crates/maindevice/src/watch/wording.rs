@@ -88,6 +88,10 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
             };
             Port::ALL.into_iter().filter_map(change).collect()
         }
+        Event::PortOpened { id, port } => {
+            let text = format!(": port {port} has its link again and was ordered to open");
+            vec![about(*id, Severity::Info, EntryKind::Link, text)]
+        }
         Event::Counters { id, counters } | Event::CountersCleared { id, counters } => {
             let rises = standing.counters(*id).map(|known| known.rises(counters));
             let rises = rises.unwrap_or_default();

@@ -7,10 +7,12 @@ mod al_errors;
 mod bench;
 mod clocks;
 mod described;
+mod gates;
 mod library;
 mod mailbox;
 #[allow(clippy::disallowed_macros, reason = "it prints a table for people")]
 mod many;
+mod reference_clock;
 mod ring;
 mod robust;
 mod run;

@@ -21,6 +21,7 @@ pub mod phy_control;
 pub mod sii_control;
 pub mod sync_manager;
 pub mod table;
+pub mod time_difference;
 pub mod watchdog;
 
 pub use al::{AlControl, AlStatus};
@@ -41,4 +42,5 @@ pub use sync_manager::{
     SmActivate, SmControl, SmDirection, SmMode, SmPdiControl, SmStatus, SyncManagerConfig,
 };
 pub use table::*;
+pub use time_difference::SystemTimeDifference;
 pub use watchdog::{WatchdogDivider, WatchdogTime};

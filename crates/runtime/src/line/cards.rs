@@ -146,7 +146,7 @@ impl Line for Cards {
         tell: &mut dyn FnMut(&HostObservation),
     ) -> Result<(), LinkError> {
         for card in &mut self.cards {
-            if now < card.watch.due() {
+            if !card.watch.is_due(now)? {
                 continue;
             }
             let counters = card.socket.counters()?;

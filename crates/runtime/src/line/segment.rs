@@ -26,7 +26,7 @@ pub enum Pace {
     Host,
 }
 
-/// How often the virtual cards' counters are looked at.
+/// How often the virtual cards' counters are looked at, if nothing is told of their links.
 const EVERY: Span = Span::ms(100);
 
 /// The segment, its cards and its time.
@@ -125,7 +125,9 @@ impl Line for VirtualLine {
         _: Instant,
         tell: &mut dyn FnMut(&HostObservation),
     ) -> Result<(), LinkError> {
-        if self.now < self.look_at {
+        let paths = Path::ALL.into_iter().take(self.paths);
+        let has_news = paths.filter(|path| self.segment.takes_card_news(*path)).count() > 0;
+        if !has_news && self.now < self.look_at {
             return Ok(());
         }
         self.look_at = self.now + EVERY;

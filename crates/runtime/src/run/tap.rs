@@ -207,7 +207,8 @@ impl Drop for Bell {
     }
 }
 
-/// The end of the thread that judges.
+/// The end of the thread that judges. Two threads cannot ask at once (it cannot be shared), and it must not be
+/// handed on once it was asked: see [`Listener::next`].
 pub struct Listener {
     full: Receiver<Log>,
     empty: SyncSender<Log>,
@@ -343,15 +344,20 @@ impl Drop for Tap {
 
 impl Listener {
     /// The next log; `None` when the run has ended. `done` is given back.
+    ///
+    /// It must always be the same thread that asks: the first one is noted as the one to be woken, and another
+    /// would sleep for ever.
     pub fn next(&self, done: Option<Log>) -> Option<Log> {
         if let Some(done) = done {
             // The run may have ended.
             let _ = self.empty.try_send(done);
         }
-        if self.thread.get().is_none() {
-            // Once: nobody else asks.
-            let _ = self.thread.set(thread::current());
-            fence(Ordering::SeqCst);
+        match self.thread.get() {
+            Some(noted) => debug_assert_eq!(noted.id(), thread::current().id(), "nobody else asks"),
+            None => {
+                let _ = self.thread.set(thread::current());
+                fence(Ordering::SeqCst);
+            }
         }
         loop {
             match self.full.try_recv() {

@@ -23,6 +23,11 @@ pub(super) const KIND: Kind = Kind {
             meaning: "Whose port it hangs on, such as `K1.B`; what was there hangs behind it.",
             shape: Shape::Text,
         },
+        Parameter {
+            key: "serial",
+            meaning: "Its serial number; counted on from those of the line unless said.",
+            shape: Shape::Whole { low: 1, high: u32::MAX, default: None },
+        },
     ],
     start: |_| Ok(Listed::boxed([])),
 };
@@ -33,6 +38,7 @@ pub(crate) struct Extra {
     pub(crate) name: String,
     pub(crate) type_name: String,
     pub(crate) on: Attachment,
+    pub(crate) serial: Option<u32>,
 }
 
 /// The device that an entry adds; `None` for entries of another kind.
@@ -57,5 +63,6 @@ pub(crate) fn extra(label: &str, entry: &FaultEntry) -> Result<Option<Extra>, Fa
         given: format!("`{on}`"),
         allowed: "a port such as `K1.B`, or `maindevice`".to_owned(),
     })?;
-    Ok(Some(Extra { name, type_name, on }))
+    let serial = values.whole("serial");
+    Ok(Some(Extra { name, type_name, on, serial }))
 }

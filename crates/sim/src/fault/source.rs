@@ -166,7 +166,12 @@ pub(super) fn frame_hits(
     let instants = spread(count, interval, stream);
     let hits = instants.into_iter().filter_map(|at| {
         let line = *stream.pick(lines)?;
-        Some((at, Change::FrameHit { line, part: part(stream), flip: flip(stream) }))
+        Some((at, frame_hit(line, stream)))
     });
-    Box::new(Listed(hits.collect()))
+    Listed::boxed(hits.collect::<Vec<_>>())
+}
+
+/// A hit in the frame that passes a line next.
+pub(super) fn frame_hit(line: Line, stream: &mut Stream) -> Change {
+    Change::FrameHit { line, part: part(stream), flip: flip(stream) }
 }

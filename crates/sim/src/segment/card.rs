@@ -28,6 +28,10 @@ pub struct HostPort {
     pub rx_dropped: u64,
 }
 
+/// So long after one change of a link the kernel may keep the next one to itself (`net/core/link_watch.c` of
+/// Linux, `linkwatch_schedule_work`); a carrier that lets frames through again it tells at once.
+const TOLD_APART: Span = Span::s(1);
+
 /// What became of the frames that the MainDevice's cards sent, since the start of the run.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct FrameTally {
@@ -60,6 +64,8 @@ pub(crate) struct Card {
     pub(super) lateness: Lateness,
     /// Changes of the carrier that are known, in the order of time.
     carrier: Vec<(Instant, bool)>,
+    /// The carrier that the kernel has told of by itself, and when.
+    told: (bool, Instant),
     /// Frames that the host loses after they came back, in the order of time.
     drops: VecDeque<(Instant, FaultId)>,
     /// When the last frame has left.
@@ -76,6 +82,7 @@ impl Default for Card {
             silent: Vec::new(),
             lateness: Lateness::default(),
             carrier: Vec::new(),
+            told: (false, Instant::ZERO),
             drops: VecDeque::new(),
             sent_until: Instant::ZERO,
         }
@@ -107,6 +114,18 @@ impl Card {
     pub(crate) fn has_carrier(&self, at: Instant) -> bool {
         let known = self.carrier.iter().rev().find(|(since, _)| *since <= at);
         known.map_or(self.counts.carrier, |(_, up)| *up)
+    }
+
+    /// Whether the kernel tells of the carrier at `now` without being asked, which it does once for a change.
+    #[inline]
+    pub(crate) fn takes_news(&mut self, now: Instant) -> bool {
+        let is_up = self.has_carrier(now);
+        let (told, at) = self.told;
+        let is_news = is_up != told && (is_up || now >= at + TOLD_APART);
+        if is_news {
+            self.told = (is_up, now);
+        }
+        is_news
     }
 
     /// From one instant to another it sends nothing.
@@ -168,5 +187,16 @@ mod tests {
         card.settle(at(25));
         assert!(!card.counts.carrier && card.counts.carrier_changes == 2);
         assert!(!card.has_carrier(at(30)));
+    }
+
+    #[test]
+    fn a_carrier_that_comes_is_told_at_once_and_one_that_goes_soon_after_a_second_later() {
+        let ms = |ms| Instant::ZERO + Span::ms(ms);
+        let mut card = Card::default();
+        for (at, up) in [(10, true), (2_000, false), (3_600, true), (3_700, false)] {
+            card.set_carrier(ms(at), up);
+        }
+        let told: Vec<u64> = (0..5_000).filter(|now| card.takes_news(ms(*now))).collect();
+        assert_eq!(told, [10, 2_000, 3_600, 4_600]);
     }
 }

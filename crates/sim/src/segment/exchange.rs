@@ -50,7 +50,8 @@ pub(super) fn with_extras(file: &SegmentFile) -> Result<SegmentFile, BuildError>
                 ring.closes_at = way_on;
             }
         }
-        file.devices.push(SegmentDevice::new(extra.name, extra.type_name, extra.on));
+        let device = SegmentDevice::new(extra.name, extra.type_name, extra.on);
+        file.devices.push(SegmentDevice { serial: extra.serial, ..device });
     }
     if file.devices.len() > planned {
         file.check()?;

@@ -384,6 +384,13 @@ impl Segment {
         HostPort { carrier: card.has_carrier(self.now), ..card.counts }
     }
 
+    /// Whether the kernel tells of a card's link without being asked, as of the time last told; once for each
+    /// change.
+    pub fn takes_card_news(&mut self, path: Path) -> bool {
+        let now = self.now;
+        self.world.cards[path.index()].takes_news(now)
+    }
+
     /// What became of the frames that the cards sent.
     #[must_use]
     pub const fn frames(&self) -> FrameTally {

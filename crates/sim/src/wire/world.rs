@@ -322,13 +322,15 @@ impl World {
             if self.links[link].contact.is_held_by(fault) {
                 self.apply(at, fault, Change::Close { link });
             }
+            // The signal first: what was in between is still there, and keeps the link of the end that had it.
             for line in Line::both(link) {
-                let index = usize::from(line.downstream);
-                if self.links[link].passage[index].is_held_by(fault) {
-                    self.apply(at, fault, Change::Carry { line });
-                }
-                if self.links[link].pair[index].is_held_by(fault) {
+                if self.links[link].pair[usize::from(line.downstream)].is_held_by(fault) {
                     self.apply(at, fault, Change::Mend { line });
+                }
+            }
+            for line in Line::both(link) {
+                if self.links[link].passage[usize::from(line.downstream)].is_held_by(fault) {
+                    self.apply(at, fault, Change::Carry { line });
                 }
             }
             if self.links[link].early.is_some_and(|(_, by)| by == fault) {

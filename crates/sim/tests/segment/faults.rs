@@ -25,7 +25,7 @@ fn cycles(bench: &mut Bench, count: usize) -> usize {
     whole
 }
 
-// proves: ESC-05 partial, JCT-05 partial
+// proves: ESC-05 partial, JCT-05
 #[test]
 fn an_open_link_cuts_off_what_is_behind_it() {
     let mut bench = Bench::plant();
@@ -99,7 +99,7 @@ fn a_cut_in_the_middle_of_a_frame_leaves_a_fragment() {
 /// Exactly `hits` frame hits on a line, at a frame each millisecond.
 fn hit(place: &str, hits: u32) -> Bench {
     let mut bench = Bench::plant();
-    let entry = FaultEntry::new(FaultName::EmcNoise)
+    let entry = FaultEntry::new(FaultName::TransmitterDamaged)
         .at(place)
         .from_to(1.0, Some(2.0 * f64::from(hits) + 1.0))
         .with("hits", hits);

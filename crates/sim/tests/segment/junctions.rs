@@ -192,6 +192,28 @@ fn twenty_thousand_cycles_a_second_and_acyclic_frames_beside_them() {
     bench.assert_audit();
 }
 
+/// In which order the ports of a terminal are used, whatever hangs on its exit, and that it turns frames when
+/// nothing does.
+fn passes_and_ends(terminal: &str, exit: Port) {
+    let on = |what: &str| device("K", "EK1100", "maindevice") + &device("T", terminal, what);
+    let next = if exit == Port::B { "EL1008" } else { "EK1100" };
+    let mut bench = Bench::new(&(on("K.B") + &device("N", next, &format!("T.{exit}"))));
+    assert_eq!(order(&mut bench), ["K", "T", "N"], "{terminal}");
+    let mut last = Bench::new(&on("K.B"));
+    assert_eq!(order(&mut last), ["K", "T"], "{terminal}");
+    let at_t = last.segment.controller(last.id("T")).unwrap();
+    let open: Vec<Port> = Port::ALL.into_iter().filter(|port| at_t.is_open(*port)).collect();
+    assert_eq!(open, [Port::A], "{terminal} turns the frame");
+}
+
+// proves: JCT-09 partial: one with a single port is in files.rs
+#[test]
+fn terminals_take_frames_by_port_0_and_pass_them_on_by_1_or_3_or_turn_them() {
+    passes_and_ends("EL2008", Port::B);
+    passes_and_ends("EL3102", Port::B);
+    passes_and_ends("EK1122", Port::D);
+}
+
 // proves: JCT-12 partial: as the controller does it
 #[test]
 fn a_port_that_closes_by_itself_opens_by_order_when_the_rest_is_ready() {

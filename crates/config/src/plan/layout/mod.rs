@@ -60,6 +60,8 @@ pub struct PlanOptions {
     pub outputs_shift: Option<Span>,
     /// How far a clock may be off the reference clock before that is told, where that is chosen.
     pub sync_window: Option<Span>,
+    /// Ports whose link was lost open by order only.
+    pub ports_open_by_order: bool,
 }
 
 impl Default for PlanOptions {
@@ -74,6 +76,7 @@ impl Default for PlanOptions {
             mailbox_states: false,
             outputs_shift: None,
             sync_window: None,
+            ports_open_by_order: false,
         }
     }
 }
@@ -189,6 +192,7 @@ impl Plan {
             devices: devices.iter().zip(0..).map(|(planned, id)| device(planned, id)).collect(),
             outputs_shift: options.outputs_shift,
             sync_window: options.sync_window,
+            ports_open_by_order: options.ports_open_by_order,
             ..Self::empty(tree)
         };
         let tasks = match options.tasks.as_slice() {

@@ -3,10 +3,13 @@
 //! Positions mean the controllers of the first full scan, in order, while all of them are there.
 //! When fewer answer, positions have moved: on a line without branches the first ones are still
 //! where they were, elsewhere a position is known only where its station address was read since.
+//!
+//! In a ring that is open each card has positions of its own. Those of card B begin at the gap, so they follow
+//! upon those of card A (S1 chapter 3: who is entered from behind is processed on the way back).
 
 use std::collections::BTreeMap;
 
-use linesman_proto::address::{DeviceId, Position, StationAddress};
+use linesman_proto::address::{DeviceId, Path, Position, StationAddress};
 use linesman_proto::command::Addressing;
 
 use super::{Answer, word_at};
@@ -23,8 +26,10 @@ pub struct Addresses {
     stations: BTreeMap<StationAddress, DeviceId>,
     /// Controllers by position while all are there.
     order: Vec<DeviceId>,
-    /// How many controllers a frame passes now.
+    /// How many controllers a frame passes now, both cards of a ring together.
     present: Option<u16>,
+    /// How many of them by each card, as far as that was seen.
+    halves: [Option<u16>; 2],
     /// Whether a station was taken for a controller's without any sign of its position.
     has_guessed: bool,
 }
@@ -47,6 +52,37 @@ impl Addresses {
     /// How many controllers a frame passes now.
     pub(super) const fn present(&self) -> Option<u16> {
         self.present
+    }
+
+    /// A frame that `card` has sent, where that is known, passed `passed` controllers.
+    pub(super) fn passed(&mut self, line: &mut Line, card: Option<Path>, passed: u16) {
+        let Some(card) = card else { return self.count(line, passed) };
+        self.halves[card.index()] = Some(passed);
+        let other = &mut self.halves[card.other().index()];
+        // More than there are: a card that is out of use left its number behind.
+        if other.is_some_and(|other| usize::from(other) + usize::from(passed) > self.order.len()) {
+            *other = None;
+        }
+        let all = passed.saturating_add(other.unwrap_or(0));
+        self.count(line, all);
+    }
+
+    /// Of two copies of a broadcast, so many controllers have answered the first one to come back and the
+    /// second one, which `card` has sent.
+    pub(super) fn split(&mut self, card: Option<Path>, (first, second): (u16, u16)) {
+        if let Some(card) = card {
+            self.halves[card.index()] = Some(second);
+            self.halves[card.other().index()] = Some(first);
+        }
+    }
+
+    /// A position in the order of all, of one that `card` counts.
+    fn of_all(&self, card: Option<Path>, position: Position) -> Position {
+        let before = match card {
+            Some(Path::B) => self.halves[Path::A.index()].unwrap_or(0),
+            Some(Path::A) | None => 0,
+        };
+        Position(position.0.wrapping_add(before))
     }
 
     /// A frame passed `passed` controllers.
@@ -78,13 +114,14 @@ impl Addresses {
         line.touch();
     }
 
-    /// The controller at a position.
+    /// The controller at a position, as the card counts that has sent the frame.
     pub(super) fn at_position(
         &mut self,
         line: &mut Line,
         position: Position,
         answer: &Answer<'_>,
     ) -> Option<DeviceId> {
+        let position = self.of_all(answer.sent_by, position);
         let index = usize::from(position.0);
         if self.present.is_none() && answer.sum > 0 {
             // Nothing says how many there are; this one is.

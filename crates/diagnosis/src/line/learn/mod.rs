@@ -10,7 +10,7 @@ mod coe;
 mod registers;
 mod sii;
 
-use linesman_proto::address::{Position, RegisterAddress, StationAddress};
+use linesman_proto::address::{Path, Position, RegisterAddress, StationAddress};
 use linesman_proto::command::{Addressing, Command, Effect};
 use linesman_proto::frame::{Datagram, FrameView};
 use linesman_proto::time::Instant;
@@ -50,6 +50,10 @@ struct Answer<'a> {
     is_last: bool,
     /// Whether positions can be counted: there is but one copy.
     is_single: bool,
+    /// The card by which this copy had gone out, where that is known.
+    sent_by: Option<Path>,
+    /// Whether cards are told apart by more than their addresses.
+    knows_cards: bool,
     /// When the request went out, where it was seen.
     sent_at: Option<Instant>,
     at: Instant,
@@ -147,6 +151,8 @@ impl Learner {
                 own: datagram.wkc().0,
                 is_last: exchange.is_last,
                 is_single: exchange.is_last && exchange.earlier.is_empty(),
+                sent_by: exchange.sent_by,
+                knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
                 sent_at: exchange.request.map(|request| request.time),
                 at: reply.time,
                 frame: reply.number,
@@ -168,6 +174,9 @@ impl Learner {
                 answer.ado < FIRST_OPTIONAL
             }
         };
+        if answer.own > 0 {
+            line.traffic.record_processed(answer.at);
+        }
         if answer.is_last {
             line.traffic.datagrams += 1;
             if is_expected && answer.sum == 0 {
@@ -228,7 +237,7 @@ impl Learner {
     fn broadcast(&mut self, line: &mut Line, answer: &Answer<'_>) {
         let passed = answer.passed();
         if let Some(passed) = passed {
-            self.addresses.count(line, passed);
+            self.addresses.passed(line, answer.sent_by, passed);
         }
         if !answer.is_last {
             return;
@@ -239,12 +248,18 @@ impl Learner {
             line.traffic.broadcast_answers = line.traffic.broadcast_answers.max(answer.sum);
             let split = (answer.sum - answer.own, answer.own);
             let is_split = split.0 > 0 && split.1 > 0;
-            line.traffic.broadcast_split =
-                is_split.then_some(Seen::new(split, answer.at, Some(answer.frame)));
             if is_split {
-                line.traffic.latest_split = Some(answer.at);
+                let seen = Seen::new(split, answer.at, Some(answer.frame));
+                line.traffic.broadcast_split = Some(seen);
             }
-            line.traffic.was_processed_by_one |= !answer.is_single && !is_split && answer.sum > 0;
+            if !answer.is_single && !is_split && answer.sum > 0 {
+                line.traffic.was_processed_by_one = true;
+                // A guess which card is which proves nothing here.
+                let sent_by = answer.sent_by.filter(|_| answer.knows_cards);
+                let card = if answer.own > 0 { sent_by } else { sent_by.map(Path::other) };
+                line.traffic.processed_alone =
+                    card.map(|card| Seen::new(card, answer.at, Some(answer.frame)));
+            }
             let is_news = line.traffic.broadcast_now.is_none_or(|known| known.value != answer.sum);
             if is_news {
                 let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
@@ -257,6 +272,7 @@ impl Learner {
                 line.touch();
             }
             if passed.is_none() {
+                self.addresses.split(answer.sent_by, split);
                 self.addresses.count(line, answer.sum);
             }
         }
@@ -275,7 +291,7 @@ impl Learner {
     /// A datagram to one controller.
     fn single(&mut self, line: &mut Line, answer: &Answer<'_>) {
         if let Some(passed) = answer.passed() {
-            self.addresses.count(line, passed);
+            self.addresses.passed(line, answer.sent_by, passed);
         }
         let is_position = answer.effect.addressing == Addressing::Position;
         let device = if is_position {
@@ -367,6 +383,10 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
     }
     if exchange.earlier.is_empty() && !exchange.is_cut_off {
         line.traffic.record_lost(request.time, request.number, exchange.returns_before);
+        line.touch();
+    }
+    if !exchange.earlier.is_empty() && exchange.earlier.iter().all(|wkc| *wkc == 0) {
+        line.traffic.record_swallowed(request.time, request.number);
         line.touch();
     }
     if let Some(card) = exchange.copy_lost {

@@ -4,13 +4,12 @@ use linesman_proto::address::{DeviceId, RegisterAddress, StationAlias};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
     AlControl, AlStatus, ClearGroup, DlControl, DlStatus, ErrorCounters, FmmuConfig, PortState,
-    WatchdogDivider, WatchdogTime,
+    SystemTimeDifference, WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::DcTime32;
 
 use super::{Answer, part, word_at};
-use crate::line::clock::ClockDifference;
 use crate::line::{Device, Line, LoopWrite, Seen};
 
 const ALIAS: u16 = 0x0012;
@@ -74,8 +73,8 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     } else if start.0 > RECEIVE_TIMES
         && let Some(bytes) = part(data, start, CLOCK_DIFFERENCE, 4).and_then(|it| it.first_chunk())
     {
-        let difference = ClockDifference(u32::from_le_bytes(*bytes));
-        news |= device.clock.record(Seen::new(difference.ns(), at, frame));
+        let difference = SystemTimeDifference::from(*bytes);
+        news |= device.clock.record(Seen::new(difference.ahead_ns(), at, frame));
     }
     if news {
         line.touch();

@@ -62,6 +62,7 @@ impl Pairing {
             is_cut_off,
             is_part: pending.is_part,
             copy_lost,
+            sent_by: None,
         });
         self.remove(index);
     }

@@ -4,8 +4,8 @@ use linesman_config::compare::{Comparison, Difference, Side, There, Wanted, comp
 use linesman_proto::address::{DeviceId, Path, Position};
 use linesman_proto::port::Port;
 use linesman_proto::time::Instant;
-use linesman_proto::topology::Reconstruction;
 use linesman_proto::topology::derive::EntryBasis;
+use linesman_proto::topology::{Reconstruction, SeenController};
 
 use super::Found;
 use crate::line::{Device, Line};
@@ -13,8 +13,8 @@ use crate::line::{Device, Line};
 impl<'a> Found<'a> {
     pub(super) fn of(line: &'a Line) -> Option<Self> {
         let planned = line.tree.as_ref().filter(|_| line.tree_is_planned)?;
-        if planned.closes_at().is_some() || !line.devices.iter().any(is_known_to_plan) {
-            // In a ring receive times and open ports say something else.
+        let is_ring = planned.closes_at().is_some();
+        if !line.devices.iter().any(is_known_to_plan) || (is_ring && !is_closed(line)) {
             return None;
         }
         let mut ids: Vec<DeviceId> =
@@ -41,7 +41,8 @@ impl<'a> Found<'a> {
             return None;
         }
         let seen: Vec<_> = devices.iter().map(|device| device.as_first_seen()).collect();
-        let Reconstruction { tree, entry_basis, errors, .. } = Reconstruction::of(Path::A, &seen);
+        let derived = if is_ring { ring_of(&seen)? } else { Reconstruction::of(Path::A, &seen) };
+        let Reconstruction { tree, entry_basis, errors, .. } = derived;
         if !errors.is_empty() || tree.detached().next().is_some() {
             return None;
         }
@@ -90,9 +91,11 @@ impl<'a> Found<'a> {
 
     /// Whether a comparison says anything that can be relied on.
     pub(super) fn tells(&self, comparison: &Comparison) -> bool {
+        let ring = self.planned.ring_nodes();
         let is_gone = |difference: &Difference| {
+            // A ring that is closed goes on behind who is missing: it is not without power, or cut off.
             matches!(difference, Difference::Missing { planned, all }
-                if all.len() == self.planned.subtree(*planned).len())
+                if all.len() == self.planned.subtree(*planned).len() && !ring.contains(planned))
         };
         let is_seen = |found: &usize| {
             matches!(
@@ -111,11 +114,35 @@ impl<'a> Found<'a> {
     }
 }
 
+/// Whether the ring was seen closed, with everybody in it plugged in the right way round: frames of card A are
+/// processed by all of them, and those of card B by nobody.
+fn is_closed(line: &Line) -> bool {
+    let by = line.traffic.processed_alone.map(|seen| seen.value);
+    line.traffic.was_processed_by_one && by != Some(Path::B)
+}
+
+/// The closed ring that these controllers form. All on its way are entered at port A, since they process the
+/// frames of card A; the frame that takes receive times comes back to none of them, so that times tell of
+/// what hangs beside the ring alone.
+fn ring_of(seen: &[SeenController]) -> Option<Reconstruction> {
+    let timeless = |seen: &SeenController| SeenController { open: seen.open, ..Default::default() };
+    let mut all: Vec<_> = seen.iter().map(timeless).collect();
+    let first = Reconstruction::of(Path::A, &all);
+    let ring = first.tree.ring_nodes();
+    for (node, controller) in all.iter_mut().enumerate() {
+        if !ring.is_empty() && !ring.contains(&node) {
+            *controller = seen[node];
+        }
+    }
+    let derived = Reconstruction::of(Path::A, &all);
+    derived.tree.closes_at().is_some().then_some(derived)
+}
+
 fn is_known_to_plan(device: &Device) -> bool {
     device.planned.is_some_and(|planned| planned.identity.is_some())
 }
 
-fn wanted(device: Option<&Device>) -> Wanted {
+pub(super) fn wanted(device: Option<&Device>) -> Wanted {
     let planned = device.and_then(|device| device.planned);
     planned.map_or_else(Wanted::default, |planned| Wanted {
         identity: planned.identity,

@@ -33,8 +33,6 @@ const WORST_QUARTZ: i128 = (1 << FINE) / 500;
 const STARTS: std::ops::RangeInclusive<u16> = 0x0080..=0x3FFF;
 /// By how much the speed counter difference stays within its start (S2 2.15.2.6).
 const MARGIN: i64 = 0x7F;
-/// The register shows the magnitude, and this bit when the local copy is ahead.
-const AHEAD: u32 = 1 << 31;
 
 /// What the filters hold.
 #[derive(Clone, Copy, Default, Debug)]
@@ -98,8 +96,8 @@ impl Core {
 
     fn show_difference(&mut self, mean: i64) {
         let magnitude = ((mean.unsigned_abs() + (1 << (MEAN_PLACES - 1))) >> MEAN_PLACES) as u32;
-        let sign = if mean >= 0 { AHEAD } else { 0 };
-        self.memory.set_u32(&r::SYSTEM_TIME_DIFFERENCE, (magnitude & !AHEAD) | sign);
+        let shown = r::SystemTimeDifference::new(magnitude, mean >= 0);
+        self.memory.set_u32(&r::SYSTEM_TIME_DIFFERENCE, shown.0);
     }
 
     fn average_deviation(&mut self, ticks: u64, received: u32) {

@@ -1,0 +1,77 @@
+//! Counters that are read closely for a while: where several links count errors at the same time, only
+//! readings that follow each other quickly show whether they come at the same moments, from one source, or
+//! each in its own time. It reads a few registers of a few SubDevices, and writes nothing.
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::port::Port;
+use linesman_proto::register::{ErrorCounter, ErrorCounters};
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
+
+use super::survey::Register;
+use crate::line::Line;
+
+/// From one reading to the next. Bursts of interference follow one another in some ten milliseconds.
+const EVERY: Span = Span::ms(5);
+/// While nothing asks for it.
+const LOOK_EVERY: Span = Span::ms(20);
+/// A link counts errors while its latest rise is not older.
+const RECENT: Span = Span::s(1);
+/// SubDevices that are read in one turn.
+const MOST: usize = 16;
+/// All error counters.
+const COUNTERS: Register = (ErrorCounters::START.0, ErrorCounters::LEN as u16);
+
+/// When the next reading is due.
+#[derive(Clone, Copy, Default, Debug)]
+pub(super) struct CloseWatch {
+    next: Instant,
+    is_needed: bool,
+}
+
+impl CloseWatch {
+    /// When the next reading is; `None` while nothing asks for it.
+    pub(super) fn next(&self) -> Option<Instant> {
+        self.is_needed.then_some(self.next)
+    }
+
+    /// What is to be read now.
+    pub(super) fn turn(&mut self, line: &Line, now: Instant) -> Vec<(DeviceId, Register)> {
+        if now < self.next {
+            return Vec::new();
+        }
+        let counting = counting(line, now);
+        self.is_needed = !counting.is_empty();
+        self.next = now + if self.is_needed { EVERY } else { LOOK_EVERY };
+        counting.into_iter().map(|id| (id, COUNTERS)).collect()
+    }
+}
+
+/// Who counts symbol errors at present, where they are on more than one link.
+fn counting(line: &Line, now: Instant) -> Vec<DeviceId> {
+    let Some(tree) = &line.tree else { return Vec::new() };
+    let is_recent = |at: Option<Instant>| at.is_some_and(|at| now < at + RECENT);
+    let mut links = Vec::new();
+    let mut found = Vec::new();
+    for (node, device) in line.devices.iter().enumerate() {
+        if !is_recent(device.counters.last_rise()) || device.silent.is_some() {
+            continue;
+        }
+        let counts = |port: &Port| {
+            let track = device.counters.track(ErrorCounter::PhysicalLayer(*port));
+            is_recent(track.and_then(|track| track.last_rise()).map(|rise| rise.at))
+        };
+        let before = links.len();
+        links.extend(
+            Port::ALL
+                .into_iter()
+                .filter(counts)
+                .filter_map(|port| tree.link_at(End::Controller(node, port))),
+        );
+        if links.len() > before && found.len() < MOST {
+            found.push(device.id);
+        }
+    }
+    let is_several = links.iter().any(|link| Some(link) != links.first());
+    if is_several { found } else { Vec::new() }
+}
