@@ -8,21 +8,19 @@ to be counted as late, each of them once, and are the only ones that may come on
 import sys
 
 from bench import FAR, HERE, NEAR, Segment, inside, parse
-from harness import LINE, LINESMAN, Skip, check
+from harness import LINE, LINESMAN, WATCHDOG_MS, Skip, check, watchdogs_expired
 
 CYCLE_US, SETTLED, COUNTED = 8000, 200, 2000
 # A host that holds a frame for longer than most of a cycle has lost it by itself.
 LIMIT_MS = 5.0
 ATTEMPTS = 4
-# The process data watchdog of a SubDevice, unless it is told otherwise.
-WATCHDOG_MS = 100
 # Both ends of a further cable, between what spoils and the segment.
 BEFORE, BEHIND = "veth8", "veth9"
 NAMES = ("frames_lost", "frames_late", "frames_duplicate", "frames_stray", "frames_truncated")
 
 
 def spoiled(line, fault, every):
-    """What Linesman counted, and what the cable says it did."""
+    """What Linesman counted, what the cable says it did, and how many watchdogs expired."""
     inside(line.far, "ip", "link", "add", BEFORE, "type", "veth", "peer", "name", BEHIND)
     for name in (BEFORE, BEHIND):
         inside(line.far, "sysctl", "-q", "-w", f"net.ipv6.conf.{name}.disable_ipv6=1")
@@ -40,18 +38,19 @@ def spoiled(line, fault, every):
                 line.near, LINESMAN, "run", "--on", NEAR, "--seconds", seconds, "--cycle-us", CYCLE_US, "--json",
                 seconds=seconds + 60,
             )
+            expired = watchdogs_expired(line)
             _, told, words = line.stop(cable)
         assert status in (0, 1), f"status {status}: {(out + err)[-600:]}"
         told, report = parse(told, words), parse(out, err)
         latest_ms = report["lateness"]["max_ns"] / 1e6
         if told["held"] == 0 and report["counts"]["cycles_missed"] == 0 and latest_ms < LIMIT_MS:
-            return report, told
+            return report, told, expired
     raise Skip(f"the host is too busy: {told}, a cycle began {latest_ms:.1f} ms late")
 
 
 def judge(line, fault, every, cycles_lost, **counted):
     """`cycles_lost`: whether a spoiled frame costs its cycle; `counted`: the names under which it is counted."""
-    report, told = spoiled(line, fault, every)
+    report, told, expired = spoiled(line, fault, every)
     counts, expected = report["counts"], COUNTED // every
     assert told["cyclic"] > SETTLED + COUNTED, told
     assert told["spoiled"] == expected, told
@@ -62,7 +61,7 @@ def judge(line, fault, every, cycles_lost, **counted):
     late = seen["frames_late"] - wanted["frames_late"]
     if late > COUNTED // 10:
         raise Skip(f"the host is too busy: it brought {late} frames late")
-    if late * CYCLE_US / 1e3 >= WATCHDOG_MS and counts["working_counter_errors"] > 0:
+    if late * CYCLE_US / 1e3 >= WATCHDOG_MS and expired > 0:
         raise Skip(f"the host is too busy: it stood still for longer than a watchdog, {late} frames late")
     wanted["frames_late"] += late
     wanted["frames_lost"] += late

@@ -15,6 +15,8 @@ ETHERCRAB = os.environ.get("ETHERCRAB_PEER", "")
 ONE, LINE, TREE = (Plant(HERE / name) for name in ("one.toml", "segment.toml", "tree.toml"))
 
 CYCLES, CYCLE_US, ROUNDS = 800, 2000, 4
+# The process data watchdog of a SubDevice, unless it is told otherwise.
+WATCHDOG_MS = 100
 CHECKS = []
 
 
@@ -162,6 +164,18 @@ def healthy(line, status, diagnosis):
         assert (status, diagnosis["verdict"]) == (1, "faulty"), (status, diagnosis["verdict"])
         return
     assert (status, diagnosis["verdict"]) == (0, "healthy"), (status, diagnosis["verdict"], names(diagnosis))
+
+
+def watchdogs_expired(line):
+    """How often a process data watchdog of the line has expired, by the counters of its SubDevices (0x0442): nobody sent it
+    outputs for that long, or the program that plays the SubDevices stood still. They leave OP then, and working counters miss
+    what they add."""
+    expired = 0
+    for number in range(1, len(LINE) + 1):
+        status, out, err = linesman(line, "reg", NEAR, number, "read", "0x0442", "--json")
+        assert status == 0, f"status {status}: {(out + err)[-600:]}"
+        expired += int(parse(out, err)["bytes"], 16)
+    return expired
 
 
 def names(diagnosis):
