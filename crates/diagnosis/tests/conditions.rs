@@ -173,6 +173,39 @@ fn devices_that_do_not_answer_either_are_the_ones() {
     assert_eq!(below.cause, FaultName::DeviceOff, "{}", text(&report));
 }
 
+/// Two that share one working counter alike: which of them misses is not known, but whatever explains it of both
+/// explains it.
+#[test]
+fn a_share_that_may_be_anybodys_hangs_beneath_what_explains_it_of_all() {
+    let play = |is_silent: bool| {
+        let mut script = running();
+        let inputs = FmmuConfig::inputs(LogicalAddress(PROCESS + 4), 2, RegisterAddress(0x1180));
+        for station in [0x1002, 0x1003] {
+            script.exchange(&[fpwr(station, 0x0610, &inputs.to_bytes())]);
+        }
+        let both = |script: &mut Script, wkc| script.exchange(&[lrw(PROCESS + 4, 2, wkc)]);
+        for _ in 0..100 {
+            both(&mut script, 2);
+        }
+        for _ in 0..if is_silent { 60 } else { 0 } {
+            script.vanish(&[lrw(PROCESS + 4, 2, 2)]);
+        }
+        for _ in 0..20 {
+            both(&mut script, 1);
+        }
+        for _ in 0..100 {
+            both(&mut script, 2);
+        }
+        report(&mut script)
+    };
+    let alone = play(false);
+    assert_eq!(only(&alone).name, "working-counter-low", "{}", text(&alone));
+    let after_silence = play(true);
+    let finding = only(&after_silence);
+    assert_eq!(finding.name, "nobody-answers", "{}", text(&after_silence));
+    assert!(finding.consequences.iter().any(|below| below.name == "working-counter-low"));
+}
+
 // silent: S210
 #[test]
 fn process_data_that_the_maindevice_stops_are_not_missing() {

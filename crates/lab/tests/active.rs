@@ -191,3 +191,50 @@ fn nothing_is_closed_unless_it_was_allowed_nor_while_frames_come_back() {
         assert!(!lab.run_while(Span::s(2), Span::ms(1), is_closed).unwrap(), "{kind} at {at}");
     }
 }
+
+/// A hole that goes by itself in the middle of a search lets frames come back as a closed port does: only what
+/// vanishes again when the port is open tells.
+#[test]
+fn a_hole_that_goes_by_itself_is_not_placed_for_sure_where_it_was_not() {
+    for lasts in (105..400).step_by(20) {
+        let mut lab = up();
+        let fault = FaultEntry::new(FaultName::FalseLink).at("K2.C>K3.A".to_owned());
+        let fault = lab.inject(&fault).unwrap();
+        run(&mut lab, lasts);
+        lab.heal(fault);
+        run(&mut lab, 4_000);
+        let said = lab.diagnosis();
+        let sure = said.findings.iter().filter(|finding| finding.confidence > 0.55);
+        for finding in sure {
+            let claim = Claim::of(finding);
+            let is_there = claim.site == hole(K2, K3) || claim.site == Site::Network;
+            assert!(
+                is_there,
+                "after {lasts} ms: {} {} at {}",
+                finding.code, claim.cause, claim.site
+            );
+        }
+    }
+}
+
+/// Where frames are lost at random, single ones come through: that a port is closed when one does says nothing.
+#[test]
+fn frames_that_are_lost_at_random_lead_no_search_astray() {
+    for hits in [300.0, 500.0, 700.0, 900.0] {
+        let mut lab = up();
+        let from = lab.now().as_nanos() as f64 / 1e6 + 1.0;
+        let card = FaultEntry::new(FaultName::NicDamaged)
+            .at("maindevice".to_owned())
+            .with("part", "receiver")
+            .with("hits", hits)
+            .from_to(from, Some(from + 1_000.0));
+        lab.inject(&card).unwrap();
+        run(&mut lab, 4_000);
+        let said = lab.diagnosis();
+        let first = Claim::of(&said.findings[0]);
+        let is_near =
+            matches!(first.site, Site::Host | Site::Network) || first.site == first_link();
+        let is_last_hop = matches!(first.site, Site::Link { a: End::MainDevice(_), .. });
+        assert!(is_near || is_last_hop, "{hits} hits: {} at {}", first.cause, first.site);
+    }
+}

@@ -6,6 +6,10 @@
 //! was, whatever happens to us (S2 2.4.1). If frames come back, the hole lies behind that port; if not, it
 //! does not. Each try halves what is left.
 //!
+//! One frame decides nothing: where frames are lost at random, one comes through now and then. So those that
+//! are sent from the first return on must come back, most of them, while the port is closed, and none when it
+//! is open again; else the hole has gone by itself, or there never was one.
+//!
 //! In a ring it is the frames of card A that are followed: they are processed on their way. Those of card B may
 //! still come round untouched, if the hole takes one direction only, or lies beside the ring.
 
@@ -24,7 +28,13 @@ const SILENT: Span = Span::ms(100);
 /// So long a closed port gets to show that it helps: longer than lost requests are repeated.
 const PATIENCE: Span = Span::ms(60);
 /// After a port was opened again, frames that were turned back at it may still be on their way.
-const SETTLE: Span = Span::ms(30);
+const SETTLE: Span = Span::ms(15);
+/// When something came back, requests that were lost before have been sent again after so long, and come back.
+const REPEATED: Span = Span::ms(25);
+/// So many requests, sent after a port was closed or opened, decide what that has changed.
+const SEVERAL: u64 = 6;
+/// They must have had so much time to come back.
+const ROUND: Span = Span::ms(10);
 /// A silence that follows so soon upon a search belongs to it.
 const AGAIN: Span = Span::s(1);
 /// Frames that go on coming back after that, with all ports open: the hole has gone by itself.
@@ -35,6 +45,8 @@ const HEALED: Span = Span::ms(1_200);
 pub(super) struct Bisect {
     /// Links (index in the tree) that may hold the hole.
     left: Vec<usize>,
+    /// The same as it was before the latest port helped: whether it did is only sure when frames vanish again.
+    before: Vec<usize>,
     step: Step,
 }
 
@@ -42,8 +54,34 @@ pub(super) struct Bisect {
 enum Step {
     /// Nothing is closed; since when.
     Open(Instant),
+    /// Nothing is closed, and it is watched whether frames vanish again.
+    Watched(Mark),
     /// The port before this link is closed; since when.
     Closed(usize, Instant),
+    /// The port before this link is closed, and something came back.
+    Helps(usize, Mark),
+}
+
+/// What had been sent and had come back at a time.
+#[derive(Clone, Copy, Debug)]
+struct Mark {
+    at: Instant,
+    sent: u64,
+    processed: u64,
+}
+
+impl Mark {
+    const fn of(line: &Line, at: Instant) -> Self {
+        Self { at, sent: line.traffic.sent, processed: line.traffic.processed }
+    }
+
+    /// How many requests were sent since, and how many frames came back, processed; `None` while these are too
+    /// few to tell.
+    fn since(&self, line: &Line, now: Instant) -> Option<(u64, u64)> {
+        let sent = line.traffic.sent - self.sent;
+        let is_enough = sent >= SEVERAL && now >= self.at + ROUND;
+        is_enough.then(|| (sent, line.traffic.processed - self.processed))
+    }
 }
 
 /// What a line whose ports may be closed must tell while it is well: how DL control stands, to be brought
@@ -65,44 +103,74 @@ impl Bisect {
         if now < since.at + SILENT || !has_link || was_searched || line.traffic.answered == 0 {
             return None;
         }
-        let left = (0..tree.links().len()).collect();
-        line.hole = Some(HoleSearch { since, found: None, ended: None });
-        Some(Self { left, step: Step::Open(now.before(SETTLE)) })
+        let left: Vec<usize> = (0..tree.links().len()).collect();
+        line.hole = Some(HoleSearch { since, found: None, has_helped: false, ended: None });
+        // That nothing comes back is known already.
+        let nothing = Mark { at: now.before(ROUND), sent: 0, ..Mark::of(line, now) };
+        Some(Self { before: left.clone(), left, step: Step::Watched(nothing) })
     }
 
     /// Goes on. Gives what is to be written next; the search is over when the line says so.
     pub(super) fn go_on(&mut self, line: &mut Line, now: Instant) -> Option<Probe> {
         let came_back = line.traffic.latest_processed;
         match self.step {
+            Step::Closed(link, at) if came_back.is_some_and(|back| back > at) => {
+                self.step = Step::Helps(link, Mark::of(line, now));
+                None
+            }
             // The request may be sent again for a while: what is written before that is over would be undone.
             Step::Closed(_, at) if now < at + PATIENCE => None,
-            Step::Closed(link, at) if came_back.is_some_and(|back| back > at) => {
-                let behind = behind(line.tree.as_ref()?, link);
-                self.left.retain(|one| behind.contains(one));
-                self.step = Step::Open(now);
-                // It would open by itself; but the next port may lie behind it.
-                set(line, link, None, now)
-            }
             Step::Closed(link, _) => {
                 let behind = behind(line.tree.as_ref()?, link);
                 self.left.retain(|one| !behind.contains(one));
                 self.close_next(line, now)
             }
+            Step::Helps(_, mark) if now < mark.at + REPEATED => None,
+            Step::Helps(link, mark) => {
+                let (sent, processed) = mark.since(line, now)?;
+                if processed * 4 < sent {
+                    // Frames come and go: this is noise, not a hole. (In a ring each card has sent its copy, and half of
+                    // what was sent may come back untouched.)
+                    let all = (0..line.tree.as_ref()?.links().len()).collect();
+                    end(line, all, false, now);
+                    return set(line, link, None, now);
+                }
+                let behind = behind(line.tree.as_ref()?, link);
+                self.before = self.left.clone();
+                self.left.retain(|one| behind.contains(one));
+                self.step = Step::Open(now);
+                // It would open by itself; but the next port may lie behind it.
+                set(line, link, None, now)
+            }
             Step::Open(at) if now < at + SETTLE => None,
-            Step::Open(at) if came_back.is_some_and(|back| back > at + SETTLE) => {
-                if now >= at + HEALED {
-                    end(line, None, now);
+            Step::Open(_) => {
+                self.step = Step::Watched(Mark::of(line, now));
+                None
+            }
+            Step::Watched(mark) if came_back.is_some_and(|back| back > mark.at) => {
+                if now >= mark.at + HEALED {
+                    // Whether the latest port helped, or the hole went just then, nobody knows.
+                    end(line, std::mem::take(&mut self.before), false, now);
                 }
                 None
             }
-            Step::Open(_) => self.close_next(line, now),
+            Step::Watched(mark) => {
+                mark.since(line, now)?;
+                if self.before.len() > self.left.len()
+                    && let Some(hole) = &mut line.hole
+                {
+                    hole.has_helped = true;
+                }
+                self.close_next(line, now)
+            }
         }
     }
 
     /// Closes the port before the link that halves what is left best.
     fn close_next(&mut self, line: &mut Line, now: Instant) -> Option<Probe> {
-        if let [only] = self.left[..] {
-            end(line, Some(only), now);
+        self.before = self.left.clone();
+        if self.left.len() == 1 {
+            end(line, std::mem::take(&mut self.left), true, now);
             return None;
         }
         let tree = line.tree.as_ref()?;
@@ -122,7 +190,7 @@ impl Bisect {
             .filter(splits)
             .min_by_key(|link| (share(*link).abs_diff(half), *link));
         let Some(link) = best else {
-            end(line, None, now);
+            end(line, std::mem::take(&mut self.left), false, now);
             return None;
         };
         self.step = Step::Closed(link, now);
@@ -130,11 +198,14 @@ impl Bisect {
     }
 }
 
-fn end(line: &mut Line, found: Option<usize>, now: Instant) {
+/// The search is over, with these links left: the only one is found if that is certain.
+fn end(line: &mut Line, left: Vec<usize>, is_certain: bool, now: Instant) {
     if let Some(hole) = &mut line.hole {
-        hole.found = found.map(|link| Seen::new(link, now, None));
+        let found = left.first().filter(|_| is_certain);
+        hole.found = found.map(|link| Seen::new(*link, now, None));
         hole.ended = Some(now);
     }
+    line.hole_left = left;
     line.touch();
 }
 

@@ -236,7 +236,9 @@ impl Engine {
             }
             if !is_active {
                 // Somebody else may have searched.
-                watched.line.hole = search::seen(&watched.line);
+                let seen = search::seen(&watched.line);
+                watched.line.hole = seen.as_ref().map(|(hole, _)| *hole);
+                watched.line.hole_left = seen.map_or_else(Vec::new, |(_, left)| left);
             }
             watched.judged = watched.line.revision();
             watched.judged_alarms = watched.alarms();
@@ -247,7 +249,9 @@ impl Engine {
             }
             let is_curious = is_active && (watched.bisect.is_some() || watched.lacks_controls());
             let is_watched = (watched.is_watched(now) || is_curious) && !has_ended;
-            watched.again = is_watched.then_some(now + JUDGE_AGAIN);
+            // A search waits for a moment after each step, whatever comes back.
+            let again = if watched.bisect.is_some() { JUDGE_EVERY } else { JUDGE_AGAIN };
+            watched.again = is_watched.then_some(now + again);
         }
         let all = self.networks.iter().flat_map(|watched| watched.conditions.iter().cloned());
         let room = Self::MOST_WAITING.saturating_sub(self.events.len());

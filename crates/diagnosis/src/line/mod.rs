@@ -70,6 +70,8 @@ pub struct HoleSearch {
     pub since: Seen<()>,
     /// The link (index in [`Line::tree`]) behind whose near port frames vanish.
     pub found: Option<Seen<usize>>,
+    /// Whether a port that was closed has brought frames back, and they vanished again when it was open.
+    pub has_helped: bool,
     /// When it was over, found or not.
     pub ended: Option<Instant>,
 }
@@ -105,6 +107,8 @@ pub struct Line {
     last_errors: Option<Instant>,
     /// The search for the place where frames vanish, going on or done.
     pub hole: Option<HoleSearch>,
+    /// The links that the latest search has left over: what it looked for was at one of them.
+    pub hole_left: Vec<usize>,
     /// DL control as it was written for temporary use, in the order of time.
     pub loop_writes: VecDeque<LoopWrite>,
     revision: u64,

@@ -22,6 +22,9 @@ const TOGETHER: Span = Span::s(1);
 /// A port that is closed shows within this time whether that helps.
 const PATIENCE: Span = Span::ms(100);
 
+/// A request that was sent so shortly before a port opens again may still be lost.
+const IN_FLIGHT: Span = Span::ms(2);
+
 /// Whoever has a link when a silence begins searches within this time.
 pub const BEGINS_WITHIN: Span = Span::ms(300);
 
@@ -61,9 +64,9 @@ pub(super) fn note(writes: &mut VecDeque<LoopWrite>, write: LoopWrite) {
 }
 
 /// The latest search that was seen, and what it has found. That the hole is before the first SubDevice no
-/// search shows: nothing helps then, as it would with a cable that is out.
+/// search shows: nothing helps then, as it would with a cable that is out. With it the links that are left over.
 #[must_use]
-pub fn seen(line: &Line) -> Option<HoleSearch> {
+pub fn seen(line: &Line) -> Option<(HoleSearch, Vec<usize>)> {
     let tree = line.tree.as_ref()?;
     let writes: Vec<&LoopWrite> = line.loop_writes.iter().collect();
     let is_apart = |pair: &[&LoopWrite]| pair[0].seen.at + TOGETHER < pair[1].seen.at;
@@ -90,17 +93,31 @@ pub fn seen(line: &Line) -> Option<HoleSearch> {
         };
         let from = write.seen.at;
         let next = writes.get(index + 1).map_or(Instant::MAX, |next| next.seen.at);
-        let helps = came_back(from, next.min(from + PATIENCE));
         let behind = behind(tree, link);
-        left.retain(|one| behind.contains(one) == helps);
+        if !came_back(from, next.min(from + PATIENCE)) {
+            left.retain(|one| !behind.contains(one));
+            continue;
+        }
+        let vanished = || silences().map(|silence| silence.since.at).filter(|at| *at > from);
+        if vanished().any(|at| at + IN_FLIGHT < next.min(from + TOGETHER)) {
+            // Frames come and go though nothing is changed: this is noise, not a hole.
+            left = (0..tree.links().len()).collect();
+            has_helped = false;
+            break;
+        }
         // It was the port, if they vanish again when that is open: a hole may also have gone by itself.
-        has_helped |= helps && silences().any(|silence| silence.since.at > from);
+        if vanished().next().is_none() {
+            break;
+        }
+        left.retain(|one| behind.contains(one));
+        has_helped = true;
     }
     let found = match left[..] {
         [only] if has_helped => Some(Seen::new(only, last.at, last.frame)),
         _ => None,
     };
-    Some(HoleSearch { since: silence.since, found, ended: Some(last.at + PATIENCE) })
+    let ended = Some(last.at + PATIENCE);
+    Some((HoleSearch { since: silence.since, found, has_helped, ended }, left))
 }
 
 /// When ports were first closed in a silence, to find the place where frames vanish: whoever does so has a link,

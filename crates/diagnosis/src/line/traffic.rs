@@ -99,6 +99,8 @@ pub struct Traffic {
     pub swallowed: VecDeque<Silence>,
     /// The latest time at which a frame came back that somebody had processed.
     pub latest_processed: Option<Instant>,
+    /// Frames that came back so.
+    pub processed: u64,
     recent_returns: RecentReturns,
     /// Who sent requests, at most four.
     pub senders: Vec<Sender>,
@@ -201,6 +203,8 @@ impl Traffic {
 
     /// A frame came back that somebody had processed.
     pub fn record_processed(&mut self, at: Instant) {
+        // Each datagram of a frame tells it.
+        self.processed += u64::from(self.latest_processed != Some(at));
         self.latest_processed = Some(at);
         if let Some(silence) = self.swallowed.back_mut() {
             silence.ended.get_or_insert(at);

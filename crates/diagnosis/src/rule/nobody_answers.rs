@@ -11,7 +11,8 @@
 //! forward: a media converter, a switch, a device that is not EtherCAT, or a damaged controller.
 //! If that is over again, and no SubDevice has lost a link or started anew meanwhile, no cable was out: for
 //! single frames among others that came back it is damage (`H110`, `H112`), for a long silence a false
-//! link. Where it was, a recording cannot say; `diagnose --active` can while it lasts: it closes ports one after the
+//! link. Where it was, those tell whose output watchdog expired, and those whose did not: frames reach all that are
+//! processed before the hole. Where that is not enough, a recording cannot say more; `diagnose --active` can while it lasts: it closes ports one after the
 //! other, for temporary use (0x0100 bit 1), so that each opens by itself after a second, and sees when frames
 //! come back. What was recorded meanwhile tells the same.
 //! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
@@ -23,17 +24,18 @@
 //! **What to do.** Look at the LED of the card and of the IN port of the first SubDevice, then at
 //! supply, cable and the choice of the card, in this order.
 
+mod parted;
+
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::register::ErrorCounter;
-use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, LinkEnd, Place, Severity, Symptom};
-use crate::line::{Device, Line, Seen, Silence, search};
+use crate::line::{Line, Seen, Silence, search};
 use crate::locate::Survey;
 
 /// The page.
@@ -58,10 +60,6 @@ const CARD: f64 = 0.1;
 const NEVER_SEEN: f64 = 0.08;
 /// Cards are looked at now and then only: a silence must last so long before their link proves anything.
 const CARRIER_LATE: Span = Span::ms(300);
-/// The watchdog of a SyncManager expired. Reference: ETG.1000.6, AL status codes.
-const OUTPUT_WATCHDOG: AlStatusCode = AlStatusCode(0x001B);
-/// States are read in turn: so long after a silence they tell of it.
-const STARVED_WITHIN: Span = Span::s(1);
 /// Ports that were closed in a silence keep it from being one; what follows so soon belongs to it.
 const SAME_SILENCE: Span = Span::ms(100);
 /// With fewer, the end of the input may have cut off the answer.
@@ -167,7 +165,7 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
     let mut condition = match (found, is_spoiled, is_hole) {
         (Some(found), ..) => placed(line, since.at, found),
         (None, true, _) => spoiling(line, since.at),
-        (None, false, true) => hole(line, silence),
+        (None, false, true) => hole(view, silence),
         (None, false, false) => cut(line, since.at, carrier.filter(|_| lasted >= CARRIER_LATE)),
     };
     condition = condition.shown_by(Evidence::frame(since.at, frame, text));
@@ -297,9 +295,10 @@ fn placed(line: &Line, at: Instant, found: Seen<usize>) -> Condition {
 }
 
 /// Nothing came back for a while, and nobody has lost a link: something took the frames that shows one.
-fn hole(line: &Line, silence: &Silence) -> Condition {
+fn hole(view: &View<'_>, silence: &Silence) -> Condition {
+    let line = view.line;
     let network = Place::Network { network: line.network };
-    let (place, confidence) = match before_the_starved(line, silence) {
+    let (place, confidence) = match parted::place(view, silence) {
         Some((link, sure)) => (link, sure),
         None => (network, 0.5),
     };
@@ -308,46 +307,6 @@ fn hole(line: &Line, silence: &Silence) -> Condition {
         .or_at(FaultName::NicDamaged, Place::Host, CARD)
         .or_at(FaultName::HostDrops, Place::Host, CARD)
         .or_at(FaultName::CableDegraded, first_link(line), CARD)
-}
-
-/// Frames reach all that lie before a hole: those whose outputs' watchdog expired lie behind it, those whose
-/// did not, though the silence was longer, before it. The link that parts them, the nearest to the card
-/// first and cables before contacts, with how sure.
-fn before_the_starved(line: &Line, silence: &Silence) -> Option<(Place, f64)> {
-    let tree = line.tree.as_ref().filter(|tree| tree.closes_at().is_none())?;
-    let (from, to) = (silence.since.at, silence.ended? + STARVED_WITHIN);
-    let lasted = silence.last.at.since(from);
-    let is_starved = |device: &Device| {
-        device.al.errors.iter().any(|error| {
-            let is_watchdog = error.code.is_some_and(|code| code.value == OUTPUT_WATCHDOG);
-            is_watchdog && from <= error.status.at && error.status.at <= to
-        })
-    };
-    let takes_outputs = |device: &&Device| {
-        let owned = line.cyclic.iter().flat_map(|cyclic| line.owners(cyclic));
-        let is_short = device.watchdog.span().is_some_and(|span| span * 2 < lasted);
-        is_short && owned.into_iter().any(|owner| owner.device == device.id && owner.writes)
-    };
-    let (starved, fed): (Vec<&Device>, Vec<&Device>) =
-        line.devices.iter().filter(takes_outputs).partition(|device| is_starved(device));
-    if starved.is_empty() {
-        return None;
-    }
-    let parts = |link: &usize| {
-        let Some(node) = tree.links()[*link].downstream.node() else { return false };
-        let behind = tree.subtree(node);
-        let has = |device: &&Device| behind.contains(&device.id.index());
-        starved.iter().all(has) && !fed.iter().any(has)
-    };
-    let mut parting: Vec<usize> = (0..tree.links().len()).filter(parts).collect();
-    let is_contact = |link: &usize| {
-        tree.links()[*link].downstream.node().is_some_and(|node| is_on_terminal_bus(line, node))
-    };
-    parting.sort_by_key(|link| (is_contact(link), *link));
-    let cables = parting.iter().filter(|link| !is_contact(link)).count().max(1);
-    let link = tree.links()[*parting.first()?].map(|node| DeviceId(node as u32));
-    let place = Place::link(line.network, link, Some(LinkDirection::Both));
-    Some((place, 0.6 / cables as f64))
 }
 
 /// Frames do come back, but damaged, and no counter can be asked where.

@@ -185,7 +185,8 @@ fn stalled(line: &Line) -> Option<Condition> {
     // Frames that come back when a port is closed had left, and others come in.
     let vanished = |hole: HoleSearch| {
         let until = hole.ended.map_or(Instant::MAX, |ended| ended + READ_WITHIN);
-        hole.found.is_some() && hole.since.at <= pause.to && pause.from <= until
+        let is_hole = hole.has_helped || hole.found.is_some();
+        is_hole && hole.since.at <= pause.to && pause.from <= until
     };
     if line.hole.is_some_and(vanished) {
         return None;

@@ -266,13 +266,10 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     for (cyclic, deficit) in deficits.iter().rev().take(3) {
         condition = condition.shown_by(evidence(line, cyclic, deficit));
     }
-    // Where the set-up was not seen, the suspects are all that are in trouble: what explains them,
-    // explains this.
-    let is_unknown = deficits.iter().all(|(cyclic, _)| line.owners(cyclic).next().is_none());
-    if suspects.is_certain || is_unknown {
-        condition =
-            condition.about(suspects.devices.iter().map(|device| Symptom::WorkingCounter(*device)));
-    }
+    // Where one or some of them are it, or the set-up was not seen and they are all that are in trouble, what
+    // explains it of each of them explains this, whoever it is.
+    condition =
+        condition.about(suspects.devices.iter().map(|device| Symptom::WorkingCounter(*device)));
     if is_sure
         && !lasts
         && let Some(ended) = ended

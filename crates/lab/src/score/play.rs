@@ -371,7 +371,8 @@ impl<'a> Play<'a> {
         let mut truth = self.lab.truth_of(active.id)?;
         // A contact that opened once is an opened link, whatever it would have done next.
         if truth.name == FaultName::LinkFlapping && truth.opened_once() && truth.signals_lost > 0 {
-            truth.name = FaultName::LinkOpen;
+            truth.name =
+                if self.is_of_ring(&truth) { FaultName::RingOpen } else { FaultName::LinkOpen };
         }
         // Who was put in between is also told by whom it has pushed on.
         if truth.name == FaultName::DeviceExtra
@@ -382,6 +383,18 @@ impl<'a> Play<'a> {
             truth.equals = equals;
         }
         Some(truth)
+    }
+
+    /// Whether a fault sits on a link of the ring.
+    fn is_of_ring(&self, truth: &Truth) -> bool {
+        let tree = self.lab.tree();
+        truth.places.iter().any(|place| match place {
+            TruthPlace::Link(end, _) | TruthPlace::Hop(end, _) => {
+                let link = tree.link_at(end.map(DeviceId::index));
+                link.is_some_and(|link| tree.is_on_ring(link))
+            }
+            TruthPlace::Device(_) | TruthPlace::Host(_) => false,
+        })
     }
 
     fn outcome(
