@@ -224,6 +224,32 @@ fn process_data_that_the_maindevice_stops_are_not_missing() {
     assert_eq!(report.verdict, Verdict::Healthy, "{}", text(&report));
 }
 
+/// What starts anew so often that it has an address only now and then is hardly ever missed. Its links come up each
+/// time, and leave errors in its counters.
+// silent: H110
+#[test]
+fn errors_of_a_start_that_nobody_missed_are_no_damage() {
+    let play = |starts_anew: bool| {
+        let mut script = running();
+        script.exchange(&[fprd(0x1002, 0x0300, &[0; 20])]);
+        cycles(&mut script, 20, 3);
+        if starts_anew {
+            script.exchange(&[fprd(0x1002, 0x0130, &[1, 0, 0, 0, 0, 0])]);
+        }
+        let mut counted = [0; 20];
+        (counted[0], counted[1]) = (3, 3);
+        script.exchange(&[fprd(0x1002, 0x0300, &counted)]);
+        for station in [0x1001, 0x1003] {
+            script.exchange(&[fprd(station, 0x0300, &[0; 20])]);
+        }
+        report(&mut script)
+    };
+    let damaged = play(false);
+    assert_eq!(only(&damaged).code, "H110", "{}", text(&damaged));
+    let restarted = play(true);
+    assert_eq!(only(&restarted).code, "H150", "{}", text(&restarted));
+}
+
 // fires: H150
 // silent: S205
 #[test]

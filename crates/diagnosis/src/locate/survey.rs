@@ -6,7 +6,7 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Route, Tree};
 
-use crate::line::{Absence, CounterTrack, DlChange, Line, Rise};
+use crate::line::{Absence, AlChange, CounterTrack, DlChange, Line, Rise};
 
 /// How far apart the readings that show a link's change and those that show the noise of that change
 /// may lie: link status and counters are read one after the other.
@@ -110,7 +110,14 @@ impl<'a> Survey<'a> {
                 absence.since.at <= rise.at
                     && absence.ended.is_none_or(|ended| rise.after_time <= ended + SAME_EVENT)
             };
-            device.absences.iter().any(was_gone) && device.has_restarted()
+            // Who starts anew again and again is missed by nobody, who asks it by its address only when it has one.
+            let fell_then = |change: &AlChange| {
+                change.is_own_fall()
+                    && rise.after_time <= change.at
+                    && change.at <= rise.at + SAME_EVENT
+            };
+            device.al.changes.iter().any(fell_then)
+                || device.absences.iter().any(was_gone) && device.has_restarted()
         })
     }
 
