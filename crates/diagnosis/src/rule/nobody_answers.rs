@@ -12,9 +12,9 @@
 //! If that is over again, and no SubDevice has lost a link or started anew meanwhile, no cable was out: for
 //! single frames among others that came back it is damage (`H110`, `H112`), for a long silence a false
 //! link. Where it was, those tell whose output watchdog expired, and those whose did not: frames reach all that are
-//! processed before the hole. Where that is not enough, a recording cannot say more; `diagnose --active` can while it lasts: it closes ports one after the
-//! other, for temporary use (0x0100 bit 1), so that each opens by itself after a second, and sees when frames
-//! come back. What was recorded meanwhile tells the same.
+//! processed before the hole. More a recording cannot say; `diagnose --active` can while it lasts: it closes ports
+//! one after the other, for temporary use (0x0100 bit 1), so that each opens by itself after a second, and sees
+//! when frames come back. What was recorded meanwhile tells the same.
 //! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
 //! every frame; which link it is, no counter can be asked.
 //! In a ring the frames of card B may come round untouched while those of card A, which SubDevices process,
