@@ -245,11 +245,9 @@ impl Condition {
     #[must_use]
     pub fn accounts_for(&self, symptom: &Symptom) -> bool {
         // Who does not answer at all does not answer by its mailbox either.
-        let wider = match symptom {
-            Symptom::Mailbox(id) => Some(Symptom::Silent(*id)),
-            _ => None,
-        };
-        self.explains.contains(symptom) || wider.is_some_and(|wider| self.explains.contains(&wider))
+        let is_silent = matches!(symptom, Symptom::Mailbox(id)
+            if self.explains.contains(&Symptom::Silent(*id)));
+        self.explains.contains(symptom) || is_silent
     }
 }
 
