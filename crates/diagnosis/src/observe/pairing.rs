@@ -423,6 +423,11 @@ impl Pairing {
             self.whole += 1;
             self.was_whole = true;
         }
+        // What the second card alone has sent so far comes round untouched: its first card is late, or sends
+        // nothing. That nobody answers it says nothing.
+        let is_alone = frame.path.is_none()
+            && pending.copy_by.is_none()
+            && self.other_card == Some(pending.source);
         settle(&Exchange {
             request: Some(pending.copy()),
             reply: Some(copy(frame)),
@@ -430,7 +435,7 @@ impl Pairing {
             is_last,
             returns_before: pending.returns_before,
             is_cut_off: false,
-            is_part: pending.is_part,
+            is_part: pending.is_part || is_alone,
             copy_lost: None,
             sent_by,
         });
