@@ -10,7 +10,8 @@
 //! **What it means.** Two MainDevices fight for the line: each changes states, clears counters and writes
 //! outputs that the other one does not expect. Or a configuration tool is plugged in beside. As long as it
 //! only reads, it does no harm but takes time on the line; once it writes, SubDevices that leave their
-//! state, refuse one, or are missing in working counters are its doing, and listed beneath.
+//! state, refuse one, are missing in working counters or do not answer by their mailboxes, and counters that are
+//! cleared, are its doing, and listed beneath.
 //!
 //! **What to do.** Find out who else is on the line and stop it, or listen only.
 
@@ -78,8 +79,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     if writes > 0 || elsewhere().count() == 0 {
         condition = condition.explaining(line.devices.iter().flat_map(|device| {
             let id = device.id;
-            [Symptom::StateLost(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)]
+            // Who is ordered into INIT closes its mailbox: what was asked is never answered, and nothing
+            // is taken until it is in PREOP again.
+            let mailbox = Symptom::Mailbox(id);
+            [Symptom::StateLost(id), Symptom::WorkingCounter(id), Symptom::Emergency(id), mailbox]
         }));
+        condition = condition.explaining([Symptom::CountersCleared]);
     }
     if writes > 0 {
         condition.severity = Severity::Error;
