@@ -22,7 +22,7 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
-use super::sender::Senders;
+use super::sender::{Senders, Written};
 use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen, Sender};
 
 /// Most requests waiting for their return; beyond, the oldest is lost.
@@ -396,10 +396,9 @@ impl Pairing {
         if !is_told {
             return;
         }
-        let commands = view.datagrams().map_while(Result::ok);
-        let mut commands = commands.filter_map(|datagram| datagram.command());
-        let writes = commands.any(|command| command.effect().writes);
-        self.senders.note_elsewhere(frame, source, writes);
+        let datagrams = view.datagrams().map_while(Result::ok);
+        let written = datagrams.filter_map(|datagram| Written::by(&datagram)).max();
+        self.senders.note_elsewhere(frame, source, written);
     }
 
     /// Pairs a return with pending request `found`.
