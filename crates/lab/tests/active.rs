@@ -104,7 +104,7 @@ fn a_recording_of_the_search_names_the_same_link() {
         let mut lab = Lab::new(&file, LabOptions { active, ..LabOptions::default() }).unwrap();
         let recording = Arc::new(Mutex::new(Engine::new(Setup::default())));
         let reader = Arc::clone(&recording);
-        lab.set_tap(Box::new(move |seen| {
+        lab.set_recorder(Box::new(move |seen| {
             let frame = FrameSeen { path: None, direction: Direction::Unknown, ..*seen };
             reader.lock().unwrap().handle_frame(&frame);
         }));
@@ -220,7 +220,7 @@ fn a_hole_that_goes_by_itself_is_not_placed_for_sure_where_it_was_not() {
 /// Where frames are lost at random, single ones come through: that a port is closed when one does says nothing.
 #[test]
 fn frames_that_are_lost_at_random_lead_no_search_astray() {
-    for hits in [300_i64, 500, 700, 900] {
+    for hits in [300_u32, 500, 700, 900] {
         let mut lab = up();
         let from = lab.now().as_nanos() as f64 / 1e6 + 1.0;
         let card = FaultEntry::new(FaultName::NicDamaged)

@@ -371,7 +371,7 @@ fn push(probes: &mut VecDeque<Probe>, line: &Line, device: DeviceId, what: Asked
 }
 
 /// DL status, AL status with its code, all error counters.
-const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), (0x0300, 20)];
+const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), close::COUNTERS];
 
 fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     let Watched { line, learner, pairing, .. } = watched;
@@ -393,9 +393,7 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
             return;
         }
     };
-    traffic.frames += 1;
-    traffic.first.get_or_insert(frame.time);
-    traffic.last = Some(frame.time);
+    traffic.record_frame(frame.time);
     traffic.truncated += u64::from(frame.truncated);
     traffic.direction_known |= frame.direction != Direction::Unknown;
     if frame.fcs == Some(false) {

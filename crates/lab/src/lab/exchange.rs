@@ -7,6 +7,7 @@ use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservati
 use linesman_maindevice::{Event, ProbeRequest, Target};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::{Instant, Span};
+use linesman_sim::segment::Outgoing;
 
 use super::{AT_ONE_INSTANT, Lab, LabError};
 use crate::options::Begin;
@@ -40,6 +41,7 @@ impl Lab {
             let frame = &transmit[..sent.len];
             self.show(Direction::Sent, sent.path, at, frame);
             self.segment.handle_frame(at, sent.path, frame);
+            self.record_outgoing();
             count += 1;
             if count > AT_ONE_INSTANT {
                 return Err(LabError::Stuck { at: self.now, what: "sending" });
@@ -101,6 +103,37 @@ impl Lab {
         }
     }
 
+    /// Gives the recorder what was handed to the cards.
+    pub(super) fn record_outgoing(&mut self) {
+        if self.recorder.is_none() {
+            return;
+        }
+        let mut bytes = std::mem::take(&mut self.outgoing);
+        while let Some(Outgoing { at, path }) = self.segment.poll_outgoing(&mut bytes) {
+            self.record(Direction::Sent, path, at, &bytes);
+        }
+        self.outgoing = bytes;
+    }
+
+    /// Gives the recorder a frame.
+    pub(super) fn record(&mut self, direction: Direction, path: Path, time: Instant, bytes: &[u8]) {
+        let Some(recorder) = &mut self.recorder else { return };
+        if self.recorder_veil.as_mut().is_some_and(|veil| veil.hides(direction, bytes)) {
+            return;
+        }
+        self.recorded += 1;
+        recorder(&FrameSeen {
+            network: self.network,
+            path: Some(path),
+            direction,
+            time,
+            number: self.recorded,
+            fcs: None,
+            truncated: false,
+            bytes,
+        });
+    }
+
     fn handle_event(&mut self, event: Event) {
         if let Event::Scanned(inventory) = &event {
             self.inventory = Some((**inventory).clone());
@@ -144,12 +177,6 @@ impl Lab {
         }
         let options = PlanOptions { cycle, clock_datagrams, ..PlanOptions::default() };
         Plan::build(&planned, inventory.tree().clone(), &options).map_err(|error| error.to_string())
-    }
-
-    /// Whether the kernel tells of a card, which then is looked at before its time.
-    pub(super) fn cards_have_news(&mut self) -> bool {
-        let paths = Path::ALL.into_iter().take(self.paths);
-        paths.filter(|path| self.segment.takes_card_news(*path)).count() > 0
     }
 
     /// Turns what the cards counted since the last look into host observations.
