@@ -22,7 +22,7 @@ import traceback
 from bench import HERE, Bench, Capture
 from harness import CHECKS, Skip
 from skipped import SKIPPED
-from stalls import Stalls
+from stalls import Stalls, Waits
 
 ATTEMPTS = 3
 HAS_TSHARK = all(shutil.which(program) for program in ("tcpdump", "tshark"))
@@ -57,10 +57,10 @@ def tried(function, stalls):
     before = []
     while True:
         start = time.monotonic()
-        told = once(function, before)
+        told, waited = once(function, before)
         if not told.startswith("FAIL") or len(before) + 1 == ATTEMPTS:
             return told
-        stood = stalls.longest_ms(start)
+        stood = max(stalls.longest_ms(start), waited)
         if stood == 0:
             return told
         why = told.splitlines()[0].removeprefix(f"FAIL {function.__name__}: ")
@@ -68,18 +68,21 @@ def tried(function, stalls):
 
 
 def once(function, before):
-    """The line that tells how one attempt went, and why those before it did not count."""
+    """The line that tells how one attempt went, and why those before it did not count; for how long a program of it had to
+    wait for a processor, in milliseconds."""
     name, start = function.__name__, time.monotonic()
+    waits = None
     try:
-        with Bench() as line:
+        with Bench() as line, Waits(line.running) as waits:
             note = "; ".join([captured(function, line), *line.notes, *before])
-        return f"ok {name}: {note}, {time.monotonic() - start:.1f} s"
+        told = f"ok {name}: {note}, {time.monotonic() - start:.1f} s"
     except Skip as why:
-        return f"skip {name}: {why}"
+        told = f"skip {name}: {why}"
     except (AssertionError, RuntimeError) as error:
-        return f"FAIL {name}: {type(error).__name__}: {error}, {time.monotonic() - start:.1f} s"
+        told = f"FAIL {name}: {type(error).__name__}: {error}, {time.monotonic() - start:.1f} s"
     except Exception as error:
-        return f"FAIL {name}: {type(error).__name__}: {error}\n{traceback.format_exc()}"
+        told = f"FAIL {name}: {type(error).__name__}: {error}\n{traceback.format_exc()}"
+    return told, waits.longest_ms if waits else 0.0
 
 
 def main():

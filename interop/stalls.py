@@ -1,9 +1,13 @@
 """When this host let its programs stand still.
 
 A program of its own, so that nothing but the host holds it up, sleeps for a millisecond again and again and notes when it
-woke late. A check that failed while the host stood still has shown nothing; one that failed while it did not has.
+woke late: `Stalls`. Who sleeps most of the time is woken soon even where those who have much to do wait long, so the kernel is
+asked, too, how long the programs of a check waited for a processor: `Waits`. A check that failed while the host stood still has
+shown nothing; one that failed while it did not has.
 """
 
+import os
+import pathlib
 import subprocess
 import sys
 import threading
@@ -47,3 +51,46 @@ class Stalls:
     def end(self):
         self.program.kill()
         self.program.wait()
+
+
+class Waits:
+    """Watches how long the programs of a check are ready to run and wait for a processor; use it in `with`."""
+
+    EVERY_S = 0.01
+
+    def __init__(self, running):
+        self.running, self.longest_ms, self.done = running, 0.0, False
+
+    def __enter__(self):
+        self.thread = threading.Thread(target=self.look, daemon=True)
+        self.thread.start()
+        return self
+
+    def look(self):
+        waited, before = {}, time.monotonic()
+        while not self.done:
+            time.sleep(self.EVERY_S)
+            last, waited = waited, self.waited_ms()
+            now = time.monotonic()
+            # The kernel adds a wait when it ends. What exceeds the time since the last look began before it, in one piece.
+            since, before = (now - before) * 1e3, now
+            jumps = (ms - last[task] - since for task, ms in waited.items() if task in last)
+            if (longest := max(jumps, default=0.0)) > LATE_MS:
+                self.longest_ms = max(self.longest_ms, longest)
+
+    def waited_ms(self):
+        """The time for which each thread has waited so far."""
+        waited = {}
+        for process in list(self.running):
+            tasks = pathlib.Path(f"/proc/{process.pid}/task")
+            # It may end meanwhile; and not every kernel counts.
+            try:
+                for task in os.listdir(tasks):
+                    waited[task] = int((tasks / task / "schedstat").read_text().split()[1]) / 1e6
+            except (OSError, IndexError):
+                continue
+        return waited
+
+    def __exit__(self, *_):
+        self.done = True
+        self.thread.join()

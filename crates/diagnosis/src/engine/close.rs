@@ -20,7 +20,7 @@ const RECENT: Span = Span::s(1);
 /// SubDevices that are read in one turn.
 const MOST: usize = 16;
 /// All error counters.
-const COUNTERS: Register = (ErrorCounters::START.0, ErrorCounters::LEN as u16);
+pub(super) const COUNTERS: Register = (ErrorCounters::START.0, ErrorCounters::LEN as u16);
 
 /// When the next reading is due.
 #[derive(Clone, Copy, Default, Debug)]

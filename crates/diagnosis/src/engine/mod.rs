@@ -367,7 +367,7 @@ fn push(probes: &mut VecDeque<Probe>, line: &Line, device: DeviceId, what: Asked
 }
 
 /// DL status, AL status with its code, all error counters.
-const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), (0x0300, 20)];
+const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), close::COUNTERS];
 
 fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     let Watched { line, learner, pairing, .. } = watched;

@@ -180,12 +180,6 @@ impl Lab {
         Plan::build(&devices, resolved.tree, &resolved.options).map_err(|error| error.to_string())
     }
 
-    /// Whether the kernel tells of a card, which then is looked at before its time.
-    pub(super) fn cards_have_news(&mut self) -> bool {
-        let paths = Path::ALL.into_iter().take(self.paths);
-        paths.filter(|path| self.segment.takes_card_news(*path)).count() > 0
-    }
-
     /// Turns what the cards counted since the last look into host observations.
     pub(super) fn look_at_cards(&mut self) {
         for path in Path::ALL.into_iter().take(self.paths) {

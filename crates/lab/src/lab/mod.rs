@@ -416,7 +416,7 @@ impl Lab {
         self.receive();
         self.main.handle_timeout(self.now);
         self.engine.handle_timeout(self.now);
-        let has_news = self.cards_have_news();
+        let has_news = self.segment.takes_card_news();
         if has_news || self.now >= self.host_next {
             self.host_next = self.now + HOST_INTERVAL;
             self.look_at_cards();

@@ -125,8 +125,7 @@ impl Line for VirtualLine {
         _: Instant,
         tell: &mut dyn FnMut(&HostObservation),
     ) -> Result<(), LinkError> {
-        let paths = Path::ALL.into_iter().take(self.paths);
-        let has_news = paths.filter(|path| self.segment.takes_card_news(*path)).count() > 0;
+        let has_news = self.segment.takes_card_news();
         if !has_news && self.now < self.look_at {
             return Ok(());
         }

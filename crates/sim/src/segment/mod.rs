@@ -384,11 +384,11 @@ impl Segment {
         HostPort { carrier: card.has_carrier(self.now), ..card.counts }
     }
 
-    /// Whether the kernel tells of a card's link without being asked, as of the time last told; once for each
-    /// change.
-    pub fn takes_card_news(&mut self, path: Path) -> bool {
+    /// Whether the kernel tells of the link of a card without being asked, as of the time last told; once for
+    /// each change. Who hears it looks at all cards.
+    pub fn takes_card_news(&mut self) -> bool {
         let now = self.now;
-        self.world.cards[path.index()].takes_news(now)
+        self.world.cards.iter_mut().fold(false, |told, card| card.takes_news(now) | told)
     }
 
     /// What became of the frames that the cards sent.
