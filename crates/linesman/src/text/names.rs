@@ -29,7 +29,7 @@ impl Names {
     /// Whether any SubDevice has a name.
     pub(crate) fn has_any(&self) -> bool {
         let is_name =
-            |(name, no): (&String, u32)| *name != "" && *name != format!("SubDevice {no}");
+            |(name, no): (&String, u32)| !name.is_empty() && *name != format!("SubDevice {no}");
         self.0.iter().zip(1..).any(is_name)
     }
 
