@@ -364,6 +364,25 @@ fn in_a_recording_it_takes_four_and_what_it_orders_is_its_doing() {
     assert_eq!(report.findings[0].severity, Severity::Error, "it writes");
 }
 
+#[test]
+fn who_only_clears_counters_makes_no_subdevice_leave_its_state() {
+    let of = |ado| Datagram { command: Command::Bwr, sent: vec![0, 0], ..brd(ado, &[0, 0], 3) };
+    // Whoever writes AL control may have made it leave OP; error counters do nothing to it.
+    for (ado, expected) in [(0x0120, vec!["C330"]), (0x0300, vec!["T400", "C330"])] {
+        let mut plant = plant();
+        for _ in 0..4 {
+            other(&mut plant.script, &of(ado), Direction::Received);
+            plant.cycles(20);
+        }
+        plant.left_op(0x1003, 0x1A);
+        let report = plant.report();
+        assert_eq!(codes(&report), expected, "{}", text(&report));
+        let other = report.findings.iter().find(|finding| finding.code == "C330").unwrap();
+        let is_harmless = other.severity == Severity::Warning;
+        assert_eq!(is_harmless, ado == 0x0300, "{}", text(&report));
+    }
+}
+
 /// An address resolution request of an office computer.
 fn office_frame() -> Vec<u8> {
     let mut bytes = vec![0xFF; 6];

@@ -487,6 +487,20 @@ fn a_device_that_was_without_supply_has_no_stopped_processor() {
     assert!(report.findings.iter().all(|one| one.code != "S206"), "{}", text(&report));
 }
 
+/// Some read the second byte of DL status alone, and the whole of it later: of the first one nothing was known.
+// silent: S206
+#[test]
+fn a_bit_that_was_never_read_has_not_fallen() {
+    let mut script = Script::new();
+    script.exchange(&[brd(0x0000, &[0x11, 0], 2)]);
+    for (station, high) in [(0x1001, 0x5A), (0x1002, 0x56)] {
+        script.exchange(&[fprd(station, 0x0111, &[high])]);
+        script.exchange(&[fprd(station, 0x0110, &[0x31, high])]);
+    }
+    let report = report(&mut script);
+    assert!(report.findings.iter().all(|one| one.code != "S206"), "{}", text(&report));
+}
+
 // fires: C332
 #[test]
 fn two_answers_to_one_address_are_found_and_nothing_is_learnt_of_them() {

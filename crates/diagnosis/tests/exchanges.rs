@@ -95,6 +95,34 @@ fn a_silence_that_ends_is_a_closed_finding() {
     assert!(finding.opened_ns < finding.closed_ns.unwrap());
 }
 
+/// Frames that are sent in a burst, some of which the recorder or the computer has lost: no cable opens and closes
+/// within microseconds.
+// silent: H100
+#[test]
+fn a_few_frames_of_a_burst_that_stay_away_are_no_open_link() {
+    for lost in [3, 12] {
+        let mut script = Script::scanned(2);
+        for _ in 0..50 {
+            script.exchange(&[brd(0x0130, &[2, 0], 2)]);
+        }
+        for _ in 0..lost {
+            script.feed(
+                &frame(&[brd(0x0130, &[0, 0], 0)], script.index, false),
+                Direction::Unknown,
+                2_000,
+            );
+            script.index = script.index.wrapping_add(1);
+        }
+        for _ in 0..200 {
+            script.exchange(&[brd(0x0130, &[2, 0], 2)]);
+        }
+        script.finish();
+        let report = script.engine.diagnosis();
+        assert_eq!(report.network.lost.0, lost, "{}", text(&report));
+        assert!(report.findings.iter().all(|one| one.code != "H100"), "{}", text(&report));
+    }
+}
+
 #[test]
 fn one_frame_without_return_at_the_end_is_no_fault() {
     let mut script = Script::scanned(2);

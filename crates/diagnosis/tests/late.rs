@@ -6,10 +6,12 @@
 mod support;
 
 use linesman_config::fault::FaultName;
-use linesman_diagnosis::Setup;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, Severity};
+use linesman_diagnosis::{HostEvent, HostObservation, Setup};
+use linesman_proto::address::{Network, Path};
+use linesman_proto::time::Instant;
 use support::plant::{Plant, codes, plant};
-use support::script::{Script, fpwr, lrw};
+use support::script::{Script, fprd, fpwr, lrw};
 use support::text;
 
 // fires: T411
@@ -136,15 +138,38 @@ fn counters(plant: &mut Plant, links_lost: u8) {
 
 // fires: X513
 #[test]
-fn frames_that_all_stay_away_while_nothing_moves_on_the_line_did_not_leave() {
+fn frames_that_all_stay_away_while_nothing_moves_on_the_line_and_the_card_takes_none_did_not_leave()
+{
+    let mut plant = plant();
+    counters(&mut plant, 0);
+    plant.lost_cycles(40);
+    plant.script.engine.handle_host(&HostObservation {
+        network: Network(0),
+        path: Path::A,
+        time: Instant::from_nanos(plant.script.now),
+        what: HostEvent::SendFailures(40),
+    });
+    plant.cycles(50);
+    counters(&mut plant, 0);
+    let report = plant.report();
+    let stalled = report.findings.iter().find(|one| one.code == "X513");
+    let stalled = stalled.unwrap_or_else(|| panic!("{}", text(&report)));
+    assert_eq!(stalled.cause, FaultName::WatchdogStarved);
+}
+
+/// A recording has no frames that the card did not take.
+// silent: X513
+// fires: H100
+#[test]
+fn frames_of_a_recording_that_all_stay_away_while_nothing_moves_on_the_line_were_sent() {
     let mut plant = plant();
     counters(&mut plant, 0);
     plant.lost_cycles(40);
     plant.cycles(50);
     counters(&mut plant, 0);
     let report = plant.report();
-    assert_eq!(codes(&report), ["X513"], "{}", text(&report));
-    assert_eq!(report.findings[0].cause, FaultName::WatchdogStarved);
+    assert_eq!(codes(&report), ["H100"], "{}", text(&report));
+    assert_eq!(report.findings[0].cause, FaultName::FalseLink);
 }
 
 // silent: X513
@@ -158,6 +183,57 @@ fn a_card_that_is_watched_and_refused_nothing_sent_them_and_nobody_answered() {
     counters(&mut plant, 0);
     let report = plant.report();
     assert_eq!(codes(&report), ["H100"], "{}", text(&report));
+}
+
+/// A recording of a line where nobody keeps step: cycles of 1 ms, each sent so many µs after its time.
+fn cycles(script: &mut Script, late_us: &[u64]) {
+    let begin = script.now;
+    for (late, nth) in late_us.iter().zip(1..) {
+        script.now = begin + nth * 1_000_000 + late * 1_000;
+        script.exchange(&[lrw(0x0100_0000, 8, 3)]);
+    }
+}
+
+// fires: X513
+// silent: X513
+#[test]
+fn a_recording_in_which_nothing_was_sent_for_a_while_is_a_note_unless_a_link_was_lost() {
+    for (ms, links_lost, is_noted) in [(60, 0, true), (8, 0, false), (60, 1, false)] {
+        let mut script = Script::scanned(2);
+        cycles(&mut script, &[0; 200]);
+        script.now += ms * 1_000_000;
+        cycles(&mut script, &[0; 200]);
+        for station in [0x1001, 0x1002] {
+            let mut counters = [0; 20];
+            counters[16] = links_lost;
+            script.exchange(&[fprd(station, 0x0300, &counters)]);
+        }
+        script.finish();
+        let report = script.engine.diagnosis();
+        let noted = report.findings.iter().find(|one| one.code == "X513");
+        assert_eq!(noted.is_some(), is_noted, "{ms} ms, {links_lost}: {}", text(&report));
+        assert!(noted.is_none_or(|note| note.severity == Severity::Info), "{}", text(&report));
+    }
+}
+
+// fires: T410
+// silent: T410
+#[test]
+fn a_recording_notes_frames_that_came_to_the_card_unevenly_where_nobody_keeps_step() {
+    for (late, is_noted) in [(300, true), (120, true), (80, false)] {
+        let mut script = Script::scanned(2);
+        let times: Vec<u64> =
+            (0..400).map(|nth| if nth > 300 && nth % 20 == 0 { late } else { 0 }).collect();
+        cycles(&mut script, &times);
+        script.finish();
+        let report = script.engine.diagnosis();
+        let noted = report.findings.iter().find(|one| one.code == "T410");
+        assert_eq!(noted.is_some(), is_noted, "{late} µs: {}", text(&report));
+        let is_note = |note: &FindingReport| {
+            note.severity == Severity::Info && note.cause == FaultName::HostJitter
+        };
+        assert!(noted.is_none_or(is_note), "{}", text(&report));
+    }
 }
 
 // silent: X513

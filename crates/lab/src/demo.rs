@@ -268,8 +268,7 @@ impl Demo {
 fn verdict_on(lab: &Lab, id: FaultId) -> Option<(FindingReport, Match)> {
     let log = lab.truth();
     let truth = lab.truth_of(id)?;
-    let scene =
-        Scene { tree: lab.tree(), host_counters: true, is_recorded: false, answered_again: false };
+    let scene = Scene { tree: lab.tree(), host_counters: true, answered_again: false };
     let company = Company::of(log, log.fault(id)?);
     let diagnosis = lab.diagnosis();
     let (finding, fits) = best_finding(&diagnosis, &truth, &scene, company)?;

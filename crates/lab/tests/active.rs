@@ -104,7 +104,7 @@ fn a_recording_of_the_search_names_the_same_link() {
         let mut lab = Lab::new(&file, LabOptions { active, ..LabOptions::default() }).unwrap();
         let recording = Arc::new(Mutex::new(Engine::new(Setup::default())));
         let reader = Arc::clone(&recording);
-        lab.set_tap(Box::new(move |seen| {
+        lab.set_recorder(Box::new(move |seen| {
             let frame = FrameSeen { path: None, direction: Direction::Unknown, ..*seen };
             reader.lock().unwrap().handle_frame(&frame);
         }));

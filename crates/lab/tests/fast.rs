@@ -117,12 +117,7 @@ fn the_cause_of_a_hard_fault_is_named_within_100_ms() {
             // While it lasts, a dip is a device without power.
             truth.name = FaultName::DeviceOff;
         }
-        let scene = Scene {
-            tree: lab.tree(),
-            host_counters: true,
-            is_recorded: false,
-            answered_again: false,
-        };
+        let scene = Scene { tree: lab.tree(), host_counters: true, answered_again: false };
         let right = events.iter().find(|event| {
             event.at >= began && matches(&truth, &scene, Claim::of(&event.finding)).is_right()
         });

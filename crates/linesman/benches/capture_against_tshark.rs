@@ -75,7 +75,7 @@ fn record(path: &Path) -> u64 {
     let tap = Arc::clone(&shared);
     let options = PlantOptions { min_devices: 30, max_devices: 30, ..PlantOptions::default() };
     let mut lab = Lab::new(&plant(Seed(1), &options), LabOptions::default()).unwrap();
-    lab.set_tap(Box::new(move |seen| {
+    lab.set_recorder(Box::new(move |seen| {
         let mut shared = tap.lock().unwrap();
         let (writer, frames) = &mut *shared;
         *frames += 1;

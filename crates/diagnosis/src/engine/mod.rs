@@ -389,9 +389,7 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
             return;
         }
     };
-    traffic.frames += 1;
-    traffic.first.get_or_insert(frame.time);
-    traffic.last = Some(frame.time);
+    traffic.record_frame(frame.time);
     traffic.truncated += u64::from(frame.truncated);
     traffic.direction_known |= frame.direction != Direction::Unknown;
     if frame.fcs == Some(false) {

@@ -223,7 +223,7 @@ impl Book {
             let cause = &self.findings[other];
             other != index
                 && !was_over(cause, effect, AFTER)
-                && cause.condition.explains.contains(symptom)
+                && cause.condition.accounts_for(symptom)
                 && !self.follows(other, effect.id)
         };
         let all = 0..self.findings.len();
@@ -277,7 +277,7 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
     let is_harmless = cause.condition.severity == Severity::Info;
     let hides_harm = is_harmless && symptoms.iter().any(is_hurt);
     !(symptoms.is_empty() || hides_harm || was_over(cause, effect, after))
-        && symptoms.iter().all(|symptom| cause.condition.explains.contains(symptom))
+        && symptoms.iter().all(|symptom| cause.condition.accounts_for(symptom))
 }
 
 /// Whether a finding was over so long before another one that this does not follow from it.

@@ -86,6 +86,8 @@ pub enum Symptom {
     StateLost(DeviceId),
     /// A controller's firmware sent an emergency.
     Emergency(DeviceId),
+    /// A controller's mailbox answers late, or not at all.
+    Mailbox(DeviceId),
     /// Frames do not come back.
     FramesLost,
     /// Frames come back late.
@@ -102,6 +104,8 @@ pub enum Symptom {
     NoCarrier,
     /// Nothing comes back at all.
     NobodyAnswers,
+    /// Error counters are cleared, and nobody here does so.
+    CountersCleared,
 }
 
 /// Another explanation.
@@ -235,6 +239,17 @@ impl Condition {
     pub fn explaining(mut self, symptoms: impl IntoIterator<Item = Symptom>) -> Self {
         self.explains.extend(symptoms);
         self
+    }
+
+    /// Whether a symptom is among what this condition explains.
+    #[must_use]
+    pub fn accounts_for(&self, symptom: &Symptom) -> bool {
+        // Who does not answer at all does not answer by its mailbox either.
+        let wider = match symptom {
+            Symptom::Mailbox(id) => Some(Symptom::Silent(*id)),
+            _ => None,
+        };
+        self.explains.contains(symptom) || wider.is_some_and(|wider| self.explains.contains(&wider))
     }
 }
 

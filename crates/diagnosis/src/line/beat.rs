@@ -19,6 +19,8 @@ const PAUSE_CYCLES: u64 = 3;
 const PAUSE: Span = Span::ms(5);
 /// From this share of the cycle on, in percent, an interval is off the beat.
 const OFF_PERCENT: u64 = 20;
+/// From this share on it is uneven, which harms nobody.
+const UNEVEN_PERCENT: u64 = 10;
 
 /// An interval that was off the beat.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -56,6 +58,8 @@ pub struct Beat {
     off_in_a_row: u32,
     /// The latest intervals off the beat, oldest first.
     pub off: VecDeque<Off>,
+    /// The latest uneven intervals, those off the beat included, oldest first.
+    pub uneven: VecDeque<Off>,
     /// The latest pauses, oldest first.
     pub pauses: VecDeque<Pause>,
 }
@@ -91,6 +95,13 @@ impl Beat {
             keep(&mut self.pauses, Pause { from: last, to: at }, PAUSES_KEPT);
         }
         let is_off = |by: u64| by * 100 >= cycle_ns * OFF_PERCENT;
+        // Whatever is missing between them is missing, not late.
+        let cycles = ((interval_ns + cycle_ns / 2) / cycle_ns).max(1);
+        let by = interval_ns.abs_diff(cycles * cycle_ns);
+        let off = Off { at, by: Span::ns(by) };
+        if by * 100 >= cycle_ns * UNEVEN_PERCENT {
+            keep(&mut self.uneven, off, KEPT);
+        }
         if !is_off(interval_ns.abs_diff(cycle_ns)) {
             self.off_in_a_row = 0;
             return paused;
@@ -105,13 +116,10 @@ impl Beat {
             };
             return paused;
         }
-        // Whatever is missing between them is missing, not late.
-        let cycles = ((interval_ns + cycle_ns / 2) / cycle_ns).max(1);
-        let by = interval_ns.abs_diff(cycles * cycle_ns);
         if !is_off(by) {
             return paused;
         }
-        keep(&mut self.off, Off { at, by: Span::ns(by) }, KEPT);
+        keep(&mut self.off, off, KEPT);
         true
     }
 
@@ -167,6 +175,7 @@ mod tests {
         let steady = || std::iter::repeat_n(1_000, 40);
         assert!(ticked(steady().chain([1_199, 801])).off.is_empty());
         assert_eq!(ticked(steady().chain([1_200, 800])).off.len(), 2);
+        assert_eq!(ticked(steady().chain([1_099, 1_100, 1_300])).uneven.len(), 2);
     }
 
     #[test]

@@ -244,6 +244,20 @@ impl Line {
         states.max().flatten().max(self.traffic.al_highest)
     }
 
+    /// When no frame at all was seen for several cycles of the process data, latest first.
+    pub fn quiet(&self) -> impl Iterator<Item = Pause> + '_ {
+        let cycle = self.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min();
+        let is_long = move |pause: &Pause| cycle.is_some_and(|cycle| pause.span() >= cycle * 3);
+        self.traffic.quiet.iter().rev().copied().filter(is_long)
+    }
+
+    /// When no frame at all was seen before those, or between those, that a silence consists of.
+    #[must_use]
+    pub fn quiet_before(&self, silence: &Silence) -> Option<Pause> {
+        let is_then = |pause: &Pause| silence.since.at <= pause.to && pause.to <= silence.last.at;
+        self.quiet().find(is_then)
+    }
+
     /// Who has an FMMU on a logical datagram, as far as it was seen being set up.
     pub fn owners(&self, cyclic: &Cyclic) -> impl Iterator<Item = Owner> + '_ {
         owners(&self.devices, cyclic.start, cyclic.len)

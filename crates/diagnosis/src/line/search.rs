@@ -127,7 +127,10 @@ pub fn began_at_once(line: &Line, (from, to): (Instant, Instant)) -> bool {
     let mut silences = line.traffic.silences.iter().rev();
     let about = silences.find(|silence| silence.since.at <= to && ended(silence) >= from);
     about.is_some_and(|silence| {
-        began(line, silence).is_some_and(|began| began.at.since(silence.since.at) < BEGINS_WITHIN)
+        // Before it nothing may have been sent: in a recording without a link nothing is.
+        let since = line.quiet_before(silence).map_or(silence.since.at, |pause| pause.from);
+        let since = since.min(silence.since.at);
+        began(line, silence).is_some_and(|began| began.at.since(since) < BEGINS_WITHIN)
     })
 }
 

@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 
 use linesman_proto::address::Path;
 use linesman_proto::state::AlState;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 use super::Seen;
+use super::beat::Pause;
 use super::host::Tally;
 use crate::observe::Sender;
 
@@ -50,6 +51,8 @@ impl Silence {
     }
 }
 
+/// Without any frame for so long nothing was sent, where process data are exchanged in a cycle.
+const QUIET: Span = Span::ms(20);
 /// With fewer requests than this it is no silence.
 const SHORT: u64 = 3;
 /// Returns whose times are kept: a request is known to be lost after so many later ones at most.
@@ -150,6 +153,9 @@ pub struct Traffic {
     pub positions_seen: u16,
     /// The highest state that broadcast reads of AL status prove.
     pub al_highest: Option<AlState>,
+    /// When no frame at all was seen, neither on its way out nor back, oldest first, at most [`SILENCES_KEPT`]. In
+    /// a recording it is so while a card takes no frames, as without a link.
+    pub quiet: VecDeque<Pause>,
     /// The first frame.
     pub first: Option<Instant>,
     /// The latest frame.
@@ -157,6 +163,21 @@ pub struct Traffic {
 }
 
 impl Traffic {
+    /// A frame was seen, on its way out or back.
+    pub fn record_frame(&mut self, at: Instant) {
+        self.frames += 1;
+        self.first.get_or_insert(at);
+        let last = self.last.unwrap_or(at);
+        // Times of two interfaces may run backwards.
+        self.last = Some(last.max(at));
+        if at.since(last) >= QUIET {
+            if self.quiet.len() == SILENCES_KEPT {
+                self.quiet.pop_front();
+            }
+            self.quiet.push_back(Pause { from: last, to: at });
+        }
+    }
+
     /// A request was lost that went out when `returns_before` frames had come back.
     pub fn record_lost(&mut self, at: Instant, frame: u64, returns_before: u64) {
         let seen = Seen::new((), at, Some(frame));

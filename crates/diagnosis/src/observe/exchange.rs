@@ -34,7 +34,8 @@ pub struct Exchange<'a> {
     /// Whether the input ended while the return may still have been on its way.
     pub is_cut_off: bool,
     /// Whether it is the copy of a request for the other card of a ring in which some commands are
-    /// replaced by NOP. The copy with all of them tells of whoever does not answer to this one.
+    /// replaced by NOP, or the one alone that was sent by it. The copy with all of them tells of whoever does not
+    /// answer to this one.
     pub is_part: bool,
     /// The card to which its copy did not come, though those of others before and after it did.
     pub copy_lost: Option<Path>,

@@ -22,7 +22,7 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
-use super::sender::Senders;
+use super::sender::{Senders, Written};
 use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen, Sender};
 
 /// Most requests waiting for their return; beyond, the oldest is lost.
@@ -396,10 +396,9 @@ impl Pairing {
         if !is_told {
             return;
         }
-        let commands = view.datagrams().map_while(Result::ok);
-        let mut commands = commands.filter_map(|datagram| datagram.command());
-        let writes = commands.any(|command| command.effect().writes);
-        self.senders.note_elsewhere(frame, source, writes);
+        let datagrams = view.datagrams().map_while(Result::ok);
+        let written = datagrams.filter_map(|datagram| Written::by(&datagram)).max();
+        self.senders.note_elsewhere(frame, source, written);
     }
 
     /// Pairs a return with pending request `found`.
@@ -423,6 +422,11 @@ impl Pairing {
             self.whole += 1;
             self.was_whole = true;
         }
+        // What the second card alone has sent so far comes round untouched: its first card is late, or sends
+        // nothing. That nobody answers it says nothing.
+        let is_alone = frame.path.is_none()
+            && pending.copy_by.is_none()
+            && self.other_card == Some(pending.source);
         settle(&Exchange {
             request: Some(pending.copy()),
             reply: Some(copy(frame)),
@@ -430,7 +434,7 @@ impl Pairing {
             is_last,
             returns_before: pending.returns_before,
             is_cut_off: false,
-            is_part: pending.is_part,
+            is_part: pending.is_part || is_alone,
             copy_lost: None,
             sent_by,
         });

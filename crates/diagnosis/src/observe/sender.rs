@@ -1,6 +1,9 @@
 //! Who sends requests: one MainDevice, its second card, or somebody else.
 
+use linesman_proto::command::Addressing;
 use linesman_proto::ethernet::MacAddress;
+use linesman_proto::frame::Datagram;
+use linesman_proto::register::ErrorCounters;
 use linesman_proto::time::Instant;
 
 use super::{Direction, FrameSeen};
@@ -28,8 +31,29 @@ pub struct Sender {
     pub is_elsewhere: bool,
     /// Frames of its own that write into SubDevices, as far as only their returns were seen.
     pub writes: u64,
+    /// Those of them that write more than error counters, which they clear by that.
+    pub orders: u64,
     /// Its latest frame.
     pub last: Instant,
+}
+
+/// What a frame writes into SubDevices.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(super) enum Written {
+    /// Error counters and nothing else: it clears them.
+    Counters,
+    /// What SubDevices work by.
+    Orders,
+}
+
+impl Written {
+    /// What a datagram writes; nothing when it only reads.
+    pub(super) fn by(datagram: &Datagram<'_>) -> Option<Self> {
+        let effect = datagram.command()?.effect();
+        let is_register = effect.addressing != Addressing::Logical;
+        let is_counter = is_register && ErrorCounters::cover(datagram.ado(), datagram.data().len());
+        effect.writes.then_some(if is_counter { Self::Counters } else { Self::Orders })
+    }
 }
 
 /// All who send.
@@ -56,7 +80,12 @@ impl Senders {
     }
 
     /// A return came of a request that was not seen here: somebody sends from another place of the line.
-    pub(super) fn note_elsewhere(&mut self, frame: &FrameSeen<'_>, mac: MacAddress, writes: bool) {
+    pub(super) fn note_elsewhere(
+        &mut self,
+        frame: &FrameSeen<'_>,
+        mac: MacAddress,
+        writes: Option<Written>,
+    ) {
         let is_known = |one: &Sender| one.mac == mac || one.mac.marked() == mac;
         if !self.all.iter().any(is_known) {
             self.note(frame, mac, true);
@@ -66,7 +95,8 @@ impl Senders {
         }
         if let Some(other) = self.all.iter_mut().find(|one| one.mac == mac && !one.is_host) {
             other.own += 1;
-            other.writes += u64::from(writes);
+            other.writes += u64::from(writes.is_some());
+            other.orders += u64::from(writes == Some(Written::Orders));
             other.last = frame.time;
             self.has_changed = true;
         }
@@ -92,6 +122,7 @@ impl Senders {
                     is_host,
                     is_elsewhere: false,
                     writes: 0,
+                    orders: 0,
                     last: frame.time,
                 });
                 self.has_changed = true;

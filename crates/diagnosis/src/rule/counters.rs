@@ -88,6 +88,7 @@ fn cleared(line: &Line) -> Option<Condition> {
     let condition = Condition::new(&CLEARED, place, FaultName::SecondMainDevice, first.at)
         .confidence(0.5)
         .confirmed(first.at)
+        .about([Symptom::CountersCleared])
         .shown_by(Evidence::register(device.id, counter.address(), first, text))
         .advise("Look for another tool that is connected to this line, or to its MainDevice.")
         .advise(

@@ -6,8 +6,8 @@
 //! the line answered; with the link up again nothing came back at all, from nobody, for several frames, and then
 //! everything did. On the cable of the card itself it shows when the card had its link back, which the system
 //! tells to the millisecond, and several frames that it sent from then on still went missing. A recording does
-//! not tell when the card had a link; but whoever searches for the place where frames vanish has one, and begins
-//! as soon as it has.
+//! not tell when the card had a link; but without one no frame is recorded as sent, and whoever searches for the
+//! place where frames vanish has one, and begins as soon as it has.
 //!
 //! **What it means.** Ports open their loops as soon as they have a link. A switch, a media converter or a slow
 //! device in between that shows its link before it forwards swallows every frame of the line meanwhile, not
@@ -126,7 +126,8 @@ fn behind_card(line: &Line, card: Path) -> Option<(&Silence, Instant)> {
         // Whoever began to search so late had no link before.
         None => search::began(line, silence)
             .map(|began| began.at)
-            .filter(|began| began.since(silence.since.at) >= search::BEGINS_WITHIN),
+            .filter(|began| began.since(silence.since.at) >= search::BEGINS_WITHIN)
+            .or_else(|| sent_again(line, silence)),
     };
     let is_blind = |silence: &Silence| {
         came(silence).is_some_and(|came| {
@@ -136,6 +137,12 @@ fn behind_card(line: &Line, card: Path) -> Option<(&Silence, Instant)> {
         })
     };
     silences(line).find(|(silence, _)| is_blind(silence))
+}
+
+/// When frames were sent again of which none came back, after none had left. A card without a link takes none,
+/// so none is recorded: it had its link again.
+fn sent_again(line: &Line, silence: &Silence) -> Option<Instant> {
+    line.quiet_before(silence).map(|pause| pause.to)
 }
 
 fn condition(

@@ -10,7 +10,8 @@
 //! **What it means.** A SubDevice that works in step with its SYNC signal needs its outputs before the
 //! signal, in every cycle. Frames that come later than the shift allows are missed: the SubDevice counts
 //! them (0x1C32:0B) and, after some, leaves OP with a synchronisation error. As long as no SYNC signal was
-//! seen being switched on (0x0981), jitter makes outputs uneven and does no other harm: no finding.
+//! seen being switched on (0x0981), jitter makes outputs uneven and does no other harm: no finding, but a note
+//! where it is seen in a recording that frames came to the card unevenly, by 10 % of the cycle or more.
 //!
 //! **What to do.** `linesman host --measure 10` tells how late this computer begins its cycles, and what to
 //! change. Then lengthen the cycle, or move the shift of the SYNC signal away from the frame.
@@ -100,17 +101,20 @@ impl Spell<'_> {
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let spells = view.line.cyclic.iter().filter_map(spell);
+    let has_sync = |device: &&Device| device.sync_on.is_some_and(|on| on.value);
+    let in_step: Vec<&Device> = view.line.devices.iter().filter(has_sync).collect();
+    let spells = view.line.cyclic.iter().filter_map(|cyclic| spell(cyclic, !in_step.is_empty()));
     let worst = spells.max_by_key(|spell| spell.worst());
     let Some(spell) = worst else { return };
     let (Some(first), Some(last)) = (spell.off.first(), spell.off.last()) else { return };
-    let has_sync = |device: &&Device| device.sync_on.is_some_and(|on| on.value);
-    let in_step: Vec<&Device> = view.line.devices.iter().filter(has_sync).collect();
-    if in_step.is_empty() {
-        // Whoever runs free takes outputs when they come.
+    // Whoever runs free takes outputs when they come. A recording, which has the times at which frames came to the
+    // card, is the only witness of what the computer did before.
+    let is_recorded = !view.line.traffic.direction_known;
+    if in_step.is_empty() && !(is_recorded && spell.at_sending) {
         return;
     }
     let severity = match spell.verdict() {
+        _ if in_step.is_empty() => Severity::Info,
         Some(Verdict::Doubtful) => Severity::Warning,
         Some(Verdict::Bad) => Severity::Error,
         None => return,
@@ -132,20 +136,26 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         .explaining(in_step.iter().map(|device| Symptom::StateLost(device.id)))
         .explaining([Symptom::FramesLate])
         .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
-        .advise("Lengthen the cycle, or move the shift of the SYNC signal away from the frame.");
+;
     condition.severity = severity;
+    if !in_step.is_empty() {
+        condition = condition.advise(
+            "Lengthen the cycle, or move the shift of the SYNC signal away from the frame.",
+        );
+    }
     if last.at + QUIET < view.line.now {
         condition = condition.ended(last.at);
     }
     conditions.push(condition);
 }
 
-/// The latest spell of a datagram: of its sending, else of its return.
-fn spell(cyclic: &Cyclic) -> Option<Spell<'_>> {
+/// The latest spell of a datagram: of its sending, else of its return; where nobody keeps step, of less, too.
+fn spell(cyclic: &Cyclic, keeps_step: bool) -> Option<Spell<'_>> {
     let of = |beat: &Beat, at_sending| {
         let cycle = beat.cycle()?;
         let mut off: Vec<Off> = Vec::new();
-        for one in beat.off.iter().rev() {
+        let all = if keeps_step { &beat.off } else { &beat.uneven };
+        for one in all.iter().rev() {
             if off.last().is_some_and(|later| later.at.since(one.at) > TOGETHER) {
                 break;
             }
@@ -163,6 +173,7 @@ fn evidence(spell: &Spell<'_>, at: Instant, in_step: usize) -> Evidence {
     let percent = worst.as_nanos() as f64 * 100.0 / spell.cycle.as_nanos() as f64;
     let what = if spell.at_sending { "were sent" } else { "came back" };
     let whom = match in_step {
+        0 => "nobody keeps step with SYNC signals, as far as the recording shows".to_owned(),
         1 => "one SubDevice works in step with a SYNC signal".to_owned(),
         count => format!("{count} SubDevices work in step with SYNC signals"),
     };

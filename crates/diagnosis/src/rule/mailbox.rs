@@ -110,7 +110,8 @@ fn slow(line: &Line, device: &Device) -> Option<Condition> {
     let since = first.value.asked;
     let mut condition = begin(line, device, &SLOW, FaultName::MailboxSlow, since, last.at)
         .confidence(0.7)
-        .or(FaultName::FirmwareFault, 0.2);
+        .or(FaultName::FirmwareFault, 0.2)
+        .about([Symptom::Mailbox(device.id)]);
     if all.iter().all(|seen| seen.at.since(seen.value.asked) < SLOW_ANSWER) {
         // Slower than most, and no MainDevice minds.
         condition.severity = Severity::Info;
@@ -158,7 +159,7 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
         .confidence(0.7)
         .or(FaultName::FirmwareFault, 0.2)
         .confirmed(since + STUCK)
-        .about([Symptom::Silent(device.id)])
+        .about([Symptom::Mailbox(device.id)])
         .shown_by(Evidence::frame(since, frame.unwrap_or(0), text))
         .advise("Look for another tool that uses the mailbox of this SubDevice.")
         .advise("Power it off and on; its process data ran on meanwhile.")

@@ -14,6 +14,8 @@
 //! link. Where it was, a recording cannot say; `diagnose --active` can while it lasts: it closes ports one after the
 //! other, for temporary use (0x0100 bit 1), so that each opens by itself after a second, and sees when frames
 //! come back. What was recorded meanwhile tells the same.
+//! A few frames that stay away between others that come back are no silence: a first cable that was open needs
+//! some tenths of a millisecond at least to carry frames again (IEEE 802.3, 24.3.4.4).
 //! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
 //! every frame; which link it is, no counter can be asked.
 //! In a ring the frames of card B may come round untouched while those of card A, which SubDevices process,
@@ -66,6 +68,9 @@ const STARVED_WITHIN: Span = Span::s(1);
 const SAME_SILENCE: Span = Span::ms(100);
 /// With fewer, the end of the input may have cut off the answer.
 const FEW: u64 = 3;
+/// A receiver of 100BASE-TX wants a signal for so long at least before its link is up again (IEEE 802.3,
+/// 24.3.4.4, stabilize_timer): what was over before was no open link. It is damage, or the computer.
+const LINK_UP: Span = Span::us(330);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
@@ -74,8 +79,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         return;
     }
     // One condition: the latest silence, or the one that lasts.
-    let is_long =
-        |silence: &&Silence| silence.frames >= CERTAIN || (silence.frames >= FEW && view.has_ended);
+    let is_long = |silence: &&Silence| match silence.ended {
+        Some(ended) => silence.frames >= CERTAIN && ended.since(silence.since.at) >= LINK_UP,
+        None => silence.frames >= CERTAIN || (silence.frames >= FEW && view.has_ended),
+    };
     let swallowed = traffic.swallowed.iter().rev().find(|silence| silence.frames >= CERTAIN);
     let silence = traffic.silences.iter().rev().find(is_long);
     if let Some(silence) = silence.into_iter().chain(swallowed).max_by_key(|one| one.since.at) {
@@ -422,7 +429,7 @@ fn first_end(line: &Line) -> Option<LinkEnd> {
 }
 
 /// From the card to the first controller, whose end is not known before it was seen.
-pub(super) fn first_link(line: &Line) -> Place {
+fn first_link(line: &Line) -> Place {
     let a: LinkEnd = End::MainDevice(Path::A);
     Place::Link { network: line.network, a, b: first_end(line), direction: None }
 }

@@ -66,7 +66,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         condition = condition
             .confirmed(silent.at)
             .about([Symptom::Silent(device.id)])
-            .explaining([Symptom::WorkingCounter(device.id), Symptom::StateLost(device.id)])
+            .explaining([
+                Symptom::WorkingCounter(device.id),
+                Symptom::StateLost(device.id),
+                Symptom::Mailbox(device.id),
+            ])
             .shown_by(Evidence::register(device.id, address, &silent, text));
         conditions.push(condition);
     }

@@ -9,9 +9,10 @@
 //! and findings about links and damage do.
 //!
 //! Without any watchdog that expired: all frames stayed away for 20 ms or more and then came again, while no
-//! link was lost, no SubDevice restarted, and no counter of any of them moved. Then they did not leave this
-//! computer, or did not get into it. Where the card is watched, it must have refused frames meanwhile: frames
-//! that it took and that nobody brought back vanished on the line (`H100`).
+//! link was lost, no SubDevice restarted, and no counter of any of them moved, and the card refused frames
+//! meanwhile. Frames that it took and that nobody brought back vanished on the line (`H100`). A recording has those that
+//! the card took alone: where it refused them, nothing is recorded as sent. If nothing at all was sent for 20 ms or
+//! more and all went on then, with no link lost and no counter moved, that is a note.
 //!
 //! **What it means.** The application, or the program that sends, stood still: a long call within the cycle
 //! (an SDO, a file, a print), a garbage collector, a debugger, a process without real-time priority, a
@@ -74,7 +75,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
     // One finding, however often it came: the latest pause is shown.
     let Some(latest) = all.iter().max_by_key(|found| found.pause.to) else {
-        conditions.extend(stalled(line));
+        conditions.extend(stalled(line).or_else(|| stood_still(line)));
         return;
     };
     let devices: Vec<DeviceId> =
@@ -211,26 +212,19 @@ fn stalled(line: &Line) -> Option<Condition> {
         let last = line.host.card(*card).send_failures.last;
         last.is_some_and(|last| last >= pause.from && last <= pause.to + READ_WITHIN)
     });
-    // Who watches the card would know that it took nothing: then the frames left, and vanished on the line.
-    if refused.is_none() && line.host.is_watched {
-        return None;
-    }
+    // A frame that was seen and that no card refused has left, and vanished on the line.
+    let card = refused?;
     let frame = silence.since.frame.unwrap_or(0);
     let mut condition = Condition::new(&PAGE, Place::Host, FaultName::WatchdogStarved, pause.from)
-        .confidence(if refused.is_some() { 0.8 } else { 0.5 })
+        .confidence(0.8)
         .or(FaultName::HostDrops, 0.1)
         .confirmed(pause.to)
         .ended(pause.to)
         .shown_by(Evidence::frame(pause.from, frame, text));
     // Nobody was hurt: no watchdog expired.
-    condition.severity = if refused.is_some() { Severity::Warning } else { Severity::Info };
-    if let Some(card) = refused {
-        let text = format!("card {card} had a link and took no frames meanwhile");
-        condition = condition.shown_by(Evidence::host(Some(pause.from), text));
-    } else {
-        let link = super::nobody_answers::first_link(line);
-        condition = condition.or_at(FaultName::FalseLink, link, 0.2);
-    }
+    condition.severity = Severity::Warning;
+    let text = format!("card {card} had a link and took no frames meanwhile");
+    condition = condition.shown_by(Evidence::host(Some(pause.from), text));
     let follows = line.devices.iter().flat_map(|device| {
         let id = device.id;
         [
@@ -247,6 +241,45 @@ fn stalled(line: &Line) -> Option<Condition> {
             .advise("Look into the system's log for messages of the card's driver.")
             .advise("Run `linesman host`: it tells what lets this computer stop a program."),
     )
+}
+
+/// In a recording: nothing was sent for a while, to anybody, and then all went on as before. The card had its
+/// link, and no watchdog expired: nobody was hurt.
+fn stood_still(line: &Line) -> Option<Condition> {
+    if line.traffic.direction_known {
+        return None;
+    }
+    let went_on = |pause: &Pause| {
+        line.cyclic.iter().any(|cyclic| cyclic.sent.last().is_some_and(|last| last > pause.to))
+    };
+    let pause = line.quiet().find(|pause| went_on(pause) && !was_silent(line, *pause))?;
+    let were_read = |at: Instant| {
+        line.devices.iter().any(|device| {
+            let mut tracks = device.counters.tracks();
+            tracks.any(|(counter, track)| {
+                matches!(counter, ErrorCounter::LostLink(_)) && track.last.at > at
+            })
+        })
+    };
+    if !(were_read(pause.to) && kept_links(line, pause)) {
+        return None;
+    }
+    let text = format!(
+        "nothing was sent for {:.1} ms, then all went on; no link was lost and no counter of any SubDevice moved",
+        pause.span().as_secs_f64() * 1e3
+    );
+    let mut condition = Condition::new(&PAGE, Place::Host, FaultName::WatchdogStarved, pause.from)
+        .confidence(0.5)
+        .or(FaultName::HostJitter, 0.3)
+        .confirmed(pause.to)
+        .ended(pause.to)
+        .shown_by(Evidence::host(Some(pause.from), text))
+        .advise(
+            "Ask whether the program that sends was to pause: a change of its state, a debugger.",
+        )
+        .advise("Run `linesman host`: it tells what lets this computer stop a program.");
+    condition.severity = Severity::Info;
+    Some(condition)
 }
 
 /// Whether no controller lost a link, found damage or started anew about a pause.

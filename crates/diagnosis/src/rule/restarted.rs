@@ -154,8 +154,11 @@ fn outage(line: &Line, device: &Device, change: &AlChange) -> Option<(Instant, I
     let silences = silences.map(|one| (one.since.at, one.ended.unwrap_or(change.at)));
     let absences = device.absences.iter().rev();
     let absences = absences.map(|absence| (absence.since.at, absence.ended.unwrap_or(change.at)));
+    // A recording has nothing of the time in which the card had no link.
+    let quiet = line.quiet().map(|pause| (pause.from, pause.to));
     let latest = |(since, until): &(Instant, Instant)| is_recent(*since, *until);
-    silences.into_iter().find(latest).or_else(|| absences.into_iter().find(latest))
+    let mut all = quiet.chain(silences).chain(absences);
+    all.find(latest)
 }
 
 fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {

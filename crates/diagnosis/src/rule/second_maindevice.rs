@@ -9,8 +9,10 @@
 //!
 //! **What it means.** Two MainDevices fight for the line: each changes states, clears counters and writes
 //! outputs that the other one does not expect. Or a configuration tool is plugged in beside. As long as it
-//! only reads, it does no harm but takes time on the line; once it writes, SubDevices that leave their
-//! state, refuse one, or are missing in working counters are its doing, and listed beneath.
+//! only reads, it does no harm but takes time on the line; when it clears error counters, what was counted
+//! is lost to everybody else, and that is all; once it writes anything else, SubDevices that leave their state,
+//! refuse one, are missing in working counters or do not answer by their mailboxes are its doing, and listed
+//! beneath.
 //!
 //! **What to do.** Find out who else is on the line and stop it, or listen only.
 
@@ -64,24 +66,36 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         .confirmed(shown.first.at)
         .shown_by(Evidence::frame(shown.first.at, shown.first.frame.unwrap_or(0), text));
     let elsewhere = || apart.iter().filter(|sender| sender.is_elsewhere);
-    let (frames, writes) = elsewhere()
-        .fold((0, 0), |(frames, writes), sender| (frames + sender.own, writes + sender.writes));
+    let sum = |count: fn(&Sender) -> u64| elsewhere().map(|sender| count(sender)).sum::<u64>();
+    let (frames, writes, orders) =
+        (sum(|sender| sender.own), sum(|sender| sender.writes), sum(|sender| sender.orders));
     if let Some(last) = elsewhere().map(|sender| sender.last).max() {
+        let clears = match writes - orders {
+            0 => String::new(),
+            clears => format!(", {clears} clear error counters"),
+        };
         let text = format!(
-            "{frames} frames came back that nobody here has sent; {writes} of them write into SubDevices"
+            "{frames} frames came back that nobody here has sent; {orders} of them write into SubDevices{clears}"
         );
         condition = condition.shown_by(Evidence::host(Some(last), text));
         if elsewhere().count() + 1 == apart.len() && last + GONE < view.now {
             condition = condition.ended(last);
         }
     }
-    if writes > 0 || elsewhere().count() == 0 {
+    let is_unknown = elsewhere().count() == 0;
+    if writes > 0 || is_unknown {
+        condition = condition.explaining([Symptom::CountersCleared]);
+    }
+    if orders > 0 || is_unknown {
         condition = condition.explaining(line.devices.iter().flat_map(|device| {
             let id = device.id;
-            [Symptom::StateLost(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)]
+            // Who is ordered into INIT closes its mailbox: what was asked is never answered, and nothing
+            // is taken until it is in PREOP again.
+            let mailbox = Symptom::Mailbox(id);
+            [Symptom::StateLost(id), Symptom::WorkingCounter(id), Symptom::Emergency(id), mailbox]
         }));
     }
-    if writes > 0 {
+    if orders > 0 {
         condition.severity = Severity::Error;
     }
     conditions.push(

@@ -11,6 +11,7 @@ use linesman_maindevice::watch::Watch;
 use linesman_maindevice::{Event, ProbeRequest, Target};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::{Instant, Span};
+use linesman_sim::segment::Outgoing;
 
 use super::{AT_ONE_INSTANT, Lab, LabError};
 use crate::options::Begin;
@@ -44,6 +45,7 @@ impl Lab {
             let frame = &transmit[..sent.len];
             self.show(Direction::Sent, sent.path, at, frame);
             self.segment.handle_frame(at, sent.path, frame);
+            self.record_outgoing();
             count += 1;
             if count > AT_ONE_INSTANT {
                 return Err(LabError::Stuck { at: self.now, what: "sending" });
@@ -107,6 +109,37 @@ impl Lab {
         if let Some(tap) = &mut self.tap {
             tap(&seen);
         }
+    }
+
+    /// Gives the recorder what was handed to the cards.
+    pub(super) fn record_outgoing(&mut self) {
+        if self.recorder.is_none() {
+            return;
+        }
+        let mut bytes = std::mem::take(&mut self.outgoing);
+        while let Some(Outgoing { at, path }) = self.segment.poll_outgoing(&mut bytes) {
+            self.record(Direction::Sent, path, at, &bytes);
+        }
+        self.outgoing = bytes;
+    }
+
+    /// Gives the recorder a frame.
+    pub(super) fn record(&mut self, direction: Direction, path: Path, time: Instant, bytes: &[u8]) {
+        let Some(recorder) = &mut self.recorder else { return };
+        if self.recorder_veil.as_mut().is_some_and(|veil| veil.hides(direction, bytes)) {
+            return;
+        }
+        self.recorded += 1;
+        recorder(&FrameSeen {
+            network: self.network,
+            path: Some(path),
+            direction,
+            time,
+            number: self.recorded,
+            fcs: None,
+            truncated: false,
+            bytes,
+        });
     }
 
     fn handle_event(&mut self, event: Event) {

@@ -64,8 +64,11 @@ pub struct Lab {
     main: MainDevice,
     engine: Engine,
     tap: Option<Tap>,
+    recorder: Option<Tap>,
+    recorded: u64,
     host_tap: Option<HostTap>,
     veil: Option<Veil>,
+    recorder_veil: Option<Veil>,
     frames: u64,
     events: Vec<(Instant, Event)>,
     finding_events: VecDeque<FindingEvent>,
@@ -78,6 +81,7 @@ pub struct Lab {
     host_last: [Option<HostPort>; 2],
     paths: usize,
     arrival: Vec<u8>,
+    outgoing: Vec<u8>,
     transmit: Vec<u8>,
 }
 
@@ -138,8 +142,11 @@ impl Lab {
             main,
             engine: Engine::new(setup),
             tap: None,
+            recorder: None,
+            recorded: 0,
             host_tap: None,
             veil: None,
+            recorder_veil: None,
             frames: 0,
             events: Vec::new(),
             finding_events: VecDeque::new(),
@@ -152,6 +159,7 @@ impl Lab {
             host_last: [None; 2],
             paths,
             arrival: Vec::with_capacity(FRAME),
+            outgoing: Vec::with_capacity(FRAME),
             transmit: vec![0; FRAME],
             options,
         };
@@ -166,14 +174,25 @@ impl Lab {
         self.tap = Some(tap);
     }
 
+    /// Lets `recorder` see every frame from now on as a capture tool beside the MainDevice does: what was handed to a
+    /// card, when it was, and what came back. What no card took is not in it
+    /// ([`Segment::poll_outgoing`](linesman_sim::segment::Segment::poll_outgoing)).
+    pub fn set_recorder(&mut self, recorder: Tap) {
+        self.segment.listen(true);
+        self.recorder = Some(recorder);
+    }
+
     /// Lets `tap` see every observation of the host from now on.
     pub fn set_host_tap(&mut self, tap: HostTap) {
         self.host_tap = Some(tap);
     }
 
-    /// Hides a share of the exchanges in which error counters are read from the diagnosis and the tap.
+    /// Hides a share of the exchanges in which error counters are read from the diagnosis and the tap, and
+    /// from the recorder.
     pub fn hide_counters(&mut self, share: f64, stream: Stream) {
-        self.veil = (share > 0.0).then(|| Veil::new(stream, share));
+        let veil = (share > 0.0).then(|| Veil::new(stream, share));
+        self.recorder_veil.clone_from(&veil);
+        self.veil = veil;
     }
 
     /// The present.
@@ -413,6 +432,7 @@ impl Lab {
     /// Lets everyone do what is due now.
     fn serve(&mut self) {
         self.segment.advance(self.now);
+        self.record_outgoing();
         self.receive();
         self.main.handle_timeout(self.now);
         self.engine.handle_timeout(self.now);
@@ -429,6 +449,7 @@ impl Lab {
             // What is not intact the card drops and counts; nobody behind it sees it.
             if came.intact {
                 self.show(Direction::Received, came.path, came.at, &arrival);
+                self.record(Direction::Received, came.path, came.at, &arrival);
                 self.main.handle_frame(came.at.max(self.now), came.path, &arrival);
             }
         }

@@ -178,7 +178,7 @@ impl<'a> Play<'a> {
         }
         let recording = Arc::new(Mutex::new(Engine::new(setup)));
         let reader = Arc::clone(&recording);
-        lab.set_tap(Box::new(move |seen| {
+        lab.set_recorder(Box::new(move |seen| {
             // As most recordings are: neither cards nor directions are told apart.
             let frame = FrameSeen { path: None, direction: Direction::Unknown, ..*seen };
             reader.lock().unwrap_or_else(PoisonError::into_inner).handle_frame(&frame);
@@ -326,7 +326,8 @@ impl<'a> Play<'a> {
     /// What is said of the recording, if it ended here.
     fn recorded(&self) -> Diagnosis {
         let mut engine = self.recording.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        engine.finish(self.lab.now(), true);
+        // A file ends with its last frame.
+        engine.finish(Instant::ZERO, true);
         engine.diagnosis()
     }
 
@@ -353,7 +354,7 @@ impl<'a> Play<'a> {
                     let scene = Scene {
                         tree: self.lab.tree(),
                         host_counters: self.case.host_counters,
-                        is_recorded: false,
+
                         answered_again: *answered_again,
                     };
                     let fits = matches(truth, &scene, claim);
@@ -404,7 +405,7 @@ impl<'a> Play<'a> {
         let tree = self.lab.tree();
         let answered_again = self.lab.reached().len() >= tree.len();
         let host_counters = self.case.host_counters;
-        let scene = Scene { tree, host_counters, is_recorded: false, answered_again };
+        let scene = Scene { tree, host_counters, answered_again };
         let company = Company::of(self.lab.truth(), record);
         let when = (company, self.case.faults.len().max(1) + self.beside);
         let cycle = self.case.cycle.as_nanos().max(1);
@@ -418,7 +419,7 @@ impl<'a> Play<'a> {
         let as_planned = |id: DeviceId| id;
         let naming: &dyn Fn(DeviceId) -> DeviceId =
             if self.has_project { &as_planned } else { &by_position };
-        let scene = Scene { host_counters: false, is_recorded: true, ..scene };
+        let scene = Scene { host_counters: false, ..scene };
         let capture = judge(recorded, &truth, &all, &scene, when, naming);
         let baseline = baseline::first_counter(&self.lab);
         Some(FaultOutcome {

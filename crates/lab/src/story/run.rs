@@ -396,8 +396,7 @@ fn verdict(on: Option<FaultName>, lab: &Lab, diagnosis: &Diagnosis) -> Result<()
         let fits = [false, true].into_iter().any(|answered_again| {
             // Once it is over and the line is back, memories tell more than silence did.
             let over = !fault.is_active();
-            let scene =
-                Scene { tree: lab.tree(), host_counters, is_recorded: false, answered_again };
+            let scene = Scene { tree: lab.tree(), host_counters, answered_again };
             (over || !answered_again)
                 && best_finding(diagnosis, &truth, &scene, Company::of(log, fault))
                     .is_some_and(|(_, fits)| fits.is_right())

@@ -223,7 +223,7 @@ impl<'a> Episode<'a> {
         let scene = Scene {
             tree: self.lab.tree(),
             host_counters: self.host_counters,
-            is_recorded: false,
+
             answered_again: false,
         };
         let diagnosis = self.lab.diagnosis();

@@ -97,8 +97,6 @@ pub struct Scene<'a> {
     pub tree: &'a Tree,
     /// Whether the card's own counters were read.
     pub host_counters: bool,
-    /// Whether there is a recording alone, which knows nothing of the card.
-    pub is_recorded: bool,
     /// Whether all that fell silent has answered again: what it remembers tells a cut from a
     /// restart.
     pub answered_again: bool,
@@ -152,11 +150,7 @@ impl List<'_> {
                 self.exact(name, Site::link(tree, one, other));
                 match name {
                     LinkOpen => self.open(truth, one, other),
-                    FalseLink => {
-                        self.one_end(truth, one, other);
-                        self.stalled(one);
-                        self.stalled(other);
-                    }
+                    FalseLink => self.one_end(truth, one, other),
                     CableDegraded | EmcNoise if truth.hit_both_ways(one, other) => {
                         for cause in sets::BOTH_WAYS.causes {
                             self.add(*cause, Site::link(tree, one, other), &sets::BOTH_WAYS);
@@ -199,9 +193,6 @@ impl List<'_> {
                 // On copper the other direction goes with it.
                 self.exact(name, Site::link(tree, from, to));
                 self.one_end(truth, from, to);
-                if name == FalseLink {
-                    self.stalled(from);
-                }
             }
             LinkFlapping => self.exact(name, Site::link(tree, from, to)),
             // Who else sends is not at a place of the line; its frames are everywhere on it.
@@ -229,17 +220,6 @@ impl List<'_> {
             for cause in sets::ONE_END.causes {
                 self.add(*cause, Site::link(self.scene.tree, one, other), &sets::ONE_END);
             }
-        }
-    }
-
-    /// Frames of a while were lost between the program and the first SubDevice, without a trace.
-    fn stalled(&mut self, card: End<DeviceId>) {
-        let tree = self.scene.tree;
-        let is_ring = tree.link_at(card.map(DeviceId::index)).is_some_and(|at| tree.is_on_ring(at));
-        let (End::MainDevice(_), Some(far)) = (card, opposite(tree, card)) else { return };
-        if self.scene.is_recorded && self.scene.answered_again && !is_ring {
-            self.add(FalseLink, Site::link(tree, card, far), &sets::STALLED);
-            self.add(WatchdogStarved, Site::Host, &sets::STALLED);
         }
     }
 
@@ -299,7 +279,6 @@ impl List<'_> {
                     self.symbols(truth, hop);
                 }
             }
-            WatchdogStarved => self.stalled(card),
             HostDrops if !self.scene.host_counters => {
                 self.on_hop(truth, (far, card), &sets::UNCOUNTED);
             }
@@ -416,7 +395,7 @@ mod tests {
 
     fn grade(truth: &Truth, host_counters: bool, cause: FaultName, site: Site) -> Grade {
         let tree = tree();
-        let scene = Scene { tree: &tree, host_counters, is_recorded: false, answered_again: false };
+        let scene = Scene { tree: &tree, host_counters, answered_again: false };
         matches(truth, &scene, Claim { cause, site }).cause
     }
 
@@ -502,8 +481,7 @@ mod tests {
         assert!(!grade(&off(SupplyOff, &[1, 3]), true, LinkOpen, above).is_right());
         assert!(!grade(&off(BrownOut, &[1]), true, LinkOpen, above).is_right());
         let tree = tree();
-        let scene =
-            Scene { tree: &tree, host_counters: true, is_recorded: false, answered_again: true };
+        let scene = Scene { tree: &tree, host_counters: true, answered_again: true };
         let claim = Claim { cause: LinkOpen, site: above };
         assert!(!matches(&off(DeviceOff, &[1]), &scene, claim).is_right(), "it has started anew");
     }

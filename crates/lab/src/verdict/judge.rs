@@ -113,7 +113,7 @@ pub fn explains(
     for truth in truths {
         // A finding may have been made while the line was silent, or since.
         for answered_again in [false, true] {
-            let scene = Scene { tree, host_counters, is_recorded: false, answered_again };
+            let scene = Scene { tree, host_counters, answered_again };
             let graded = matches(truth, &scene, claim);
             if (graded.cause, graded.place) > (best.cause, best.place) {
                 best = graded;

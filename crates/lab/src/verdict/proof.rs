@@ -1,15 +1,14 @@
 //! Proofs of admitted sets: one line, played once with each cause of a set.
 //!
 //! What the MainDevice sends and gets, and what its computer notices, is written down with its times; of
-//! a set all that must be the same, of a set for recordings all frames. Two controls keep the proof from being empty: each fault must have
+//! a set all that must be the same. Two controls keep the proof from being empty: each fault must have
 //! acted by the truth log, and what it leaves must differ from a line on which nothing is wrong. What
 //! parts the causes ([`Parted`]) must part them here, too.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use linesman_diagnosis::observe::{Direction, FrameSeen, HostObservation};
+use linesman_diagnosis::observe::{Direction, HostObservation};
 use linesman_diagnosis::report::Diagnosis;
-use linesman_diagnosis::{Engine, Setup};
 use linesman_proto::address::Path;
 use linesman_proto::time::Instant;
 use linesman_sim::segment_file::SegmentFile;
@@ -181,12 +180,10 @@ fn run(
     shown: Shown,
     (from_ms, until_ms): (u64, u64),
 ) -> Result<Played, String> {
-    // Whoever writes a recording asks nobody.
-    let (host_counters, probes) = (shown == Shown::All, shown != Shown::FramesAlone);
+    let host_counters = shown == Shown::All;
     // The sets are about devices that nobody knows by number.
     let begin = if from_ms > 0 { Begin::Idle } else { Begin::Run };
-    let options =
-        LabOptions { host_counters, probes, serials: false, begin, ..LabOptions::default() };
+    let options = LabOptions { host_counters, serials: false, begin, ..LabOptions::default() };
     let mut lab = Lab::new(file, options).map_err(|error| error.to_string())?;
     lab.run_until(Instant::from_nanos(from_ms * 1_000_000)).map_err(|error| error.to_string())?;
     if begin == Begin::Idle {
@@ -198,11 +195,7 @@ fn run(
         seen.lock().unwrap_or_else(PoisonError::into_inner).push(observed);
     };
     let frames = Arc::clone(&seen);
-    let recording = Arc::new(Mutex::new(Engine::new(Setup::default())));
-    let reader = Arc::clone(&recording);
     lab.set_tap(Box::new(move |frame| {
-        let recorded = FrameSeen { path: None, direction: Direction::Unknown, ..*frame };
-        reader.lock().unwrap_or_else(PoisonError::into_inner).handle_frame(&recorded);
         note(
             &frames,
             Observed::Frame {
@@ -213,20 +206,11 @@ fn run(
             },
         );
     }));
-    if shown != Shown::FramesAlone {
-        let host = Arc::clone(&seen);
-        lab.set_host_tap(Box::new(move |observation| note(&host, Observed::Host(*observation))));
-    }
+    let host = Arc::clone(&seen);
+    lab.set_host_tap(Box::new(move |observation| note(&host, Observed::Host(*observation))));
     lab.run_until(Instant::from_nanos(until_ms * 1_000_000)).map_err(|error| error.to_string())?;
     let acted = lab.truth().faults().iter().any(|fault| fault.first_effect.is_some());
-    let diagnosis = match shown {
-        Shown::All | Shown::WithoutCounters => lab.diagnosis(),
-        Shown::FramesAlone => {
-            let mut engine = recording.lock().unwrap_or_else(PoisonError::into_inner);
-            engine.finish(lab.now(), true);
-            engine.diagnosis()
-        }
-    };
+    let diagnosis = lab.diagnosis();
     let seen = std::mem::take(&mut *seen.lock().unwrap_or_else(PoisonError::into_inner));
     Ok(Played { seen, diagnosis, acted })
 }

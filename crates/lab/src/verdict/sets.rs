@@ -45,8 +45,6 @@ pub enum Shown {
     All,
     /// Without what the card has counted.
     WithoutCounters,
-    /// Frames alone, as in a recording.
-    FramesAlone,
 }
 
 /// One cause, as it is put into the line of [`super::proof::LINE`].
@@ -407,35 +405,10 @@ pub static NOBODY: AdmittedSet = AdmittedSet {
     },
 };
 
-/// A line that stood still, in a recording.
-pub static STALLED: AdmittedSet = AdmittedSet {
-    name: "stalled",
-    causes: &[WatchdogStarved, FalseLink],
-    while_so: "in a recording, all frames of a while are lost on their way to the first SubDevice, and come back \
-               again after it",
-    why: "a recording has the frames that a program gave to its card; whether the card took them, or the cable \
-          behind it, only the computer could tell, and no controller saw them",
-    proof: Proof {
-        shown: Shown::FramesAlone,
-        until_ms: 6_000,
-        plays: &[
-            Play {
-                cause: Some(WatchdogStarved),
-                file: "to_ms = 3_300\nkind = 'watchdog-starved'\nat = 'maindevice'\npause_ms = 300",
-            },
-            Play {
-                cause: Some(FalseLink),
-                file: "to_ms = 3_300\nkind = 'false-link'\nat = 'maindevice-K1.A'\nfar = 'with-link'",
-            },
-        ],
-        parted: Parted::ByHost,
-    },
-};
-
 /// All of them.
 pub static ALL: &[&AdmittedSet] = &[
     &SILENT, &ONE_END, &OVERLOAD, &SYMBOLS, &BOTH_WAYS, &FIRST_HOP, &LAST_HOP, &UNCOUNTED, &TWINS,
-    &EQUALS, &EXTRAS, &NOBODY, &STALLED,
+    &EQUALS, &EXTRAS, &NOBODY,
 ];
 
 #[cfg(test)]

@@ -201,6 +201,13 @@ impl ErrorCounters {
     /// Length of the block in bytes.
     pub const LEN: usize = (table::LOST_LINK_COUNTER.end().0 - Self::START.0) as usize;
 
+    /// Whether an access to `length` bytes at an address touches nothing but these counters.
+    #[must_use]
+    pub fn cover(start: RegisterAddress, length: usize) -> bool {
+        let (from, start) = (usize::from(Self::START.0), usize::from(start.0));
+        start >= from && start + length <= from + Self::LEN
+    }
+
     /// What `data`, read from `start` on, say. Counters that they do not cover stay `None`; `start`
     /// may lie before the block, and `data` may end anywhere.
     #[must_use]
@@ -411,6 +418,13 @@ mod tests {
         // The lost-link counters are a group of their own.
         assert_eq!(of(ErrorCounter::LostLink(Port::A)), Difference::between(15, 17));
         assert_eq!(of(ErrorCounter::LostLink(Port::B)), Difference::between(16, 16));
+    }
+
+    #[test]
+    fn an_access_to_counters_alone() {
+        let cover = |start, length| ErrorCounters::cover(RegisterAddress(start), length);
+        assert!(cover(0x0300, 20) && cover(0x0300, 1) && cover(0x0313, 1) && cover(0x030C, 2));
+        assert!(!cover(0x02FF, 2) && !cover(0x0300, 21) && !cover(0x0313, 2) && !cover(0x0120, 2));
     }
 
     #[test]

@@ -150,6 +150,12 @@ impl Card {
         silent.map(|(_, _, fault)| *fault)
     }
 
+    /// Whether the kernel hands frames to the driver at an instant: until it knows that there is no carrier, and
+    /// while the card takes any.
+    pub(super) fn takes_frames(&self, at: Instant) -> bool {
+        (self.has_carrier(at) || self.told.0) && self.silenced_by(at).is_none()
+    }
+
     /// Makes the changes of the carrier up to `now`.
     #[inline]
     pub(crate) fn settle(&mut self, now: Instant) {

@@ -1,7 +1,7 @@
 //! Frames that a card sends later than it was told to: a busy host, a queue.
 //!
-//! A host keeps back a single frame now and then, or all of them by so much for a while. Either way
-//! the frame waits in the card, those behind it wait with it, and it goes on its way when it leaves. A card
+//! A host keeps back a single frame now and then, before it comes to the card; or the card keeps back all of
+//! them by so much for a while. Either way those behind it wait with it, and it goes on its way when it leaves. A card
 //! that is in time sends one frame after the other, too: what is handed to it while one is still leaving
 //! waits for its end.
 
@@ -29,6 +29,8 @@ pub(super) struct Lateness {
     single: VecDeque<(Instant, Span, FaultId)>,
     /// When the last frame that was sent, or kept back, has left.
     busy_until: Instant,
+    /// Until then the computer keeps back a frame, which has not come to the card, and those behind it.
+    held_until: Instant,
 }
 
 impl Lateness {
@@ -42,7 +44,17 @@ impl Lateness {
 
 /// Frames that wait in the cards, by the time at which they leave.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Waiting(VecDeque<(Instant, Path, Vec<u8>)>);
+pub(super) struct Waiting(VecDeque<Kept>);
+
+/// A frame that waits.
+#[derive(Clone, Debug)]
+struct Kept {
+    leaves: Instant,
+    path: Path,
+    /// Whether who listens was shown it: it has come to the card.
+    was_shown: bool,
+    bytes: Vec<u8>,
+}
 
 impl Card {
     /// From `at` on frames leave later.
@@ -70,8 +82,13 @@ impl Card {
     /// Whether a frame that is sent at `now` may have to wait.
     #[inline]
     fn is_late(&self, now: Instant) -> bool {
-        let Lateness { all, single, busy_until } = &self.lateness;
+        let Lateness { all, single, busy_until, .. } = &self.lateness;
         !all.is_empty() || !single.is_empty() || *busy_until > now
+    }
+
+    /// Whether a frame that is sent at `now` waits in the computer for another one that is kept back there.
+    fn is_held_by_host(&self, now: Instant) -> bool {
+        self.lateness.held_until > now
     }
 
     /// When a frame leaves that is sent at `now`, if not at once, and who keeps it back, unless it
@@ -85,6 +102,9 @@ impl Card {
         let late =
             all.into_iter().chain(single).filter(|(from, by, _)| *from <= now && *by > Span::ZERO);
         let most = late.max_by_key(|(_, by, _)| *by);
+        if let Some((_, by, _)) = single {
+            lateness.held_until = lateness.held_until.max(now + by);
+        }
         let leaves = most.map_or(now, |(_, by, _)| now + by).max(lateness.busy_until);
         if leaves <= now {
             return None;
@@ -114,28 +134,30 @@ impl Segment {
             let effect = Effect::FrameHeldBack { by: leaves.since(now) };
             self.world.truth.effect(now, fault, Place::Host(path), effect);
         }
+        let is_in_card = !self.world.cards[path.index()].is_held_by_host(now);
+        let was_shown = is_in_card && self.show(now, path, frame);
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
         bytes.extend_from_slice(frame);
         let waiting = &mut self.waiting.0;
-        let before = waiting.iter().take_while(|(other, _, _)| *other <= leaves).count();
-        waiting.insert(before, (leaves, path, bytes));
+        let before = waiting.iter().take_while(|other| other.leaves <= leaves).count();
+        waiting.insert(before, Kept { leaves, path, was_shown, bytes });
         true
     }
 
     /// Sends what was kept back until now.
     #[inline]
     pub(super) fn send_kept_back(&mut self, now: Instant) {
-        while self.waiting.0.front().is_some_and(|(leaves, _, _)| *leaves <= now) {
-            if let Some((leaves, path, frame)) = self.waiting.0.pop_front() {
-                self.send(leaves, path, &frame);
-                self.recycle(frame);
+        while self.waiting.0.front().is_some_and(|kept| kept.leaves <= now) {
+            if let Some(Kept { leaves, path, was_shown, bytes }) = self.waiting.0.pop_front() {
+                self.send(leaves, path, &bytes, was_shown);
+                self.recycle(bytes);
             }
         }
     }
 
     /// When the next frame that was kept back leaves.
     pub(super) fn next_leaves(&self) -> Option<Instant> {
-        self.waiting.0.front().map(|(leaves, _, _)| *leaves)
+        self.waiting.0.front().map(|kept| kept.leaves)
     }
 }

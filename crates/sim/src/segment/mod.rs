@@ -12,6 +12,7 @@ mod identification;
 mod late;
 pub mod plug;
 mod ready;
+mod shown;
 mod signal_wires;
 mod turn;
 
@@ -26,6 +27,7 @@ use linesman_proto::topology::Tree;
 pub use build::BuildError;
 pub use card::{FrameTally, HostPort};
 pub use plug::PlugError;
+pub use shown::Outgoing;
 
 use self::arrivals::Arrivals;
 use crate::controller::{Controller, WatchdogKind};
@@ -83,6 +85,8 @@ pub struct Segment {
     spare: Vec<Vec<u8>>,
     /// Frames that leave later.
     waiting: late::Waiting,
+    /// Frames that go out, for who listens.
+    shown: shown::Shown,
     tally: FrameTally,
 }
 
@@ -112,22 +116,26 @@ impl Segment {
         let now = self.now;
         self.send_kept_back(now);
         if !self.keep_back(now, path, frame) {
-            self.send(now, path, frame);
+            self.send(now, path, frame, false);
         }
     }
 
-    /// A frame leaves its card.
-    fn send(&mut self, now: Instant, path: Path, frame: &[u8]) {
+    /// A frame leaves its card, which may have been shown to who listens before.
+    fn send(&mut self, now: Instant, path: Path, frame: &[u8], was_shown: bool) {
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
         bytes.extend_from_slice(frame);
         bytes.resize(frame.len().max(MIN_LEN), 0);
         self.world.frames += 1;
+        let given = frame;
         let frame = WireFrame { bytes, damage: Damage::default(), number: self.world.frames };
         let duration = frame.duration();
         self.world.look_ahead(now, duration);
         self.world.advance(now);
         self.fetch_strangers();
+        if !was_shown && frame.bytes.len() <= MAX_LEN {
+            self.show(now, path, given);
+        }
         let card = &mut self.world.cards[path.index()];
         if frame.bytes.len() > MAX_LEN || !card.has_carrier(now) {
             card.counts.tx_dropped += 1;

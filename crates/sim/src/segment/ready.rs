@@ -8,6 +8,7 @@ use linesman_proto::topology::Tree;
 
 use super::arrivals::Arrivals;
 use super::late::Waiting;
+use super::shown::Shown;
 use super::{DeviceInfo, FrameTally, Segment};
 use crate::controller::Controller;
 use crate::device::Signals;
@@ -62,6 +63,7 @@ impl Segment {
             strange: BTreeSet::new(),
             spare: Vec::new(),
             waiting: Waiting::default(),
+            shown: Shown::default(),
             tally: FrameTally::default(),
         }
     }

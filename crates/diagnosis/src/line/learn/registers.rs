@@ -235,7 +235,8 @@ fn al_status(data: &[u8], start: RegisterAddress) -> Option<AlStatus> {
 
 /// DL status as far as it was read. Some poll the second byte alone, which says all of loops and
 /// communication; a port is then taken to have a carrier where it communicates, and the rest of the
-/// first byte to be as it was, or well.
+/// first byte to be as it was. Whether a processor feeds its watchdog is not in it: as long as that was never
+/// read nobody is taken to, so that the first reading is none that fell.
 fn dl_status(device: &Device, data: &[u8], start: RegisterAddress) -> Option<DlStatus> {
     if let Some(word) = word_at(data, start, DL_STATUS) {
         return Some(DlStatus(word));
@@ -245,7 +246,7 @@ fn dl_status(device: &Device, data: &[u8], start: RegisterAddress) -> Option<DlS
     if let Some(known) = known.filter(|known| known.to_bytes()[1] == high) {
         return Some(known);
     }
-    let low = known.unwrap_or(DlStatus::default().with_pdi(true, true)).to_bytes()[0];
+    let low = known.unwrap_or(DlStatus::default().with_pdi(true, false)).to_bytes()[0];
     let read = DlStatus::from_bytes([low, high]);
     Some(Port::ALL.into_iter().fold(read, |status, port| {
         let state = status.port_state(port);

@@ -45,7 +45,7 @@ pub(super) fn run(
     let recorder = Arc::new(Mutex::new(recorder));
     let tap = Arc::clone(&recorder);
     if session.record.is_some() {
-        lab.set_tap(Box::new(move |frame| {
+        lab.set_recorder(Box::new(move |frame| {
             if let Some(recorder) = &mut *tap.lock().unwrap_or_else(PoisonError::into_inner) {
                 recorder.frame(frame);
             }
