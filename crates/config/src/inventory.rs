@@ -48,10 +48,17 @@ impl FoundDevice {
     }
 }
 
-/// Number and type of a SubDevice in one word.
+/// Number and name, or type, of a SubDevice in one word. A name that says so itself, as a saved scan gives them, is
+/// not put into brackets once more.
 #[must_use]
-pub fn label(id: DeviceId, type_name: &str) -> String {
-    if type_name.is_empty() { format!("{}", id.no()) } else { format!("{} ({type_name})", id.no()) }
+pub fn label(id: DeviceId, name: &str) -> String {
+    let no = id.no();
+    let says_so = name.strip_prefix(&format!("{no} (")).is_some_and(|rest| rest.ends_with(')'));
+    match name {
+        "" => no.to_string(),
+        name if says_so => name.to_owned(),
+        name => format!("{no} ({name})"),
+    }
 }
 
 /// All SubDevices of a network and how they are wired.

@@ -172,6 +172,25 @@ fn what_kept_a_card_from_sending_is_told_by_whether_it_comes_again() {
     }
 }
 
+// The evidence says when the link went, also once it is back.
+// fires: H101
+#[test]
+fn a_card_lost_its_link_when_it_went_and_not_when_it_came_back() {
+    let mut script = running();
+    host(&mut script, HostEvent::Carrier(true));
+    let before = script.now;
+    host(&mut script, HostEvent::Carrier(false));
+    script.now += 2_000_000_000;
+    host(&mut script, HostEvent::Carrier(true));
+    cycles(&mut script, 100);
+    let report = report(&mut script);
+    assert_eq!(codes(&report), ["H101"], "{}", text(&report));
+    let evidence = &report.findings[0].evidence;
+    let shown = evidence.iter().find(|one| one.text == "card A has no link");
+    let at = shown.and_then(|one| one.time_ns).unwrap_or_else(|| panic!("{}", text(&report)));
+    assert!((before..before + 1_000_000_000).contains(&at.0), "{}", text(&report));
+}
+
 // silent: X512
 #[test]
 fn a_card_without_a_cable_need_not_send() {

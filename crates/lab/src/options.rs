@@ -35,6 +35,8 @@ pub struct LabOptions {
     pub active: bool,
     /// Whether SubDevices with distributed clocks are brought into step with SYNC0, one event a cycle.
     pub clocks: bool,
+    /// Whether the MainDevice's log is kept: what happened, in words.
+    pub log: bool,
     /// What is done with the line from the start.
     pub begin: Begin,
     /// What the report says was looked at; empty for the segment's name.
@@ -52,6 +54,7 @@ impl Default for LabOptions {
             probes: true,
             active: false,
             clocks: false,
+            log: false,
             begin: Begin::Run,
             source: String::new(),
         }

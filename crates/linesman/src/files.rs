@@ -17,14 +17,7 @@ const MAX_TEXT: u64 = 16 * 1024 * 1024;
 /// The text of a file.
 pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
     let name = path.display();
-    let refuse = |error: std::io::Error| {
-        let advice = if error.kind() == std::io::ErrorKind::NotFound {
-            "check the path"
-        } else {
-            "check that it is a file which you may read (`ls -l`)"
-        };
-        Failure::new(format!("{name}: reading {what}: {error}"), advice)
-    };
+    let refuse = |error| unread(path, what, &error);
     let len = fs::metadata(path).map_err(refuse)?.len();
     if len > MAX_TEXT {
         let reason = format!("{name}: {len} bytes, expected {what}, a text of at most {MAX_TEXT}");
@@ -38,6 +31,19 @@ pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
                       `capture:FILE`";
         Failure::new(reason, advice)
     })
+}
+
+/// Why a file was not read.
+fn unread(path: &Path, what: &str, error: &std::io::Error) -> Failure {
+    let name = path.display();
+    if error.kind() == std::io::ErrorKind::NotFound {
+        return Failure::new(
+            format!("{name}: there is no such file, expected {what}"),
+            "check the path",
+        );
+    }
+    let advice = "check that it is a file which you may read (`ls -l`)";
+    Failure::new(format!("{name}: reading {what}: {error}"), advice)
 }
 
 /// What a segment file describes.
@@ -66,9 +72,7 @@ pub(crate) fn segment_file(path: &Path) -> Result<SegmentFile, Failure> {
 
 /// The bytes of a file that is not for people, of at most `most` bytes.
 pub(crate) fn bytes(path: &Path, what: &str, most: u64) -> Result<Vec<u8>, Failure> {
-    let refuse = |error: std::io::Error| {
-        Failure::new(format!("{}: reading {what}: {error}", path.display()), "check the path")
-    };
+    let refuse = |error| unread(path, what, &error);
     let len = fs::metadata(path).map_err(refuse)?.len();
     if len > most {
         let reason = format!("{}: {len} bytes, expected {what} of at most {most}", path.display());

@@ -30,9 +30,17 @@ fn main() -> ExitCode {
     };
     let mut output = Output::new(cli.color);
     let json = cli.command.wants_json();
-    match command::run(cli.command, &mut output) {
+    let ended = match command::run(cli.command, &mut output) {
         Ok(status) => status.into(),
         Err(failure) => refuse(&failure, json, &mut output),
+    };
+    match output.loss() {
+        None => ended,
+        // An answer that is not whole is none, whatever it was.
+        Some(loss) => {
+            output.complain(&loss);
+            exit::Status::NotJudged.into()
+        }
     }
 }
 

@@ -5,9 +5,10 @@ mod support;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use support::capture::{HEADER, Pcap, RECORD};
-use support::{Run, assert_valid, linesman};
+use support::{PROGRAM, Run, assert_valid, linesman};
 use tempfile::TempDir;
 
 /// Files of one test.
@@ -64,7 +65,7 @@ fn a_segment_file_that_is_none() {
             assert!(run.stderr.contains(word), "{name}, `{word}`: {}", run.stderr);
         }
     }
-    refused(&sim(files.0.path().join("missing.toml")), &["missing.toml", "No such file"]);
+    refused(&sim(files.0.path().join("missing.toml")), &["missing.toml", "no such file"]);
 }
 
 #[test]
@@ -193,4 +194,20 @@ fn a_long_capture_is_judged_frame_by_frame() {
     assert_eq!(network["frames"], 300_000);
     assert_eq!(network["datagrams"], 150_000);
     assert_eq!(network["unanswered"], 0);
+}
+
+#[test]
+fn an_answer_that_does_not_fit_on_the_disk_is_none() {
+    let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
+        eprintln!("SKIPPED: there is no /dev/full");
+        return;
+    };
+    let mut command = Command::new(PROGRAM);
+    let output = command.args(["explain", "H110"]).stdout(full).output().expect("it starts");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(
+        told.contains("standard output: writing the answer") && told.contains("do: "),
+        "{told}"
+    );
 }

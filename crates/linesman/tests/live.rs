@@ -167,3 +167,16 @@ fn what_cannot_be_put_on_a_line_is_refused() {
     assert!(run.stderr.contains("K9") && run.stderr.contains("no fault 5"), "{}", run.stderr);
     assert!(run.stderr.contains("--control SOCKET"), "{}", run.stderr);
 }
+
+#[test]
+fn ctrl_c_ends_a_watch_and_what_was_seen_is_judged() {
+    let script = r#"
+        "$LINESMAN" counters near0 --for 600 --every-ms 100 --json & watch=$!
+        sleep 3; kill -INT $watch; wait $watch"#;
+    let Some(run) = beside_segment(script) else { return };
+    assert_eq!(run.status, 0, "{}", run.all());
+    let report = run.json();
+    assert_valid(&report, "counters");
+    assert_eq!(report["diagnosis"]["verdict"], "healthy");
+    assert!((0.1..60.0).contains(&report["seconds"].as_f64().unwrap()), "{report}");
+}

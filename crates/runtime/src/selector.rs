@@ -79,7 +79,8 @@ pub enum SelectorError {
     /// It looks like a path, but of which kind of file?
     #[error(
         "`{given}`: no network interface can be called so. Do: for a capture say `capture:{given}`, \
-         for a virtual segment `sim:{given}`; cards are listed by `linesman interfaces`"
+         for a virtual segment `sim:{given}`; cards are listed by `linesman interfaces`; the socket of \
+         `linesman run --control` is there while that runs"
     )]
     NotAnInterface {
         /// The whole word.

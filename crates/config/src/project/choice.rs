@@ -91,6 +91,19 @@ pub struct ProjectTask {
 }
 
 impl ProjectTask {
+    /// A task with this cycle time, in whole µs, and nothing special.
+    #[must_use]
+    pub fn new(name: &str, cycle: Span) -> Self {
+        Self {
+            name: name.to_owned(),
+            cycle_us: u32::try_from(cycle.as_nanos() / 1_000).unwrap_or(u32::MAX),
+            io_at: IoAt::default(),
+            separate_inputs: false,
+            pre_ticks: 0,
+            repeats: 0,
+        }
+    }
+
     /// The same for the planner.
     #[must_use]
     pub fn options(&self, network: &Network) -> TaskOptions {

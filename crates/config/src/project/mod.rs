@@ -15,6 +15,7 @@
 //! Unknown keys are errors. The order of devices is the order of their numbers.
 
 mod choice;
+mod choose;
 mod description;
 mod device;
 pub mod ethernet;

@@ -19,6 +19,8 @@ pub struct HostHistory {
 pub struct CardHistory {
     /// Whether it has a link, as last heard, with when that changed.
     pub carrier: Option<Seen<bool>>,
+    /// When the link went last.
+    pub carrier_lost: Option<Instant>,
     /// How often the link came or went.
     pub carrier_changes: u64,
     /// Frames it dropped because their check sequence was wrong.
@@ -112,6 +114,7 @@ impl HostHistory {
                 known => {
                     card.carrier_changes += u64::from(known.is_some());
                     card.carrier = Some(Seen::new(on, at, None));
+                    card.carrier_lost = if on { card.carrier_lost } else { Some(at) };
                 }
             },
             HostEvent::CardErrors { crc, other } => {

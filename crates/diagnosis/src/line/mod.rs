@@ -20,6 +20,7 @@ pub mod trip;
 
 use std::collections::VecDeque;
 
+use linesman_config::inventory::label;
 use linesman_config::project::Project;
 use linesman_proto::address::{DeviceId, LogicalAddress, Network, Path, Position, StationAddress};
 use linesman_proto::port::Port;
@@ -215,10 +216,7 @@ impl Line {
     /// What people call a controller: `7 (EL2004)`, or `7` where no name is known.
     #[must_use]
     pub fn label(&self, id: DeviceId) -> String {
-        match self.device(id).and_then(Device::best_name) {
-            Some(name) => format!("{} ({name})", id.no()),
-            None => id.no().to_string(),
-        }
+        label(id, self.device(id).and_then(Device::best_name).unwrap_or_default())
     }
 
     /// The links of the tree with controllers by identity; empty without a tree.

@@ -184,12 +184,14 @@ fn status_drops(line: &Line, end: End) -> Vec<Drop> {
         End::MainDevice(path) => {
             let card = line.host.card(path);
             let Some(carrier) = card.carrier else { return Vec::new() };
-            // Only the latest change is kept.
-            let (at, frame) = (carrier.at, None);
-            match (carrier.value, card.carrier_changes) {
-                (false, _) => vec![Drop { end, at, frame, back: None }],
-                (true, 0) => Vec::new(),
-                (true, _) => vec![Drop { end, at, frame, back: Some(at) }],
+            // Only the latest loss is kept.
+            let frame = None;
+            match card.carrier_lost {
+                None => Vec::new(),
+                Some(at) if carrier.value => {
+                    vec![Drop { end, at, frame, back: Some(carrier.at) }]
+                }
+                Some(at) => vec![Drop { end, at, frame, back: None }],
             }
         }
     }

@@ -233,17 +233,17 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
         None => String::new(),
     };
     let shown = [
-        (ErrorCounter::InvalidFrame(port), frames > 0, frames_text),
-        (
-            ErrorCounter::PhysicalLayer(port),
-            damage.symbols.is_some_and(|symbols| symbols > 0),
-            symbols_text,
-        ),
+        (ErrorCounter::InvalidFrame(port), frames, frames_text),
+        (ErrorCounter::PhysicalLayer(port), damage.symbols.unwrap_or(0), symbols_text),
     ];
-    for (counter, is_shown, text) in shown {
+    for (counter, count, mut text) in shown {
         let track = survey.track(node, counter);
-        if let Some(rise) = track.filter(|_| is_shown).and_then(|track| track.last_rise()) {
+        if let Some(rise) = track.filter(|_| count > 0).and_then(|track| track.last_rise()) {
             let first = track.and_then(|track| survey.rises(track).next()).unwrap_or(rise);
+            // Else the values beside it would contradict it.
+            if count > u64::from(rise.after.saturating_sub(first.before)) {
+                text += "; the counter was cleared in between";
+            }
             let evidence = Evidence::rise(id, counter.address(), Some(port), rise, text)
                 .values(Some(u64::from(first.before)), Some(u64::from(rise.after)));
             condition.evidence.push(evidence);

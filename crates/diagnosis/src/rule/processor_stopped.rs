@@ -8,7 +8,8 @@
 //!
 //! **What it means.** The firmware hangs, or the processor is halted or without supply, while its controller
 //! goes on: frames pass, working counters and AL status stay as they were, outputs are still taken and
-//! inputs stay at their last values. Requests for a state or to the mailbox stay unanswered. Where it is in
+//! inputs stay at their last values. When it stopped while it held a buffer of its process data, its share of the
+//! working counter is missing, too; that is listed beneath. Requests for a state or to the mailbox stay unanswered. Where it is in
 //! step with SYNC signals it may report an error of synchronisation first: that follows.
 //!
 //! **What to do.** Do not trust its inputs. Power it off and on; note its firmware version, and ask its maker
@@ -43,6 +44,17 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             conditions.push(condition(view.line, device, change, back.map(|back| back.at)));
         }
     }
+}
+
+/// Whether the processor of a SubDevice stood still at some moment between two.
+pub(super) fn stood_within(device: &Device, from: Instant, to: Instant) -> bool {
+    let changes = &device.dl.changes;
+    let (mut stops, backs) =
+        (changes.iter().enumerate(), |change: &&DlChange| change.to.pdi_watchdog_ok());
+    stops.any(|(at, change)| {
+        let back = changes.iter().skip(at + 1).find(backs);
+        has_stopped(device, change) && change.at <= to && back.is_none_or(|back| back.at >= from)
+    })
 }
 
 /// Whether the bit fell, and not because the whole device started anew.

@@ -7,7 +7,7 @@
 //! well; it is known from the time after the process data were set up. Who owns which part is known from
 //! the FMMUs (0x0600 and up) that were seen being written. A SubDevice that gives inputs adds 1; one
 //! that takes outputs adds 1 to an LWR and 2 to an LRW. The missing amount and what else is known of the
-//! owners (error or fallen state, a lost link on the way, no answer) tell who it is: those whose shares
+//! owners (error or fallen state, a lost link on the way, no answer, a processor that has stopped) tell who it is: those whose shares
 //! add up to just what is missing, and as few as possible. When the MainDevice itself took a SubDevice
 //! out of SAFEOP or OP, a lower working counter is what it wanted.
 //!
@@ -22,7 +22,7 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 
-use super::{Rule, RulePage, View};
+use super::{Rule, RulePage, View, processor_stopped};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::line::{Cyclic, Deficit, Device, Line, Owner, Trouble};
 use crate::locate::Drops;
@@ -93,7 +93,7 @@ fn suspects(view: &View<'_>, lost: &[Drops], cyclic: &Cyclic, deficit: &Deficit)
     let certain = |devices| Suspects { is_certain: true, devices };
     let signs: Vec<Sign> =
         owners.iter().map(|owner| sign(view, lost, owner.device, deficit)).collect();
-    for least in [Sign::Error, Sign::LinkLost, Sign::Absent] {
+    for least in [Sign::Error, Sign::LinkLost, Sign::Absent, Sign::Stopped] {
         let suspected = shares.iter().zip(&signs).filter(|(_, sign)| **sign >= least);
         let suspected: Vec<_> = suspected.map(|(share, _)| share.clone()).collect();
         // Who hangs behind a SubDevice that failed goes with it, and comes back at a time of its own: the
@@ -107,7 +107,7 @@ fn suspects(view: &View<'_>, lost: &[Drops], cyclic: &Cyclic, deficit: &Deficit)
         }
     }
     let full = |(_, shares): &(DeviceId, Vec<u16>)| shares.first().copied().unwrap_or(0);
-    let in_trouble = || shares.iter().zip(&signs).filter(|(_, sign)| **sign > Sign::None);
+    let in_trouble = || shares.iter().zip(&signs).filter(|(_, sign)| **sign >= Sign::Absent);
     if in_trouble().map(|(share, _)| full(share)).sum::<u16>() >= missing {
         return certain(in_trouble().map(|(share, _)| share.0).collect());
     }
@@ -180,6 +180,9 @@ fn fewest(shares: &[(DeviceId, Vec<u16>)], missing: u16) -> Option<Vec<DeviceId>
 enum Sign {
     /// Nothing.
     None,
+    /// Its processor has stopped: its share is missing where it held a buffer just then, which nobody gives back
+    /// (0x0807 + 8n bit 0). Mostly it held none.
+    Stopped,
     /// It did not answer when it was asked; noise takes single answers, too.
     Absent,
     /// It lies behind a link that was lost.
@@ -207,6 +210,7 @@ fn sign(view: &View<'_>, lost: &[Drops], id: DeviceId, deficit: &Deficit) -> Sig
     match (then.any(|drops| is_behind(drops) == Some(true)), trouble) {
         (true, _) => Sign::LinkLost,
         (false, Some(_)) => Sign::Absent,
+        (false, None) if processor_stopped::stood_within(device, from, to) => Sign::Stopped,
         (false, None) => Sign::None,
     }
 }

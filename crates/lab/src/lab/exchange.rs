@@ -1,9 +1,13 @@
 //! What goes from engine to engine: frames, events, probes, what the cards count.
 
+use std::sync::Arc;
+
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{ClockSettings, Plan, PlanOptions, PlannedDevice};
+use linesman_config::project::{Described, ProjectDevice};
 use linesman_diagnosis::Asked;
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
+use linesman_maindevice::watch::Watch;
 use linesman_maindevice::{Event, ProbeRequest, Target};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::{Instant, Span};
@@ -50,6 +54,10 @@ impl Lab {
         self.transmit = transmit;
         while let Some(event) = self.main.poll_event() {
             self.handle_event(event);
+        }
+        if let Some(watch) = &mut self.watch {
+            watch.handle_timeout(self.now);
+            self.log.extend(std::iter::from_fn(|| watch.poll_entry()));
         }
         while let Some(probe) = self.engine.poll_probe() {
             let device =
@@ -144,6 +152,9 @@ impl Lab {
         if let Event::ScanFailed(error) = &event {
             self.failure = Some(error.to_string());
         }
+        if let Some(watch) = &mut self.watch {
+            watch.handle_event(self.now, &event);
+        }
         if self.events.len() >= KEPT_EVENTS {
             self.events.drain(..KEPT_EVENTS / 2);
         }
@@ -154,6 +165,7 @@ impl Lab {
         match self.make_plan(inventory) {
             Ok(plan) => {
                 self.main.start(self.now, plan.clone());
+                self.watch = self.options.log.then(|| Watch::new(Arc::new(plan.clone())));
                 self.plan = Some(plan);
             }
             Err(error) => self.failure = Some(error),
@@ -162,6 +174,9 @@ impl Lab {
 
     /// The plan for what was found, with the names of the project where they fit.
     fn make_plan(&self, inventory: &Inventory) -> Result<Plan, String> {
+        if self.project.chooses() {
+            return self.chosen_plan(inventory);
+        }
         let mut planned = inventory.planned(self.options.target);
         if planned.len() == self.project.devices.len() {
             for (device, id) in planned.iter_mut().zip(0..) {
@@ -177,6 +192,25 @@ impl Lab {
         }
         let options = PlanOptions { cycle, clock_datagrams, ..PlanOptions::default() };
         Plan::build(&planned, inventory.tree().clone(), &options).map_err(|error| error.to_string())
+    }
+
+    /// The plan that the project chooses, for SubDevices that are what was found in their places: there are no
+    /// descriptions of their makers, but what they say of themselves.
+    fn chosen_plan(&self, inventory: &Inventory) -> Result<Plan, String> {
+        let order = self.tree.order();
+        let mut lookup = |wanted: &ProjectDevice| {
+            let node = self.project.devices.iter().position(|device| device.name == wanted.name);
+            let place = order.iter().position(|at| Some(*at) == node);
+            let found = place.and_then(|place| inventory.devices.get(place));
+            Ok(found
+                .map(|found| Described { profile: found.profile.clone(), ..Described::default() }))
+        };
+        let resolved = self.project.resolve(&mut lookup).map_err(|error| error.to_string())?;
+        let mut devices = resolved.devices;
+        for (device, node) in devices.iter_mut().zip(order) {
+            device.target = self.target_of(DeviceId(*node as u32));
+        }
+        Plan::build(&devices, resolved.tree, &resolved.options).map_err(|error| error.to_string())
     }
 
     /// Turns what the cards counted since the last look into host observations.

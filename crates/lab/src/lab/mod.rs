@@ -15,12 +15,15 @@ use std::collections::VecDeque;
 
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::Plan;
-use linesman_config::project::Project;
+use linesman_config::plan::layout::DEFAULT_TASK;
+use linesman_config::project::{Project, ProjectDevice, ProjectTask};
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostObservation};
 use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
 use linesman_diagnosis::{Engine, Event as FindingEvent, Setup};
+use linesman_maindevice::watch::{LogEntry, Watch};
 use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::address::{DeviceId, Network};
+use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 use linesman_sim::seed::Stream;
@@ -72,6 +75,8 @@ pub struct Lab {
     failure: Option<String>,
     inventory: Option<Inventory>,
     plan: Option<Plan>,
+    watch: Option<Watch>,
+    log: Vec<LogEntry>,
     host_next: Instant,
     host_last: [Option<HostPort>; 2],
     paths: usize,
@@ -86,8 +91,24 @@ impl Lab {
     /// # Errors
     /// [`LabError::Segment`] when the file describes no segment.
     pub fn new(file: &SegmentFile, options: LabOptions) -> Result<Self, LabError> {
+        Self::with_project(file, file.project()?, options)
+    }
+
+    /// A lab for a segment file whose MainDevice runs by this project: that of the file, with choices.
+    ///
+    /// # Errors
+    /// [`LabError::Segment`] when the file describes no segment, [`LabError::Project`] when the project
+    /// contradicts itself.
+    pub fn with_project(
+        file: &SegmentFile,
+        mut project: Project,
+        options: LabOptions,
+    ) -> Result<Self, LabError> {
         let segment = Segment::build(file)?;
-        let mut project = file.project()?;
+        if project.chooses() && project.tasks.is_empty() {
+            // SYNC signals come in the cycle of a task.
+            project.tasks.push(ProjectTask::new(DEFAULT_TASK, options.cycle));
+        }
         if !options.serials {
             project.devices.iter_mut().for_each(|device| device.serial = None);
         }
@@ -107,7 +128,7 @@ impl Lab {
             clock: "virtual".to_owned(),
         };
         let mut settings = Options { ring: paths == 2, ..Options::default() };
-        if options.clocks {
+        if options.clocks || project.devices.iter().any(|device| device.clock.is_some()) {
             settings.drift_frames = DRIFT_FRAMES;
         }
         let settings = settings.on_line(segment.tree().len(), segment.longest_way());
@@ -132,6 +153,8 @@ impl Lab {
             failure: None,
             inventory: None,
             plan: None,
+            watch: None,
+            log: Vec::new(),
             host_next: Instant::ZERO,
             host_last: [None; 2],
             paths,
@@ -251,6 +274,13 @@ impl Lab {
         self.finding_events.pop_front()
     }
 
+    /// The log of the MainDevice since it has a plan, oldest first; empty unless
+    /// [`LabOptions::log`] asks for it.
+    #[must_use]
+    pub fn log(&self) -> &[LogEntry] {
+        &self.log
+    }
+
     /// Frames seen by the diagnosis, both directions.
     #[must_use]
     pub fn frames(&self) -> u64 {
@@ -297,9 +327,15 @@ impl Lab {
             !is_reached
                 || self.segment.controller(*id).is_none_or(|controller| {
                     let status = controller.al_status();
-                    status.error() || status.state().state() != Some(self.options.target)
+                    status.error() || status.state().state() != Some(self.target_of(*id))
                 })
         })
+    }
+
+    /// How far a SubDevice is driven.
+    pub(super) fn target_of(&self, id: DeviceId) -> AlState {
+        let wanted = self.project.devices.get(id.index()).filter(|device| device.state.is_some());
+        wanted.and_then(ProjectDevice::target).unwrap_or(self.options.target)
     }
 
     /// Lets time pass until `until`.

@@ -352,7 +352,7 @@ impl Drawer<'_, '_> {
             CycleTooFast => entry.with("needs_us", self.number(5_500.0, 50_000.0)),
             FirmwareFault => {
                 let how = match self.offer.when {
-                    When::Running => self.word(&["hangs", "restarts"]),
+                    When::Running => self.word(&["hangs", "restarts", "memory-blocked"]),
                     When::FromStart => self.word(&["inputs-frozen", "state-machine-dead"]),
                 };
                 entry.with("how", how)

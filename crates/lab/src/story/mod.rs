@@ -23,6 +23,9 @@
 //! - expect exit 1
 //! ````
 //!
+//! A second block, ```` ```toml project ````, holds what the MainDevice is told beyond who is where: tables of a
+//! project file.
+//!
 //! List items are steps ([`step`]), everything else is told to the reader. Time 0 is when all
 //! SubDevices have reached the target state; `at` waits for a time, the other steps happen where
 //! they stand.

@@ -12,6 +12,8 @@ pub struct Story {
     pub front: Front,
     /// The line it happens on.
     pub segment: SegmentText,
+    /// What the MainDevice is told beyond who is where: tables of a project file.
+    pub choices: Option<String>,
     /// What happens, in order.
     pub steps: Vec<StepAt>,
 }
@@ -89,13 +91,25 @@ impl Story {
         let mut lines = text.lines().enumerate().map(|(at, line)| (at + 1, line));
         let front = front(&mut lines)?;
         let mut toml: Option<String> = None;
+        let mut choices: Option<String> = None;
         let mut steps = Vec::new();
         while let Some((line, text)) = lines.next() {
             if let Some(language) = text.strip_prefix("```") {
                 let block = fenced(&mut lines);
-                if language.trim().starts_with("toml") && toml.replace(block).is_some() {
-                    let what = "a second TOML block: a story has one segment".to_owned();
-                    return Err(StoryError::Line { line, what });
+                let (one, what) = match language.split_whitespace().collect::<Vec<_>>()[..] {
+                    ["toml", "project"] => (
+                        &mut choices,
+                        "a second project: write all that is chosen into one ```toml project block",
+                    ),
+                    ["toml", ..] => (
+                        &mut toml,
+                        "a second TOML block: a story has one segment; what a project chooses is \
+                         written into a ```toml project block",
+                    ),
+                    _ => continue,
+                };
+                if one.replace(block).is_some() {
+                    return Err(StoryError::Line { line, what: what.to_owned() });
                 }
             } else if let Some(item) = text.strip_prefix("- ") {
                 let (at, step) =
@@ -123,7 +137,7 @@ impl Story {
                 "no steps: write them as list items, `- expect healthy`",
             ));
         }
-        Ok(Self { front, segment, steps })
+        Ok(Self { front, segment, choices, steps })
     }
 }
 
@@ -227,6 +241,16 @@ mod tests {
         assert_eq!(steps, [(12, Some(Span::s(1))), (15, None)]);
         let exit = Step::Expect { what: Expectation::Exit(0), within: Span::ZERO };
         assert_eq!(story.steps[1].step, exit);
+    }
+
+    #[test]
+    fn what_the_project_chooses_has_a_block_of_its_own() {
+        let block = "```toml project\n[network]\nsync_window_ns = 500\n```\n";
+        let story = Story::parse(&format!("{STORY}{block}")).unwrap();
+        assert_eq!(story.choices.as_deref(), Some("[network]\nsync_window_ns = 500\n"));
+        assert_eq!(story.segment, Story::parse(STORY).unwrap().segment);
+        let error = Story::parse(&format!("{STORY}{block}{block}")).unwrap_err().to_string();
+        assert!(error.contains("line 20: a second project"), "{error}");
     }
 
     #[test]

@@ -117,14 +117,20 @@ fn try_play(
     let mut file =
         SegmentFile::parse_with(&text, files).map_err(|error| format!("its segment: {error}"))?;
     file.seed.get_or_insert(story.front.seed);
+    let mut project = file.project().map_err(|error| format!("its segment: {error}"))?;
+    if let Some(choices) = &story.choices {
+        project = project.choose(choices).map_err(|error| format!("its project: {error}"))?;
+    }
+    let first_task = project.tasks.first();
     let options = LabOptions {
         target: story.front.target,
-        cycle: story.front.cycle,
+        cycle: first_task.map_or(story.front.cycle, |task| Span::us(u64::from(task.cycle_us))),
         host_counters: story.front.host_counters,
         project: story.front.project,
+        log: true,
         ..LabOptions::default()
     };
-    let mut lab = Lab::new(&file, options).map_err(|error| error.to_string())?;
+    let mut lab = Lab::with_project(&file, project, options).map_err(|error| error.to_string())?;
     let (witness, tap) = Witness::new();
     lab.set_tap(tap);
     let mut stage = Stage { lab, start: Instant::ZERO, faults: Vec::new(), witness };
@@ -368,6 +374,7 @@ fn holds(resolved: &Resolved<'_>, lab: &Lab, witness: &Witness) -> Result<(), St
             let found = exit_status(&diagnosis);
             check(found == *status, &format!("exit status {status}, found {found}"))
         }
+        Expectation::Log { words, told } => witness.logged(words, *told, lab),
         Expectation::Ground(ground) => witness.holds(ground, lab),
         // Reading takes time of its own and is done before.
         Expectation::Object(_) => Ok(()),

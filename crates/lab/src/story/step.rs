@@ -18,6 +18,7 @@
 //! [at TIME] expect all closed [within TIME]
 //! [at TIME] expect line up [within TIME]
 //! [at TIME] expect exit N
+//! [at TIME] expect [no] log "WORDS"
 //! [at TIME] expect object …     what comes of reading an object: see `object`
 //! [at TIME] expect …            what is so on the segment: see `ground`
 //! ```
@@ -143,6 +144,13 @@ pub enum Expectation {
     LineUp,
     /// What `diagnose` would exit with.
     Exit(u8),
+    /// An entry of the MainDevice's log has these words since the last `inject`, or none has.
+    Log {
+        /// The words.
+        words: String,
+        /// Whether there must be one.
+        told: bool,
+    },
     /// Something is so on the segment, whatever the diagnosis says.
     Ground(Ground),
     /// Something comes of reading an object.
@@ -276,6 +284,8 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             words.expect("counter")?;
             Expectation::Ground(Ground::NoOtherCounter)
         }
+        "no" if words.take("log") => Expectation::Log { words: quoted(words)?, told: false },
+        "log" => Expectation::Log { words: quoted(words)?, told: true },
         "no" if words.take("carrier") => Expectation::Ground(Ground::Carrier(false)),
         "no" => {
             words.expect("finding")?;
@@ -304,7 +314,7 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             let count = other.parse().map_err(|_| {
                 format!(
                     "`{other}` cannot be expected: expected `verdict`, `finding`, `no finding`, `N findings`, \
-                     `healthy`, `inconclusive`, `all closed`, `line up`, `exit N`, or something of the \
+                     `healthy`, `inconclusive`, `all closed`, `line up`, `exit N`, `log \"…\"`, or something of the \
                      segment: `counter`, `no other counter`, `port`, `state`, `lost frames`, \
                      `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`, `clock`, `object`"
                 )
@@ -316,6 +326,16 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
         }
     };
     Ok(Step::Expect { what, within })
+}
+
+/// `"words"`: the rest of a step.
+fn quoted(words: &mut Words<'_>) -> Result<String, String> {
+    let rest = std::mem::take(&mut words.rest).trim();
+    let inside = rest.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+    let inside = inside.filter(|inside| !inside.is_empty());
+    inside
+        .map(str::to_owned)
+        .ok_or_else(|| format!("`{rest}`: expected words of the log in double quotes"))
 }
 
 fn named(word: &str) -> Result<What, String> {
@@ -431,6 +451,11 @@ mod tests {
             ("expect all closed within 2 s", Expectation::AllClosed, Span::s(2)),
             ("expect line up within 3 s", Expectation::LineUp, Span::s(3)),
             ("expect exit 1", Expectation::Exit(1), Span::ZERO),
+            (
+                "expect no log \"sync window\" within 1 s",
+                Expectation::Log { words: "sync window".to_owned(), told: false },
+                Span::s(1),
+            ),
         ];
         for (text, what, within) in table {
             assert_eq!(read(text), (None, Step::Expect { what, within }), "{text}");
@@ -448,6 +473,7 @@ mod tests {
             ("inject link-open", "a fault needs a place"),
             ("expect something", "`healthy`"),
             ("expect all open", "expected `closed`"),
+            ("expect log sync window", "in double quotes"),
             ("expect healthy now", "`now` is left over"),
         ] {
             let error = parse(text).unwrap_err();

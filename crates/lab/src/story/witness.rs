@@ -79,6 +79,8 @@ pub(super) struct Witness {
     /// Counters at the last `inject`.
     counters: BTreeMap<(DeviceId, ErrorCounter), u8>,
     tally: FrameTally,
+    /// How long the log of the MainDevice was then.
+    logged: usize,
     /// Counters that were named since.
     named: BTreeSet<(DeviceId, ErrorCounter)>,
 }
@@ -98,6 +100,7 @@ impl Witness {
     pub(super) fn mark(&mut self, lab: &Lab) {
         self.counters = counters(lab).collect();
         self.tally = lab.segment().frames();
+        self.logged = lab.log().len();
         self.named.clear();
     }
 
@@ -108,6 +111,16 @@ impl Witness {
                 moved.iter().filter_map(|one| Some((device(lab, &one.device).ok()?, one.counter)));
             self.named.extend(found);
         }
+    }
+
+    /// Whether an entry of the log has these words, or none has, as it is expected.
+    pub(super) fn logged(&self, words: &str, told: bool, lab: &Lab) -> Result<(), String> {
+        let since = lab.log().get(self.logged..).unwrap_or_default();
+        check(since.iter().any(|entry| entry.text.contains(words)) == told, || {
+            let entries: Vec<&str> = since.iter().map(|entry| entry.text.as_str()).collect();
+            let none = if told { "an" } else { "no" };
+            format!("{none} entry of the log with \"{words}\"; it has\n{}", entries.join("\n"))
+        })
     }
 
     /// Whether an expectation holds now; what is so instead if not.

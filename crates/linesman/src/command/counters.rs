@@ -17,7 +17,7 @@ use super::service::{DeviceReport, Session, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
-use crate::output::{Output, Table};
+use crate::output::{Output, Table, wrapped};
 use crate::text::names::Names;
 use crate::version;
 use samples::{PortReport, Samples};
@@ -83,6 +83,11 @@ pub(crate) struct DeviceCounters {
     processing_unit: Option<u8>,
 }
 
+/// What stands in the table.
+const LEGEND: &str = "for each port: bad frames/bad symbols, fwd marked bad before, lnk lost links, (+7) so many rose meanwhile; `.` is 0, `--` did not answer.";
+/// What it may mean.
+const HISTORY: &str = "What stood before may be history: `--clear --for 60` tells what rises now.";
+
 /// Reads them.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     if let Some(path) = &arguments.csv {
@@ -113,13 +118,11 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     }
     output.text(&table(&session, &samples, output));
     if let Some(diagnosis) = &diagnosis {
-        output.line("");
+        output.line(&format!("\n{}", wrapped("", LEGEND, output.width())));
         diagnose::print(diagnosis, &names(&session), output);
     } else if arguments.seconds.is_none() {
-        output.line(
-            "\nfor each port: bad frames/bad symbols, fwd marked bad before, lnk lost links. What \
-             stood before may be history: `--clear --for 60` tells what rises now.",
-        );
+        let legend = format!("{LEGEND} {HISTORY}");
+        output.text(&format!("\n{}", wrapped("", &legend, output.width())));
     }
     Ok(status)
 }
@@ -136,11 +139,12 @@ fn watch(
     while at < all {
         let step = every.min(all.saturating_sub(at));
         let goes_on = session.wait(step)?;
-        at += step;
-        samples.read(session, at)?;
+        // Ctrl-C ends the watch, and what was seen until then is judged.
         if !goes_on {
             break;
         }
+        at += step;
+        samples.read(session, at)?;
     }
     Ok(at)
 }

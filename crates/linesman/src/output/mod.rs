@@ -29,6 +29,8 @@ pub(crate) struct Output {
     width: usize,
     /// Set once nobody reads any more; then nothing is written, and nothing is an error.
     closed: bool,
+    /// Why something of the answer could not be written, where somebody wants to read it.
+    lost: Option<io::Error>,
 }
 
 impl Output {
@@ -40,6 +42,7 @@ impl Output {
             complaints: Paint::for_stream(color, io::stderr().is_terminal()),
             width: width.map_or(PLAIN_WIDTH, |width| width.clamp(40, MAX_WIDTH)),
             closed: false,
+            lost: None,
         }
     }
 
@@ -64,8 +67,18 @@ impl Output {
             return;
         }
         let mut stdout = io::stdout().lock();
-        // A reader that has seen enough is no error; a full disk cannot be told to anybody here.
-        self.closed = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).is_err();
+        if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+            self.closed = true;
+            // A reader that has seen enough is no error; a full disk is.
+            self.lost = Some(error).filter(|error| error.kind() != io::ErrorKind::BrokenPipe);
+        }
+    }
+
+    /// Why the answer could not be written to its end, if it could not.
+    pub(crate) fn loss(&self) -> Option<Failure> {
+        let lost = self.lost.as_ref()?;
+        let reason = format!("standard output: writing the answer: {lost}");
+        Some(Failure::new(reason, "make room where it is written to, then repeat the command"))
     }
 
     /// Writes text and ends the line.

@@ -3,7 +3,7 @@
 use linesman_diagnosis::report::{EvidenceReport, FindingReport, FindingState, Number};
 use maud::{Markup, html};
 
-use crate::text::finding::{Writer, percent, register_value, severity_word, when};
+use crate::text::finding::{Writer, others, percent, register_value, severity_word, when};
 use crate::text::quantity::time;
 
 /// Most pieces of evidence in a table; a page with thousands of rows helps nobody.
@@ -60,7 +60,7 @@ fn article(finding: &FindingReport, writer: &Writer<'_>) -> Markup {
                 dd {
                     b { (finding.cause) } " (" (percent(finding.confidence)) "): " (finding.cause.meaning())
                 }
-                @for other in &finding.alternatives {
+                @for other in others(finding) {
                     dt { "Or" }
                     dd {
                         b { (other.cause) } " (" (percent(other.confidence)) "): " (other.cause.meaning())

@@ -18,9 +18,16 @@ pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
         let code = &diagnosis.findings[0].code;
         let hint = format!("\n`linesman explain {code}` says how such a finding is made.\n");
         text.push_str(&writer.paint.faint(&hint));
+        if writer.timed && diagnosis.network.devices.0 > 0 && !writer.names.has_any() {
+            text.push_str(&writer.paint.faint(NAMED));
+        }
     }
     text
 }
+
+/// What makes numbers into names.
+const NAMED: &str = "`--project machine.toml`, as `linesman scan WHERE --save machine.toml` writes it, gives the \
+                     SubDevices names.\n";
 
 fn verdict(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     let paint = writer.paint;

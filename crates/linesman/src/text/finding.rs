@@ -37,7 +37,7 @@ impl Writer<'_> {
         let mut text = self.headline(finding);
         self.add(&mut text, "where", &self.names.place(&finding.place));
         self.add(&mut text, "cause", &cause(finding));
-        for other in &finding.alternatives {
+        for other in others(finding) {
             self.add(&mut text, "or", &self.alternative(other));
             if let Some(by) = &other.told_apart_by {
                 self.add(&mut text, "", &format!("told apart by: {by}"));
@@ -51,7 +51,7 @@ impl Writer<'_> {
             let heading = if index == 0 { "do" } else { "" };
             self.add(&mut text, heading, &format!("{}. {action}", index + 1));
         }
-        self.consequences(&mut text, &finding.consequences);
+        self.consequences(&mut text, finding);
         text
     }
 
@@ -132,8 +132,14 @@ impl Writer<'_> {
         format!("{head}{}{tail}", evidence.text)
     }
 
-    fn consequences(&self, text: &mut String, all: &[FindingReport]) {
-        let flat = flattened(all);
+    fn consequences(&self, text: &mut String, cause: &FindingReport) {
+        // The same trouble, come and gone before, is no consequence to a reader.
+        let is_same = |one: &&FindingReport| one.code == cause.code && one.place == cause.place;
+        let (before, flat): (Vec<_>, Vec<_>) =
+            flattened(&cause.consequences).into_iter().partition(is_same);
+        for one in before.iter().filter(|_| self.timed).take(MOST_CONSEQUENCES) {
+            self.add(text, "before", &format!("the same, {}", when(one)));
+        }
         for (index, one) in flat.iter().take(MOST_CONSEQUENCES).enumerate() {
             let heading = if index == 0 { "so also" } else { "" };
             let place = self.names.place(&one.place);
@@ -165,6 +171,11 @@ fn flattened(all: &[FindingReport]) -> Vec<&FindingReport> {
 fn cause(finding: &FindingReport) -> String {
     let percent = percent(finding.confidence);
     format!("{} ({percent}): {}", finding.cause, finding.cause.meaning())
+}
+
+/// What else it may be, as far as that is worth a person's time: below half a percent it is not.
+pub(crate) fn others(finding: &FindingReport) -> impl Iterator<Item = &AlternativeReport> {
+    finding.alternatives.iter().filter(|other| other.confidence >= 0.005)
 }
 
 /// A severity in plain text.

@@ -1,6 +1,8 @@
 //! What people call the SubDevices.
 
+use linesman_config::inventory::label;
 use linesman_diagnosis::report::{DirectionReport, EndReport, PlaceReport};
+use linesman_proto::address::DeviceId;
 
 /// Names by number; a SubDevice without one is called by its number alone.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -20,8 +22,15 @@ impl Names {
             Some("") => no.to_string(),
             // What files without names call them.
             Some(name) if name == format!("SubDevice {no}") => no.to_string(),
-            Some(name) => format!("{no} ({name})"),
+            Some(name) => label(DeviceId(no.saturating_sub(1)), name),
         }
+    }
+
+    /// Whether any SubDevice has a name.
+    pub(crate) fn has_any(&self) -> bool {
+        let is_name =
+            |(name, no): (&String, u32)| !name.is_empty() && *name != format!("SubDevice {no}");
+        self.0.iter().zip(1..).any(is_name)
     }
 
     /// The bare name; empty when it has none.
@@ -65,6 +74,15 @@ impl Names {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    // A saved scan calls SubDevices by number and type.
+    #[test]
+    fn a_name_with_its_number_is_said_once() {
+        let names = ["1 (EK1100)", "1 (EL1008)", "3 (left"].map(str::to_owned);
+        let names = Names::new(names);
+        let said = [1, 2, 3].map(|no| names.device(no));
+        assert_eq!(said, ["1 (EK1100)", "2 (1 (EL1008))", "3 (3 (left)"]);
+    }
 
     #[test]
     fn places_are_told_by_names_and_in_their_direction() {

@@ -115,8 +115,10 @@ fn sockets_of_others(files: &Files) -> Check {
     let every = all.iter().filter(|row| row.get(3) == Some(&"0003")).count();
     let ethercat = ethercat.count();
     if ethercat > 0 {
-        let found =
-            format!("{ethercat} sockets for EtherCAT frames are open: a MainDevice is at work");
+        let (sockets, are) = if ethercat == 1 { ("socket", "is") } else { ("sockets", "are") };
+        let found = format!(
+            "{ethercat} {sockets} for EtherCAT frames {are} open: a MainDevice or a virtual segment is at work"
+        );
         return Check::new(Area::Kernel, NAME, Outcome::Doubtful, found)
             .effect("two MainDevices on one card disturb each other")
             .mend("sudo ss -0 -p   # shows whose sockets they are");

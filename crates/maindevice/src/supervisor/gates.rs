@@ -5,7 +5,8 @@
 //! a network with `ports_open_by_order` the loops towards planned SubDevices stay closed instead. When a port
 //! reports its link again, the section behind it is made ready: those in it that were lost are looked for, and set
 //! up anew once they answer, so that their process data are taken up again; and the link must have stayed up for a
-//! while. Then the port is ordered to open. All other traffic goes on.
+//! while, which is looked at closely: a contact that flaps is up at most looks. Then the port is ordered to open.
+//! All other traffic goes on.
 //!
 //! The cables of a ring are left as they are: a closed loop there is what keeps it alive.
 //!
@@ -14,8 +15,8 @@
 use linesman_config::plan::{DevicePlan, Plan};
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::Port;
-use linesman_proto::register::{self, DlControl, DlStatus, LoopMode};
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::register::{self, DlControl, DlStatus, EcatEvents, LoopMode};
+use linesman_proto::time::Span;
 use linesman_proto::topology::{End, Tree};
 
 use super::{Context, Found};
@@ -25,6 +26,8 @@ use crate::executor::{Wire, lock};
 
 /// A link that came back must stay so long before its port opens.
 const STEADY: Span = Span::ms(100);
+/// How often it is looked at meanwhile. What comes and goes between two looks is kept as an event (0x0210 bit 2).
+const LOOK: Span = Span::ms(10);
 
 /// The second byte of DL control: the loop modes, two bits for each port. Writing it does not touch the rest.
 const LOOPS: RegisterAddress = RegisterAddress(register::DL_CONTROL.address.0 + 1);
@@ -33,8 +36,6 @@ const LOOPS: RegisterAddress = RegisterAddress(register::DL_CONTROL.address.0 + 
 pub(super) struct Gates {
     /// Those with a planned SubDevice behind.
     ports: Vec<Port>,
-    /// Since when a closed port has had its link again, by port.
-    linked: [Option<Instant>; Port::ALL.len()],
     is_set: bool,
 }
 
@@ -42,16 +43,12 @@ impl Gates {
     pub(super) fn new(context: &Context, device: &DevicePlan) -> Self {
         let is_wanted = context.plan.ports_open_by_order;
         let ports = if is_wanted { towards(&context.plan.tree, device) } else { Vec::new() };
-        Self { ports, linked: [None; Port::ALL.len()], is_set: false }
+        Self { ports, is_set: false }
     }
 
     /// The SubDevice starts anew: its controller may have forgotten all.
     pub(super) fn forget(&mut self) {
-        *self = Self {
-            ports: std::mem::take(&mut self.ports),
-            linked: Default::default(),
-            is_set: false,
-        };
+        self.is_set = false;
     }
 
     /// Sets the ports to open by order, or by themselves again.
@@ -68,29 +65,47 @@ impl Gates {
     }
 
     /// Acts upon how the ports stand: opens those that are ready.
-    pub(super) async fn tend(&mut self, context: &Context, device: &DevicePlan, status: DlStatus) {
+    pub(super) async fn tend(&self, context: &Context, device: &DevicePlan, status: DlStatus) {
         if !self.is_set {
             return;
         }
-        let now = context.wire.now();
-        for port in self.ports.clone() {
-            let state = status.port_state(port);
-            let linked = &mut self.linked[port.index()];
-            if !(state.link && state.closed) {
-                *linked = None;
-                continue;
-            }
-            let since = *linked.get_or_insert(now);
-            if now < since + STEADY || !is_prepared(context, device, port) {
+        for port in &self.ports {
+            let is_ready = waits(status, *port) && is_prepared(context, device, *port);
+            if !is_ready || !is_steady(&context.wire, device, *port).await {
                 continue;
             }
             // Written again, the mode opens the loop.
-            if write(&context.wire, device, [(port, LoopMode::AutoClose)]).await {
-                self.linked[port.index()] = None;
-                context.wire.emit(Event::PortOpened { id: device.id, port });
+            if write(&context.wire, device, [(*port, LoopMode::AutoClose)]).await {
+                context.wire.emit(Event::PortOpened { id: device.id, port: *port });
             }
         }
     }
+}
+
+/// Whether a port has its link again and is closed.
+fn waits(status: DlStatus, port: Port) -> bool {
+    let state = status.port_state(port);
+    state.link && state.closed
+}
+
+/// Whether the link of a closed port stays up for a while: it is at each look, and nothing has changed in between.
+async fn is_steady(wire: &Wire, device: &DevicePlan, port: Port) -> bool {
+    let target = Target::Station(device.station);
+    let (events, status) = (register::ECAT_EVENT_REQUEST, register::DL_STATUS);
+    let until = wire.now() + STEADY;
+    while wire.now() < until {
+        wire.sleep(LOOK).await;
+        // In this order: reading the status clears its event.
+        let events = wire.read(target, events.address, events.len);
+        let status = wire.read(target, status.address, status.len);
+        let (Ok(events), Ok(status)) = (events.await, status.await) else { return false };
+        let has_changed = EcatEvents(events.word(0)).contains(EcatEvents::DL_STATUS);
+        let has_answered = events.answered() && status.answered();
+        if !has_answered || has_changed || !waits(DlStatus(status.word(0)), port) {
+            return false;
+        }
+    }
+    true
 }
 
 /// Lets the ports of a SubDevice open by themselves again, where they opened by order: the line is left.

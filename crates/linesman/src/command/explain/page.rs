@@ -18,8 +18,10 @@ pub(super) struct Page {
 enum Part {
     /// A paragraph.
     Text(String),
-    /// A line that stays as it is: Markdown knows better.
+    /// A line that stays as it is: an empty one, a heading, one of a table or of code.
     Line(String),
+    /// A point of a list: its mark and its words.
+    Point(String, String),
     /// A heading with one thing behind it.
     Fact(&'static str, String),
     /// A heading with a list beneath.
@@ -72,6 +74,9 @@ impl Page {
                     text.push_str(format!("  {words}").trim_end());
                     text.push('\n');
                 }
+                Part::Point(mark, words) => {
+                    text.push_str(&wrapped(&format!("  {mark} "), words, width))
+                }
                 Part::Text(words) => text.push_str(&wrapped("  ", words, width)),
                 Part::Fact(name, words) => {
                     let head = format!("  {:<11}", format!("{name}:"));
@@ -95,9 +100,7 @@ pub(super) fn finding(page: &RulePage) -> Page {
     let class = class(page.class);
     let title = format!("Finding {} {} ({severity}, {class})", page.code, page.name);
     let mut result = Page::new(title);
-    for line in page.manual().trim().lines() {
-        result.parts.push(Part::Line(line.to_owned()));
-    }
+    result.parts = parts(page.manual().trim());
     result
 }
 
@@ -105,10 +108,40 @@ pub(super) fn finding(page: &RulePage) -> Page {
 pub(super) fn topic(text: &str) -> Page {
     let (title, rest) = text.split_once('\n').unwrap_or((text, ""));
     let mut page = Page::new(title.trim_start_matches("# ").to_owned());
-    for line in rest.trim().lines() {
-        page.parts.push(Part::Line(line.to_owned()));
-    }
+    page.parts = parts(rest.trim());
     page
+}
+
+/// The paragraphs, points and lines of a page in Markdown, whose own line ends fit no terminal.
+fn parts(markdown: &str) -> Vec<Part> {
+    let mut parts = Vec::new();
+    let mut is_code = false;
+    for line in markdown.lines() {
+        let words = line.trim();
+        let is_fence = words.starts_with("```");
+        is_code ^= is_fence;
+        if is_code || is_fence || words.is_empty() || words.starts_with(['#', '|']) {
+            parts.push(Part::Line(line.to_owned()));
+            continue;
+        }
+        let point = words.split_once(' ').filter(|(mark, _)| is_mark(mark));
+        match (point, parts.last_mut()) {
+            (Some((mark, words)), _) => parts.push(Part::Point(mark.to_owned(), words.to_owned())),
+            (None, Some(Part::Text(text) | Part::Point(_, text))) => {
+                text.push(' ');
+                text.push_str(words);
+            }
+            (None, _) => parts.push(Part::Text(words.to_owned())),
+        }
+    }
+    parts
+}
+
+/// Whether a word begins a point of a list: `*`, `-` or `1.`.
+fn is_mark(word: &str) -> bool {
+    let number = word.strip_suffix('.').unwrap_or_default();
+    matches!(word, "*" | "-")
+        || (!number.is_empty() && number.bytes().all(|digit| digit.is_ascii_digit()))
 }
 
 /// A page about an AL status code.
@@ -242,5 +275,22 @@ const fn class(class: Class) -> &'static str {
         Class::Configuration => "configuration",
         Class::Timing => "timing",
         Class::Host => "host",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_fit_the_terminal_and_keep_their_points() {
+        let text = "One paragraph that goes\non.\n\n* a point\n  of two lines\n* another\n\n| a | table stays |\n\n\
+                    ```sh\nso does code\n```\n1. first";
+        let mut page = Page::new("T".to_owned());
+        page.parts = parts(text);
+        let shown = page.render(Paint::PLAIN, 22);
+        let expected = "T\n  One paragraph that\n  goes on.\n\n  * a point of two\n    lines\n  * another\n\n\
+                        \x20 | a | table stays |\n\n  ```sh\n  so does code\n  ```\n  1. first\n";
+        assert_eq!(shown, expected);
     }
 }

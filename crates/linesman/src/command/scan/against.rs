@@ -3,7 +3,7 @@
 
 use linesman_config::compare::{Comparison, Difference, Side, Unlike, Wanted, compare};
 use linesman_config::identity;
-use linesman_config::inventory::{FoundDevice, Inventory};
+use linesman_config::inventory::{FoundDevice, Inventory, label};
 use linesman_config::project::{Project, ProjectDevice};
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
@@ -128,9 +128,7 @@ struct Names<'a> {
 impl Names<'_> {
     fn planned(&self, node: usize) -> String {
         let name = self.project.devices.get(node).map_or("", |device| device.name.as_str());
-        let no = DeviceId(node as u32).no();
-        // A saved scan has names with numbers.
-        if name.starts_with(&format!("{no} ")) { name.to_owned() } else { format!("{no} ({name})") }
+        label(DeviceId(node as u32), name)
     }
 
     fn found(&self, node: usize) -> String {
