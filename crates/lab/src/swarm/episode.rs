@@ -243,54 +243,21 @@ impl<'a> Episode<'a> {
         if fault.links_lost > 0 || fault.supplies_lost > 0 {
             return true;
         }
-        let seen = |place: &Place, is_frame: bool| match place {
-            // A card counts no symbols; without its counters only what does not come back is seen,
-            // and a few frames may get lost on a good line.
+        // A card counts no symbols; without its counters only what does not come back is seen, and a few
+        // frames may get lost on a good line.
+        let seen = |place: &Place, effect: &Effect| match place {
             Place::Direction(_, End::MainDevice(_)) | Place::Host(_) => {
-                is_frame && self.host_counters
+                self.host_counters && matches!(effect, Effect::FrameSpoiled { .. })
             }
-            Place::Direction(_, End::Controller(..)) | Place::Link(..) | Place::Device(_) => true,
+            Place::Direction(_, End::Controller(..)) | Place::Link(..) | Place::Device(_) => {
+                matches!(effect, Effect::FrameSpoiled { .. } | Effect::SymbolError)
+            }
         };
         self.lab.truth().entries().iter().any(|entry| match entry {
-            Entry::Effect { fault: Some(id), place, effect, .. } if *id == fault.id => match effect
-            {
-                Effect::SymbolError => seen(place, false),
-                Effect::FrameSpoiled { .. } => seen(place, true),
-                Effect::FrameLost { .. }
-                | Effect::ContentRefused { .. }
-                | Effect::SignalLost
-                | Effect::SignalBack
-                | Effect::PowerLost
-                | Effect::PowerBack
-                | Effect::StateRefused { .. }
-                | Effect::Misbehaves(_)
-                | Effect::ProcessorStopped
-                | Effect::ProcessorRuns
-                | Effect::ProcessorRestarted
-                | Effect::EmergencySent { .. }
-                | Effect::CardSilent
-                | Effect::WatchdogSet { .. }
-                | Effect::WatchdogExpired { .. }
-                | Effect::ClockDrifts { .. }
-                | Effect::ClockStopped
-                | Effect::ClockRestarted
-                | Effect::ClockRestored
-                | Effect::SyncCut
-                | Effect::SyncBounces
-                | Effect::SyncBack
-                | Effect::WorkTakes { .. }
-                | Effect::WorkRestored
-                | Effect::FrameHeldBack { .. }
-                | Effect::OldCounters
-                | Effect::WrongDevice
-                | Effect::MissingDevice
-                | Effect::ExtraDevice
-                | Effect::SwappedDevice
-                | Effect::SharedAddress { .. }
-                | Effect::StrangerSent { .. }
-                | Effect::WrongPort => false,
-            },
-            Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => false,
+            Entry::Effect { fault: by, place, effect, .. } => {
+                *by == Some(fault.id) && seen(place, effect)
+            }
+            Entry::Begin { .. } | Entry::End { .. } => false,
         })
     }
 
