@@ -135,8 +135,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         .shown_by(evidence(&spell, last.at, in_step.len()))
         .explaining(in_step.iter().map(|device| Symptom::StateLost(device.id)))
         .explaining([Symptom::FramesLate])
-        .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
-;
+        .advise(
+            "Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.",
+        );
     condition.severity = severity;
     if !in_step.is_empty() {
         condition = condition.advise(
