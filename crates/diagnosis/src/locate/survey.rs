@@ -111,12 +111,10 @@ impl<'a> Survey<'a> {
                     && absence.ended.is_none_or(|ended| rise.after_time <= ended + SAME_EVENT)
             };
             // Who starts anew again and again is missed by nobody, who asks it by its address only when it has one.
-            let fell_then = |change: &AlChange| {
-                change.is_own_fall()
-                    && rise.after_time <= change.at
-                    && change.at <= rise.at + SAME_EVENT
-            };
-            device.al.changes.iter().any(fell_then)
+            let since_then = |change: &&AlChange| rise.after_time <= change.at;
+            let fell_then =
+                |change: &AlChange| change.at <= rise.at + SAME_EVENT && change.is_own_fall();
+            device.al.changes.iter().rev().take_while(since_then).any(fell_then)
                 || device.absences.iter().any(was_gone) && device.has_restarted()
         })
     }
