@@ -136,6 +136,15 @@ fn counters(plant: &mut Plant, links_lost: u8) {
     }
 }
 
+/// For a while no frame comes back; error counters are read before and after it.
+fn all_lost_for_a_while(plant: &mut Plant, links_lost: u8) -> Diagnosis {
+    counters(plant, 0);
+    plant.lost_cycles(40);
+    plant.cycles(50);
+    counters(plant, links_lost);
+    plant.report()
+}
+
 // fires: X513
 #[test]
 fn frames_that_all_stay_away_while_nothing_moves_on_the_line_and_the_card_takes_none_did_not_leave()
@@ -163,11 +172,7 @@ fn frames_that_all_stay_away_while_nothing_moves_on_the_line_and_the_card_takes_
 #[test]
 fn frames_of_a_recording_that_all_stay_away_while_nothing_moves_on_the_line_were_sent() {
     let mut plant = plant();
-    counters(&mut plant, 0);
-    plant.lost_cycles(40);
-    plant.cycles(50);
-    counters(&mut plant, 0);
-    let report = plant.report();
+    let report = all_lost_for_a_while(&mut plant, 0);
     assert_eq!(codes(&report), ["H100"], "{}", text(&report));
     assert_eq!(report.findings[0].cause, FaultName::FalseLink);
 }
@@ -177,11 +182,7 @@ fn frames_of_a_recording_that_all_stay_away_while_nothing_moves_on_the_line_were
 #[test]
 fn a_card_that_is_watched_and_refused_nothing_sent_them_and_nobody_answered() {
     let mut plant = Plant::new(Setup { host_counters: true, ..Setup::default() });
-    counters(&mut plant, 0);
-    plant.lost_cycles(40);
-    plant.cycles(50);
-    counters(&mut plant, 0);
-    let report = plant.report();
+    let report = all_lost_for_a_while(&mut plant, 0);
     assert_eq!(codes(&report), ["H100"], "{}", text(&report));
 }
 
@@ -240,11 +241,7 @@ fn a_recording_notes_frames_that_came_to_the_card_unevenly_where_nobody_keeps_st
 #[test]
 fn with_a_link_that_was_lost_meanwhile_it_is_not_the_computer() {
     let mut plant = plant();
-    counters(&mut plant, 0);
-    plant.lost_cycles(40);
-    plant.cycles(50);
-    counters(&mut plant, 1);
-    let report = plant.report();
+    let report = all_lost_for_a_while(&mut plant, 1);
     assert!(!codes(&report).contains(&"X513"), "{}", text(&report));
 }
 

@@ -354,7 +354,6 @@ impl<'a> Play<'a> {
                     let scene = Scene {
                         tree: self.lab.tree(),
                         host_counters: self.case.host_counters,
-
                         answered_again: *answered_again,
                     };
                     let fits = matches(truth, &scene, claim);
