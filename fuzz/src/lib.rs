@@ -13,6 +13,7 @@ mod frame;
 mod mailbox;
 mod mailbox_client;
 mod observation_file;
+mod pasted;
 mod project;
 mod segment;
 mod segment_file;
@@ -28,6 +29,7 @@ pub use frame::frame;
 pub use mailbox::mailbox;
 pub use mailbox_client::mailbox_client;
 pub use observation_file::observation_file;
+pub use pasted::pasted;
 pub use project::project;
 pub use segment::segment;
 pub use segment_file::segment_file;
@@ -47,6 +49,7 @@ pub const TARGETS: &[Target] = &[
     ("mailbox", mailbox),
     ("mailbox_client", mailbox_client),
     ("observation_file", observation_file),
+    ("pasted", pasted),
     ("project", project),
     ("segment", segment),
     ("segment_file", segment_file),

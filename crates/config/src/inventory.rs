@@ -41,23 +41,28 @@ pub struct FoundDevice {
 }
 
 impl FoundDevice {
-    /// The name people know it by: "3 (EL1008)".
+    /// The name people know it by: "SubDevice 3 (EL1008)".
     #[must_use]
     pub fn label(&self) -> String {
-        label(self.id, &self.profile.type_name)
+        label(self.id, "", &self.profile.type_name)
     }
 }
 
-/// Number and name, or type, of a SubDevice in one word. A name that says so itself, as a saved scan gives them, is
-/// not put into brackets once more.
+/// What people call a SubDevice, everywhere: its name, with its type in parentheses, `Term 4 (EL3104)`; one without a
+/// name by its number, `SubDevice 4 (EL3104)`, and `SubDevice 4` where nothing is known of it. A name that says the
+/// type itself stays as it is.
 #[must_use]
-pub fn label(id: DeviceId, name: &str) -> String {
+pub fn label(id: DeviceId, name: &str, type_name: &str) -> String {
     let no = id.no();
-    let says_so = name.strip_prefix(&format!("{no} (")).is_some_and(|rest| rest.ends_with(')'));
-    match name {
-        "" => no.to_string(),
-        name if says_so => name.to_owned(),
-        name => format!("{no} ({name})"),
+    let numbered = format!("SubDevice {no}");
+    // Scans of earlier versions called SubDevices "4 (EL3104)".
+    let old = name.strip_prefix(&format!("{no} (")).and_then(|rest| rest.strip_suffix(')'));
+    let is_name = old.is_none() && name != no.to_string() && name != type_name;
+    let base = if is_name && !name.is_empty() { name } else { numbered.as_str() };
+    match old.unwrap_or(type_name) {
+        "" => base.to_owned(),
+        kind if base.contains(kind) => base.to_owned(),
+        kind => format!("{base} ({kind})"),
     }
 }
 
@@ -80,7 +85,7 @@ impl Inventory {
     /// The name people know a SubDevice by, or its number.
     #[must_use]
     pub fn label(&self, id: DeviceId) -> String {
-        self.devices.get(id.index()).map_or_else(|| id.no().to_string(), FoundDevice::label)
+        self.devices.get(id.index()).map_or_else(|| label(id, "", ""), FoundDevice::label)
     }
 
     /// What was found, for a comparison with what was planned.
@@ -107,5 +112,29 @@ impl Inventory {
             settings: DeviceSettings::default(),
         };
         self.devices.iter().map(planned).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_subdevice_is_called_by_name_and_type_or_by_its_number() {
+        for (name, type_name, expected) in [
+            ("Term 4", "EL3104", "Term 4 (EL3104)"),
+            ("Term 4 (EL3104)", "EL3104", "Term 4 (EL3104)"),
+            ("B3", "", "B3"),
+            ("", "EL3104", "SubDevice 4 (EL3104)"),
+            ("EL3104", "EL3104", "SubDevice 4 (EL3104)"),
+            ("", "", "SubDevice 4"),
+            ("4", "EL3104", "SubDevice 4 (EL3104)"),
+            ("SubDevice 4", "EL3104", "SubDevice 4 (EL3104)"),
+            ("4 (EL3104)", "", "SubDevice 4 (EL3104)"),
+            ("4 (EL3104)", "EL3104", "SubDevice 4 (EL3104)"),
+            ("5 (left)", "EL3104", "5 (left) (EL3104)"),
+        ] {
+            assert_eq!(label(DeviceId(3), name, type_name), expected, "{name}, {type_name}");
+        }
     }
 }

@@ -48,7 +48,9 @@ fn every_real_capture_is_read_as_what_it_is() {
         assert_eq!(network.datagrams.0, datagrams, "{name}");
         assert!(report.complete, "{name}");
         if name != "ec-soem-sdinfo-no-slaves" {
-            assert_eq!(report.verdict, Verdict::Healthy, "{name}: {}", text(&report));
+            // Of two and of ten frames nobody can say that a line is healthy.
+            let wanted = if datagrams < 10 { Verdict::Inconclusive } else { Verdict::Healthy };
+            assert_eq!(report.verdict, wanted, "{name}: {}", text(&report));
             let said = report.findings.iter().map(|finding| finding.code.as_str());
             let noted = NOTES.iter().filter(|(of, ..)| *of == name).map(|(_, code, _)| *code);
             assert!(said.eq(noted), "{name}: {}", text(&report));

@@ -138,7 +138,7 @@ fn wrong_files_say_where_and_what() {
         ("[[device]]\non = \"maindevice\"\ncolour = 1", "unknown field `colour`"),
         ("[[device]]\non = \"maindevice\"\nports.E = {}", "unknown field `E`"),
         ("[[device]]\non = \"maindevice\"\nports.A = { rx = \"0x10000\" }", "0x0412"),
-        ("[[device]]\non = \"maindevice\"\nports.A = { frame = 300 }", "300"),
+        ("[[device]]\non = \"maindevice\"\nports.A = { frame = -3 }", "a count from 0 up"),
         ("[[device]]\non = \"maindevice\"\nports.A = { frame = 3, rx = 3 }", "either it"),
         ("[[device]]\non = \"maindevice\"\nstate = \"RUN\"", "`RUN` is no state"),
         ("[[device]]\non = \"K1.B\"", "no device is called `K1`"),

@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex};
 
 use linesman_config::project::Project;
 use linesman_diagnosis::observe::{Direction, FrameSeen};
-use linesman_diagnosis::{Engine, Setup};
+use linesman_diagnosis::{Engine, InputKind, Setup};
 use linesman_lab::lab::Lab;
 use linesman_lab::options::LabOptions;
 use linesman_proto::address::{Network, Path};
@@ -113,6 +113,7 @@ fn cpu_ns() -> u64 {
 /// is up.
 fn play(recorded: &Recorded, seconds: u64) -> (f64, Engine) {
     let setup = Setup {
+        input: InputKind::Driven,
         project: Some(recorded.project.clone()),
         host_counters: true,
         probes: true,

@@ -15,8 +15,8 @@ use crate::version::VERSION;
     version = VERSION,
     about = "Walks an EtherCAT line and finds the fault.",
     after_help = "WHERE is eth0 (a network card), eth0+eth1 (a ring), listen:eth0 (beside another \
-                  MainDevice), sim:plant.toml (a virtual segment) or capture:trace.pcapng (or any \
-                  path ending in .pcap, .pcapng or their .gz).\n\nExit status: 0 healthy, 1 an error \
+                  MainDevice), sim:plant.toml (a virtual segment) or, for `diagnose`, files: \
+                  captures, and texts with what was read; - is standard input.\n\nExit status: 0 healthy, 1 an error \
                   or warning was found, 2 nothing could be judged, 3 inconclusive.",
     disable_help_subcommand = true,
     arg_required_else_help = true
@@ -57,7 +57,7 @@ pub(crate) enum Command {
     Interfaces(interfaces::Arguments),
     /// This computer as a suspect: what makes frames late or loses them, and the commands that mend it
     Host(host::Arguments),
-    /// What a finding, AL status code, abort code, register, state or fault name means
+    /// What a code, register, object, state, value, word or line of a log means
     Explain(explain::Arguments),
     /// States of SubDevices: look, ask for another, acknowledge an error
     State(state::Arguments),
@@ -94,6 +94,38 @@ pub(crate) enum Command {
 }
 
 impl Command {
+    /// Where the line is, as the user has named it.
+    pub(crate) fn place(&self) -> Option<&str> {
+        match self {
+            Self::Scan(arguments) => Some(&arguments.place),
+            Self::Diagnose(arguments) => match arguments.places.as_slice() {
+                [place] => Some(place),
+                _ => None,
+            },
+            Self::State(arguments) => Some(&arguments.line),
+            Self::Counters(arguments) => Some(&arguments.line),
+            Self::Probe(arguments) => Some(&arguments.line),
+            Self::Online(arguments) => arguments.place.as_deref(),
+            Self::Run(arguments) => Some(&arguments.on),
+            Self::Sdo(arguments) => Some(&arguments.place.line),
+            Self::History(arguments) => Some(&arguments.place.line),
+            Self::Foe(arguments) => Some(&arguments.place.line),
+            Self::Sii(arguments) => Some(&arguments.place.line),
+            Self::Reg(arguments) => Some(&arguments.place.line),
+            Self::Demo(_)
+            | Self::Plan(_)
+            | Self::Interfaces(_)
+            | Self::Host(_)
+            | Self::Explain(_)
+            | Self::Sim(_)
+            | Self::Fault(_)
+            | Self::Lab(_)
+            | Self::Log(_)
+            | Self::Schema(_)
+            | Self::Completion(_) => None,
+        }
+    }
+
     /// Whether the answer is to be JSON, a failure included.
     pub(crate) fn wants_json(&self) -> bool {
         match self {
@@ -116,7 +148,8 @@ impl Command {
             Self::Reg(arguments) => arguments.json,
             Self::Counters(arguments) => arguments.json,
             Self::Probe(arguments) => arguments.json,
-            Self::Demo(_) | Self::Explain(_) | Self::Schema(_) | Self::Completion(_) => false,
+            Self::Explain(arguments) => arguments.json,
+            Self::Demo(_) | Self::Schema(_) | Self::Completion(_) => false,
         }
     }
 }

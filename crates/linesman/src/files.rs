@@ -1,9 +1,12 @@
 //! Files that users write: read as a whole, with messages that say which file and where.
 
 use std::fs;
+use std::io::Read as _;
 use std::path::Path;
 
 use linesman_config::project::Project;
+use linesman_link::input::Input;
+use linesman_link::whole_file;
 pub(crate) use linesman_runtime::named_files::NamedFiles;
 use linesman_runtime::named_files::{MAX_DESCRIPTION, read_at_most};
 use linesman_sim::segment::Segment;
@@ -23,13 +26,28 @@ pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
         let reason = format!("{name}: {len} bytes, expected {what}, a text of at most {MAX_TEXT}");
         return Err(Failure::new(reason, "check the path"));
     }
-    let bytes = read_at_most(path, MAX_TEXT).map_err(refuse)?;
+    decoded(path, read_at_most(path, MAX_TEXT).map_err(refuse)?, what)
+}
+
+/// The bytes of an input that is a text in some encoding.
+pub(crate) fn bytes_of(input: Input, what: &str) -> Result<Vec<u8>, Failure> {
+    let path = input.name().to_owned();
+    let mut bytes = Vec::new();
+    let read = input.into_stream().take(MAX_TEXT + 1).read_to_end(&mut bytes);
+    read.map_err(|error| unread(&path, what, &error))?;
+    if bytes.len() as u64 > MAX_TEXT {
+        let name = path.display();
+        let reason = format!("{name}: expected {what}, a text of at most {MAX_TEXT} bytes");
+        return Err(Failure::new(reason, "check that this is the right file"));
+    }
+    Ok(bytes)
+}
+
+fn decoded(path: &Path, bytes: Vec<u8>, what: &str) -> Result<String, Failure> {
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        let reason = format!("{name}: at byte {at}: no text in UTF-8, expected {what} in TOML");
-        let advice = "check that this is the right file; save it as UTF-8; for a capture say \
-                      `capture:FILE`";
-        Failure::new(reason, advice)
+        let reason = format!("{}: at byte {at}: no text in UTF-8, expected {what}", path.display());
+        Failure::new(reason, "check that this is the right file; save it as UTF-8")
     })
 }
 
@@ -114,10 +132,17 @@ pub(crate) fn write_new(path: &Path, what: &str, text: &str) -> Result<(), Failu
 /// Writes a file that is not there yet.
 pub(crate) fn write_new_bytes(path: &Path, what: &str, bytes: &[u8]) -> Result<(), Failure> {
     refuse_to_overwrite(path)?;
-    fs::write(path, bytes).map_err(|error| {
-        let reason = format!("{}: writing {what}: {error}", path.display());
-        Failure::new(reason, "check the rights of the directory and its free space")
-    })
+    whole_file::create(path, bytes).map_err(|error| unwritten(path, what, &error))
+}
+
+/// Writes a file in place of the one that is there.
+pub(crate) fn replace(path: &Path, what: &str, text: &str) -> Result<(), Failure> {
+    whole_file::replace(path, text.as_bytes()).map_err(|error| unwritten(path, what, &error))
+}
+
+fn unwritten(path: &Path, what: &str, error: &std::io::Error) -> Failure {
+    let reason = format!("{}: writing {what}: {error}", path.display());
+    Failure::new(reason, "check the rights of the directory and its free space")
 }
 
 /// An error inside a file.

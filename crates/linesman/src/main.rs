@@ -4,12 +4,14 @@
 //! answer through [`output`] and ends with an [`exit::Status`], or with a [`failure::Failure`] when
 //! nothing could be judged.
 
+mod amount;
 mod cli;
 mod command;
 mod drawing;
 mod exit;
 mod failure;
 mod files;
+mod hint;
 mod output;
 mod page;
 mod text;
@@ -28,7 +30,7 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
     };
-    let mut output = Output::new(cli.color);
+    let mut output = Output::new(cli.color).at(cli.command.place());
     let json = cli.command.wants_json();
     let ended = match command::run(cli.command, &mut output) {
         Ok(status) => status.into(),
@@ -46,10 +48,11 @@ fn main() -> ExitCode {
 
 /// Says why nothing could be judged.
 fn refuse(failure: &Failure, json: bool, output: &mut Output) -> ExitCode {
+    let failure = output.made(failure);
     if json {
         output.json(&failure.report());
     }
-    output.complain(failure);
+    output.complain(&failure);
     exit::Status::NotJudged.into()
 }
 

@@ -41,7 +41,7 @@ pub fn open(place: &str) -> Result<Segment, Error> {
             Where::Cards(Cards::open(&names, HostClock::start())?)
         }
         Selector::Segment(path) => virtual_line(&path)?,
-        Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
+        Selector::Listen(_) | Selector::File(_) => {
             return Err(Error::NotDrivable { given: place.to_owned() });
         }
     };

@@ -76,7 +76,7 @@ fn a_device_that_is_plugged_in_elsewhere_is_found_by_its_alias() {
     let project = write(&folder, "plain.toml", &plain);
     let run = drive(&project, &moved, &[]);
     assert_eq!(run.status, 2, "{}", run.all());
-    assert!(run.all().contains("place 3: expected 3 (EL2008)"), "{}", run.all());
+    assert!(run.all().contains("place 3: expected SubDevice 3 (EL2008)"), "{}", run.all());
     // The way through a network configuration of another tool is the same.
     let eni = folder.path().join("line.xml");
     let project = folder.path().join("project.toml");
@@ -104,13 +104,13 @@ fn an_alias_that_two_have_is_refused_and_told() {
     let twice = write(&folder, "twice.toml", &line(&twice));
     let run = drive(&project, &twice, &[]);
     assert!(run.all().contains("2 SubDevices answer to its alias 11"), "{}", run.all());
-    assert!(run.all().contains("linesman sii alias"), "{}", run.all());
+    assert!(run.all().contains("linesman sii WHERE DEVICE alias N"), "{}", run.all());
     let table = [
         ("alias = 11", "addressing = \"alias\"", "expected `alias`, 1 to 65535"),
         (
             "alias = 11",
             "alias = 0x1003\naddressing = \"alias\"",
-            "is an address of `3 (EL2008)` too",
+            "is an address of `SubDevice 3 (EL2008)` too",
         ),
         ("alias = 11", "alias = 11\naddressing = \"allias\"", "allias"),
     ];

@@ -128,7 +128,7 @@ fn the_table_of_28_shows_what_a_cable_in_the_wrong_place_does() {
         .collect();
     assert_eq!(differences, [("missing", 15), ("moved", 22)], "{against:#}");
     let moved = &against["differences"][1]["action"];
-    assert!(moved.as_str().unwrap().contains("into port C of 1 ("), "{moved}");
+    assert!(moved.as_str().unwrap().contains("into port C of SubDevice 1 ("), "{moved}");
     let text = desk.compare(&twenty_eight(true), &[]).stdout;
     for words in ["LNK_MIS C", "VPRS", "NO_COMM", "cables are plugged in the wrong order"] {
         assert!(text.contains(words), "`{words}` is missing:\n{text}");
@@ -156,7 +156,7 @@ fn an_additional_link_and_a_reversed_coupler_are_told() {
     let report = desk.compare(&reversed, &["--json"]).json();
     assert_eq!(kinds(&report), ["reversed"], "{report:#}");
     let action = report["against"]["differences"][0]["action"].as_str().unwrap();
-    assert!(action.contains("exchange the cables at ports A and C of 4 ("), "{action}");
+    assert!(action.contains("exchange the cables at ports A and C of SubDevice 4 ("), "{action}");
 }
 
 /// Plans another line on the same desk, and gives its text.

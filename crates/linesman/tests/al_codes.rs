@@ -50,7 +50,7 @@ fn run(when: When, fault: &str, clock: &str) -> Run {
     let saved = linesman(["scan", &on, "--save", &path("machine.toml")]);
     assert_eq!(saved.status, 0, "{}", saved.all());
     let text = fs::read_to_string(path("machine.toml")).unwrap();
-    let name = "name = \"3 (EL4102)\"";
+    let name = "name = \"SubDevice 3 (EL4102)\"";
     assert!(text.contains(name), "{text}");
     fs::write(path("machine.toml"), text.replace(name, &format!("{name}\n{clock}"))).unwrap();
     let times = match when {

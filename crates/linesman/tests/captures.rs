@@ -86,8 +86,7 @@ fn text_names_the_verdict_first() {
     let run = linesman(["diagnose".as_ref(), file.as_os_str()]);
     assert_eq!(run.status, 0, "{}", run.all());
     // Its computer kept single frames back.
-    let expected =
-        "HEALTHY  ec-replay-ek1100-el2828-el2889.pcapng: nothing is wrong with the line; 1 note\n";
+    let expected = "HEALTHY  ec-replay-ek1100-el2828-el2889.pcapng: nothing wrong was found in what was judged; 1";
     assert!(run.stdout.starts_with(expected), "{}", run.stdout);
     assert!(run.stdout.contains("3 SubDevices, highest state OP"), "{}", run.stdout);
 }

@@ -110,7 +110,7 @@ fn a_probe_tells_link_by_link_what_became_of_many_frames() {
         .filter(|link| link["away"] != serde_json::json!([0, 0]))
         .map(|link| link["far"].as_str().unwrap())
         .collect();
-    assert_eq!(bad, ["3 (K2).A"], "{report:#}");
+    assert_eq!(bad, ["K2 (EK1100).A"], "{report:#}");
     let finding = &report["diagnosis"]["findings"][0];
     assert_eq!(finding["place"]["a"]["port"], "C", "{finding:#}");
     let run = desk.run("probe", &["--frames", "50"]);

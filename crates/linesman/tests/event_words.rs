@@ -66,11 +66,11 @@ fn an_aborted_state_change_is_logged_with_what_was_asked_and_what_was_read() {
     let at = at.unwrap_or_else(|| panic!("{texts:#?}"));
     assert_eq!(
         texts[at],
-        "'2 (EL3102)' (1002): state change aborted (requested PREOP, back to INIT)"
+        "'SubDevice 2 (EL3102)' (1002): state change aborted (requested PREOP, back to INIT)"
     );
     assert!(
         texts[at + 1].starts_with(
-            "'2 (EL3102)' (1002): INIT to PREOP failed, read 0x0011, expected 0x0002, AL 0x0014 no valid firmware"
+            "'SubDevice 2 (EL3102)' (1002): INIT to PREOP failed, read 0x0011, expected 0x0002, AL 0x0014 no valid firmware"
         ),
         "{texts:#?}"
     );
@@ -94,7 +94,9 @@ fn a_line_that_is_cut_and_mended_is_logged_with_times_and_exported() {
         assert!(!found.is_empty(), "{part}: {:#?}", texts(&entries));
         found
     };
-    let lost = when("'3 (EK1100)' (1003) - '4 (EL2008)' (1004) Communication interrupted");
+    let lost = when(
+        "'SubDevice 3 (EK1100)' (1003) - 'SubDevice 4 (EL2008)' (1004) Communication interrupted",
+    );
     let back = when("Communication re-established");
     let time = |entry: &Value| entry["time"].as_str().unwrap().to_owned();
     assert!(time(lost[0]) < time(back[0]), "{} {}", time(lost[0]), time(back[0]));
@@ -118,13 +120,13 @@ fn a_fall_from_op_by_a_fault_of_its_own_is_logged_with_its_code() {
         // Its watchdog is shorter than the cycle, while all others get their outputs in time.
         (
             "kind = \"watchdog-starved\"\ndevice = \"O2\"\nwatchdog_ms = 0.3\n",
-            "'3 (EL4102)' (1003): abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog",
+            "'SubDevice 3 (EL4102)' (1003): abnormal state change (from OP to SAFEOP), AL 0x001B sync manager watchdog",
             "task which sends the outputs",
         ),
         // Its firmware crashes and starts anew.
         (
             "kind = \"firmware-fault\"\ndevice = \"O2\"\nhow = \"restarts\"\n",
-            "'3 (EL4102)' (1003): abnormal state change (from OP to INIT), AL 0x0060",
+            "'SubDevice 3 (EL4102)' (1003): abnormal state change (from OP to INIT), AL 0x0060",
             "",
         ),
     ] {
@@ -139,7 +141,8 @@ fn a_fall_from_op_by_a_fault_of_its_own_is_logged_with_its_code() {
         );
         assert_eq!(entries[at]["no"], 3);
         assert!(
-            texts[at + 1].starts_with("'3 (EL4102)' (1003): ") && texts[at + 1].contains(words),
+            texts[at + 1].starts_with("'SubDevice 3 (EL4102)' (1003): ")
+                && texts[at + 1].contains(words),
             "{texts:#?}"
         );
         // It was up before, and it is nobody else's.
@@ -193,7 +196,12 @@ fn a_wrong_working_counter_is_followed_at_once_by_what_was_read_because_of_it() 
     let text = entries
         .iter()
         .find(|entry| entry["text"].as_str().unwrap().contains("Communication interrupted"));
-    assert!(text.unwrap()["text"].as_str().unwrap().contains("'3 (EK1100)' (1003) - '4 (EL2008)'"));
+    assert!(
+        text.unwrap()["text"]
+            .as_str()
+            .unwrap()
+            .contains("'SubDevice 3 (EK1100)' (1003) - 'SubDevice 4 (EL2008)'")
+    );
 }
 
 /// Steady noise moves counters with every reading, and those of everybody behind.

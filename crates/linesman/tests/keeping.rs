@@ -35,7 +35,7 @@ fn driven(fault: &str, network: &str, device: &str) -> (Vec<bool>, String) {
     let saved = linesman(["scan", &on, "--save", &path("machine.toml")]);
     assert_eq!(saved.status, 0, "{}", saved.all());
     let text = fs::read_to_string(path("machine.toml")).unwrap();
-    let name = "name = \"2 (EL3102)\"";
+    let name = "name = \"SubDevice 2 (EL3102)\"";
     assert!(text.contains(name), "{text}");
     let text = text.replace(name, &format!("{name}\n{device}"));
     let first = text.find("[[device]]").unwrap();

@@ -88,18 +88,23 @@ fn an_idle_line_is_healthy_for_both_who_look() {
 
 #[test]
 fn a_line_that_another_maindevice_drives_is_left_alone() {
+    // It sits at the other end of the cable, as one of another computer would: no lock tells of it.
     let script = r#"
-        "$LINESMAN" diagnose near0 --seconds 2 > /dev/null &
+        ip link add near1 type veth peer name far1; ip link set near1 up; ip link set far1 up
+        "$LINESMAN" diagnose far1 --seconds 3 > /dev/null 2>&1 &
         other=$!
         sleep 0.8
-        "$LINESMAN" scan near0; echo "scan $?"
-        "$LINESMAN" diagnose near0 --seconds 0.1; echo "diagnose $?"
-        wait $other; echo "other $?"
+        "$LINESMAN" scan near1; echo "scan $?"
+        "$LINESMAN" diagnose near1 --seconds 0.1; echo "diagnose $?"
+        "$LINESMAN" run --on near1 --seconds 0.1; echo "run $?"
+        wait $other
     "#;
     let Some(run) = beside_segment(script) else { return };
-    assert_eq!(run.stdout, "scan 2\ndiagnose 2\nother 0\n", "{}", run.stderr);
-    assert_eq!(run.stderr.matches("another MainDevice drives this line").count(), 2);
-    assert_eq!(run.stderr.matches("`linesman diagnose listen:near0`").count(), 2);
+    assert_eq!(run.stdout, "scan 2\ndiagnose 2\nrun 2\n", "{}", run.stderr);
+    let heard = "near1: another MainDevice drives this line: ";
+    assert_eq!(run.stderr.matches(heard).count(), 3, "{}", run.stderr);
+    assert_eq!(run.stderr.matches("EtherCAT frames from").count(), 3, "{}", run.stderr);
+    assert_eq!(run.stderr.matches("`linesman diagnose listen:near1`").count(), 3);
 }
 
 #[test]
@@ -165,7 +170,7 @@ fn what_cannot_be_put_on_a_line_is_refused() {
     assert!(run.stdout.starts_with("No faults so far.\n0\n2\n2\n{"), "{}", run.all());
     assert!(run.stdout.ends_with("}\n2\n"), "{}", run.all());
     assert!(run.stderr.contains("K9") && run.stderr.contains("no fault 5"), "{}", run.stderr);
-    assert!(run.stderr.contains("--control SOCKET"), "{}", run.stderr);
+    assert!(run.stderr.contains("--on NIC --control "), "{}", run.stderr);
 }
 
 #[test]

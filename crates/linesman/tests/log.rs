@@ -9,6 +9,7 @@ use std::path::Path;
 use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::{EntryKind, Severity};
 use linesman_runtime::event_log::{EventLog, StoredEntry};
+use support::capture::Pcap;
 use support::{PROGRAM, assert_valid, linesman};
 use tempfile::TempDir;
 
@@ -26,6 +27,7 @@ fn write(path: &Path) {
         device_no: Some(no),
         device_name: Some(format!("Term {}", 63 + no)),
         text: text.to_owned(),
+        finding: None,
     };
     let lost = "'Term 64 (EK1100)' (1015) - 'Term 70 (EL1262)' (101b) Communication interrupted";
     let back = "'Term 64 (EK1100)' (1015) Communication re-established";
@@ -48,7 +50,8 @@ fn a_log_is_read_filtered_and_exported() {
     let all = linesman(["log", file]);
     assert_eq!(all.status, 0, "{}", all.all());
     assert!(
-        all.stdout.contains("2016-11-17 10:16:50.182  error    'Term 64 (EK1100)' (1015) - "),
+        all.stdout
+            .contains("2016-11-17 10:16:50.182 +00:00  error    'Term 64 (EK1100)' (1015) - "),
         "{}",
         all.stdout
     );
@@ -70,6 +73,49 @@ fn a_log_is_read_filtered_and_exported() {
     assert_eq!(json["runs"].as_array().unwrap().len(), 2);
     let runs = linesman(["log", file, "--runs"]);
     assert!(runs.stdout.contains("2016-11-17 10:00:00.000"), "{}", runs.stdout);
+}
+
+/// Runs the program in Central Europe.
+fn in_berlin(words: &[&str]) -> String {
+    let mut command = std::process::Command::new(PROGRAM);
+    // As a rule, so that no table of time zones is needed.
+    command.args(words).env("TZ", "CET-1CEST,M3.5.0,M10.5.0/3");
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn people_read_times_of_their_zone_and_programs_utc() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("log.sqlite");
+    write(&path);
+    let file = path.to_str().unwrap();
+    let all = in_berlin(&["log", file]);
+    assert!(all.contains("2016-11-17 11:16:50.182 +01:00  error "), "{all}");
+    assert!(in_berlin(&["log", file, "--runs"]).contains("2016-11-16 09:00:00.000 +01:00"));
+    // A time without a zone is one of this host; what is shown is taken back.
+    for since in ["2016-11-17 11:16:51", "2016-11-17T11:16:51", "2016-11-17 11:16:51.000 +01:00"] {
+        let some = in_berlin(&["log", file, "--since", since]);
+        assert!(some.contains("re-established") && some.contains("1 of 3 entries"), "{some}");
+    }
+    assert!(in_berlin(&["log", file, "--since", "2016-11-17"]).contains("2 of 3 entries"));
+    for machine in ["--csv", "--json"] {
+        let text = in_berlin(&["log", file, machine]);
+        assert!(text.contains("2016-11-17T10:16:50.182000000Z"), "{text}");
+    }
+    // A diagnosis, too: the capture begins at 22:13:20 UTC.
+    let path = folder.path().join("trace.pcap");
+    let mut capture = Pcap::new();
+    capture.exchanges(100);
+    std::fs::write(&path, &capture.0).unwrap();
+    let capture = path.to_str().unwrap();
+    let text = in_berlin(&["diagnose", capture]);
+    assert!(
+        text.contains("begun 2023-11-14 23:13:20.000 +01:00; times count from there"),
+        "{text}"
+    );
+    assert!(in_berlin(&["diagnose", capture, "--json"]).contains("2023-11-14T22:13:20.000000000Z"));
 }
 
 // S0 L2272-2390, S1 L975-1006: 2,630 of 38,332 events are those of one source, found and exported after the
@@ -96,6 +142,7 @@ fn of_38332_events_the_2630_of_one_source_are_filtered_and_exported() {
                 device_no: Some(if is_one { 14 } else { 3 }),
                 device_name: Some(if is_one { "Term 14" } else { "Term 3" }.to_owned()),
                 text: format!("event {number}"),
+                finding: None,
             }
         })
         .collect();

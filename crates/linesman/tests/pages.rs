@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use linesman_diagnosis::rule;
+use linesman_diagnosis::observation_file::ObservationFile;
+use linesman_diagnosis::{Setup, rule};
 use linesman_proto::port::Port;
 use linesman_sim::device::library;
 use linesman_sim::fault::{KINDS, Shape, manual};
@@ -206,4 +207,34 @@ fn every_key_of_the_segment_file_is_explained() {
         keys += 1;
     }
     assert!(keys > 20, "{keys} keys");
+}
+
+#[test]
+fn every_key_of_observation_files_is_explained() {
+    let page = std::fs::read_to_string(docs().join("guide/observations.md")).unwrap();
+    let schema = serde_json::to_value(schemars::schema_for!(ObservationFile)).unwrap();
+    let mut tables = vec![&schema];
+    tables.extend(schema["$defs"].as_object().unwrap().values());
+    let keys = tables.iter().filter_map(|table| table["properties"].as_object()).flatten();
+    let is_missing = |key: &&String| {
+        let as_value = page.lines().any(|line| line.starts_with(&format!("{key} = ")));
+        !page.contains(&format!("`{}`", key.to_lowercase()))
+            && !as_value
+            && key.as_str() != "closes_at"
+    };
+    let missing: Vec<&String> = keys.map(|(key, _)| key).filter(is_missing).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+#[test]
+fn observation_files_of_the_guide_can_be_judged() {
+    let page = std::fs::read_to_string(docs().join("guide/observations.md")).unwrap();
+    let files: Vec<&str> =
+        page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert!(files.len() >= 4);
+    for text in files {
+        let file = ObservationFile::parse(text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let diagnosis = file.diagnosis(Setup::default());
+        assert!(!diagnosis.findings.is_empty(), "each shows something:\n{text}");
+    }
 }

@@ -116,7 +116,7 @@ fn interference_a_fault_inside_a_device_and_its_firmware_are_told_apart() {
         "{text}"
     );
     assert!(!causes(finding).contains(&"emc-noise"), "{:?}", causes(finding));
-    assert!(text.contains("Exchange SubDevice 5"), "{text}");
+    assert!(text.contains("Exchange T5 ("), "{text}");
 
     // Frames come back whole, and one device does not do its work: no counter moves.
     let (firmware, text) =

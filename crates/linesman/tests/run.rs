@@ -102,7 +102,7 @@ fn another_line_than_the_project_says_is_not_driven() {
     fs::write(place.path("plant.toml"), PLANT.replace("EL2008", "EL2004")).unwrap();
     let run = place.run(Some("machine.toml"), &["--seconds", "1"]);
     assert_eq!(run.status, 2, "{}", run.all());
-    assert!(run.stderr.contains("place 3: expected 3 (EL2008)"), "{}", run.stderr);
+    assert!(run.stderr.contains("place 3: expected SubDevice 3 (EL2008)"), "{}", run.stderr);
     assert!(run.stderr.contains("product code"), "{}", run.stderr);
     fs::write(place.path("plant.toml"), PLANT.split("[[device]]\nname = \"O1\"").next().unwrap())
         .unwrap();
@@ -113,13 +113,64 @@ fn another_line_than_the_project_says_is_not_driven() {
 
 #[test]
 fn a_fault_while_it_runs_is_told_and_gives_status_1() {
-    let fault = "[[fault]]\nkind = \"device-off\"\ndevice = \"O1\"\nfrom_ms = 1000\nto_ms = 1500\n";
-    let place = Place::new(&format!("{PLANT}{fault}"));
+    let place = Place::new(&format!("{PLANT}{O1_IS_OFF}"));
     let run = place.run(None, &["--seconds", "4"]);
     assert_eq!(run.status, 1, "{}", run.all());
     for words in ["Communication interrupted", "Communication re-established"] {
         assert!(run.stdout.contains(words), "{words}: {}", run.stdout);
     }
+}
+
+const O1_IS_OFF: &str =
+    "[[fault]]\nkind = \"device-off\"\ndevice = \"O1\"\nfrom_ms = 1000\nto_ms = 1500\n";
+
+#[test]
+fn findings_of_a_run_stand_in_its_log_and_at_its_end() {
+    let place = Place::new(&format!("{PLANT}{O1_IS_OFF}"));
+    let log = place.path("log.sqlite").display().to_string();
+    let run = place.run(None, &["--seconds", "4", "--log", &log]);
+    assert_eq!(run.status, 1, "{}", run.all());
+    let (_, end) = run.stdout.split_once("Findings: ").unwrap();
+    for words in ["error", "ERROR", "where", "cause", "when", "do  ", "`linesman explain "] {
+        assert!(end.contains(words), "{words}: {end}");
+    }
+    let read = linesman(["log", &log, "--kind", "finding", "--json"]).json();
+    assert_valid(&read, "log");
+    let entries = read["entries"].as_array().unwrap();
+    let mine = entries.iter().filter(|entry| entry["finding"]["code"] == "H101");
+    let of_link: Vec<(&str, &str)> = mine
+        .map(|entry| (&entry["finding"]["event"], &entry["severity"]))
+        .map(|(event, severity)| (event.as_str().unwrap(), severity.as_str().unwrap()))
+        .collect();
+    let expected = [("opened", "error"), ("confirmed", "error"), ("closed", "info")];
+    assert_eq!(of_link, expected, "{entries:#?}");
+    let link = entries.iter().find(|entry| entry["finding"]["code"] == "H101").unwrap();
+    assert_eq!((&link["no"], &link["finding"]["cause"]), (&3.into(), &"link-open".into()));
+    assert!(link["finding"]["place"].as_str().unwrap().contains("port B"), "{link}");
+    let text = linesman(["log", &log, "--text", "H101"]).stdout;
+    assert!(text.contains("H101 link-lost opened: link ") && text.contains("link-open"), "{text}");
+    // Who does not want them gets none.
+    let quiet = place.path("quiet.sqlite").display().to_string();
+    place.run(None, &["--seconds", "2", "--log", &quiet, "--log-without", "finding"]);
+    let read = linesman(["log", &quiet, "--kind", "finding", "--json"]).json();
+    assert_eq!(read["entries"], serde_json::json!([]));
+}
+
+#[test]
+fn the_report_of_a_run_has_the_diagnosis() {
+    let place = Place::new(&format!("{PLANT}{O1_IS_OFF}"));
+    let run = place.run(None, &["--seconds", "4", "--json"]);
+    assert_eq!(run.status, 1, "{}", run.all());
+    let report = run.json();
+    assert_valid(&report, "run");
+    assert_valid(&report["diagnosis"], "diagnosis");
+    assert_eq!(report["diagnosis"]["verdict"], "faulty");
+    assert!(report["diagnosis"]["tool"].as_str().unwrap().starts_with("linesman "));
+    let run = place.run(None, &["--seconds", "4", "--json", "--no-diagnosis"]);
+    assert_eq!((run.status, &run.json()["diagnosis"]), (0, &serde_json::Value::Null));
+    let place = Place::new(PLANT);
+    let run = place.run(None, &["--seconds", "2"]);
+    assert!(run.stdout.ends_with("\nNo findings.\n"), "{}", run.stdout);
 }
 
 #[test]

@@ -77,8 +77,16 @@ fn a_scan_names_the_terminal_that_needs_a_feed_before_it() {
     // 2,000 mA are supplied, each terminal takes 110 mA.
     let (text, json) = scan(19);
     let said = text.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(said.contains("overloaded from 20 (EL2008) on: 90 mA are missing"), "{}", text.all());
-    assert!(said.contains("power feed terminal (EL94xx) before 20 (EL2008)"), "{}", text.all());
+    assert!(
+        said.contains("overloaded from SubDevice 20 (EL2008) on: 90 mA are missing"),
+        "{}",
+        text.all()
+    );
+    assert!(
+        said.contains("power feed terminal (EL94xx) before SubDevice 20 (EL2008)"),
+        "{}",
+        text.all()
+    );
     assert_valid(&json, "scan");
     assert_eq!(json["ebus"][0]["first_negative"], 20);
     let (text, json) = scan(18);
@@ -109,7 +117,7 @@ fn a_cut_cable_is_one_finding_that_names_the_link() {
     assert_eq!(place["a"], serde_json::json!({ "no": 1, "port": "C" }));
     assert_eq!(place["b"], serde_json::json!({ "no": 4, "port": "A" }));
     let text = with_segment("diagnose", cut, &[]);
-    assert!(text.stdout.contains("1 (K1) port C"), "names: {}", text.stdout);
+    assert!(text.stdout.contains("K1 (EK1100) port C"), "names: {}", text.stdout);
 }
 
 #[test]

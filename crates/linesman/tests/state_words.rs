@@ -81,11 +81,11 @@ fn the_example_tells_by_the_two_words_that_data_are_missing_and_who_is_to_blame(
     let mut told = Vec::new();
     watched::watch(&format!("sim:{}", file.display()), |line| told.push(line)).unwrap();
     // First all that share the datagram, then the one, and its neighbour at whose port it was.
-    for terminal in ["2 (EL1008)", "3 (EL1008)", "4 (EL1008)"] {
+    for terminal in ["SubDevice 2 (EL1008)", "SubDevice 3 (EL1008)", "SubDevice 4 (EL1008)"] {
         assert!(told.contains(&format!("{terminal}: data missing, OP")), "{told:#?}");
     }
     let last = |name: &str| told.iter().rfind(|line| line.starts_with(name)).unwrap().as_str();
-    assert_eq!(last("2 (EL1008)"), "2 (EL1008): data good, OP");
-    assert_eq!(last("3 (EL1008)"), "3 (EL1008): data good, OP LNK_MIS B");
-    assert_eq!(last("4 (EL1008)"), "4 (EL1008): data missing, INIT NO_COMM");
+    assert_eq!(last("SubDevice 2 (EL1008)"), "SubDevice 2 (EL1008): data good, OP");
+    assert_eq!(last("SubDevice 3 (EL1008)"), "SubDevice 3 (EL1008): data good, OP LNK_MIS B");
+    assert_eq!(last("SubDevice 4 (EL1008)"), "SubDevice 4 (EL1008): data missing, INIT NO_COMM");
 }

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::interface::Holder;
+
 /// A failed use of a network card. Its text names the card, what was tried, and what to do next.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -57,6 +59,14 @@ pub enum LinkError {
         /// The program that needs the capability.
         binary: PathBuf,
     },
+    /// Another process sends on the card.
+    #[error("{interface}: {}: {holder}. Do: {}", in_use(.holder), beside(.interface, .holder))]
+    InUse {
+        /// The name of the interface.
+        interface: String,
+        /// Which process.
+        holder: Holder,
+    },
     /// A frame is longer than the interface can send.
     #[error(
         "{interface}: sending a frame of {len} bytes, expected at most {}: the MTU is {mtu}, \
@@ -109,6 +119,25 @@ impl LinkError {
 /// Where this program lies, for those who are to give it rights.
 pub(crate) fn this_program() -> PathBuf {
     std::env::current_exe().unwrap_or_else(|_| PathBuf::from("linesman"))
+}
+
+fn in_use(holder: &Holder) -> &'static str {
+    match holder.is_segment() {
+        true => "a virtual segment answers on this card already",
+        false => "another MainDevice drives this line",
+    }
+}
+
+fn beside(interface: &str, holder: &Holder) -> String {
+    if holder.is_segment() {
+        return "end it first, or name another card".to_owned();
+    }
+    let control = holder.path_given("--control").filter(|path| path.exists());
+    let ask = control.map_or_else(String::new, |path| {
+        let path = path.display();
+        format!(", ask it through its socket, `linesman online {path}`")
+    });
+    format!("end it first{ask}, or watch without sending, `linesman diagnose listen:{interface}`")
 }
 
 fn list(names: &[String]) -> String {

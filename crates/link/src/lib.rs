@@ -1,9 +1,10 @@
 //! Network cards, clocks and capture files: the only crate that touches them.
 //!
-//! Read first: [`capture`] for files, [`clock`] for time, [`interface`] for the cards there are,
+//! Read first: [`input`] for what a command reads, [`capture`] for recordings in it, [`clock`] for time, [`interface`] for the cards there are,
 //! [`socket`] for frames on them, [`host`] for what the host itself does wrong, [`computer`] for why it
 //! may, [`real_time`] for what
-//! a cycle asks of it, [`shared_image`] for process data that other programs see.
+//! a cycle asks of it, [`shared_image`] for process data that other programs see, [`signal`] for what is
+//! done about a signal, [`whole_file`] for files that are written as a whole.
 
 #![deny(unsafe_code)]
 
@@ -13,8 +14,11 @@ pub mod computer;
 pub mod direction;
 pub mod error;
 pub mod host;
+pub mod input;
 pub mod interface;
 pub mod real_time;
 pub mod shared_image;
+pub mod signal;
 pub mod socket;
 pub mod unix_time;
+pub mod whole_file;

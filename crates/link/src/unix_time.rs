@@ -6,6 +6,9 @@
 use std::fmt;
 use std::ops::Add;
 
+use jiff::Timestamp;
+use jiff::civil::DateTime;
+use jiff::tz::TimeZone;
 use linesman_proto::time::Span;
 
 /// Nanoseconds since 1970-01-01 00:00 UTC; before that, negative.
@@ -41,13 +44,38 @@ impl UnixTime {
     /// The time that an RFC 3339 text names; `None` when it names none.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
-        Some(Self(text.parse::<jiff::Timestamp>().ok()?.as_nanosecond()))
+        Some(Self(text.parse::<Timestamp>().ok()?.as_nanosecond()))
+    }
+
+    /// The time that somebody of this host means: RFC 3339, what [`local`](Self::local) writes, or a date
+    /// with or without a time, in the time zone of the host.
+    #[must_use]
+    pub fn parse_local(text: &str) -> Option<Self> {
+        let text = text.trim();
+        let joined = text.replacen(" +", "+", 1).replacen(" -", "-", 1);
+        let there = || Self::parse(text).or_else(|| Self::parse(&joined));
+        let here = || {
+            let zoned = text.parse::<DateTime>().ok()?.to_zoned(TimeZone::system()).ok()?;
+            Some(Self(zoned.timestamp().as_nanosecond()))
+        };
+        there().or_else(here)
+    }
+
+    /// For people: in the time zone of this host (TZ), to the millisecond, with the offset from UTC:
+    /// `2026-03-01 11:16:50.182 +01:00`.
+    #[must_use]
+    pub fn local(self) -> String {
+        let zoned = |stamp: Timestamp| stamp.to_zoned(TimeZone::system());
+        match Timestamp::from_nanosecond(self.0).map(zoned) {
+            Ok(zoned) => zoned.strftime("%Y-%m-%d %H:%M:%S%.3f %:z").to_string(),
+            Err(_) => self.to_string(),
+        }
     }
 
     /// As RFC 3339 with nanoseconds, in UTC; `None` outside the years -9999..=9999.
     #[must_use]
     pub fn rfc3339(self) -> Option<String> {
-        let stamp = jiff::Timestamp::from_nanosecond(self.0).ok()?;
+        let stamp = Timestamp::from_nanosecond(self.0).ok()?;
         Some(format!("{stamp:.9}"))
     }
 }

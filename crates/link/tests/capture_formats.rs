@@ -234,36 +234,86 @@ fn cooked_frames_are_rebuilt_and_other_link_types_counted() {
     assert_eq!(reader.skipped(), skipped);
 }
 
-#[test]
-fn gzip_is_known_by_its_bytes_and_its_damage_ends_the_capture() {
+/// A capture of several blocks of zstd, 128 KiB each, that does not shrink to nothing.
+fn long_capture() -> Vec<u8> {
     let m = BOTH[0];
     let mut file = m.pcap_header(0xA1B2_C3D4, 0, 1);
-    for seed in 0..200 {
-        let bytes: Vec<u8> =
-            ethercat(seed, 200).iter().enumerate().map(|(i, b)| b ^ (i * i) as u8).collect();
-        file.extend(m.pcap_frame(seed.into(), 0, 200, &bytes));
+    for seed in 0..2_400_u32 {
+        let noise = |(i, byte): (u32, &u8)| {
+            byte ^ (seed * 200 + i).wrapping_mul(2_654_435_761).to_be_bytes()[1]
+        };
+        let bytes: Vec<u8> = (0..).zip(&ethercat(seed as u8, 200)).map(noise).collect();
+        file.extend(m.pcap_frame(seed, 0, 200, &bytes));
     }
+    file
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+fn xz(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = liblzma::write::XzEncoder::new(Vec::new(), 1);
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+fn zst(bytes: &[u8]) -> Vec<u8> {
+    zstd::encode_all(bytes, 3).unwrap()
+}
+
+#[test]
+fn packed_captures_are_known_by_their_bytes_and_damage_ends_them() {
+    let file = long_capture();
     let (plain, _) = read(&file).unwrap();
-    let pack = |bytes: &[u8]| {
-        let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
-        encoder.write_all(bytes).unwrap();
-        encoder.finish().unwrap()
-    };
-    let (packed, end) = read(&pack(&file)).unwrap();
-    assert_eq!(packed, plain);
-    assert!(end.complete(), "{end}");
-    assert_eq!(end.offset, file.len() as u64, "counts what was unpacked");
+    type Pack = fn(&[u8]) -> Vec<u8>;
+    let packers: [(&str, Pack); 3] = [("gzip", gzip), ("xz", xz), ("zstd", zst)];
+    for (name, pack) in packers {
+        let whole = pack(&file);
+        let (packed, end) = read(&whole).unwrap();
+        assert_eq!(packed, plain, "{name}");
+        assert!(end.complete(), "{name}: {end}");
+        assert_eq!(end.offset, file.len() as u64, "{name}: counts what was unpacked");
 
-    // Two members, as `cat a.gz b.gz` makes them.
-    let parts = [pack(&file[..1000]), pack(&file[1000..])].concat();
-    assert_eq!(read(&parts).unwrap().0, plain);
+        // Two parts, as `cat a.gz b.gz` makes them.
+        let parts = [pack(&file[..1000]), pack(&file[1000..])].concat();
+        assert_eq!(read(&parts).unwrap().0, plain, "{name}");
 
-    let whole = pack(&file);
-    let (some, end) = read(&whole[..whole.len() - 100]).unwrap();
-    assert!(!end.complete());
-    assert!(!some.is_empty() && some[..] == plain[..some.len()], "{} frames", some.len());
-    let twice = read(&pack(&whole)).unwrap_err();
-    assert!(twice.to_string().contains("compressed twice"), "{twice}");
+        // Most of what comes before a cut is there.
+        for cut in [1, whole.len() / 3] {
+            let (some, end) = read(&whole[..whole.len() - cut]).unwrap();
+            assert!(!end.complete(), "{name}, {cut} bytes cut off");
+            assert_eq!(some[..], plain[..some.len()], "{name}, {cut} bytes cut off");
+            assert!(some.len() > 600, "{name}, {cut} bytes cut off: {} frames", some.len());
+        }
+        let mut damaged = whole.clone();
+        let middle = damaged.len() * 2 / 3;
+        damaged[middle] ^= 0x55;
+        damaged.truncate(middle + 20);
+        let (some, end) = read(&damaged).unwrap();
+        assert!(!end.complete() && !some.is_empty(), "{name}: {end}");
+        for (other, again) in packers {
+            let twice = read(&again(&whole)).unwrap_err();
+            assert!(twice.to_string().contains("compressed twice"), "{name}, {other}: {twice}");
+        }
+    }
+}
+
+#[test]
+fn a_packed_file_that_asks_for_much_memory_is_refused() {
+    // A dictionary of 1.5 GiB, and a window of 1 GiB.
+    let mut greedy = xz(&long_capture());
+    // Block header: size, flags, filter 0x21, one byte of properties, then padding and CRC32.
+    assert_eq!(greedy[14..16], [0x21, 0x01]);
+    greedy[16] = 39;
+    let crc = crc32fast::hash(&greedy[12..20]).to_le_bytes();
+    greedy[20..24].copy_from_slice(&crc);
+    let error = read(&greedy).unwrap_err();
+    assert!(error.to_string().contains("reading failed"), "{error}");
+    let error = read(b"\x28\xB5\x2F\xFD\x00\xA0rest of a frame").unwrap_err();
+    assert!(error.to_string().contains("reading failed"), "{error}");
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod namespace;
 use linesman_link::clock::HostClock;
 use linesman_link::direction::FrameDirection::{Incoming, Outgoing};
 use linesman_link::error::LinkError;
+use linesman_link::interface::CardLock;
 use linesman_link::socket::{
     Batch, ListenFilter, Listener, RawSocket, Ready, SocketOptions, StampSource, wait_any,
 };
@@ -323,5 +324,24 @@ fn without_privilege_the_way_to_get_it_is_told() {
         let binary = std::env::current_exe().unwrap();
         let line = format!("sudo setcap cap_net_raw+ep {}", binary.display());
         assert!(error.to_string().contains(&line), "{error}");
+    });
+}
+
+#[test]
+fn a_card_is_locked_once_until_the_lock_is_dropped() {
+    with_cable(|| {
+        let lock = CardLock::take("va").unwrap();
+        let process = i32::try_from(std::process::id()).unwrap();
+        let error = CardLock::take("va").unwrap_err();
+        let LinkError::InUse { interface, holder } = &error else { panic!("{error}") };
+        assert_eq!((interface.as_str(), holder.process), ("va", Some(process)));
+        assert_eq!(CardLock::holder("va").unwrap().as_ref(), Some(holder));
+        // The other end of the cable is another card.
+        let other = CardLock::take("vb").unwrap();
+        drop(lock);
+        assert_eq!(CardLock::holder("va").unwrap(), None);
+        CardLock::take("va").unwrap();
+        drop(other);
+        assert!(matches!(CardLock::take("nobody"), Err(LinkError::Missing { .. })));
     });
 }

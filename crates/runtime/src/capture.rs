@@ -1,4 +1,4 @@
-//! A capture file as the diagnosis sees it: frames in the order of the file, in times of the run.
+//! A capture as the diagnosis sees it: frames in the order of the file, in times of the run.
 
 use std::path::Path;
 
@@ -7,6 +7,7 @@ use linesman_link::capture::{
     CaptureEnd, CaptureError, CaptureInterface, CaptureReader, FrameDirection, RunClock,
     SkippedLinkType,
 };
+use linesman_link::input::Input;
 use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Network;
 use linesman_proto::time::{Instant, Span};
@@ -23,8 +24,26 @@ impl Capture {
     /// # Errors
     /// When it is none, or is damaged in its first block.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, CaptureError> {
-        let path = path.as_ref();
-        Ok(Self { clock: RunClock::for_file(path)?, reader: CaptureReader::open(path)? })
+        Self::of(Input::open(path)?)
+    }
+
+    /// Reads a capture from an input. Of a file the run begins with the earliest frame of any
+    /// interface; a pipe cannot be read twice, and the run begins with its first frame.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn of(input: Input) -> Result<Self, CaptureError> {
+        let clock = match input.is_file() {
+            true => RunClock::for_file(input.name())?,
+            false => RunClock::default(),
+        };
+        Ok(Self { clock, reader: CaptureReader::of(input)? })
+    }
+
+    /// The share of the file that has been read, 0 to 1; `None` where nobody knows the whole.
+    #[must_use]
+    pub fn progress(&self) -> Option<f64> {
+        self.reader.progress()
     }
 
     /// The next frame; `None` at the end. Its bytes are borrowed: nothing is copied.

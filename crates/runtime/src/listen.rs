@@ -6,6 +6,7 @@ use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
 use linesman_link::clock::HostClock;
 use linesman_link::direction::FrameDirection;
 use linesman_link::error::LinkError;
+use linesman_link::interface::CardLock;
 use linesman_link::socket::{Batch, ListenFilter, Listener, Ready, Waitable, wait_any};
 use linesman_proto::address::{Network, Path};
 use linesman_proto::ethernet::MacAddress;
@@ -147,8 +148,13 @@ fn listening(chance: u64) -> Span {
 /// as soon as somebody is heard for 0.3 s or longer.
 ///
 /// # Errors
-/// When an interface cannot be used.
+/// When an interface cannot be used, or is used by another process of this host.
 pub fn is_driven(names: &[String]) -> Result<Option<Driven>, LinkError> {
+    for interface in names {
+        if let Some(holder) = CardLock::holder(interface)? {
+            return Err(LinkError::InUse { interface: interface.clone(), holder });
+        }
+    }
     let clock = HostClock::start();
     let mut ears = Ears::open(names, clock)?;
     // No seed: two hosts must not draw the same. The standard library asks the system.

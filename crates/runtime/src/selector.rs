@@ -5,17 +5,18 @@
 //!
 //! let ring: Selector = "eth0+eth1".parse().unwrap();
 //! assert_eq!(ring, Selector::Cards(vec!["eth0".into(), "eth1".into()]));
-//! assert_eq!("trace.pcapng".parse(), Ok(Selector::Capture("trace.pcapng".into())));
+//! assert_eq!("trace.pcapng".parse(), Ok(Selector::File("trace.pcapng".into())));
 //! ```
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
+
+use linesman_link::input::{STANDARD_INPUT, is_capture_name, is_text_name};
+use linesman_link::interface;
 
 /// Longest name of a network interface on Linux, in bytes.
 const MAX_NAME_LEN: usize = 15;
-/// Ends of file names that say "this is a capture"; each may be followed by `.gz`.
-const CAPTURE_ENDS: [&str; 3] = [".pcapng", ".pcap", ".cap"];
 
 /// Where frames come from.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
@@ -26,17 +27,31 @@ pub enum Selector {
     Listen(Vec<String>),
     /// A virtual segment, described by a file.
     Segment(PathBuf),
-    /// A capture file.
-    Capture(PathBuf),
-    /// An observation file: what another tool has read.
-    Observations(PathBuf),
+    /// A file, a pipe, or `-` for standard input: a capture, or a text with what another tool has
+    /// read. Its bytes say which ([`Content`](linesman_link::input::Content)).
+    File(PathBuf),
 }
 
 impl Selector {
     /// The kinds, for messages.
     pub const HELP: &'static str = "eth0 (a network card), eth0+eth1 (a ring), listen:eth0 (beside another MainDevice), \
-         sim:plant.toml (a virtual segment), capture:trace.pcapng (or any path ending in .pcap, \
-         .pcapng or their .gz)";
+         sim:plant.toml (a virtual segment), trace.pcapng (a capture; a name that might be a network \
+         card with `capture:` in front), notes.txt (what another tool has read), - (standard input)";
+
+    /// What a word means where both cards and files are taken: a word that might be a card is a file
+    /// if there is one of that name and no such card.
+    ///
+    /// # Errors
+    /// As parsing it, when there is no such file.
+    pub fn resolve(given: &str) -> Result<Self, SelectorError> {
+        let file = || Self::File(PathBuf::from(given));
+        let is_there = || Path::new(given).exists();
+        match given.parse() {
+            Ok(Self::Cards(names)) if is_there() && !are_cards(&names) => Ok(file()),
+            Err(_) if !given.is_empty() && is_there() => Ok(file()),
+            parsed => parsed,
+        }
+    }
 }
 
 impl fmt::Display for Selector {
@@ -45,10 +60,20 @@ impl fmt::Display for Selector {
             Self::Cards(names) => f.write_str(&names.join("+")),
             Self::Listen(names) => write!(f, "listen:{}", names.join("+")),
             Self::Segment(path) => write!(f, "sim:{}", path.display()),
-            Self::Capture(path) => write!(f, "capture:{}", path.display()),
-            Self::Observations(path) => path.display().fmt(f),
+            Self::File(path) => {
+                let text = path.display().to_string();
+                let is_plain = text.parse() == Ok(self.clone());
+                write!(f, "{}{text}", if is_plain { "" } else { "capture:" })
+            }
         }
     }
+}
+
+/// Whether all of these are network cards of this host.
+fn are_cards(names: &[String]) -> bool {
+    // Without an answer of the kernel they are what they look like.
+    interface::list()
+        .map_or(true, |cards| names.iter().all(|name| cards.iter().any(|card| card.name == *name)))
 }
 
 /// A word that is no selector.
@@ -78,9 +103,8 @@ pub enum SelectorError {
     },
     /// It looks like a path, but of which kind of file?
     #[error(
-        "`{given}`: no network interface can be called so. Do: for a capture say `capture:{given}`, \
-         for a virtual segment `sim:{given}`; cards are listed by `linesman interfaces`; the socket of \
-         `linesman run --control` is there while that runs"
+        "`{given}`: there is no such file, and no network card can be called so. Do: check the path; \
+         cards are listed by `linesman interfaces`"
     )]
     NotAnInterface {
         /// The whole word.
@@ -101,22 +125,19 @@ impl FromStr for Selector {
         }
         match given.split_once(':') {
             Some(("sim", rest)) => return path(rest).map(Self::Segment),
-            Some(("capture", rest)) => return path(rest).map(Self::Capture),
+            Some(("capture", rest)) => return path(rest).map(Self::File),
             Some(("listen", rest)) => return cards(given, rest).map(Self::Listen),
             // A path may have a colon too.
-            Some((kind, _)) if !kind.contains('/') && !is_capture(given) && !is_toml(given) => {
+            Some((kind, _)) if !kind.contains('/') && !is_file_name(given) => {
                 let kind = kind.to_owned();
                 return Err(SelectorError::UnknownKind { given: given.to_owned(), kind });
             }
             Some(_) | None => {}
         }
-        if is_capture(given) {
-            return path(given).map(Self::Capture);
+        match is_file_name(given) {
+            true => path(given).map(Self::File),
+            false => cards(given, given).map(Self::Cards),
         }
-        if is_toml(given) {
-            return path(given).map(Self::Observations);
-        }
-        cards(given, given).map(Self::Cards)
     }
 }
 
@@ -146,14 +167,9 @@ fn may_be_interface(name: &str) -> bool {
     name.len() <= MAX_NAME_LEN && name != "." && name != ".." && name.bytes().all(printable)
 }
 
-fn is_capture(path: &str) -> bool {
-    let lower = path.to_ascii_lowercase();
-    let name = lower.strip_suffix(".gz").unwrap_or(&lower);
-    CAPTURE_ENDS.iter().any(|end| name.ends_with(end))
-}
-
-fn is_toml(path: &str) -> bool {
-    path.to_ascii_lowercase().ends_with(".toml")
+/// Whether no card is called so, or the name says that it is a file.
+fn is_file_name(given: &str) -> bool {
+    given == STANDARD_INPUT || given.contains('/') || is_capture_name(given) || is_text_name(given)
 }
 
 #[cfg(test)]
@@ -176,12 +192,18 @@ mod tests {
             ("listen:eth0+eth1", Selector::Listen(words(&["eth0", "eth1"]))),
             ("sim:plant.toml", Selector::Segment("plant.toml".into())),
             ("sim:/tmp/a:b", Selector::Segment("/tmp/a:b".into())),
-            ("capture:trace", Selector::Capture("trace".into())),
-            ("trace.pcap", Selector::Capture("trace.pcap".into())),
-            ("/tmp/a b/Trace.PCAPNG.gz", Selector::Capture("/tmp/a b/Trace.PCAPNG.gz".into())),
-            ("./12:30.pcapng", Selector::Capture("./12:30.pcapng".into())),
-            ("12:30.pcapng", Selector::Capture("12:30.pcapng".into())),
-            ("read.toml", Selector::Observations("read.toml".into())),
+            ("capture:trace", Selector::File("trace".into())),
+            ("trace.pcap", Selector::File("trace.pcap".into())),
+            ("/tmp/a b/Trace.PCAPNG.gz", Selector::File("/tmp/a b/Trace.PCAPNG.gz".into())),
+            ("trace.pcap.zst", Selector::File("trace.pcap.zst".into())),
+            ("./12:30.pcapng", Selector::File("./12:30.pcapng".into())),
+            ("12:30.pcapng", Selector::File("12:30.pcapng".into())),
+            ("read.toml", Selector::File("read.toml".into())),
+            ("notes.TXT", Selector::File("notes.TXT".into())),
+            ("./online list.csv", Selector::File("./online list.csv".into())),
+            ("./plant", Selector::File("./plant".into())),
+            ("-", Selector::File("-".into())),
+            ("trace.pcap1", Selector::Cards(words(&["trace.pcap1"]))),
         ];
         for (given, expected) in rows {
             assert_eq!(given.parse(), Ok(expected), "{given}");
@@ -198,13 +220,26 @@ mod tests {
             ("eth0+", "a name is missing"),
             ("eth0+eth0", "the same card twice"),
             ("a+b+c", "two ends"),
-            ("./plant", "`sim:./plant`"),
             ("an-interface-name-too-long", "linesman interfaces"),
         ];
         for (given, words) in rows {
             let error = given.parse::<Selector>().unwrap_err().to_string();
             assert!(error.contains(words), "{given}: {error}");
         }
+    }
+
+    #[test]
+    fn a_file_that_is_there_is_one_unless_a_card_is_called_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("it:1");
+        std::fs::write(&path, "").unwrap();
+        let word = path.display().to_string();
+        assert_eq!(Selector::resolve(&word), Ok(Selector::File(path)));
+        // Tests run where `src` lies; every host has the loopback interface.
+        assert_eq!(Selector::resolve("src"), Ok(Selector::File("src".into())));
+        assert_eq!(Selector::resolve("lo"), Ok(Selector::Cards(words(&["lo"]))));
+        assert_eq!(Selector::resolve("nobody0"), Ok(Selector::Cards(words(&["nobody0"]))));
+        assert!(Selector::resolve("tap:eth0").is_err() && Selector::resolve("").is_err());
     }
 
     proptest! {

@@ -1,34 +1,47 @@
-//! The wish to stop: Ctrl-C, or an end that was asked for.
+//! The wish to stop: a signal, or an end that was asked for.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use linesman_link::signal;
 use linesman_link::socket::Bell;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
+/// Signals by which somebody asks for the end; the second of them ends the program at once.
+const ASKED: [i32; 2] = [SIGINT, SIGTERM];
 
 /// Set once somebody wants the program to stop. Copies are the same wish.
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
     wish: Arc<AtomicBool>,
     bells: Arc<Mutex<Vec<Bell>>>,
-    signals: bool,
+    /// The signals that are this wish.
+    signals: Vec<i32>,
 }
 
 impl Stop {
-    /// Set by Ctrl-C (SIGINT) and SIGTERM. The second Ctrl-C ends the program at once, as if it
-    /// were not asked for.
+    /// Set by Ctrl-C (SIGINT), SIGTERM and SIGHUP. The second Ctrl-C ends the program at once, as if
+    /// it were not asked for.
+    ///
+    /// SIGHUP says that the terminal is gone. It never ends the program at once: a connection that
+    /// breaks brings it twice, from the kernel and from the shell, and maybe a SIGTERM behind. It is
+    /// left alone where it was ignored at the start, as by `nohup`.
     ///
     /// # Errors
     /// When the system refuses.
     pub fn on_signals() -> io::Result<Self> {
-        let stop = Self { signals: true, ..Self::default() };
-        for signal in SIGNALS {
+        let mut stop = Self { signals: ASKED.to_vec(), ..Self::default() };
+        let asked = Arc::new(AtomicBool::new(false));
+        for signal in ASKED {
             // In this order: the default of the second signal, then the note of the first.
-            signal_hook::flag::register_conditional_default(signal, Arc::clone(&stop.wish))?;
+            signal_hook::flag::register_conditional_default(signal, Arc::clone(&asked))?;
+            signal_hook::flag::register(signal, Arc::clone(&asked))?;
             signal_hook::flag::register(signal, Arc::clone(&stop.wish))?;
+        }
+        if !signal::is_ignored(SIGHUP)? {
+            signal_hook::flag::register(SIGHUP, Arc::clone(&stop.wish))?;
+            stop.signals.push(SIGHUP);
         }
         Ok(stop)
     }
@@ -52,10 +65,8 @@ impl Stop {
     /// # Errors
     /// When the system refuses.
     pub fn rings(&self, bell: &Bell) -> io::Result<()> {
-        if self.signals {
-            for signal in SIGNALS {
-                signal_hook::low_level::pipe::register(signal, bell.for_signals()?)?;
-            }
+        for signal in &self.signals {
+            signal_hook::low_level::pipe::register(*signal, bell.for_signals()?)?;
         }
         self.bells().push(bell.clone());
         if self.is_set() {

@@ -79,8 +79,12 @@ impl FileDatagram {
     }
 }
 
-/// The task of an element; `number` counts from 1.
-pub(super) fn task(element: &Element, number: usize) -> Result<FileTask, EsiError> {
+/// The task of an element; `number` counts from 1. One without a cycle time has `otherwise`.
+pub(super) fn task(
+    element: &Element,
+    number: usize,
+    otherwise: Option<Span>,
+) -> Result<FileTask, EsiError> {
     let comment = clean(element.child_text("Comment"));
     // "synchronized with task 'NC-Task 1 SAF'"
     let mut quoted = comment.split('\'');
@@ -89,15 +93,20 @@ pub(super) fn task(element: &Element, number: usize) -> Result<FileTask, EsiErro
         _ => format!("Task {number}"),
     };
     let cycle = element.child_number::<u32>("CycleTime").map_err(|one| one.within("Cyclic"))?;
-    let cycle = cycle
-        .filter(|us| *us > 0)
-        .ok_or_else(|| element.error("it has no CycleTime, expected one in µs above 0"))?;
+    let cycle = cycle.filter(|us| *us > 0).map(|us| Span::us(u64::from(us)));
+    let missing = || {
+        element.error(
+            "it has no CycleTime, expected one in µs above 0. Do: say it, `--cycle-us 1000`, or export \
+             the file again",
+        )
+    };
+    let cycle = cycle.or(otherwise).ok_or_else(missing)?;
     let frames = element.children("Frame").map(frame).collect::<Result<_, _>>();
     let own = element.child(OWN);
     let at_end = own.is_some_and(|own| own.attribute("io-at") == Some("task-end"));
     Ok(FileTask {
         name,
-        cycle: Span::us(u64::from(cycle)),
+        cycle,
         io_at: if at_end { IoAt::TaskEnd } else { IoAt::TaskBegin },
         frames: frames.map_err(|error| error.within("Cyclic"))?,
     })

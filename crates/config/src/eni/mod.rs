@@ -19,6 +19,8 @@ mod write;
 pub use error::EniError;
 pub use write::write;
 
+use linesman_proto::time::Span;
+
 use self::cyclic::FileTask;
 use self::sub_device::FileDevice;
 use crate::esi::encoding;
@@ -49,6 +51,8 @@ struct File {
     tasks: Vec<FileTask>,
     image: Option<Element>,
     mailbox_states: Option<u32>,
+    /// Cycle time of tasks that have none.
+    cycle: Option<Span>,
     notes: Vec<String>,
 }
 
@@ -65,11 +69,19 @@ impl Eni {
     /// # Errors
     /// [`EniError`]: what is no XML, no ENI, encrypted, or contradicts itself, with element and line.
     pub fn parse(bytes: &[u8]) -> Result<Self, EniError> {
+        Self::parse_with(bytes, None)
+    }
+
+    /// Reads a file; tasks without a cycle time, which it need not say, have `cycle`.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn parse_with(bytes: &[u8], cycle: Option<Span>) -> Result<Self, EniError> {
         let text = encoding::decode(bytes)?;
         if is_encrypted(&text) {
             return Err(EniError::Encrypted);
         }
-        let mut file = File::default();
+        let mut file = File { cycle, ..File::default() };
         let mut root = None;
         let containers = |path: &[String]| match path {
             [root] => root == ROOT,
@@ -123,7 +135,7 @@ impl File {
             }
             "Cyclic" => {
                 let number = self.tasks.len() + 1;
-                let task = cyclic::task(&element, number);
+                let task = cyclic::task(&element, number, self.cycle);
                 self.tasks.push(task.map_err(|error| error.within("Config"))?);
             }
             "ProcessImage" => self.image = Some(element),

@@ -6,6 +6,7 @@
 //! counter can be explained and two copies of a frame can be merged. The expected working counter
 //! is never a number here but a function: see [`expect`].
 
+mod cycle;
 pub mod expect;
 pub mod layout;
 pub mod lint;
@@ -32,6 +33,7 @@ use crate::identity::RevisionRule;
 use crate::profile::{DeviceProfile, Mailbox};
 use crate::start_up::StartUpCommand;
 
+pub use cycle::CycleError;
 pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
 pub use lint::{Doubt, Severity};

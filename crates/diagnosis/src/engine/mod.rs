@@ -12,6 +12,7 @@ use linesman_proto::address::{DeviceId, Network, RegisterAddress};
 use linesman_proto::frame::{FrameError, FrameView};
 use linesman_proto::time::{Instant, Span};
 
+use crate::coverage::{Coverage, InputKind};
 use crate::finding::{Book, Finding, Severity};
 use crate::line::{Line, Seen, search};
 use crate::observe::{
@@ -62,6 +63,7 @@ impl Engine {
             None => Line::new(Network(0)),
         };
         line.host.is_watched = setup.host_counters;
+        line.sees_all_orders = setup.input == InputKind::Driven;
         Self {
             setup,
             networks: vec![Watched::new(line)],
@@ -161,6 +163,7 @@ impl Engine {
     #[must_use]
     pub fn diagnosis(&self) -> Diagnosis {
         let roots = self.book.roots();
+        let coverage = self.coverage();
         Diagnosis {
             schema: report::SCHEMA.to_owned(),
             tool: concat!("linesman ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -168,8 +171,10 @@ impl Engine {
             clock: self.setup.clock.clone(),
             source: self.setup.source.clone(),
             complete: self.is_complete,
-            verdict: self.verdict(),
+            verdict: self.verdict(&coverage),
             network: self.network_report(),
+            coverage: report::coverage::report(&coverage),
+            understood: None,
             findings: roots
                 .into_iter()
                 .map(|finding| report::build::finding(&self.book, finding))
@@ -195,6 +200,7 @@ impl Engine {
         let index = known.unwrap_or_else(|| {
             let mut line = Line::new(network);
             line.host.is_watched = self.setup.host_counters;
+            line.sees_all_orders = self.setup.input == InputKind::Driven;
             self.networks.push(Watched::new(line));
             self.networks.len() - 1
         });
@@ -228,7 +234,9 @@ impl Engine {
             if !watched.is_due(now) {
                 continue;
             }
-            if self.book.findings().is_empty() {
+            if self.book.names_devices() {
+                watched.learner.name();
+            } else {
                 watched.learner.settle(&mut watched.line);
             }
             if watched.learner.is_settled() {
@@ -324,20 +332,20 @@ impl Engine {
         }
     }
 
-    fn verdict(&self) -> Verdict {
-        if self.book.worst().is_some_and(|worst| worst >= Severity::Warning) {
-            return Verdict::Faulty;
+    /// What could be judged of all networks, so far.
+    #[must_use]
+    pub fn coverage(&self) -> Coverage {
+        let mut coverage = Coverage::default();
+        for watched in &self.networks {
+            coverage.merge(Coverage::of(&watched.line, self.setup.input));
         }
-        let was_seen_at_work = self.networks.iter().any(|watched| {
-            let traffic = &watched.line.traffic;
-            traffic.answered > 0 && !traffic.is_one_sided()
-        });
-        let was_read = self.networks.iter().any(|watched| {
-            let mut devices = watched.line.devices.iter();
-            devices.any(|device| device.al.status.is_some() || device.counters.is_known())
-        });
-        let has_frames = self.networks.iter().any(|watched| watched.line.traffic.frames > 0);
-        if was_seen_at_work || (!has_frames && was_read) {
+        coverage
+    }
+
+    fn verdict(&self, coverage: &Coverage) -> Verdict {
+        if self.book.worst().is_some_and(|worst| worst >= Severity::Warning) {
+            Verdict::Faulty
+        } else if coverage.suffices() {
             Verdict::Healthy
         } else {
             Verdict::Inconclusive
@@ -406,9 +414,11 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     }
     let print = Fingerprint::of(&view);
     traffic.cut_short += u64::from(print.is_cut && !frame.truncated);
+    traffic.datagrams_cut += u64::from(print.is_cut && frame.truncated);
     let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(line, exchange));
-    let mistaken = pairing.take_mistaken();
+    let (mistaken, unrecorded) = (pairing.take_mistaken(), pairing.take_unrecorded());
     let traffic = &mut line.traffic;
+    traffic.note_unrecorded(unrecorded, frame.time);
     if mistaken > 0 {
         traffic.sent = traffic.sent.saturating_sub(mistaken);
         traffic.returned += mistaken;

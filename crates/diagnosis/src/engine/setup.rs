@@ -5,6 +5,7 @@ use linesman_proto::address::{DeviceId, Network, RegisterAddress, StationAddress
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::Instant;
 
+use crate::coverage::InputKind;
 use crate::finding::Change;
 use crate::report::FindingReport;
 
@@ -13,6 +14,8 @@ use crate::report::FindingReport;
 pub struct Setup {
     /// What was planned, for network 0.
     pub project: Option<Project>,
+    /// The way by which evidence comes in.
+    pub input: InputKind,
     /// Whether the counters of the host's cards will be reported, so that silence means zero.
     pub host_counters: bool,
     /// Whether probes can be sent.

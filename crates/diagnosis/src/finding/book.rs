@@ -7,7 +7,7 @@
 
 use linesman_proto::time::{Instant, Span};
 
-use super::{Condition, Severity, Symptom};
+use super::{Condition, Place, Severity, Symptom};
 
 /// What follows from a condition may show so long after its end: SubDevices are asked one by one, and
 /// links need seconds to come back.
@@ -139,6 +139,15 @@ impl Book {
     #[must_use]
     pub fn has_open(&self) -> bool {
         self.findings.iter().any(|finding| finding.closed.is_none())
+    }
+
+    /// Whether any finding is about single SubDevices or links.
+    #[must_use]
+    pub fn names_devices(&self) -> bool {
+        self.findings.iter().any(|finding| match finding.condition.place {
+            Place::Link { .. } | Place::Device { .. } => true,
+            Place::Network { .. } | Place::Host => false,
+        })
     }
 
     /// Findings that follow from no other one, worst first, then in order of time.

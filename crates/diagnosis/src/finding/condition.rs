@@ -288,8 +288,8 @@ impl Evidence {
             device: Some(device),
             port,
             register: Some(register),
-            before: Some(u64::from(rise.before)),
-            after: Some(u64::from(rise.after)),
+            before: Some(rise.before),
+            after: Some(rise.after),
             ..Self::new(EvidenceKind::Register, Some(rise.at), text)
         }
     }

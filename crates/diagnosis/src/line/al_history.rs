@@ -15,6 +15,10 @@ pub struct AlHistory {
     pub status: Option<Seen<AlStatus>>,
     /// AL status code (0x0134) as last read.
     pub code: Option<Seen<AlStatusCode>>,
+    /// Time of the latest reading of AL status, whether or not it was news.
+    pub latest_reading: Option<Instant>,
+    /// The lowest state that was asked for and not reached yet.
+    lowest_asked: Option<AlState>,
     /// The state last asked for (0x0120).
     pub requested: Option<Seen<StateValue>>,
     /// The highest state it was ever seen in.
@@ -102,12 +106,16 @@ pub struct AlChange {
     pub from: AlStatus,
     /// As it is then.
     pub to: AlStatus,
+    /// When it was last read as it was.
+    pub after: Instant,
     /// When, by which frame.
     pub at: Instant,
     /// The number of the frame that showed it.
     pub frame: Option<u64>,
     /// The state asked for at that time, where a request was seen.
     pub requested: Option<AlState>,
+    /// The lowest state that was asked for before that and not reached.
+    pub lowest_asked: Option<AlState>,
 }
 
 impl AlChange {
@@ -116,7 +124,8 @@ impl AlChange {
     pub fn is_own_fall(&self) -> bool {
         let (from, to) = (self.from.state().state(), self.to.state().state());
         let (Some(from), Some(to)) = (from, to) else { return false };
-        let was_asked = self.requested.is_none_or(|requested| requested < from);
+        let was_asked = self.requested.is_none_or(|requested| requested < from)
+            || self.lowest_asked.is_some_and(|asked| asked < from);
         to < from && !was_asked && !self.to.error()
     }
 }
@@ -124,6 +133,12 @@ impl AlChange {
 impl AlHistory {
     /// Takes a reading of AL status. Says whether it is news.
     pub fn record_status(&mut self, status: AlStatus, at: Instant, frame: Option<u64>) -> bool {
+        let after = self.latest_reading.unwrap_or(at);
+        let lowest_asked = self.lowest_asked;
+        if status.state().state() <= lowest_asked {
+            self.lowest_asked = None;
+        }
+        self.latest_reading = self.latest_reading.max(Some(at));
         let was_overdue = self.record_answer(status, Seen::new((), at, frame));
         self.record_error(status, at, frame);
         let before = self.status.replace(Seen::new(status, at, frame));
@@ -138,7 +153,7 @@ impl AlHistory {
         let requested = self.requested.and_then(|requested| requested.value.state());
         push_kept(
             &mut self.changes,
-            AlChange { from: before.value, to: status, at, frame, requested },
+            AlChange { from: before.value, to: status, after, at, frame, requested, lowest_asked },
         );
         true
     }
@@ -231,6 +246,11 @@ impl AlHistory {
         {
             error.ended.get_or_insert(requested.at);
         }
+        let asked = requested.value.state();
+        self.lowest_asked = match (self.lowest_asked, asked) {
+            (Some(one), Some(other)) => Some(one.min(other)),
+            (one, other) => one.or(other),
+        };
         let is_new = self.requested.is_none_or(|known| known.value != requested.value);
         if is_new {
             self.has_arrived = false;

@@ -44,6 +44,12 @@ pub struct Astray {
 }
 
 impl ClockHistory {
+    /// Whether its difference to the reference clock was ever read.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        !self.differences.is_empty() || self.near.is_some()
+    }
+
     /// A reading of 0x092C, in ns. Says whether it is news.
     pub fn record(&mut self, seen: Seen<i64>) -> bool {
         if self.differences.len() == KEPT {

@@ -11,28 +11,35 @@ use super::Seen;
 
 /// How many rises of one counter are kept; older ones are forgotten, the total stays.
 pub const RISES_KEPT: usize = 256;
+/// Where a register of eight bits stops.
+const END: u64 = 255;
 
 /// All counters of one controller.
 #[derive(Clone, Default, Debug)]
 pub struct CounterHistory {
     tracks: BTreeMap<ErrorCounter, CounterTrack>,
-    /// The latest value of each.
-    last: ErrorCounters,
     /// Falls without a write that was seen: the line has another reader, or the supply was gone.
     clears: u32,
     /// When that was last read, and before which fall.
-    cleared: Option<Seen<(ErrorCounter, u8)>>,
+    cleared: Option<Seen<(ErrorCounter, u64)>>,
     /// When a rise was last read.
     last_rise: Option<Instant>,
+    /// When the counters of bad frames were last cleared by a write that was seen.
+    cleared_by_order: Option<Instant>,
 }
 
 /// One counter over time.
 #[derive(Clone, Debug)]
 pub struct CounterTrack {
     /// The first reading.
-    pub first: Seen<u8>,
+    pub first: Seen<u64>,
     /// The latest reading.
-    pub last: Seen<u8>,
+    pub last: Seen<u64>,
+    /// Whether a tool adds it up: then it stops nowhere. A register stops at 255.
+    pub is_total: bool,
+    /// Whether the value before the first reading that somebody gave is not known and was taken for 0: what it
+    /// counts may be old.
+    pub may_be_old: bool,
     /// Rises together, through clears.
     pub total: Total,
     /// What `total` was when the present spell of errors began.
@@ -45,9 +52,9 @@ pub struct CounterTrack {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Rise {
     /// The reading before it.
-    pub before: u8,
+    pub before: u64,
     /// The reading after it.
-    pub after: u8,
+    pub after: u64,
     /// By how much it certainly rose, and whether that is exact.
     pub difference: Difference,
     /// When the reading before was made; the rise happened between the two.
@@ -81,28 +88,18 @@ impl CounterHistory {
     ) -> bool {
         let mut fell = [false; ClearGroup::ALL.len()];
         for (counter, value) in reading.iter() {
-            let group = counter.clear_group() as usize;
-            if let Some(last) = self.last.value(counter).filter(|last| value < *last) {
-                fell[group] = true;
-                self.cleared = Some(Seen::new((counter, last), at, frame));
-            }
+            self.note_fall(counter, value.into(), &mut fell, Seen::new((), at, frame));
         }
         self.clears += fell.iter().filter(|fell| **fell).count() as u32;
         let mut news = false;
         for (counter, value) in reading.iter() {
             let group = counter.clear_group() as usize;
-            *self.last.slot(counter) = Some(value);
-            let track = self.tracks.entry(counter).or_insert_with(|| {
-                news = true;
-                CounterTrack {
-                    first: Seen::new(value, at, frame),
-                    last: Seen::new(value, at, frame),
-                    total: Total::default(),
-                    before_spell: 0,
-                    rises: VecDeque::new(),
-                }
-            });
-            news |= track.record(value, fell[group], at, frame);
+            let track = self.track_of(counter, value.into(), at, frame, &mut news);
+            let difference = match fell[group] {
+                true => track.total.record_after_clear(value),
+                false => track.total.record(value),
+            };
+            news |= track.record(value.into(), difference, at, frame);
             if track.last_rise().is_some_and(|rise| rise.at == at) {
                 self.last_rise = Some(at);
             }
@@ -110,8 +107,80 @@ impl CounterHistory {
         news
     }
 
+    /// Takes totals that a tool adds up, of any size. Says whether any of them rose or fell, or is new.
+    pub fn record_totals(
+        &mut self,
+        reading: &[(ErrorCounter, u64)],
+        at: Instant,
+        frame: Option<u64>,
+    ) -> bool {
+        let mut fell = [false; ClearGroup::ALL.len()];
+        for (counter, value) in reading {
+            self.note_fall(*counter, *value, &mut fell, Seen::new((), at, frame));
+        }
+        self.clears += fell.iter().filter(|fell| **fell).count() as u32;
+        let mut news = false;
+        for (counter, value) in reading {
+            let track = self.track_of(*counter, *value, at, frame, &mut news);
+            track.is_total = true;
+            let difference = track.total.record_total(*value);
+            news |= track.record(*value, difference, at, frame);
+            if track.last_rise().is_some_and(|rise| rise.at == at) {
+                self.last_rise = Some(at);
+            }
+        }
+        news
+    }
+
+    /// Notes which group was cleared, where a counter fell.
+    fn note_fall(
+        &mut self,
+        counter: ErrorCounter,
+        value: u64,
+        fell: &mut [bool; ClearGroup::ALL.len()],
+        seen: Seen<()>,
+    ) {
+        if let Some(last) = self.latest(counter).filter(|last| value < *last) {
+            fell[counter.clear_group() as usize] = true;
+            self.cleared = Some(Seen::new((counter, last), seen.at, seen.frame));
+        }
+    }
+
+    fn track_of(
+        &mut self,
+        counter: ErrorCounter,
+        value: u64,
+        at: Instant,
+        frame: Option<u64>,
+        news: &mut bool,
+    ) -> &mut CounterTrack {
+        self.tracks.entry(counter).or_insert_with(|| {
+            *news = true;
+            let seen = Seen::new(value, at, frame);
+            CounterTrack {
+                first: seen,
+                last: seen,
+                is_total: false,
+                may_be_old: false,
+                total: Total::default(),
+                before_spell: 0,
+                rises: VecDeque::new(),
+            }
+        })
+    }
+
+    /// Notes that the value before a counter's first reading is not known, and was taken for 0.
+    pub fn note_may_be_old(&mut self, counter: ErrorCounter) {
+        if let Some(track) = self.tracks.get_mut(&counter) {
+            track.may_be_old = true;
+        }
+    }
+
     /// Notes that a write cleared a group on purpose: the next readings count from 0.
-    pub fn note_clear(&mut self, group: ClearGroup) {
+    pub fn note_clear(&mut self, group: ClearGroup, at: Instant) {
+        if group == ClearGroup::Rx {
+            self.cleared_by_order = Some(at);
+        }
         for counter in ErrorCounter::ALL {
             if counter.clear_group() != group {
                 continue;
@@ -120,18 +189,7 @@ impl CounterHistory {
                 track.total.note_own_clear();
                 track.last.value = 0;
             }
-            let slot = self.last.slot(counter);
-            if slot.is_some() {
-                *slot = Some(0);
-            }
         }
-    }
-
-    /// Counts all values of the next readings as rises from 0: for an observation without earlier
-    /// values, whose counters are judged as they stand.
-    pub fn assume_zero_before(&mut self, at: Instant) {
-        let zeros = ErrorCounters::from_bytes(&[0; ErrorCounters::LEN], ErrorCounters::START);
-        self.record_counters(&zeros, at, None);
     }
 
     /// One counter over time; `None` when it was never read.
@@ -169,7 +227,7 @@ impl CounterHistory {
     pub fn errors_since(&self, start: RegisterAddress, data: &[u8]) -> Option<Instant> {
         let reading = ErrorCounters::from_bytes(data, start);
         let risen = reading.iter().filter(|(counter, value)| {
-            *value > 0 && self.last.value(*counter).is_some_and(|last| last != *value)
+            *value > 0 && self.latest(*counter).is_some_and(|last| last != u64::from(*value))
         });
         risen.filter_map(|(counter, _)| Some(self.tracks.get(&counter)?.last.at)).min()
     }
@@ -187,6 +245,12 @@ impl CounterHistory {
         self.last_rise
     }
 
+    /// When the counters of bad frames were last cleared by a write that was seen.
+    #[must_use]
+    pub const fn cleared_by_order(&self) -> Option<Instant> {
+        self.cleared_by_order
+    }
+
     /// How often a group of counters fell without a write that was seen.
     #[must_use]
     pub const fn foreign_clears(&self) -> u32 {
@@ -195,22 +259,26 @@ impl CounterHistory {
 
     /// The latest fall without a write that was seen: which counter, and what it had counted.
     #[must_use]
-    pub const fn cleared(&self) -> Option<Seen<(ErrorCounter, u8)>> {
+    pub const fn cleared(&self) -> Option<Seen<(ErrorCounter, u64)>> {
         self.cleared
     }
 
-    /// The latest value of each counter.
+    /// The latest value of a counter; `None` when it was never read.
     #[must_use]
-    pub const fn last(&self) -> &ErrorCounters {
-        &self.last
+    pub fn latest(&self, counter: ErrorCounter) -> Option<u64> {
+        self.tracks.get(&counter).map(|track| track.last.value)
     }
 }
 
 impl CounterTrack {
-    fn record(&mut self, value: u8, cleared: bool, at: Instant, frame: Option<u64>) -> bool {
+    fn record(
+        &mut self,
+        value: u64,
+        difference: Option<Difference>,
+        at: Instant,
+        frame: Option<u64>,
+    ) -> bool {
         let before = self.last;
-        let difference =
-            if cleared { self.total.record_after_clear(value) } else { self.total.record(value) };
         // The time of the latest reading matters even when nothing changed: a later rise happened
         // after it.
         self.last = Seen::new(value, at, frame);
@@ -229,6 +297,18 @@ impl CounterTrack {
             });
         }
         difference.rise > 0 || difference.cleared
+    }
+
+    /// Whether it stands at its end and counts no more: 255 of a register.
+    #[must_use]
+    pub const fn is_at_end(&self) -> bool {
+        !self.is_total && self.last.value == END
+    }
+
+    /// Whether it stood at its end when it was first read.
+    #[must_use]
+    pub const fn was_at_end(&self) -> bool {
+        !self.is_total && self.first.value == END
     }
 
     /// Rises of the present spell of errors.

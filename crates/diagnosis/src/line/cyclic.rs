@@ -16,12 +16,16 @@ pub const DEFICITS_KEPT: usize = 16;
 pub struct Cyclic {
     /// LRD, LWR or LRW.
     pub command: Command,
+    /// What another program calls it, where nobody saw the datagram itself.
+    pub name: Option<String>,
     /// Where it begins.
     pub start: LogicalAddress,
     /// Its length in bytes.
     pub len: u16,
     /// How often it came back.
     pub count: u64,
+    /// The working counter it came back with for the first time.
+    pub first: Seen<u16>,
     /// The working counter it comes back with, since when.
     pub wkc: Seen<u16>,
     /// The highest working counter since the process data were set up, when it was first reached:
@@ -33,6 +37,11 @@ pub struct Cyclic {
     pub sent: Beat,
     /// When it came back.
     pub returned: Beat,
+    /// When the working counter last fell, where it may have been ordered without anybody having seen it.
+    pub may_be_ordered: Option<Seen<u16>>,
+    /// Whether the process data were laid out anew since it last came back: the next working counter is the
+    /// first of the new layout.
+    is_laid_out_anew: bool,
 }
 
 /// A stretch of time in which a working counter was too low.
@@ -48,6 +57,17 @@ pub struct Deficit {
     pub count: u64,
     /// When it was right again.
     pub ended: Option<Instant>,
+}
+
+/// Whether the MainDevice has taken SubDevices out of the states in which they exchange process data.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Ordered {
+    /// It has.
+    Yes,
+    /// It has not.
+    No,
+    /// It may have, in a frame that was not seen.
+    Unseen,
 }
 
 /// Who has an FMMU on a logical datagram.
@@ -67,14 +87,27 @@ impl Cyclic {
     pub fn new(command: Command, start: LogicalAddress, len: u16, wkc: Seen<u16>) -> Self {
         Self {
             command,
+            name: None,
             start,
             len,
             count: 1,
+            first: wkc,
             wkc,
             highest: wkc,
             deficits: VecDeque::new(),
             sent: Beat::default(),
             returned: Beat::default(),
+            may_be_ordered: None,
+            is_laid_out_anew: false,
+        }
+    }
+
+    /// What it is called in messages.
+    #[must_use]
+    pub fn label(&self) -> String {
+        match &self.name {
+            Some(name) => format!("{} `{name}`", self.command),
+            None => format!("{} at {}, {} bytes", self.command, self.start, self.len),
         }
     }
 
@@ -84,10 +117,29 @@ impl Cyclic {
         self.deficits.back().is_some_and(|deficit| deficit.ended.is_none())
     }
 
-    /// Takes a working counter. `is_wanted` tells, when it falls, whether the MainDevice asked
-    /// for it by taking a SubDevice out of SAFEOP or OP. Says whether it is news.
-    pub fn record(&mut self, wkc: Seen<u16>, is_wanted: impl FnOnce() -> bool) -> bool {
+    /// Notes that FMMUs of this datagram were set otherwise at `at`: what was expected of it holds no longer, what
+    /// was missing before that was missing all the same.
+    pub fn lay_out_anew(&mut self, at: Instant) {
+        self.is_laid_out_anew = true;
+        self.set_up_again();
+        if let Some(deficit) = self.deficits.back_mut() {
+            deficit.ended.get_or_insert(at);
+        }
+    }
+
+    /// Notes that FMMUs of this datagram were set again: while SubDevices are brought up frames come unevenly.
+    pub fn set_up_again(&mut self) {
+        (self.sent, self.returned) = (Beat::default(), Beat::default());
+    }
+
+    /// Takes a working counter. `ordered` tells, when it falls, whether the MainDevice asked for it by taking a
+    /// SubDevice out of SAFEOP or OP. Says whether it is news.
+    pub fn record(&mut self, wkc: Seen<u16>, ordered: impl FnOnce() -> Ordered) -> bool {
         self.count += 1;
+        if std::mem::take(&mut self.is_laid_out_anew) {
+            (self.first, self.wkc, self.highest) = (wkc, wkc, wkc);
+            return true;
+        }
         let open = self.deficits.back_mut().filter(|deficit| deficit.ended.is_none());
         if wkc.value == self.wkc.value {
             if let Some(deficit) = open {
@@ -110,9 +162,16 @@ impl Cyclic {
             deficit.lowest = deficit.lowest.min(wkc.value);
             return true;
         }
-        if is_wanted() {
-            self.highest = wkc;
-            return true;
+        match ordered() {
+            Ordered::Yes => {
+                self.highest = wkc;
+                return true;
+            }
+            Ordered::Unseen => {
+                (self.highest, self.may_be_ordered) = (wkc, Some(wkc));
+                return true;
+            }
+            Ordered::No => {}
         }
         if self.deficits.len() == DEFICITS_KEPT {
             self.deficits.pop_front();

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use linesman_config::identity::RevisionRule;
+use linesman_config::inventory::label;
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias};
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::PortMap;
@@ -13,8 +14,8 @@ use linesman_proto::topology::SeenController;
 
 use super::mailbox::MailboxHistory;
 use super::{
-    AlChange, AlError, AlHistory, ClockHistory, CounterHistory, DlHistory, Power, Seen, SiiImage,
-    push_kept,
+    AlChange, AlError, AlHistory, ClockHistory, CounterHistory, Counting, DlHistory, ErrorSum,
+    Power, ReportedTrouble, Seen, SiiImage, push_kept,
 };
 
 /// A controller.
@@ -54,6 +55,14 @@ pub struct Device {
     pub dl: DlHistory,
     /// Its error counters.
     pub counters: CounterHistory,
+    /// How it counts them, where its controller is known.
+    pub counting: Option<Counting>,
+    /// Errors of all its ports together, where a tool says no more.
+    pub error_sum: Option<ErrorSum>,
+    /// Trouble that another tool reports, in order of time.
+    pub reported_trouble: Vec<Seen<ReportedTrouble>>,
+    /// How long a frame is on its way from the reference clock to it: register 0x0928.
+    pub delay: Option<Span>,
     /// Emergencies it sent, oldest first, at most [`CHANGES_KEPT`](super::CHANGES_KEPT).
     pub emergencies: VecDeque<Seen<Emergency>>,
     /// What its mailbox tells of trouble.
@@ -215,6 +224,10 @@ impl Device {
             al: AlHistory::default(),
             dl: DlHistory::default(),
             counters: CounterHistory::default(),
+            counting: None,
+            error_sum: None,
+            reported_trouble: Vec::new(),
+            delay: None,
             emergencies: VecDeque::new(),
             mailbox: MailboxHistory::default(),
             watchdog: Watchdog::default(),
@@ -238,10 +251,11 @@ impl Device {
         }
     }
 
-    /// The name of the project, else the type.
+    /// What people call it, by the name of the project and its type as far as they are known.
     #[must_use]
-    pub fn best_name(&self) -> Option<&str> {
-        self.name.as_deref().or(self.type_name.as_deref())
+    pub fn label(&self) -> String {
+        let (name, type_name) = (self.name.as_deref(), self.type_name.as_deref());
+        label(self.id, name.unwrap_or_default(), type_name.unwrap_or_default())
     }
 
     /// Notes that it answered.

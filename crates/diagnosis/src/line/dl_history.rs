@@ -15,6 +15,8 @@ pub struct DlHistory {
     pub first: Option<Seen<DlStatus>>,
     /// As last read.
     pub last: Option<Seen<DlStatus>>,
+    /// Time of the latest reading, whether or not it was news.
+    pub latest_reading: Option<Instant>,
     /// Changes, oldest first, at most [`CHANGES_KEPT`](super::CHANGES_KEPT).
     pub changes: VecDeque<DlChange>,
     /// All changes, also those forgotten.
@@ -37,6 +39,7 @@ pub struct DlChange {
 impl DlHistory {
     /// Takes a reading of DL status. Says whether it is news.
     pub fn record(&mut self, status: DlStatus, at: Instant, frame: Option<u64>) -> bool {
+        self.latest_reading = self.latest_reading.max(Some(at));
         let seen = Seen::new(status, at, frame);
         let Some(last) = self.last else {
             self.first = Some(seen);

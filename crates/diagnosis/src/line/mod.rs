@@ -13,6 +13,7 @@ pub mod dl_history;
 pub mod host;
 pub mod learn;
 pub mod mailbox;
+pub mod reported;
 pub mod search;
 pub mod sii_image;
 pub mod traffic;
@@ -32,11 +33,12 @@ pub use al_history::{AlChange, AlError, AlHistory, StateRequest};
 pub use beat::{Beat, Off, Pause};
 pub use clock::{ClockHistory, Reference};
 pub use counters::{CounterHistory, CounterTrack, Rise};
-pub use cyclic::{Cyclic, Deficit, Owner};
+pub use cyclic::{Cyclic, Deficit, Ordered, Owner};
 pub use device::{Absence, Device, Planned, SeenIdentity, SharedAddress, SharedBy, Trouble};
 pub use dl_history::{DlChange, DlHistory};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
+pub use reported::{Counting, ErrorSum, Reported, ReportedTrouble};
 pub use search::LoopWrite;
 pub use sii_image::{Power, SiiImage};
 pub use traffic::{Silence, Traffic};
@@ -77,6 +79,11 @@ pub struct HoleSearch {
     pub ended: Option<Instant>,
 }
 
+/// After DL control was written, ports are in motion for so long: until it is written back.
+const ORDER_LASTS: Span = Span::ms(200);
+/// Frames that were sent so shortly before are on their way then.
+const ORDER_IN_FLIGHT: Span = Span::ms(2);
+
 /// Errors that come after so long a time without any are a new spell.
 pub const SPELL_GAP: Span = Span::s(2);
 
@@ -91,6 +98,8 @@ pub struct Line {
     pub tree: Option<Tree>,
     /// Whether the tree comes from a project or an observation file, not from what was seen.
     pub tree_is_planned: bool,
+    /// Whether this program drives the line, so that no order to a SubDevice goes unseen.
+    pub sees_all_orders: bool,
     /// What the host noticed.
     pub host: HostHistory,
     /// Logical datagrams that are sent again and again.
@@ -101,6 +110,8 @@ pub struct Line {
     pub trips: Trips,
     /// Frames and datagrams.
     pub traffic: Traffic,
+    /// What another program says of the line.
+    pub reported: Reported,
     /// The time of the latest frame or observation.
     pub now: Instant,
     /// When the present spell of errors began: at the earliest time that its first reading allows.
@@ -110,6 +121,9 @@ pub struct Line {
     pub hole: Option<HoleSearch>,
     /// The links that the latest search has left over: what it looked for was at one of them.
     pub hole_left: Vec<usize>,
+    /// When DL control was last written to stay, as a MainDevice does to measure delays on an opened ring: frames that
+    /// were on their way then are lost by order.
+    pub loops_ordered: Option<Instant>,
     /// DL control as it was written for temporary use, in the order of time.
     pub loop_writes: VecDeque<LoopWrite>,
     revision: u64,
@@ -180,6 +194,14 @@ impl Line {
         self.last_errors = self.last_errors.max(Some(at));
     }
 
+    /// Whether a request that was sent at `at` may be lost because the MainDevice opened or closed ports.
+    #[must_use]
+    pub fn is_lost_by_order(&self, at: Instant) -> bool {
+        self.loops_ordered.is_some_and(|ordered| {
+            ordered.before(ORDER_IN_FLIGHT) <= at && at.since(ordered) < ORDER_LASTS
+        })
+    }
+
     /// A controller.
     #[must_use]
     pub fn device(&self, id: DeviceId) -> Option<&Device> {
@@ -213,10 +235,10 @@ impl Line {
         all.find(|device| device.position == Some(position)).map(|device| device.id)
     }
 
-    /// What people call a controller: `7 (EL2004)`, or `7` where no name is known.
+    /// What people call a controller: `Term 7 (EL2004)`, or `SubDevice 7` where nothing is known of it.
     #[must_use]
     pub fn label(&self, id: DeviceId) -> String {
-        label(id, self.device(id).and_then(Device::best_name).unwrap_or_default())
+        self.device(id).map_or_else(|| label(id, "", ""), Device::label)
     }
 
     /// The links of the tree with controllers by identity; empty without a tree.

@@ -53,6 +53,8 @@ impl Silence {
 
 /// Without any frame for so long nothing was sent, where process data are exchanged in a cycle.
 const QUIET: Span = Span::ms(20);
+/// Gaps in the recording that are kept.
+const UNRECORDED_KEPT: usize = 256;
 /// With fewer requests than this it is no silence.
 const SHORT: u64 = 3;
 /// Returns whose times are kept: a request is known to be lost after so many later ones at most.
@@ -87,6 +89,8 @@ pub struct Traffic {
     pub returned: u64,
     /// Frames whose way out was seen and whose return was not, though others came back later.
     pub lost: Tally,
+    /// Frames that did not come back because ports were opened or closed on purpose; they are not among `lost`.
+    pub lost_by_order: u64,
     /// Of those of which the copy of one card came back: how many did not come to this card.
     pub copies_lost: [Tally; 2],
     /// The first lost frame.
@@ -107,6 +111,11 @@ pub struct Traffic {
     recent_returns: RecentReturns,
     /// Who sent requests, at most four.
     pub senders: Vec<Sender>,
+    /// Requests that were sent and are not in the recording, as their numbers tell.
+    pub unrecorded: Tally,
+    /// When: before which recorded requests, the latest ones, and when the request before each was recorded.
+    pub unrecorded_at: VecDeque<Pause>,
+    last_noted: Option<Instant>,
     /// Returns whose request was not seen.
     pub returned_alone: u64,
     /// Frames recorded twice.
@@ -124,8 +133,14 @@ pub struct Traffic {
     pub first_damaged: Option<Seen<()>>,
     /// Frames of which the recorder kept only the beginning.
     pub truncated: u64,
+    /// Frames of which the recorder kept so little that a datagram, or its working counter, is missing.
+    pub datagrams_cut: u64,
     /// Frames that end before their last datagram does, though they were recorded whole.
     pub cut_short: u64,
+    /// The largest step by which time stamps ran backwards.
+    pub clock_back: Span,
+    /// The longest time without any frame.
+    pub longest_gap: Span,
     /// Datagrams judged: each request once.
     pub datagrams: u64,
     /// Datagrams that nobody answered: their frame never came back, or came back with working
@@ -172,6 +187,8 @@ impl Traffic {
         let last = self.last.unwrap_or(at);
         // Times of two interfaces may run backwards.
         self.last = Some(last.max(at));
+        self.clock_back = self.clock_back.max(last.since(at));
+        self.longest_gap = self.longest_gap.max(at.since(last));
         if at.since(last) >= QUIET {
             if self.quiet.len() == SILENCES_KEPT {
                 self.quiet.pop_front();
@@ -180,12 +197,45 @@ impl Traffic {
         }
     }
 
-    /// A request was lost that went out when `returns_before` frames had come back.
-    pub fn record_lost(&mut self, at: Instant, frame: u64, returns_before: u64) {
+    /// A request was recorded at `at`, and so many before it were not.
+    pub fn note_unrecorded(&mut self, count: u64, at: Instant) {
+        let before = self.last_noted.replace(at).unwrap_or(at);
+        if count == 0 {
+            return;
+        }
+        self.unrecorded.add(count, at);
+        let gap = Pause { from: before.min(at), to: at };
+        match self.unrecorded_at.back_mut() {
+            // Gaps that follow one another at once are kept as one.
+            Some(last) if gap.from.since(last.to) < QUIET => last.to = gap.to,
+            Some(_) | None => {
+                if self.unrecorded_at.len() == UNRECORDED_KEPT {
+                    self.unrecorded_at.pop_front();
+                }
+                self.unrecorded_at.push_back(gap);
+            }
+        }
+    }
+
+    /// Whether something may have been said between two times that is not in the recording: requests that were left
+    /// out, frames that were cut off, or one direction only.
+    #[must_use]
+    pub fn may_lack(&self, from: Instant, to: Instant) -> bool {
+        let overlaps = |gap: &Pause| gap.from <= to && from <= gap.to;
+        self.datagrams_cut > 0 || self.is_one_sided() || self.unrecorded_at.iter().any(overlaps)
+    }
+
+    /// A request was lost that went out when `returns_before` frames had come back; `by_order`, if ports were opened or
+    /// closed on purpose meanwhile.
+    pub fn record_lost(&mut self, at: Instant, frame: u64, returns_before: u64, by_order: bool) {
         let seen = Seen::new((), at, Some(frame));
-        self.lost.add(1, at);
-        self.first_lost.get_or_insert(seen);
-        self.latest_lost = Some(seen);
+        if by_order {
+            self.lost_by_order += 1;
+        } else {
+            self.lost.add(1, at);
+            self.first_lost.get_or_insert(seen);
+            self.latest_lost = Some(seen);
+        }
         let ended = self.return_after(returns_before, at);
         if let Some(silence) = self.silences.back_mut() {
             if silence.returns_before == returns_before {
@@ -271,7 +321,10 @@ impl Traffic {
             return false;
         }
         let only_returned = self.sent == 0 && self.returned_alone > 0;
-        let only_sent = self.returned == 0 && self.sent > 0 && self.lost_addressed > 0;
+        // A copy for a ring's second card may be taken for a return now and then.
+        let is_unanswered = self.returned == 0
+            || (self.answered == 0 && self.processed == 0 && self.returned * 20 < self.sent);
+        let only_sent = is_unanswered && self.sent > 0 && self.lost_addressed > 0;
         only_returned || only_sent
     }
 }

@@ -438,7 +438,7 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
 fn other_way_counts(survey: &Survey<'_>, hop: Hop) -> bool {
     let End::Controller(node, port) = hop.from else { return true };
     let track = survey.track(node, ErrorCounter::PhysicalLayer(port));
-    track.is_some_and(|track| track.last.value < u8::MAX || track.spell_rise() > 0)
+    track.is_some_and(|track| !track.is_at_end() || track.spell_rise() > 0)
 }
 
 const fn suspect(cause: FaultName, spot: Spot, weight: f64) -> Suspect {

@@ -14,7 +14,7 @@ use linesman_proto::topology::{End, Hop, Route};
 
 use super::spells::Spells;
 use super::survey::Survey;
-use crate::line::{CounterTrack, Rise};
+use crate::line::{CounterTrack, Counting, Rise};
 
 /// Damage on one hop: a link in one direction, with the sender and the receiver at its ends.
 #[derive(Clone, PartialEq, Debug)]
@@ -110,9 +110,12 @@ impl Located {
 /// Links that come up together with the computer spoil the first frames; those are not missed.
 const COMING_UP: Span = Span::ms(100);
 
+/// Cards tell what they counted so long after it at most.
+const CARD_READ_WITHIN: Span = Span::ms(300);
+
 /// Whether a counter stood at its end already when the present errors began.
 fn is_stuck(track: &CounterTrack) -> bool {
-    track.last.value == u8::MAX && track.spell_rise() == 0
+    track.is_at_end() && track.spell_rise() == 0
 }
 
 /// Bad frames that earlier checks counted.
@@ -264,7 +267,8 @@ impl Walk<'_, '_> {
         let before = self.carried;
 
         let bad = invalid.settled + forwarded.settled;
-        let frames = if before.frames == 0 || forwarded.total > 0 {
+        let apart = self.counting(Some(node)).is_some_and(|counting| counting.forwarded_apart);
+        let frames = if before.frames == 0 || forwarded.total > 0 || apart {
             invalid.settled
         } else if before.is_lower_bound || invalid.is_lower_bound {
             // Two counters that both stand at their end, or were cleared at different times, differ
@@ -278,7 +282,8 @@ impl Walk<'_, '_> {
 
         // Some controllers make a symbol error anew when they send a bad frame on: then the symbols
         // go with the bad frames that came, one each.
-        let goes_with_frames = physical.settled <= bad && physical.settled * 2 >= bad;
+        let remakes = self.counting(hop.from.node()).is_none_or(|one| one.remakes_symbol_errors);
+        let goes_with_frames = remakes && physical.settled <= bad && physical.settled * 2 >= bad;
         let remade = match frames == 0 && before.frames > 0 && goes_with_frames {
             true => self.counted_with_frames(node, port),
             false => 0,
@@ -296,6 +301,11 @@ impl Walk<'_, '_> {
         ))
     }
 
+    /// How a controller counts, where that is known.
+    fn counting(&self, node: Option<usize>) -> Option<Counting> {
+        self.survey.line().devices.get(node?)?.counting
+    }
+
     /// How many symbol errors of a port came with bad frames. A reading may come between the symbol and the end of
     /// its frame: then the one shows in this reading, the other in the next.
     fn counted_with_frames(&self, node: usize, port: Port) -> u64 {
@@ -309,7 +319,7 @@ impl Walk<'_, '_> {
         let with_frames = rises(ErrorCounter::PhysicalLayer(port)).filter(|rise| {
             frames.meet((rise.after_time.before(Span::ns(1)), rise.at + Span::ns(1)))
         });
-        with_frames.map(|rise| u64::from(rise.difference.rise)).sum()
+        with_frames.map(|rise| rise.difference.rise).sum()
     }
 
     fn read(&self, hop: Hop, track: &CounterTrack) -> Reading {
@@ -322,7 +332,7 @@ impl Walk<'_, '_> {
             is_lower_bound: track.total.is_lower_bound(),
         };
         for rise in self.survey.rises(track) {
-            let by = u64::from(rise.difference.rise);
+            let by = rise.difference.rise;
             if rise.at > horizon {
                 reading.settled = reading.settled.saturating_sub(by);
             } else if self.survey.falls_with_link_change(hop.link, rise)
@@ -365,6 +375,12 @@ impl Walk<'_, '_> {
         let is_silent = silences.back().is_some_and(|silence| silence.ended.is_none());
         let may_judge = self.survey.has_ended() && !is_silent;
         let read_since = |at: Instant| may_judge || self.horizon > at;
+        // What controllers had counted when they were cleared nobody has read.
+        let devices = self.survey.line().devices.iter();
+        let cleared = devices.filter_map(|device| device.counters.cleared_by_order()).max();
+        if cleared.is_some_and(|cleared| last <= cleared + CARD_READ_WITHIN) {
+            return None;
+        }
         let frames = errors.of_spell().saturating_sub(self.carried.frames);
         let is_new = if self.carried.frames == 0 {
             read_since(first)
@@ -397,7 +413,9 @@ impl Walk<'_, '_> {
         // Somebody who looks for the place where all of them vanish does so in a silence, not in noise.
         let was_searched =
             line.hole.is_some_and(|hole| first <= hole.since.at && hole.since.at <= last);
-        let is_explained = is_first || was_searched || self.survey.any_link_changed(first, last);
+        let is_cut = line.traffic.datagrams_cut > 0;
+        let is_explained =
+            is_cut || is_first || was_searched || self.survey.any_link_changed(first, last);
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,
             card,

@@ -89,7 +89,7 @@ impl Drops {
                 return track.total.rise();
             }
             let later = track.rises.iter().filter(|rise| rise.at >= since);
-            later.map(|rise| u64::from(rise.difference.rise)).sum()
+            later.map(|rise| rise.difference.rise).sum()
         };
         let losses = tracks.iter().map(|track| rises(track)).max().unwrap_or(0);
         let noticed = || {

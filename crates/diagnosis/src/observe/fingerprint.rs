@@ -5,7 +5,7 @@
 //! latter tell the two apart where the capture does not.
 
 use linesman_proto::command::{Addressing, Command};
-use linesman_proto::frame::FrameView;
+use linesman_proto::frame::{CutHeader, FrameView};
 
 /// Both halves of a frame, hashed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -24,6 +24,8 @@ pub struct Fingerprint {
     pub is_answered: bool,
     /// Datagrams that could be read.
     pub datagrams: u32,
+    /// Index of the first datagram.
+    pub first_index: u8,
     /// Whether the walk over the datagrams ended too early.
     pub is_cut: bool,
 }
@@ -39,13 +41,18 @@ impl Fingerprint {
             commands: 0,
             is_answered: false,
             datagrams: 0,
+            first_index: 0,
             is_cut: false,
         };
-        for datagram in view.datagrams() {
+        let mut datagrams = view.datagrams();
+        for datagram in datagrams.by_ref() {
             let Ok(datagram) = datagram else {
                 print.is_cut = true;
                 break;
             };
+            if print.datagrams == 0 {
+                print.first_index = datagram.index();
+            }
             let is_position = datagram.command().is_some_and(|command| {
                 matches!(command.addressing(), Addressing::Position | Addressing::Broadcast)
             });
@@ -62,7 +69,28 @@ impl Fingerprint {
             print.is_answered |= wkc > 0;
             print.datagrams += 1;
         }
+        if let Some(header) = datagrams.cut_header().filter(|_| print.is_cut) {
+            if print.datagrams == 0 {
+                print.first_index = header.index;
+            }
+            print.add_cut(header);
+        }
         print
+    }
+
+    /// Adds what is left of a datagram that the recorder cut off: enough to tell frames apart.
+    fn add_cut(&mut self, header: CutHeader) {
+        let addressing = Command::from_code(header.code).map(Command::addressing);
+        let address = match addressing {
+            Some(Addressing::Position | Addressing::Broadcast) => header.address >> 16,
+            Some(Addressing::Station | Addressing::Logical | Addressing::None) | None => {
+                header.address
+            }
+        };
+        let tail = u64::from(header.index) << 48 | u64::from(header.len) << 32;
+        self.lasting = mix(self.lasting, u64::from(header.code) << 56 | tail | u64::from(address));
+        self.changing = mix(self.changing, u64::from(header.address ^ address));
+        self.skeleton = mix(self.skeleton, tail | u64::from(address));
     }
 }
 

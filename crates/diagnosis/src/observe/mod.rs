@@ -6,6 +6,7 @@ pub mod fingerprint;
 pub mod pairing;
 pub mod seen;
 pub mod sender;
+mod sequence;
 
 pub use exchange::{Exchange, FrameCopy};
 pub use fingerprint::Fingerprint;

@@ -13,6 +13,7 @@
 //! backwards, many do.
 
 mod loss;
+mod one_way;
 mod sent_by;
 
 use std::collections::VecDeque;
@@ -22,6 +23,7 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
+use self::one_way::OneWay;
 use super::sender::{Senders, Written};
 use super::{Direction, Exchange, Fingerprint, FrameCopy, FrameSeen, Sender};
 
@@ -75,18 +77,10 @@ pub struct Pairing {
     was_whole: bool,
     /// Returns that were taken for requests, since this was asked.
     mistaken: u64,
-}
-
-/// Whether the recording shows only what comes back.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-enum OneWay {
-    /// Nothing speaks for it yet.
-    #[default]
-    Open,
-    /// Answers came from this marked address, and no request was seen: whatever has it comes back.
-    From(MacAddress),
-    /// Requests and returns are both there.
-    No,
+    /// Requests that were sent and not recorded, as their numbers tell, since this was asked.
+    unrecorded: u64,
+    /// Returns without a request since the recording began to look as if it had no requests.
+    alone: u32,
 }
 
 #[derive(Clone, Debug)]
@@ -131,7 +125,24 @@ impl Pairing {
         settle: &mut impl FnMut(&Exchange<'_>),
     ) -> Outcome {
         let source = view.source();
-        let found = self.pending.iter().position(|pending| pending.print.lasting == print.lasting);
+        let is_unknown = frame.direction == Direction::Unknown;
+        // In a recording of returns alone the copy that card B sent looks like a request; what card A sent is no
+        // answer to it.
+        let is_others = |pending: &Pending| {
+            is_unknown
+                && source.is_marked()
+                && !pending.source.is_marked()
+                && pending.copy_by.is_none()
+                && pending.source.marked() != source
+        };
+        let found = self
+            .pending
+            .iter()
+            .position(|pending| pending.print.lasting == print.lasting && !is_others(pending));
+        if is_unknown && self.is_one_way_for_sure() && !source.is_marked() {
+            // The copy of a ring's second card, which no controller has touched.
+            return Outcome::Duplicate;
+        }
         let is_return = match frame.direction {
             Direction::Sent => false,
             Direction::Received => true,
@@ -223,8 +234,16 @@ impl Pairing {
         std::mem::take(&mut self.mistaken)
     }
 
+    /// How many requests were sent and not recorded, as their numbers tell, since this was asked.
+    pub fn take_unrecorded(&mut self) -> u64 {
+        std::mem::take(&mut self.unrecorded)
+    }
+
     /// Whether a frame of unknown direction is on its way back.
     fn is_return(&self, found: Option<usize>, source: MacAddress, print: Fingerprint) -> bool {
+        if self.is_one_way_for_sure() {
+            return true;
+        }
         let Some(pending) = found.map(|index| &self.pending[index]) else {
             let is_own = |sender: &Sender| !sender.mac.is_marked() && sender.mac.marked() == source;
             return print.is_answered
@@ -243,51 +262,6 @@ impl Pairing {
             // An address that is marked from the start shows nothing. Where answers are known to
             // come, a second frame is the return; else it is the request again.
             (true, _) => self.returns > 0,
-        }
-    }
-
-    /// A return came whose request was not seen. An answer from a marked address, with no request
-    /// ever paired, means that requests are not recorded; what nobody answered and was taken for one
-    /// came back too. Where the MainDevice's own address has the mark, the next answer to such a
-    /// frame shows the mistake.
-    fn weigh_one_way(
-        &mut self,
-        source: MacAddress,
-        print: Fingerprint,
-        settle: &mut impl FnMut(&Exchange<'_>),
-    ) {
-        match self.one_way {
-            OneWay::Open if print.is_answered && source.is_marked() => {
-                self.one_way = OneWay::From(source);
-                self.senders.forget(source);
-                while let Some(at) = self.pending.iter().position(|one| one.source == source) {
-                    let reply = Some(self.pending[at].copy());
-                    let returns_before = self.returns;
-                    settle(&Exchange {
-                        request: None,
-                        reply,
-                        earlier: &[],
-                        is_last: true,
-                        returns_before,
-                        is_cut_off: false,
-                        is_part: false,
-                        copy_lost: None,
-                        sent_by: None,
-                    });
-                    self.returns += 1;
-                    self.mistaken += 1;
-                    self.remove(at);
-                }
-            }
-            OneWay::From(_) => {
-                let was_its_request = |(returned, _): &(Fingerprint, Instant)| {
-                    returned.lasting == print.lasting && !returned.is_answered
-                };
-                if print.is_answered && self.returned.iter().flatten().any(was_its_request) {
-                    self.one_way = OneWay::No;
-                }
-            }
-            OneWay::Open | OneWay::No => {}
         }
     }
 
@@ -311,6 +285,7 @@ impl Pairing {
             pending.out += 1;
             return Outcome::RequestCopy;
         }
+        let is_unknown_card = frame.path.is_none();
         let is_other_card = |pending: &&mut Pending| {
             pending.print == print
                 && pending.copy_by.is_none()
@@ -339,7 +314,18 @@ impl Pairing {
         {
             return Outcome::Duplicate;
         }
+        // For the two cards of a ring some commands are replaced by NOP, now in the one copy, now in the other.
+        let is_twin = |pending: &Pending| {
+            pending.print.skeleton == print.skeleton
+                && pending.source.marked() != source.marked()
+                && gap(pending.time, frame.time) <= OTHER_CARD
+        };
+        let is_repeated =
+            is_repeated || (is_unknown_card && self.pending.iter().rev().take(8).any(is_twin));
         self.senders.note(frame, source, is_repeated);
+        if frame.direction == Direction::Unknown && !is_repeated {
+            self.unrecorded += self.senders.number(source, &print);
+        }
         let has_more = |pending: &Pending| {
             pending.print.skeleton == print.skeleton
                 && pending.print.commands > print.commands

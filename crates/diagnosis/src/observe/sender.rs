@@ -6,7 +6,8 @@ use linesman_proto::frame::Datagram;
 use linesman_proto::register::ErrorCounters;
 use linesman_proto::time::Instant;
 
-use super::{Direction, FrameSeen};
+use super::sequence::IndexSequence;
+use super::{Direction, Fingerprint, FrameSeen};
 use crate::line::Seen;
 
 /// So many requests of its own make a sender one for sure.
@@ -35,6 +36,8 @@ pub struct Sender {
     pub orders: u64,
     /// Its latest frame.
     pub last: Instant,
+    /// How it numbers its frames.
+    indexes: IndexSequence,
 }
 
 /// What a frame writes into SubDevices.
@@ -74,9 +77,10 @@ impl Senders {
         std::mem::replace(&mut self.has_changed, false)
     }
 
-    /// What was taken for a sender is none.
-    pub(super) fn forget(&mut self, mac: MacAddress) {
-        self.all.retain(|sender| sender.mac != mac);
+    /// Those that were taken for senders are none.
+    pub(super) fn forget(&mut self, is_theirs: impl Fn(MacAddress) -> bool) {
+        self.all.retain(|sender| !is_theirs(sender.mac));
+        self.has_changed = true;
     }
 
     /// A return came of a request that was not seen here: somebody sends from another place of the line.
@@ -102,6 +106,14 @@ impl Senders {
         }
     }
 
+    /// A request of a sender has this index and so many datagrams. Gives how many requests before it were not
+    /// recorded, and since when, as far as its numbers tell.
+    pub(super) fn number(&mut self, mac: MacAddress, print: &Fingerprint) -> u64 {
+        let sender = self.all.iter_mut().find(|sender| sender.mac == mac);
+        let datagrams = u8::try_from(print.datagrams.max(1)).unwrap_or(u8::MAX);
+        sender.map_or(0, |sender| sender.indexes.take(print.first_index, datagrams))
+    }
+
     /// Somebody sent a request; a repeated one may be that of a second card.
     pub(super) fn note(&mut self, frame: &FrameSeen<'_>, mac: MacAddress, is_repeated: bool) {
         let own = u64::from(!is_repeated);
@@ -124,6 +136,7 @@ impl Senders {
                     writes: 0,
                     orders: 0,
                     last: frame.time,
+                    indexes: IndexSequence::default(),
                 });
                 self.has_changed = true;
             }

@@ -5,12 +5,15 @@
 
 pub mod build;
 mod calibration;
+pub mod coverage;
 pub mod number;
 
 use linesman_config::fault::{Class, FaultName};
 use serde::{Deserialize, Serialize};
 
 pub use crate::finding::{EvidenceKind, Severity};
+pub use crate::pasted::Understood;
+pub use coverage::CoverageReport;
 pub use number::Number;
 
 /// Name and version of the format.
@@ -36,6 +39,12 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The network as a whole.
     pub network: NetworkReport,
+    /// What could be judged, and what not.
+    #[serde(default)]
+    pub coverage: CoverageReport,
+    /// Of a pasted text: what was understood, and what not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub understood: Option<Understood>,
     /// What is wrong, worst first.
     pub findings: Vec<FindingReport>,
 }
@@ -44,11 +53,11 @@ pub struct Diagnosis {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// The line was seen at work, and no error or warning was found.
+    /// No error or warning was found, and enough was judged to have shown one.
     Healthy,
     /// There is, or was, an error or a warning.
     Faulty,
-    /// Too little was seen to say so.
+    /// No error or warning was found, and too little was judged to call the line healthy: see `coverage`.
     Inconclusive,
 }
 

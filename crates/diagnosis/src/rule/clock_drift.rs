@@ -200,7 +200,7 @@ fn begin(line: &Line, id: DeviceId, astray: &[Astray]) -> Condition {
 fn evidence(line: &Line, id: DeviceId, astray: &Astray) -> Evidence {
     let us = |ns: i64| ns as f64 / 1e3;
     let text = format!(
-        "clock of SubDevice {}: {:+.3} µs off the reference, then {:+.3} µs, at most {:+.3} µs; up to {} parts \
+        "clock of {}: {:+.3} µs off the reference, then {:+.3} µs, at most {:+.3} µs; up to {} parts \
          per million",
         line.label(id),
         us(astray.near.value),

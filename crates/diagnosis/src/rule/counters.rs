@@ -77,11 +77,11 @@ fn cleared(line: &Line) -> Option<Condition> {
     let times: u32 = all.iter().map(|(device, _)| device.counters.foreign_clears()).sum();
     let (counter, before) = first.value;
     let text = format!(
-        "{} of SubDevice {} fell from {before} to {} without a write that was seen here; {times} times on \
+        "{} of {} fell from {before} to {} without a write that was seen here; {times} times on \
          {} SubDevices by now",
         name(counter),
         line.label(device.id),
-        device.counters.last().value(counter).unwrap_or(0),
+        device.counters.latest(counter).unwrap_or(0),
         all.len()
     );
     let place = Place::Network { network: line.network };
@@ -101,7 +101,7 @@ fn full(line: &Line, device: &Device) -> Option<Condition> {
     // One that came to its end here has told all it had to tell.
     let is_full = |counter: &ErrorCounter| {
         let track = device.counters.track(*counter);
-        track.is_some_and(|track| track.first.value == u8::MAX && track.last.value == u8::MAX)
+        track.is_some_and(|track| track.was_at_end() && track.is_at_end())
     };
     let full: Vec<ErrorCounter> = ErrorCounter::ALL.into_iter().filter(is_full).collect();
     let first = *full.first()?;
@@ -109,7 +109,7 @@ fn full(line: &Line, device: &Device) -> Option<Condition> {
     let since = track.first.at;
     let names: Vec<String> = full.iter().map(|counter| name(*counter)).collect();
     let text = format!(
-        "at its end, 255, and counts no more: {} of SubDevice {}",
+        "at its end, 255, and counts no more: {} of {}",
         names.join(", "),
         line.label(device.id)
     );

@@ -45,10 +45,13 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             .confirmed(first.at)
             .ended(last.at)
             .about([Symptom::Emergency(device.id)])
-            .advise("`linesman history` shows the texts, from the description of the device.");
+            .advise(format!(
+                "`linesman history WHERE {}` shows the texts, from the description of the device.",
+                device.id.no()
+            ));
         for seen in all {
             let label = line.label(device.id);
-            let text = format!("SubDevice {label} noted {}", text(&seen.value));
+            let text = format!("{label} noted {}", text(&seen.value));
             condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
         }
         conditions.push(condition);

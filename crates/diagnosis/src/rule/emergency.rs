@@ -57,7 +57,7 @@ fn condition(
     for seen in errors.iter().rev().take(SHOWN) {
         let sorts: Vec<_> = seen.value.register.names().collect();
         let text = format!(
-            "SubDevice {} sent emergency 0x{:04X} ({}), error register: {}",
+            "{} sent emergency 0x{:04X} ({}), error register: {}",
             line.label(device.id),
             seen.value.code,
             seen.value.class().text(),

@@ -44,8 +44,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
     let traffic = &line.traffic;
     let destroyed = destroyed(line);
-    let counted =
-        |rises: &[&Rise]| -> u64 { rises.iter().map(|rise| u64::from(rise.difference.rise)).sum() };
+    let counted = |rises: &[&Rise]| -> u64 { rises.iter().map(|rise| rise.difference.rise).sum() };
     let seen = traffic.first_foreign;
     let firsts =
         destroyed.iter().filter_map(|(_, rises)| rises.first().map(|rise| rise.after_time));
@@ -67,7 +66,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for (device, rises) in &destroyed {
         let Some(rise) = rises.last() else { continue };
         let text = format!(
-            "SubDevice {} destroyed {} frames in its processing unit, and no port counted a damaged one",
+            "{} destroyed {} frames in its processing unit, and no port counted a damaged one",
             line.label(device.id),
             counted(rises)
         );

@@ -223,12 +223,12 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
     let label = survey.line().label(id);
     let frames = damage.frames;
     let frames_text = format!(
-        "SubDevice {label}, port {port}, is the first in the order of checks that counts bad frames \
+        "{label}, port {port}, is the first in the order of checks that counts bad frames \
          from {from}: {at_least}{frames} of its own"
     );
     let symbols_text = match damage.symbols {
         Some(symbols) => format!(
-            "SubDevice {label}, port {port}, could not decode {at_least}{symbols} symbols from {from}"
+            "{label}, port {port}, could not decode {at_least}{symbols} symbols from {from}"
         ),
         None => String::new(),
     };
@@ -241,11 +241,11 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
         if let Some(rise) = track.filter(|_| count > 0).and_then(|track| track.last_rise()) {
             let first = track.and_then(|track| survey.rises(track).next()).unwrap_or(rise);
             // Else the values beside it would contradict it.
-            if count > u64::from(rise.after.saturating_sub(first.before)) {
+            if count > rise.after.saturating_sub(first.before) {
                 text += "; the counter was cleared in between";
             }
             let evidence = Evidence::rise(id, counter.address(), Some(port), rise, text)
-                .values(Some(u64::from(first.before)), Some(u64::from(rise.after)));
+                .values(Some(first.before), Some(rise.after));
             condition.evidence.push(evidence);
         }
     }
@@ -253,8 +253,8 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
         let (by, counter) = (DeviceId(node as u32), ErrorCounter::Forwarded(marked_at));
         if let Some(rise) = survey.track(node, counter).and_then(|track| track.last_rise()) {
             let text = format!(
-                "SubDevice {} counts {frames} frames that were bad already when they came; port {port} of \
-                 SubDevice {label}, whose own counter tells nothing, has let them pass",
+                "{} counts {frames} frames that were bad already when they came; port {port} of \
+                 {label}, whose own counter tells nothing, has let them pass",
                 survey.line().label(by),
             );
             let evidence = Evidence::rise(by, counter.address(), Some(marked_at), rise, text);
@@ -281,7 +281,7 @@ fn card_evidence(last_hop: &LastHop) -> Evidence {
 fn end_text(survey: &Survey<'_>, end: End) -> String {
     match survey.name(end) {
         End::MainDevice(card) => format!("the MainDevice (card {card})"),
-        End::Controller(id, port) => format!("SubDevice {}, port {port}", survey.line().label(id)),
+        End::Controller(id, port) => format!("{}, port {port}", survey.line().label(id)),
     }
 }
 
@@ -318,7 +318,7 @@ fn actions(survey: &Survey<'_>, cause: FaultName, spot: Spot) -> Vec<String> {
         Spot::Device(node) => {
             let label = survey.line().label(DeviceId(node as u32));
             vec![
-                format!("Exchange SubDevice {label}: symbols after it are clean, frames are not."),
+                format!("Exchange {label}: symbols after it are clean, frames are not."),
                 "Before that, check its supply; the cable behind it is not the cause.".to_owned(),
             ]
         }

@@ -198,7 +198,7 @@ fn wrong(
     let label = line.label(slot.id);
     let place = Place::device(line.network, slot.id);
     let text = format!(
-        "SubDevice {label} has another {what} than planned: found {}; planned {}",
+        "{label} has another {what} than planned: found {}; planned {}",
         identity::text(&seen.value),
         identity::text(&planned)
     );
@@ -207,7 +207,7 @@ fn wrong(
             .confidence(0.7)
             .or(FaultName::DeviceWrong, 0.2)
             .advise(format!(
-                "Exchange it with SubDevice {}: each sits in the other's place.",
+                "Exchange it with {}: each sits in the other's place.",
                 line.label(other)
             )),
         None => Condition::new(&WRONG, place, FaultName::DeviceWrong, seen.at)

@@ -189,7 +189,7 @@ fn blame_supply(
     condition.actions.insert(
         0,
         format!(
-            "SubDevices {} fell silent at the same moment: look for the supply that they share.",
+            "{} fell silent at the same moment: look for the supply that they share.",
             names.join(", ")
         ),
     );
@@ -232,7 +232,7 @@ fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
         condition = condition.ended(ended);
     }
     let far = match link.downstream {
-        End::Controller(node, _) => format!("SubDevice {}", line.label(DeviceId(node as u32))),
+        End::Controller(node, _) => line.label(DeviceId(node as u32)),
         End::MainDevice(_) => "the MainDevice's second card".to_owned(),
     };
     condition =
@@ -316,7 +316,7 @@ pub(super) fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
                 let has_risen = lost.rises.iter().any(|rise| rise.at >= drops.first);
                 let was_read = device.silent.is_none()
                     && lost.last.at > drops.last
-                    && lost.last.value < u8::MAX
+                    && !lost.is_at_end()
                     && !device.has_restarted();
                 (seen || has_risen || was_read).then_some(seen || has_risen)
             }
@@ -428,11 +428,11 @@ fn status_evidence(line: &Line, drop: &Drop) -> Evidence {
             let label = line.label(id);
             let text = match drop.back {
                 Some(back) => {
-                    format!("DL status of SubDevice {label}: port {port} had no link until {back}")
+                    format!("DL status of {label}: port {port} had no link until {back}")
                 }
-                None => format!(
-                    "DL status of SubDevice {label}: port {port} has no link, and one belongs there"
-                ),
+                None => {
+                    format!("DL status of {label}: port {port} has no link, and one belongs there")
+                }
             };
             Evidence::register(id, table::DL_STATUS.address, &seen, text)
                 .port(port)
@@ -450,6 +450,6 @@ fn counter_evidence(line: &Line, end: End) -> Option<Evidence> {
     let id = DeviceId(node as u32);
     let count = track.total.rise();
     let often = if count == 1 { "once".to_owned() } else { format!("{count} times") };
-    let text = format!("SubDevice {} lost the link of port {port} {often}", line.label(id));
+    let text = format!("{} lost the link of port {port} {often}", line.label(id));
     Some(Evidence::rise(id, counter.address(), Some(port), rise, text))
 }

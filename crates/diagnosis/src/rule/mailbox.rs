@@ -87,10 +87,10 @@ fn refused(line: &Line, device: &Device) -> Option<Condition> {
     for seen in all.iter().rev().take(SHOWN) {
         let text = match seen.value {
             Refusal::Abort { object, code } => {
-                format!("SubDevice {label} aborts {object}: {}", SdoAbortCode(code))
+                format!("{label} aborts {object}: {}", SdoAbortCode(code))
             }
             Refusal::Error(code) => {
-                format!("the mailbox of SubDevice {label} answers with error {code}")
+                format!("the mailbox of {label} answers with error {code}")
             }
         };
         condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
@@ -119,8 +119,7 @@ fn slow(line: &Line, device: &Device) -> Option<Condition> {
     for seen in all.iter().rev().take(SHOWN) {
         let ms = seen.at.since(seen.value.asked).as_nanos() / 1_000_000;
         let what = seen.value.object.map_or_else(String::new, |object| format!(" to {object}"));
-        let text =
-            format!("SubDevice {} answers a request{what} after {ms} ms", line.label(device.id));
+        let text = format!("{} answers a request{what} after {ms} ms", line.label(device.id));
         condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
     }
     Some(
@@ -147,12 +146,16 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
         .filter(|(from, to, _)| to.since(*from) >= STUCK);
     let over = mailbox.stuck.back().map(|(from, to)| (*from, *to, None));
     let (since, until, frame) = full.or(waiting).or(over)?;
+    if view.line.traffic.may_lack(since, until) {
+        // The answer may have been fetched by a frame that is not in the recording.
+        return None;
+    }
     let label = view.line.label(device.id);
     let ms = until.since(since).as_nanos() / 1_000_000;
     let text = if full.is_some() {
-        format!("SubDevice {label} takes no request out of its mailbox for {ms} ms")
+        format!("{label} takes no request out of its mailbox for {ms} ms")
     } else {
-        format!("SubDevice {label} has not answered a request for {ms} ms; its controller answers")
+        format!("{label} has not answered a request for {ms} ms; its controller answers")
     };
     let place = Place::device(view.line.network, device.id);
     let mut condition = Condition::new(&STUCK_PAGE, place, FaultName::MailboxStuck, since)

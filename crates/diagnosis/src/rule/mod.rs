@@ -3,19 +3,25 @@
 //! A rule is a pure function of the line. It is asked whenever something was learnt, and says all
 //! conditions that hold or held, each time anew; [`crate::finding`] keeps track of what is news.
 
+pub mod assumed_wiring;
 pub mod clock_drift;
 pub mod counters;
 pub mod device_message;
 pub mod early_link;
 pub mod ebus_budget;
 pub mod emergency;
+pub mod errors_at_device;
+pub mod exchanged;
+pub mod fewer_answer;
 pub mod foreign_frames;
 pub mod frame_errors;
+pub mod frames_unplaced;
 pub mod host_trouble;
 pub mod identity;
 pub mod jitter;
 pub mod late;
 pub mod link_lost;
+pub mod long_delay;
 pub mod mailbox;
 pub mod nobody_answers;
 pub mod not_answering;
@@ -23,6 +29,8 @@ pub mod one_direction;
 pub mod paused;
 pub mod processor_stopped;
 pub mod reference_clock;
+pub mod reported_late;
+pub mod reported_trouble;
 pub mod reported_wrong;
 pub mod restarted;
 pub mod ring_reversed;
@@ -105,6 +113,7 @@ pub const RULES: &[Rule] = &[
     //
     // The network as a whole, working counters and states.
     nobody_answers::RULE,
+    fewer_answer::RULE,
     shared_address::RULE,
     restarted::RULE,
     reference_clock::RULE,
@@ -125,6 +134,15 @@ pub const RULES: &[Rule] = &[
     counters::RULE,
     second_maindevice::RULE,
     foreign_frames::RULE,
+    //
+    // What another tool tells, where nothing above explains it; and what was exchanged, of all above.
+    reported_trouble::RULE,
+    reported_late::RULE,
+    long_delay::RULE,
+    errors_at_device::RULE,
+    frames_unplaced::RULE,
+    exchanged::RULE,
+    assumed_wiring::RULE,
 ];
 
 /// The manual: every page of every rule, by code.

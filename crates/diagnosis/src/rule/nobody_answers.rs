@@ -73,7 +73,8 @@ const LINK_UP: Span = Span::us(330);
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
     let traffic = &line.traffic;
-    if traffic.is_one_sided() {
+    // Of frames that were cut off nobody knows whether they were answered.
+    if traffic.is_one_sided() || traffic.datagrams_cut * 2 > traffic.frames {
         return;
     }
     // One condition: the latest silence, or the one that lasts.

@@ -155,7 +155,7 @@ fn condition(line: &Line, found: &Found<'_>, all: &[DeviceId]) -> Condition {
         Some(card) => format!("card {card} took no frames"),
     };
     let text = format!(
-        "{what} for {:.1} ms; the watchdog of SubDevice {} holds for {:.1} ms",
+        "{what} for {:.1} ms; the watchdog of {} holds for {:.1} ms",
         ms(found.pause.span()),
         found.devices.first().map(|device| line.label(device.id)).unwrap_or_default(),
         ms(shortest.unwrap_or(Span::ZERO))

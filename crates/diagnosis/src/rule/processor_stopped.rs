@@ -74,7 +74,7 @@ fn condition(line: &Line, device: &Device, change: &DlChange, back: Option<Insta
     let label = line.label(id);
     let seen = Seen::new((), change.at, change.frame);
     let text = format!(
-        "DL status of SubDevice {label}: its processor does not serve the process data interface any more"
+        "DL status of {label}: its processor does not serve the process data interface any more"
     );
     let condition =
         Condition::new(&PAGE, Place::device(line.network, id), FaultName::FirmwareFault, change.at)
@@ -93,7 +93,7 @@ fn condition(line: &Line, device: &Device, change: &DlChange, back: Option<Insta
                 Symptom::WorkingCounter(id),
                 Symptom::Emergency(id),
             ])
-            .advise(format!("Take no input of SubDevice {label} for fresh."))
+            .advise(format!("Take no input of {label} for fresh."))
             .advise(
                 "Power it off and on; note its firmware version and ask its maker, with a capture.",
             )

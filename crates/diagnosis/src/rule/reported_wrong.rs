@@ -76,14 +76,14 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             table::SII_DATA.address,
             &seen,
             format!(
-                "SubDevice {} is not the planned one, nor are {} others behind it",
+                "{} is not the planned one, nor are {} others behind it",
                 line.label(first.id),
                 wrong.len() - 1
             ),
         ));
     for (id, port) in &empty {
         let label = line.label(*id);
-        let text = format!("port {port} of SubDevice {label} has no link, and one belongs there");
+        let text = format!("port {port} of {label} has no link, and one belongs there");
         condition = condition
             .shown_by(Evidence::register(*id, table::DL_STATUS.address, &seen, text).port(*port))
             .advise(format!(
@@ -93,7 +93,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     condition = condition
         .advise(format!("Look whether {} is the device at {place}.", line.label(first.id)))
         .advise(
-            "Run `linesman scan --against` with the project: it says which cable or device it is.",
+            "Run `linesman scan WHERE --against PROJECT.toml`: it says which cable or device it is.",
         );
     conditions.push(condition.explaining(explained(line, &wrong, &silent, &empty)));
 }

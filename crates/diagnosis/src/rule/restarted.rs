@@ -96,6 +96,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         if let Some(change) = own.next_back() {
             // Who was gone and is seen on its way up again was in INIT in between, read or not.
             let gone = outage(line, device, change);
+            let is_cut = line.traffic.datagrams_cut > 0;
+            if (is_cut || gone.is_none()) && line.traffic.may_lack(change.after, change.at) {
+                // The order may have been given in a frame that is not in the recording.
+                continue;
+            }
             let is_restart = change.to.state().state() == Some(AlState::Init) || gone.is_some();
             falls.push(Fall { device, change, is_restart, gone });
         }
@@ -191,7 +196,7 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
     }
     if let Some((since, until)) = fall.gone {
         let text = format!(
-            "SubDevice {} was gone for {:.0} ms before that",
+            "{} was gone for {:.0} ms before that",
             line.label(device.id),
             until.since(since).as_secs_f64() * 1000.0
         );

@@ -58,11 +58,11 @@ fn condition(line: &Line, owner: &Device, shared: &SharedAddress) -> Condition {
     let label = line.label(owner.id);
     let text = match shared.first.value {
         SharedBy::WorkingCounter(wkc) => format!(
-            "working counter {wkc} where SubDevice {label} alone answers to {}: another one answers, too",
+            "working counter {wkc} where {label} alone answers to {}: another one answers, too",
             shared.station
         ),
         SharedBy::Reading(id) => format!(
-            "SubDevice {}, asked by its position, has station address {}: that of SubDevice {label}",
+            "{}, asked by its position, has station address {}: that of {label}",
             line.label(id),
             shared.station
         ),

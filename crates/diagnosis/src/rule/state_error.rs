@@ -267,7 +267,10 @@ fn evidence(
 ) -> Vec<Evidence> {
     let mut list = Vec::new();
     let from = error.from.map_or("an unknown state", AlState::name);
-    let now = error.status.value.state();
+    let now = match error.status.value.state() {
+        state if state.bits() == 0 => "a state that nobody told".to_owned(),
+        state => state.to_string(),
+    };
     let again = if times > 1 { format!(", {times} times by now") } else { String::new() };
     let text = match error.requested.and_then(|requested| requested.value.state()) {
         Some(wanted) if !error.had_arrived => {

@@ -40,7 +40,13 @@ const AL_STATUS: RegisterAddress = RegisterAddress(0x0130);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for device in &view.line.devices {
-        let overdue = device.al.requests.iter().rev().find(|request| request.is_overdue());
+        // A later order may be in a frame that is not in the recording.
+        let is_seen = |request: &StateRequest| {
+            let until = request.polled.map_or(request.asked.at, |polled| polled.at);
+            !view.line.traffic.may_lack(request.asked.at, until)
+        };
+        let overdue = device.al.requests.iter().rev();
+        let overdue = overdue.filter(|one| one.is_overdue()).find(|one| is_seen(one));
         conditions.extend(overdue.map(|request| condition(view.line, device, request)));
     }
 }
@@ -57,7 +63,7 @@ fn condition(line: &Line, device: &Device, request: &StateRequest) -> Condition 
     };
     let (from, seconds) = (request.from, request.waited().as_secs_f64());
     let stays = format!(
-        "AL status of SubDevice {label}: still {from} and no error, read {} times within {seconds:.1} s",
+        "AL status of {label}: still {from} and no error, read {} times within {seconds:.1} s",
         request.polls
     );
     let untaken = match request.untaken {
@@ -82,7 +88,7 @@ fn condition(line: &Line, device: &Device, request: &StateRequest) -> Condition 
     let wanted = Some(u64::from(asked.value.bits()));
     condition = condition
         .shown_by(Evidence::register(id, AL_CONTROL, asked, control).values(None, wanted))
-        .advise(format!("Power SubDevice {label} off and on, and ask for the state again."))
+        .advise(format!("Power {label} off and on, and ask for the state again."))
         .advise(
             "Ask for the states one by one: at the step that hangs, look at start-up commands and at what \
              its firmware does there.",

@@ -86,7 +86,7 @@ fn condition(
 ) -> Condition {
     let ms = |span: Span| span.as_nanos() as f64 / 1e6;
     let text = format!(
-        "the process data watchdog of SubDevice {} holds for {:.3} ms, and a cycle takes {:.3} ms",
+        "the process data watchdog of {} holds for {:.3} ms, and a cycle takes {:.3} ms",
         line.label(device.id),
         ms(span),
         ms(cycle)

@@ -203,13 +203,13 @@ impl<'a> Found<'a> {
                 let there = self.there[found].identity.map(|there| identity::text(&there));
                 let wanted = self.wanted[planned].identity.map(|wanted| identity::text(&wanted));
                 format!(
-                    "SubDevice {label} has another {what} than planned: found {}; planned {}",
+                    "{label} has another {what} than planned: found {}; planned {}",
                     there.unwrap_or_default(),
                     wanted.unwrap_or_default()
                 )
             }
             Unlike::Alias { planned, found } => {
-                format!("SubDevice {label} has alias {found}, planned was {planned}")
+                format!("{label} has alias {found}, planned was {planned}")
             }
         };
         let cause = match what {

@@ -46,6 +46,9 @@ const AROUND: Span = Span::ms(1500);
 /// So soon after a deficit states and links have been read anew.
 const ASKED: Span = Span::ms(200);
 
+/// A deficit that has been over for so long is judged: what was known then of states and links may be forgotten since.
+const JUDGED_FOR: Span = Span::ms(2_500);
+
 /// Who did not do his share.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Suspects {
@@ -62,8 +65,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
     let lost = Drops::all(view.line);
     for cyclic in &view.line.cyclic {
-        for deficit in &cyclic.deficits {
-            let suspects = suspects(view, &lost, cyclic, deficit);
+        let is_history =
+            |deficit: &&Deficit| deficit.ended.is_some_and(|ended| ended + JUDGED_FOR < view.now);
+        for deficit in cyclic.deficits.iter().filter(|deficit| !is_history(deficit)) {
+            let explained = explained(conditions, deficit);
+            let suspects = suspects(view, &lost, cyclic, deficit, &explained);
             groups.entry(suspects).or_default().push((cyclic, deficit));
         }
     }
@@ -72,9 +78,33 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
 }
 
+/// Whose share other findings of that time account for.
+fn explained(conditions: &[Condition], deficit: &Deficit) -> Vec<DeviceId> {
+    let is_then = |condition: &&Condition| {
+        let until = deficit.ended.unwrap_or(Instant::MAX);
+        condition.since.before(AROUND) <= until
+            && condition.ended.is_none_or(|ended| ended + AROUND >= deficit.first.at)
+    };
+    let symptoms = conditions.iter().filter(is_then).flat_map(|condition| &condition.explains);
+    let mut devices: Vec<DeviceId> = symptoms
+        .filter_map(|symptom| {
+            if let Symptom::WorkingCounter(device) = symptom { Some(*device) } else { None }
+        })
+        .collect();
+    devices.sort_unstable();
+    devices.dedup();
+    devices
+}
+
 /// Which of the owners can explain what is missing: those with the strongest signs of trouble whose
 /// shares add up to just that, and as few as possible.
-fn suspects(view: &View<'_>, lost: &[Drops], cyclic: &Cyclic, deficit: &Deficit) -> Suspects {
+fn suspects(
+    view: &View<'_>,
+    lost: &[Drops],
+    cyclic: &Cyclic,
+    deficit: &Deficit,
+    explained: &[DeviceId],
+) -> Suspects {
     let line = view.line;
     let missing = deficit.expected - deficit.lowest;
     let owners: Vec<_> = line.owners(cyclic).collect();
@@ -113,6 +143,13 @@ fn suspects(view: &View<'_>, lost: &[Drops], cyclic: &Cyclic, deficit: &Deficit)
     }
     if shares.iter().map(full).sum::<u16>() == missing {
         return certain(owners.iter().map(|owner| owner.device).collect());
+    }
+    // What another finding takes from it need not be sought elsewhere.
+    let of_others = || shares.iter().filter(|(device, _)| explained.contains(device));
+    if of_others().map(full).sum::<u16>() >= missing {
+        let of_others: Vec<_> = of_others().cloned().collect();
+        let all = of_others.iter().map(|(device, _)| *device).collect();
+        return certain(fewest(&of_others, missing).unwrap_or(all));
     }
     // One device that fails loses its whole share, or one direction of it.
     let alone = shares.iter().filter(|(_, shares)| shares.contains(&missing));
@@ -288,14 +325,10 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
         (true, _) => condition.advise(
             "Read AL status and DL status of all SubDevices: who is missing, or not in OP?",
         ),
-        (false, true) => condition.advise(format!(
-            "Read AL status (0x0130) and its code of SubDevice {}.",
-            names.join(", ")
-        )),
-        (false, false) => condition.advise(format!(
-            "Read AL status (0x0130) of SubDevices {}: one of them is it.",
-            names.join(", ")
-        )),
+        (false, true) => condition
+            .advise(format!("Read AL status (0x0130) and its code of {}.", names.join(", "))),
+        (false, false) => condition
+            .advise(format!("Read AL status (0x0130) of {}: one of them is it.", names.join(", "))),
     };
     condition
         .advise("Take no output of this datagram for written and no input for fresh meanwhile.")
@@ -303,20 +336,20 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
 
 fn evidence(line: &Line, cyclic: &Cyclic, deficit: &Deficit) -> Evidence {
     let owners: Vec<_> = line.owners(cyclic).map(|owner| line.label(owner.device)).collect();
-    let whose = if owners.is_empty() {
-        String::new()
-    } else {
-        format!(" (SubDevices {})", owners.join(", "))
-    };
+    let whose = if owners.is_empty() { String::new() } else { format!(" ({})", owners.join(", ")) };
     let until = match deficit.ended {
         Some(at) => format!("{} times until {} ns", deficit.count, at.as_nanos()),
         None => format!("{} times so far", deficit.count),
     };
     let text = format!(
-        "{} at {}, {} bytes{whose}: working counter {} instead of {}, {until}",
-        cyclic.command, cyclic.start, cyclic.len, deficit.lowest, deficit.expected
+        "{}{whose}: working counter {} instead of {}, {until}",
+        cyclic.label(),
+        deficit.lowest,
+        deficit.expected
     );
-    let frame = deficit.first.frame.unwrap_or(0);
-    Evidence::frame(deficit.first.at, frame, text)
-        .values(Some(u64::from(deficit.expected)), Some(u64::from(deficit.first.value)))
+    let shown = match deficit.first.frame {
+        Some(frame) => Evidence::frame(deficit.first.at, frame, text),
+        None => Evidence::host(Some(deficit.first.at), text),
+    };
+    shown.values(Some(u64::from(deficit.expected)), Some(u64::from(deficit.first.value)))
 }

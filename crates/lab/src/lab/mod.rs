@@ -19,7 +19,7 @@ use linesman_config::plan::layout::DEFAULT_TASK;
 use linesman_config::project::{Project, ProjectDevice, ProjectTask};
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostObservation};
 use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
-use linesman_diagnosis::{Engine, Event as FindingEvent, Setup};
+use linesman_diagnosis::{Engine, Event as FindingEvent, InputKind, Setup};
 use linesman_maindevice::watch::{LogEntry, Watch};
 use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::address::{DeviceId, Network};
@@ -117,6 +117,7 @@ impl Lab {
         let paths = if file.ring.is_some() { 2 } else { 1 };
         let setup = Setup {
             project: options.project.then(|| project.clone()),
+            input: InputKind::Driven,
             host_counters: options.host_counters,
             probes: options.probes,
             active: options.active,

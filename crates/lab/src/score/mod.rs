@@ -12,6 +12,7 @@ pub mod case;
 pub mod disturb;
 pub mod draw;
 mod effect;
+pub mod excerpt;
 pub mod judge;
 pub mod perturb;
 pub mod play;

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_config::fault::FaultName;
+use linesman_config::project::Project;
 use linesman_diagnosis::observe::{Direction, FrameSeen};
 use linesman_diagnosis::report::Diagnosis;
 use linesman_diagnosis::{Engine, Setup};
@@ -10,7 +11,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Stream;
-use linesman_sim::truth::FaultId;
+use linesman_sim::truth::{FaultId, TruthLog};
 
 use super::baseline;
 use super::built_in::{Stop, around_extra, with_built_in};
@@ -18,6 +19,7 @@ use super::case::{Case, CaseKind, ScoreOptions};
 use super::disturb::disturb;
 use super::draw::{Drawn, Ends, Offer, When, draw};
 use super::effect::effects;
+use super::excerpt::{Tape, take_down};
 use super::judge::{Judged, alarms, claim, judge};
 use crate::choice::{Ground, are_apart, text};
 use crate::lab::{Lab, LabError};
@@ -109,6 +111,21 @@ pub fn run_case(seed: u64, options: &ScoreOptions) -> CaseReport {
     CaseReport { unplayable: Some(why), ..empty(&case, 0) }
 }
 
+/// Plays a case and takes its recording down. Gives the truth, and the project where the recording is judged with
+/// one.
+pub(super) fn play_taped(
+    case: &Case,
+    options: &ScoreOptions,
+    tape: &Tape,
+) -> Result<(CaseReport, TruthLog, Option<Project>), Stop> {
+    let mut play = Play::new(case, options)?;
+    let reader = Arc::clone(tape);
+    play.lab.set_recorder(Box::new(move |seen| take_down(&reader, seen)));
+    let report = play.run_all()?;
+    let project = play.has_project.then(|| play.lab.project().clone());
+    Ok((report, play.lab.truth().clone(), project))
+}
+
 fn empty(case: &Case, devices: usize) -> CaseReport {
     CaseReport {
         seed: case.seed.0,
@@ -187,6 +204,10 @@ impl<'a> Play<'a> {
     }
 
     fn play(mut self) -> Result<CaseReport, Stop> {
+        self.run_all()
+    }
+
+    fn run_all(&mut self) -> Result<CaseReport, Stop> {
         let mut report = empty(self.case, self.lab.tree().len());
         let mut active: Vec<Active> = Vec::new();
         if self.built_in.is_empty() {

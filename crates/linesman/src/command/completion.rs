@@ -20,6 +20,6 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut Cli::command(), "linesman", &mut script);
-    output.text(&String::from_utf8_lossy(&script));
+    output.raw(&String::from_utf8_lossy(&script));
     Ok(Status::Good)
 }

@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use super::diagnose;
 use super::service::{DeviceReport, Session, end};
+use crate::amount::{MILLISECOND, SECOND, duration};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -27,22 +28,28 @@ use samples::{PortReport, Samples};
 pub(crate) struct Arguments {
     /// Where the line is: eth0, eth0+eth1 (a ring), sim:plant.toml, or the socket of `run --control`
     #[arg(value_name = "WHERE")]
-    line: String,
+    pub(crate) line: String,
     /// Clear all counters first: what they held from power-on is no fault
     #[arg(long)]
     clear: bool,
-    /// Watch for so many seconds, and judge what rises
-    #[arg(long = "for", value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
-    seconds: Option<u64>,
-    /// Read every so many ms while watching
+    /// Watch for so long (60, 10m), and judge what rises
+    #[arg(
+        long = "for",
+        alias = "seconds",
+        value_name = "SECONDS",
+        value_parser = duration(SECOND, MILLISECOND, Span::s(86_400))
+    )]
+    lasts: Option<Span>,
+    /// Time between two readings while watching (500, 1s)
     #[arg(
         long,
+        visible_alias = "every",
         value_name = "MS",
-        default_value_t = 500,
-        requires = "seconds",
-        value_parser = clap::value_parser!(u64).range(10..=3_600_000)
+        default_value = "500",
+        requires = "lasts",
+        value_parser = duration(MILLISECOND, Span::ms(10), Span::s(3_600))
     )]
-    every_ms: u64,
+    every_ms: Span,
     /// Write each reading of each counter into this file, for a spreadsheet
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
@@ -102,15 +109,14 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
     }
     samples.read(&mut session, Span::ZERO)?;
-    let watched = match arguments.seconds {
-        Some(seconds) => watch(&mut session, &mut samples, seconds, arguments.every_ms)?,
+    let watched = match arguments.lasts {
+        Some(lasts) => watch(&mut session, &mut samples, lasts, arguments.every_ms)?,
         None => Span::ZERO,
     };
     if let Some(path) = &arguments.csv {
         files::write_new(path, "the readings", &samples.csv(&session))?;
     }
-    let judged = arguments.seconds.and(session.inventory());
-    let diagnosis = judged.map(|inventory| samples.diagnosis(inventory, session.place()));
+    let diagnosis = arguments.lasts.and_then(|_| session.diagnosis());
     let status = diagnosis.as_ref().map_or(Status::Good, diagnose::status);
     if arguments.json {
         output.json(&report(&session, &samples, watched, diagnosis));
@@ -120,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     if let Some(diagnosis) = &diagnosis {
         output.line(&format!("\n{}", wrapped("", LEGEND, output.width())));
         diagnose::print(diagnosis, &names(&session), output);
-    } else if arguments.seconds.is_none() {
+    } else if arguments.lasts.is_none() {
         let legend = format!("{LEGEND} {HISTORY}");
         output.text(&format!("\n{}", wrapped("", &legend, output.width())));
     }
@@ -131,10 +137,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 fn watch(
     session: &mut Session,
     samples: &mut Samples,
-    seconds: u64,
-    every_ms: u64,
+    all: Span,
+    every: Span,
 ) -> Result<Span, Failure> {
-    let (all, every) = (Span::s(seconds), Span::ms(every_ms));
     let mut at = Span::ZERO;
     while at < all {
         let step = every.min(all.saturating_sub(at));
@@ -152,7 +157,7 @@ fn watch(
 /// What people call the SubDevices.
 pub(super) fn names(session: &Session) -> Names {
     let name = |known: &super::service::Known| {
-        known.name.clone().unwrap_or_else(|| known.type_name.clone())
+        (known.name.clone().unwrap_or_default(), known.type_name.clone())
     };
     Names::new(session.devices().iter().map(name))
 }

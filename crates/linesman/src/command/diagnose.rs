@@ -2,24 +2,27 @@
 
 mod capture;
 mod cards;
+mod file;
 pub(crate) mod follow;
 mod listen;
 mod observations;
 mod segment;
+pub(crate) mod several;
 
 use std::path::PathBuf;
 
 use linesman_config::project::Project;
-use linesman_diagnosis::report::{Diagnosis, Verdict};
+use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_diagnosis::{Engine, Setup};
 use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Network;
 use linesman_proto::state::AlState;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 use linesman_runtime::record::Recorder;
 use linesman_runtime::selector::Selector;
 
 use self::follow::Follower;
+use crate::amount::lasting;
 use crate::drawing;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -31,27 +34,37 @@ use crate::text::finding::Writer;
 use crate::text::names::Names;
 use crate::version;
 
-use super::sim;
+use super::driven;
 
 /// The clock of an observation file.
 pub(super) const NO_CLOCK: &str = "none";
+/// The clock of several readings, or of a log.
+pub(crate) const READINGS: &str = "readings";
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
+#[command(
+    after_help = "What a file is, its bytes say, not its name: a capture (pcap, pcapng), or a text with \
+                  what was read; either may be packed by gzip, xz or zstd. `-` is standard input, \
+                  and a pipe is judged as it comes: `ssh HOST tcpdump -i eth0 -U -w - ether proto \
+                  0x88a4 | linesman diagnose -`.\n\nSeveral files are told in a line each. Exit \
+                  status of several: 1 if anything is wrong in one of them, else 2 if one could not \
+                  be judged, else 3 if one is inconclusive, else 0."
+)]
 pub(crate) struct Arguments {
-    /// Where the frames are, or a file with what was read: eth0, eth0+eth1, listen:eth0,
-    /// sim:plant.toml, trace.pcapng, observations.toml
-    #[arg(value_name = "WHERE|OBSERVATIONS.toml")]
-    place: String,
+    /// Where the frames are: eth0, eth0+eth1, listen:eth0, sim:plant.toml; or files with what was
+    /// seen: trace.pcapng, observations.toml, a text with what other tools print, - (standard input)
+    #[arg(value_name = "WHERE|FILE", required = true)]
+    pub(crate) places: Vec<String>,
     /// What was planned (TOML): names, wiring and identities to hold the line against
     #[arg(long, value_name = "FILE")]
     project: Option<PathBuf>,
     /// Tell findings as they open and close; with --json one linesman.event/1 per line
     #[arg(long)]
     follow: bool,
-    /// How long to look; Ctrl-C ends it too
-    #[arg(long, value_name = "N")]
-    seconds: Option<f64>,
+    /// How long to look (5, 500ms, 10m); Ctrl-C ends it too
+    #[arg(long, visible_alias = "for", value_name = "SECONDS", value_parser = lasting())]
+    seconds: Option<Span>,
     /// Write what is seen to a capture file, for Wireshark or to be judged again
     #[arg(long, value_name = "FILE.pcapng")]
     record: Option<PathBuf>,
@@ -101,16 +114,19 @@ impl From<Target> for AlState {
 
 /// Judges what the selector names.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let selector = arguments.place.parse()?;
+    let [place] = arguments.places.as_slice() else { return several::run(arguments, output) };
+    let selector = Selector::resolve(place)?;
     refuse_misplaced(arguments, &selector)?;
     for path in [&arguments.html, &arguments.svg].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
     }
     let project = arguments.project.as_deref().map(files::project).transpose()?;
     match &selector {
-        Selector::Capture(path) => {
-            let session = Session::new(arguments, &selector, project);
-            capture::run(path, session, output)
+        Selector::File(path) => {
+            let stop = driven::stop()?;
+            let mut session = Session::new(arguments, &selector, project);
+            let judged = file::judge(path, &stop, &mut session, output)?;
+            Ok(session.answer(&judged.engine, &judged.names, judged.at, output))
         }
         Selector::Listen(names) => {
             listen::run(names, Session::new(arguments, &selector, project), output)
@@ -124,15 +140,12 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let target = arguments.to.unwrap_or_default().into();
             segment::run(path, target, arguments.active, session, output)
         }
-        Selector::Observations(path) => {
-            observations::run(path, Session::new(arguments, &selector, project), output)
-        }
     }
 }
 
 /// Refuses options that say nothing about such a selector: whoever wrote them expects something.
 fn refuse_misplaced(arguments: &Arguments, selector: &Selector) -> Result<(), Failure> {
-    let is_file = matches!(selector, Selector::Capture(_) | Selector::Observations(_));
+    let is_file = matches!(selector, Selector::File(_));
     let is_segment = matches!(selector, Selector::Segment(_));
     let is_driven = matches!(selector, Selector::Cards(_));
     let Arguments { project, seconds, record, active, to, .. } = arguments;
@@ -152,15 +165,25 @@ fn refuse_misplaced(arguments: &Arguments, selector: &Selector) -> Result<(), Fa
     }
 }
 
+/// A file that has been judged.
+struct Judged {
+    engine: Engine,
+    names: Names,
+    /// The end of its time.
+    at: Instant,
+}
+
 /// A diagnosis that is being made.
 pub(crate) struct Session {
     setup: Setup,
     follower: Option<Follower>,
-    seconds: Option<f64>,
+    lasts: Option<Span>,
     record: Option<PathBuf>,
     html: Option<PathBuf>,
     svg: Option<PathBuf>,
     json: bool,
+    /// Of a pasted text: what was understood.
+    understood: Option<Understood>,
 }
 
 impl Session {
@@ -170,11 +193,12 @@ impl Session {
         Self {
             setup,
             follower,
-            seconds: arguments.seconds,
+            lasts: arguments.seconds,
             record: arguments.record.clone(),
             html: arguments.html.clone(),
             svg: arguments.svg.clone(),
             json: arguments.json,
+            understood: None,
         }
     }
 
@@ -194,9 +218,9 @@ impl Session {
         }
     }
 
-    /// When a look that began at 0 ends: when the user said, else after `seconds`.
-    fn until(&self, seconds: f64) -> Result<Instant, Failure> {
-        sim::until(Some(self.seconds.unwrap_or(seconds)))
+    /// When a look that began at 0 ends: when the user said, else after `lasts`.
+    fn until(&self, lasts: Span) -> Instant {
+        Instant::ZERO + self.lasts.unwrap_or(lasts)
     }
 
     /// Tells what happened to findings, where that was asked for.
@@ -222,17 +246,30 @@ impl Session {
         complete: bool,
         output: &mut Output,
     ) -> Status {
+        self.end(&mut engine, at, complete, output);
+        self.answer(&engine, &names(&engine), at, output)
+    }
+
+    /// Ends the input.
+    fn end(&mut self, engine: &mut Engine, at: Instant, complete: bool, output: &mut Output) {
         engine.finish(at, complete);
-        self.follow(&mut engine, output);
-        let names = names(&engine);
-        self.flush(&names, output);
-        self.answer(&engine, &names, at, output)
+        self.follow(engine, output);
+        self.flush(&names(engine), output);
+    }
+
+    /// The whole answer.
+    fn diagnosis(&self, engine: &Engine) -> Diagnosis {
+        let mut diagnosis = engine.diagnosis();
+        diagnosis.tool = version::tool();
+        diagnosis.understood.clone_from(&self.understood);
+        // When a pipe began is known once its first frame has come.
+        diagnosis.start = diagnosis.start.or_else(|| self.setup.start.clone());
+        diagnosis
     }
 
     /// Gives the answer.
     fn answer(&self, engine: &Engine, names: &Names, at: Instant, output: &mut Output) -> Status {
-        let mut diagnosis = engine.diagnosis();
-        diagnosis.tool = version::tool();
+        let diagnosis = self.diagnosis(engine);
         match (&self.follower, self.json) {
             (Some(follower), true) => follower.end(at, &diagnosis, output),
             (None, true) => output.json(&diagnosis),
@@ -256,7 +293,13 @@ impl Session {
         let line = engine.line(Network(0));
         if let Some(path) = &self.html {
             let timed = diagnosis.clock != NO_CLOCK;
-            let writer = Writer { names, paint: Paint::PLAIN, width: usize::MAX, timed };
+            let writer = Writer {
+                names,
+                paint: Paint::PLAIN,
+                width: usize::MAX,
+                timed,
+                place: &diagnosis.source,
+            };
             let page = page::page(diagnosis, line, &writer, at);
             files::write_new(path, "the report", &page)?;
         }
@@ -276,14 +319,21 @@ impl Session {
 pub(super) fn print(diagnosis: &Diagnosis, names: &Names, output: &mut Output) {
     // An observation file says what was read, not when.
     let timed = diagnosis.clock != NO_CLOCK;
-    let writer = Writer { names, paint: output.paint(), width: output.width(), timed };
+    let writer = Writer {
+        names,
+        paint: output.paint(),
+        width: output.width(),
+        timed,
+        place: &diagnosis.source,
+    };
     output.text(&text::diagnosis::write(diagnosis, &writer));
 }
 
 /// What the SubDevices are called: by the project, else by their types.
 fn names(engine: &Engine) -> Names {
     let devices = engine.line(Network(0)).map(|line| line.devices.as_slice()).unwrap_or_default();
-    Names::new(devices.iter().map(|device| device.best_name().unwrap_or_default().to_owned()))
+    let known = |text: &Option<String>| text.clone().unwrap_or_default();
+    Names::new(devices.iter().map(|device| (known(&device.name), known(&device.type_name))))
 }
 
 pub(super) fn status(diagnosis: &Diagnosis) -> Status {

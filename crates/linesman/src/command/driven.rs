@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use linesman_link::input::is_capture_name;
 use linesman_runtime::line::{Pace, VirtualLine};
 use linesman_runtime::listen::{Driven, is_driven};
+use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
 use linesman_runtime::wiring::Wiring;
 
@@ -11,7 +13,7 @@ use crate::failure::Failure;
 use crate::files;
 use crate::text::quantity::{count, time};
 
-/// Refuses a line on which EtherCAT frames are heard.
+/// Refuses a line on which EtherCAT frames are heard, or whose card another process has locked.
 pub(crate) fn refuse(names: &[String]) -> Result<(), Failure> {
     let name = names.join("+");
     match is_driven(names)? {
@@ -30,6 +32,36 @@ pub(crate) fn refuse(names: &[String]) -> Result<(), Failure> {
             Err(Failure::new(reason, advice))
         }
     }
+}
+
+/// Refuses what frames cannot be sent to: `word` is what was named.
+pub(crate) fn not_drivable(word: &str, selector: &Selector) -> Failure {
+    let path = match selector {
+        Selector::File(path) => path.as_path(),
+        Selector::Cards(_) | Selector::Listen(_) | Selector::Segment(_) => {
+            let reason = format!("`{word}`: nothing can be driven there, it is only listened to");
+            let card = word.trim_start_matches("listen:");
+            let advice =
+                format!("`linesman diagnose {word}` listens; to send, name it as `{card}`");
+            return Failure::new(reason, advice);
+        }
+    };
+    let is_recording = word.starts_with("capture:") || is_capture_name(word);
+    let is_toml = path.extension().is_some_and(|end| end == "toml");
+    if !path.exists() && !is_recording && !is_toml {
+        let reason = format!("`{word}`: nothing can be driven there: no such file, socket or card");
+        let advice = "check the path; cards are listed by `linesman interfaces`; the socket of \
+                      `linesman run --control` is there while that runs";
+        return Failure::new(reason, advice);
+    }
+    let reason = format!("`{word}`: nothing can be driven there, it is a file");
+    let advice = match is_toml {
+        true => format!("name a network card; if it is a virtual segment say `sim:{word}`"),
+        false => {
+            format!("name a network card; a recording is judged by `linesman diagnose {word}`")
+        }
+    };
+    Failure::new(reason, advice)
 }
 
 /// Why nobody answers, with what to check.

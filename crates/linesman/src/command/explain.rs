@@ -1,43 +1,86 @@
-//! `linesman explain`: what a code or a name means, and what to do about it.
+//! `linesman explain`: what a code, a name, a value or a line of a log means, and what to do about it.
 //!
-//! A number may be several things: 0x0130 is a register, 0x001D an AL status code; what it may be
-//! is all shown. `al:`, `abort:` and `register:` in front say which is meant.
+//! A number may be several things: 0x0130 is a register, 0x001D an AL status code, 8130 the code of an
+//! emergency. All that it may be is shown, the most likely first. A word in front (`AL`, `abort`,
+//! `register`, `object`, `emergency`) says which is meant.
 
+mod bare_number;
+mod bytes;
+mod codes;
+mod commands;
+mod findings;
+mod found;
+mod messages;
+mod number;
+mod objects;
 mod page;
+mod prefixed_number;
+mod registers;
+mod resolve;
+mod state_words;
+mod states;
+mod suggest;
 mod topic;
+mod vocabulary;
+mod working_counter;
 
-use linesman_config::fault::FaultName;
-use linesman_diagnosis::rule::{self, RulePage};
-use linesman_proto::address::RegisterAddress;
-use linesman_proto::mailbox::abort_code::SdoAbortCode;
-use linesman_proto::register::{self, Description};
-use linesman_proto::state::status_code::{AlStatusCode, Origin};
-use linesman_proto::state::{AlState, status_code};
+use linesman_diagnosis::rule;
+use serde::Serialize;
 
-use self::page::Page;
+use self::page::{Kind, Page, Reading};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::Output;
+use crate::version;
 
-/// Most names that are suggested for a word which is none.
-const MOST_SUGGESTIONS: usize = 8;
+/// Letters of a word that are repeated when it is unknown.
+const MOST_REPEATED: usize = 60;
 
-/// What can be asked.
+/// Arguments of the command.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
-    /// A finding (H101), AL status code (0x001D), abort code (0x06090011), register (0x0130 or its
-    /// name), state (SAFEOP), fault name (link-open) or topic (counter-guide, lamps, line-codes, located,
-    /// lost-links, running-errors, start-up-errors, two-counters); several words are one name
-    #[arg(required = true, value_name = "CODE")]
-    code: Vec<String>,
+    /// A code (0x001B, 06010000, 8130), register (0x0130), object (0x1C32:0B), finding (H101), fault,
+    /// state (SAFEOP+ERR), command (LRW), word of TwinCAT, IgH or SOEM, value (DL 0x5617), bytes of a
+    /// message, or a line of a log; without it, a list of what can be asked
+    #[arg(value_name = "WORD", allow_negative_numbers = true)]
+    word: Vec<String>,
+    /// JSON, schema linesman.explain/1
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The answer as JSON.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Report {
+    /// `linesman.explain/1`.
+    schema: String,
+    /// Name and version of the program.
+    tool: String,
+    /// The word or line that was asked; `null` without one.
+    asked: Option<String>,
+    /// All that it can mean, the most likely first; without a word, what can be asked.
+    readings: Vec<Reading>,
 }
 
 /// Prints all pages about the word.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let word = arguments.code.join(" ");
-    let pages = pages(&word);
+    let asked = arguments.word.join(" ");
+    let pages = match arguments.word.is_empty() {
+        true => vec![overview()],
+        false => resolve::resolve(&asked),
+    };
     if pages.is_empty() {
-        return Err(unknown(&word));
+        return Err(unknown(&asked));
+    }
+    if arguments.json {
+        output.json(&Report {
+            schema: "linesman.explain/1".to_owned(),
+            tool: version::tool(),
+            asked: (!arguments.word.is_empty()).then_some(asked),
+            readings: pages.iter().map(Page::reading).collect(),
+        });
+        return Ok(Status::Good);
     }
     for (index, page) in pages.iter().enumerate() {
         let gap = if index == 0 { "" } else { "\n" };
@@ -46,140 +89,85 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     Ok(Status::Good)
 }
 
-/// All that the word can mean.
-fn pages(word: &str) -> Vec<Page> {
-    if let Some((kind, rest)) = word.split_once(':') {
-        let number = number(rest);
-        return match (kind, number) {
-            ("al", Some(Number { value, .. })) => u16::try_from(value)
-                .map(|code| page::status(AlStatusCode(code)))
-                .into_iter()
-                .collect(),
-            ("abort", Some(Number { value, .. })) => vec![page::abort(SdoAbortCode(value))],
-            ("register" | "reg", Some(Number { value, .. })) => {
-                register_at(value).map(|found| page::register(&found)).into_iter().collect()
-            }
-            ("register" | "reg", None) => named_register(rest).into_iter().collect(),
-            _ => Vec::new(),
-        };
-    }
-    if let Some(number) = number(word) {
-        return numbered(number);
-    }
-    let findings = rule::catalogue().into_iter().filter(|page| is_about(page, word));
-    let state = AlState::ALL.into_iter().find(|state| state.name().eq_ignore_ascii_case(word));
-    let fault = word.to_ascii_lowercase().parse::<FaultName>().ok();
-    let mut pages: Vec<Page> = findings.map(page::finding).collect();
-    pages.extend(state.map(page::state));
-    pages.extend(fault.map(page::fault));
-    pages.extend(named_register(word));
-    pages.extend(topic::find(word).map(|topic| page::topic(topic.text)));
-    pages
+/// A page that lists the kinds of words, with examples.
+fn overview() -> Page {
+    let topics: Vec<&str> = topic::ALL.iter().map(|topic| topic.name).collect();
+    let codes: Vec<&str> = rule::catalogue().into_iter().map(|page| page.code).collect();
+    Page::new(Kind::Topic, "linesman explain WORD: what can be asked")
+        .fact("codes", "`0x001B`, `1B`, `AL 0x14`, `abort 06010000`, `8130`, `emergency 0x8611`, `FoE 0x8003`")
+        .fact("registers", "`0x0130`, `al-status`, `RX error counter port B`; ports: `port B`")
+        .fact("objects", "`0x1C12`, `0x1C32:0B`, `6041`, `Statusword`; mapped entries: `60410010`")
+        .fact(
+            "values",
+            "`DL 0x5617`, `rx 0x0412`, `0x6041 = 0x0237`, `State 0x2408`, `DevState 0x0800`, `WKC 2/3`",
+        )
+        .fact("bytes", "`00 E0 21 1C …` (diagnosis message), `30 81 11 00 00 00 00 00` (emergency)")
+        .fact("states", "`SAFEOP`, `SAFEOP+ERR`, `OP LNK_MIS B`")
+        .fact("commands", "`LRW`, `FPRD` and the other thirteen")
+        .fact(
+            "words",
+            "`WKC`, `SYNC0`, `WcState`, `NO_COMM`, `VPRS`, `SKIPPED`, `no slaves found`; a line of a log, whole",
+        )
+        .fact("findings", format!("{} to {}, as `linesman diagnose` gives them", codes.first().unwrap_or(&""), codes.last().unwrap_or(&"")))
+        .fact("faults", "`link-open`, `cable-degraded` and the other causes of findings")
+        .fact("topics", topics.join(", "))
 }
 
-/// Whether a finding's page is meant, by code or by name.
-fn is_about(page: &RulePage, word: &str) -> bool {
-    page.code.eq_ignore_ascii_case(word) || page.name.eq_ignore_ascii_case(word)
-}
-
-/// A number and how it was written.
-#[derive(Clone, Copy)]
-struct Number {
-    value: u32,
-    /// Whether it was written with the digits of an abort code, eight.
-    long: bool,
-}
-
-/// `0x1D`, `0x001d`, `29`.
-fn number(word: &str) -> Option<Number> {
-    let word = word.trim();
-    let hex = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X"));
-    let value = match hex {
-        Some(digits) => u32::from_str_radix(digits, 16).ok()?,
-        None => word.parse().ok()?,
-    };
-    Some(Number { value, long: hex.is_some_and(|digits| digits.len() > 4) })
-}
-
-fn numbered(number: Number) -> Vec<Page> {
-    let code = match u16::try_from(number.value) {
-        Ok(code) if !number.long => AlStatusCode(code),
-        Ok(_) | Err(_) => return vec![page::abort(SdoAbortCode(number.value))],
-    };
-    let register = register_at(number.value);
-    let is_standard = code.explain().origin == Origin::Standard;
-    let mut pages = Vec::new();
-    // A number that no table has is a status code all the same: what to do with one is known too.
-    if is_standard || register.is_none() {
-        pages.push(page::status(code));
-    }
-    // Few mean the middle of a register when there is a status code of that number.
-    let meant = register.filter(|found| !is_standard || found.offset == 0);
-    pages.extend(meant.map(|found| page::register(&found)));
-    pages
-}
-
-fn register_at(value: u32) -> Option<Description> {
-    register::describe(RegisterAddress(u16::try_from(value).ok()?))
-}
-
-fn named_register(name: &str) -> Option<Page> {
-    let found = register::by_name(name)?;
-    register::describe(found.address).map(|description| page::register(&description))
-}
-
-fn unknown(word: &str) -> Failure {
-    let near = near(word);
+fn unknown(asked: &str) -> Failure {
+    let near = suggest::near(asked);
     let advice = if near.is_empty() {
-        "name an AL status code (0x001D), an abort code (0x06090011), a register (0x0130, `AL \
-         status`), a state (SAFEOP), a fault name (link-open) or a finding (H101)"
+        "name an AL status code (0x001D), an abort code (0x06090011), a register (0x0130, `AL status`), an \
+         object (0x1C32:0B), a state (SAFEOP), a fault name (link-open) or a finding (H101); `linesman \
+         explain` lists what can be asked"
             .to_owned()
     } else {
         format!("try one of: {}", near.join(", "))
     };
-    Failure::new(format!("`{word}`: no code or name like this is known"), advice)
-}
-
-/// Names that have the word in them.
-fn near(word: &str) -> Vec<String> {
-    let wanted = word.to_ascii_lowercase();
-    let has = |name: &str| wanted.len() > 2 && name.to_ascii_lowercase().contains(&wanted);
-    let faults = FaultName::ALL.iter().map(|fault| fault.name()).filter(|name| has(name));
-    let registers = register::ALL.iter().map(|register| register.name).filter(|name| has(name));
-    let findings = rule::catalogue().into_iter();
-    let findings = findings
-        .filter(|page| has(page.name) || page.code.to_ascii_lowercase().starts_with(&wanted));
-    let codes = status_code::ALL.iter().filter(|code| has(code.name));
-    findings
-        .map(|page| format!("{} ({})", page.code, page.name))
-        .chain(faults.map(str::to_owned))
-        .chain(registers.map(|name| format!("`{name}`")))
-        .chain(codes.map(|entry| format!("0x{:04X} ({})", entry.code.value(), entry.name)))
-        .take(MOST_SUGGESTIONS)
-        .collect()
+    let shown: String = asked.chars().take(MOST_REPEATED).flat_map(char::escape_debug).collect();
+    let more = if asked.chars().count() > MOST_REPEATED { "…" } else { "" };
+    let reason = match asked.len() > resolve::MOST_LETTERS {
+        true => format!(
+            "`{shown}{more}`: {} letters, at most {} are looked at",
+            asked.len(),
+            resolve::MOST_LETTERS
+        ),
+        false => format!("`{shown}{more}`: no code or name like this is known"),
+    };
+    Failure::new(reason, advice)
 }
 
 #[cfg(test)]
 mod tests {
+    use linesman_config::fault::FaultName;
+    use linesman_proto::mailbox::abort_code;
+    use linesman_proto::mailbox::coe::{emergency, standard_object};
+    use linesman_proto::register;
+    use linesman_proto::state::status_code;
+
     use super::*;
+    use crate::output::Paint;
 
     fn titles(word: &str) -> Vec<String> {
-        pages(word).iter().map(|page| page.title().to_owned()).collect()
+        resolve::resolve(word).iter().map(|page| page.title().to_owned()).collect()
     }
 
-    #[test]
-    fn a_word_gives_all_that_it_can_mean() {
-        assert_eq!(titles("0x001D"), ["AL status code 0x001D: invalid output configuration"]);
-        assert_eq!(titles("0x0130"), ["Register 0x0130: AL status"]);
-        assert_eq!(titles("al-status"), ["Register 0x0130: AL status"]);
-        assert_eq!(titles("0x0303"), ["Register 0x0302: RX error counter, port B"]);
-        assert_eq!(titles("safeop"), ["State SAFEOP"]);
-        assert_eq!(titles("link-open"), ["Fault link-open"]);
-        assert!(titles("h100")[0].starts_with("Finding H100"));
-        assert_eq!(titles("0x06010002").len(), 1);
-        assert_eq!(titles("0x0011").len(), 1, "a status code, no register");
-        assert_eq!(titles("al:0x0130").len(), 1);
-        assert_eq!(titles("nonsense"), [""; 0]);
+    /// Every word that any table has.
+    fn all_words() -> Vec<String> {
+        let mut words: Vec<String> = Vec::new();
+        words.extend(register::ALL.iter().map(|entry| format!("0x{:04X}", entry.address.value())));
+        words.extend(
+            status_code::ALL.iter().map(|entry| format!("al:0x{:04X}", entry.code.value())),
+        );
+        words.extend(abort_code::ALL.iter().map(|entry| format!("0x{:08X}", entry.code.value())));
+        words.extend(
+            emergency::code::ALL.iter().map(|entry| format!("emergency 0x{:04X}", entry.code)),
+        );
+        words.extend(standard_object::all().map(|object| format!("object {}", object.first)));
+        words.extend(FaultName::ALL.iter().map(|fault| fault.name().to_owned()));
+        words.extend(rule::catalogue().iter().map(|page| page.code.to_owned()));
+        words.extend(topic::ALL.iter().map(|topic| topic.name.to_owned()));
+        words.extend(vocabulary::all().flat_map(|word| word.spellings()).map(str::to_owned));
+        words
     }
 
     #[test]
@@ -192,14 +180,40 @@ mod tests {
             let word = format!("0x{:04X}", code.code.value());
             assert!(titles(&word)[0].starts_with("AL status code"), "{word}");
         }
+        for object in standard_object::all() {
+            let word = object.first.to_string();
+            assert!(titles(&word)[0].starts_with("CoE object"), "{word}: {:?}", titles(&word));
+        }
         for fault in FaultName::ALL {
             assert!(titles(fault.name()).contains(&format!("Fault {fault}")));
         }
     }
 
     #[test]
+    fn no_page_shows_marks_of_markdown_or_a_line_too_long() {
+        for word in all_words() {
+            let pages = resolve::resolve(&word);
+            assert!(!pages.is_empty(), "{word}");
+            for (page, width) in pages.iter().flat_map(|page| [(page, 60), (page, 110)]) {
+                let text = page.render(Paint::PLAIN, width);
+                for mark in ["`", "**", "\n  #", "](", "| ", "|---"] {
+                    assert!(!text.contains(mark), "{word}: {mark} in {text}");
+                }
+                for line in text.lines() {
+                    let room = line.trim_start();
+                    let is_one_word = !room.trim_start_matches("- ").contains(' ');
+                    assert!(
+                        line.chars().count() <= width || is_one_word,
+                        "{word}: {width}: {line}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_near_miss_is_told() {
-        let failure = unknown("watchdog");
+        let failure = unknown("watchdog-strved");
         assert!(failure.next_step.contains("watchdog-starved"), "{failure:?}");
     }
 }

@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use linesman_config::fault::FaultName;
+use linesman_proto::time::Span;
 use linesman_runtime::control::message::{
     FaultState, Faults, Request, SignalDirection, SignalState, SignalTable,
 };
@@ -15,6 +16,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::sim::summary;
+use crate::amount::{LONGEST, MILLISECOND, duration};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -44,9 +46,9 @@ enum Action {
         /// A device, by name; more than one for a shared cause
         #[arg(long, value_name = "NAME")]
         device: Vec<String>,
-        /// How long it lasts; until it is healed unless said
-        #[arg(long, value_name = "MS")]
-        for_ms: Option<f64>,
+        /// How long it lasts (500, 2s); until it is healed unless said
+        #[arg(long, visible_alias = "for", value_name = "MS", value_parser = duration(MILLISECOND, Span::ns(1), LONGEST))]
+        for_ms: Option<Span>,
         /// Parameters of its kind, such as hits_per_s=40, and its schedule: every_ms=500 for_ms=20
         #[arg(value_name = "KEY=VALUE", value_parser = parameter)]
         parameters: Vec<(String, toml::Value)>,
@@ -129,7 +131,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     match &arguments.action {
         Action::Inject { kind, at, device, for_ms, parameters } => {
             let fault = Box::new(entry(*kind, at, device, parameters)?);
-            faults(arguments, &Request::Inject { fault, for_ms: *for_ms }, output)
+            let for_ms = for_ms.map(|lasts| lasts.as_nanos() as f64 / 1e6);
+            faults(arguments, &Request::Inject { fault, for_ms }, output)
         }
         Action::Heal { no } => faults(arguments, &Request::Heal { no: *no }, output),
         Action::Unplug { name } => {
@@ -184,8 +187,8 @@ fn asked<T: DeserializeOwned>(arguments: &Arguments, request: &Request) -> Resul
 
 fn unreachable(arguments: &Arguments, error: &std::io::Error) -> Failure {
     let path = arguments.socket.display();
-    let advice = "start the segment with `linesman sim SEGMENT.toml --on NIC --control SOCKET`, \
-                  and name the same socket";
+    let advice =
+        format!("start the segment with `linesman sim SEGMENT.toml --on NIC --control {path}`");
     Failure::new(format!("{path}: asking the segment: {error}"), advice)
 }
 

@@ -23,7 +23,7 @@ const LONGEST: u64 = 64 << 20;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    place: Place,
+    pub(crate) place: Place,
     #[command(subcommand)]
     action: Action,
     /// JSON, schema linesman.file/1; linesman.refusal/1 when it is refused

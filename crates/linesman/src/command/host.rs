@@ -11,6 +11,7 @@ use linesman_link::interface::{self, InterfaceKind};
 use linesman_proto::time::Span;
 use serde::Serialize;
 
+use crate::amount::{MICROSECOND, SECOND, duration};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, wrapped};
@@ -22,18 +23,19 @@ pub(crate) struct Arguments {
     /// Cards to look at, too; all that have a socket for a cable unless said
     #[arg(value_name = "NIC")]
     cards: Vec<String>,
-    /// Wake up in a cycle for so many seconds and tell how late that was
-    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=600))]
-    measure: Option<u64>,
-    /// The cycle to measure with, in µs
+    /// Wake up in a cycle for so long (10, 1m) and tell how late that was
+    #[arg(long, value_name = "SECONDS", value_parser = duration(SECOND, Span::ms(100), Span::s(600)))]
+    measure: Option<Span>,
+    /// The cycle to measure with (500, 1ms)
     #[arg(
         long,
+        visible_alias = "cycle",
         value_name = "US",
-        default_value_t = 1_000,
+        default_value = "1000",
         requires = "measure",
-        value_parser = clap::value_parser!(u64).range(50..=1_000_000)
+        value_parser = duration(MICROSECOND, Span::us(50), Span::s(1))
     )]
-    cycle_us: u64,
+    cycle_us: Span,
     /// Judge the files below this folder, a copy of another computer's /sys and /proc
     #[arg(long, value_name = "FOLDER", conflicts_with = "measure")]
     root: Option<PathBuf>,
@@ -93,8 +95,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     };
     let cards = cards(arguments)?;
     let checks = inspect(&files, &cards);
-    let cycle = Span::us(arguments.cycle_us);
-    let jitter = arguments.measure.map(|seconds| jitter::measure(cycle, Span::s(seconds)));
+    let jitter = arguments.measure.map(|lasts| jitter::measure(arguments.cycle_us, lasts));
     let worst = checks.iter().map(|check| check.outcome).max();
     let late = jitter.as_ref().is_some_and(|jitter| !jitter.is_good());
     if arguments.json {

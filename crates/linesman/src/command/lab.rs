@@ -1,5 +1,6 @@
 //! `linesman lab`: stories, swarms, scores and recordings in virtual time.
 
+pub(crate) mod excerpts;
 pub(crate) mod replay;
 pub(crate) mod score;
 
@@ -16,6 +17,7 @@ use linesman_lab::story::run::play;
 use linesman_lab::swarm::physics::{PhysicsReport, run_physics_seed};
 use linesman_lab::swarm::run::{SeedReport, SwarmOptions, SwarmReport, run_seed};
 
+use crate::amount::number_of_things;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -41,6 +43,8 @@ enum Command {
     Replay(replay::Arguments),
     /// Measure how often the diagnosis is right, on plants and faults drawn by chance
     Score(score::Arguments),
+    /// Cut recordings at random, and hold the verdicts on them against the truth
+    Excerpts(excerpts::Arguments),
     /// Run plants and faults drawn by chance, and check what must always hold
     Swarm {
         /// From the first seed up to, not including, the second
@@ -62,7 +66,7 @@ impl Arguments {
         match &self.command {
             Command::Replay(arguments) => arguments.json,
             Command::Score(arguments) => arguments.json,
-            Command::Run { .. } | Command::Swarm { .. } => false,
+            Command::Run { .. } | Command::Swarm { .. } | Command::Excerpts(_) => false,
         }
     }
 }
@@ -73,6 +77,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Command::Run { stories } => run_stories(stories, output),
         Command::Replay(arguments) => replay::run(arguments, output),
         Command::Score(arguments) => Ok(score::run(arguments, output)),
+        Command::Excerpts(arguments) => excerpts::run(arguments, output),
         Command::Swarm { seeds, physics: true, quiet } => {
             Ok(run_physics(seeds.clone(), *quiet, output))
         }
@@ -84,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 fn seeds(text: &str) -> Result<Range<u64>, String> {
     let wrong = || format!("`{text}`: expected two numbers, such as 0..200");
     let (from, to) = text.split_once("..").ok_or_else(wrong)?;
-    let number = |text: &str| text.trim().parse().map_err(|_| wrong());
+    let number = |text: &str| number_of_things(text).ok_or_else(wrong);
     let (from, to) = (number(from)?, number(to)?);
     if from >= to {
         return Err(format!("`{text}`: expected a second number greater than the first"));

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::{EntryKind, Severity};
-use linesman_runtime::event_log::{EventLog, Filter, Run, StoredEntry};
+use linesman_runtime::event_log::{EventLog, Filter, LoggedFinding, Run, StoredEntry};
 use serde::Serialize;
 
+use crate::amount::{self, SECOND};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -17,7 +18,8 @@ use crate::version;
 pub(crate) struct Arguments {
     /// The event log, as `run --log` wrote it
     file: PathBuf,
-    /// Not before: a time (2026-03-01T10:16:50Z) or how long ago (90s, 10m, 2h, 3d)
+    /// Not before: a time ("2026-03-01 10:16:50" in the time zone of this host, 2026-03-01T10:16:50Z) or how
+    /// long ago (90s, 10m, 2h, 3d)
     #[arg(long, value_name = "TIME")]
     since: Option<String>,
     /// Not after
@@ -39,8 +41,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "WORDS")]
     text: Option<String>,
     /// The newest so many
-    #[arg(long, short = 'n', value_name = "COUNT")]
-    limit: Option<u32>,
+    #[arg(long, short = 'n', value_name = "COUNT", value_parser = amount::count(0, u32::MAX.into()))]
+    limit: Option<u64>,
     /// The runs, not their entries
     #[arg(long, conflicts_with_all = ["csv", "limit"])]
     runs: bool,
@@ -115,6 +117,8 @@ struct EntryReport {
     device: Option<String>,
     /// What happened.
     text: String,
+    /// The finding that it is about, and what became of it; `null`: it is about something else.
+    finding: Option<LoggedFinding>,
 }
 
 impl From<&Run> for RunReport {
@@ -140,6 +144,7 @@ impl From<&StoredEntry> for EntryReport {
             no: entry.device_no,
             device: entry.device_name.clone(),
             text: entry.text.clone(),
+            finding: entry.finding.clone(),
         }
     }
 }
@@ -149,7 +154,16 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let log = EventLog::open(&arguments.file)?;
     let runs = log.runs()?;
     let filter = filter(arguments, &runs)?;
-    let entries = if arguments.runs { Vec::new() } else { log.entries(&filter)? };
+    let mut entries = if arguments.runs { Vec::new() } else { log.entries(&filter)? };
+    // Answers call a SubDevice by name and type; the log has the name.
+    let bare = filter
+        .device_name
+        .as_deref()
+        .and_then(|called| called.rsplit_once(" ("))
+        .map(|(name, _)| name);
+    if let Some(name) = bare.filter(|_| entries.is_empty()) {
+        entries = log.entries(&Filter { device_name: Some(name.to_owned()), ..filter.clone() })?;
+    }
     let of = log.count()?;
     let shown = |run: &&Run| arguments.runs || entries.iter().any(|entry| entry.run == run.id);
     if arguments.json {
@@ -161,7 +175,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             entries: entries.iter().map(EntryReport::from).collect(),
         });
     } else if arguments.csv {
-        output.line("run,time,severity,kind,no,device,text");
+        output.raw("run,time,severity,kind,no,device,text\n");
         for entry in &entries {
             let fields = [
                 entry.run.to_string(),
@@ -172,7 +186,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
                 entry.device_name.clone().unwrap_or_default(),
                 entry.text.clone(),
             ];
-            output.line(&fields.map(|field| csv(&field)).join(","));
+            output.raw(&format!("{}\n", fields.map(|field| csv(&field)).join(",")));
         }
     } else if arguments.runs {
         show_runs(&runs, output);
@@ -187,8 +201,8 @@ fn show_runs(runs: &[Run], output: &mut Output) {
     for run in runs {
         table.row([
             run.id.to_string(),
-            short(run.started),
-            run.ended.map_or_else(|| "-".to_owned(), short),
+            run.started.local(),
+            run.ended.map_or_else(|| "-".to_owned(), UnixTime::local),
             run.line.clone(),
             run.project.clone(),
             run.tool.clone(),
@@ -205,15 +219,9 @@ fn show_entries(entries: &[StoredEntry], of: u64, output: &mut Output) {
             Severity::Warning => paint.warning("warning"),
             Severity::Info => "info   ".to_owned(),
         };
-        output.line(&format!("{}  {word}  {}", short(entry.at), entry.text));
+        output.line(&format!("{}  {word}  {}", entry.at.local(), entry.text));
     }
     output.line(&format!("{} of {of} entries", entries.len()));
-}
-
-/// To the millisecond, as the sources write it: `2026-03-01 10:16:50.182`.
-fn short(time: UnixTime) -> String {
-    let text = time.to_string().replace('T', " ");
-    text.get(..23).map_or(text.clone(), str::to_owned)
 }
 
 /// A field of a CSV file (RFC 4180). What a spreadsheet would take for a formula is made text.
@@ -241,7 +249,7 @@ fn filter(arguments: &Arguments, runs: &[Run]) -> Result<Filter, Failure> {
                         arguments.file.display(),
                         runs.len()
                     ),
-                    "`linesman log FILE --runs` lists them",
+                    format!("`linesman log {} --runs` lists them", arguments.file.display()),
                 )
             };
             Some(known.ok_or_else(unknown)?)
@@ -249,10 +257,13 @@ fn filter(arguments: &Arguments, runs: &[Run]) -> Result<Filter, Failure> {
     };
     let (device_no, device_name) = match arguments.device.as_deref() {
         None => (None, None),
-        Some(word) => match word.parse() {
-            Ok(no) => (Some(no), None),
-            Err(_) => (None, Some(word.to_owned())),
-        },
+        Some(word) => {
+            let word = word.trim_matches(['\'', '"']);
+            match word.strip_prefix("SubDevice ").unwrap_or(word).parse() {
+                Ok(no) => (Some(no), None),
+                Err(_) => (None, Some(word.to_owned())),
+            }
+        }
     };
     Ok(Filter {
         since: arguments.since.as_deref().map(time).transpose()?,
@@ -263,33 +274,26 @@ fn filter(arguments: &Arguments, runs: &[Run]) -> Result<Filter, Failure> {
         device_name,
         run,
         text: arguments.text.clone(),
-        limit: arguments.limit,
+        limit: arguments.limit.map(|limit| u32::try_from(limit).unwrap_or(u32::MAX)),
     })
 }
 
 /// A point in time, or how long ago.
 fn time(word: &str) -> Result<UnixTime, Failure> {
-    UnixTime::parse(word).or_else(|| ago(word)).ok_or_else(|| {
+    UnixTime::parse_local(word).or_else(|| ago(word)).ok_or_else(|| {
         Failure::new(
             format!("`{word}` is no time"),
-            "write a time as 2026-03-01T10:16:50Z, or how long ago as 90s, 10m, 2h or 3d",
+            "write a time as 2026-03-01 10:16:50 or 2026-03-01T10:16:50Z, or how long ago as 90s, 10m, \
+             2h or 3d",
         )
     })
 }
 
 fn ago(word: &str) -> Option<UnixTime> {
-    let unit = word.chars().last()?;
-    let count: u64 = word.get(..word.len() - unit.len_utf8())?.parse().ok()?;
-    let seconds = match unit {
-        's' => 1,
-        'm' => 60,
-        'h' => 3_600,
-        'd' => 86_400,
-        _ => return None,
-    };
-    let span = i128::from(count) * seconds * 1_000_000_000;
+    // A plain number would be no time, and no length of time either.
+    let span = amount::span(word, SECOND).filter(|_| word.ends_with(char::is_alphabetic))?;
     let now = linesman_link::clock::HostClock::start().started_at();
-    Some(UnixTime::from_nanos(now.as_nanos() - span))
+    Some(UnixTime::from_nanos(now.as_nanos() - i128::from(span.as_nanos())))
 }
 
 #[cfg(test)]
@@ -306,7 +310,8 @@ mod tests {
     #[test]
     fn times_are_read_or_refused() {
         let at = time("2026-03-01T10:16:50.182Z").unwrap();
-        assert_eq!(short(at), "2026-03-01 10:16:50.182");
+        assert_eq!(time(&at.local()), Ok(at), "as it is shown");
+        assert_eq!(time("2026-03-01 00:00:00"), time("2026-03-01"));
         assert!(time("10m").unwrap() < time("5m").unwrap());
         assert!(time("yesterday").is_err());
         assert!(time("").is_err());

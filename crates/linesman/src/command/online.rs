@@ -13,11 +13,14 @@ use std::time::Duration;
 
 use linesman_maindevice::service::Service;
 use linesman_proto::address::DeviceId;
+use linesman_proto::time::Span;
 use linesman_runtime::online::report::{OnlineReport, SCHEMA};
 use linesman_runtime::selector::Selector;
 use linesman_runtime::service;
 
 use self::live::{Live, Pace};
+use crate::amount::{MILLISECOND, SECOND, duration};
+use crate::command::driven;
 use crate::command::service::{is_socket, silent};
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -33,8 +36,9 @@ pub(crate) struct Arguments {
     /// Where the line is: the socket of `run --control`; eth0, eth0+eth1 (a ring) or sim:plant.toml for a
     /// line that nobody drives; or a report that was saved (a path ending in .json)
     #[arg(value_name = "WHERE", required_unless_present = "control")]
-    place: Option<String>,
-    /// One SubDevice in detail: its number (3), station address (0x1003) or name; all unless said
+    pub(crate) place: Option<String>,
+    /// One SubDevice in detail: its number (3), station address (0x1003), position (position:2) or name, also as
+    /// answers write it ("Term 4 (EL3104)"); all unless said
     #[arg(value_name = "DEVICE")]
     device: Option<String>,
     /// The socket of a running MainDevice, instead of WHERE
@@ -43,12 +47,18 @@ pub(crate) struct Arguments {
     /// Again and again: a table on a terminal (q ends it), else a line for each change
     #[arg(long, short)]
     live: bool,
-    /// How long to look; live without an end unless said
-    #[arg(long, value_name = "SECONDS")]
-    seconds: Option<f64>,
-    /// Time between two looks of the live view
-    #[arg(long, value_name = "MS", default_value_t = 500, value_parser = clap::value_parser!(u64).range(20..=60_000))]
-    interval_ms: u64,
+    /// How long to look (5, 10m); live without an end unless said
+    #[arg(long, visible_alias = "for", value_name = "SECONDS", value_parser = duration(SECOND, Span::ZERO, Span::s(86_400)))]
+    seconds: Option<Span>,
+    /// Time between two looks of the live view (500, 1s)
+    #[arg(
+        long,
+        visible_alias = "interval",
+        value_name = "MS",
+        default_value = "500",
+        value_parser = duration(MILLISECOND, Span::ms(20), Span::s(60))
+    )]
+    interval_ms: Span,
     /// Let counts begin at 0 first. Errors: the registers too, which are read and cleared in one go
     #[arg(long, value_name = "WHAT", value_enum)]
     clear: Option<What>,
@@ -105,10 +115,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         match place.parse::<Selector>()? {
             Selector::Cards(names) => line::cards(&names, &place, arguments, output)?,
             Selector::Segment(path) => line::segment(&path, &place, arguments, output)?,
-            selector @ (Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_)) => {
-                let reason = format!("`{selector}`: nobody can be asked there");
-                let advice = format!("judge it with `linesman diagnose {place}`");
-                return Err(Failure::new(reason, advice));
+            selector @ (Selector::Listen(_) | Selector::File(_)) => {
+                return Err(driven::not_drivable(&place, &selector));
             }
         }
     };
@@ -148,18 +156,12 @@ fn conclude(
 }
 
 fn interval(arguments: &Arguments) -> Duration {
-    Duration::from_millis(arguments.interval_ms)
+    Duration::from_nanos(arguments.interval_ms.as_nanos())
 }
 
 /// How long to look; `None`: until somebody ends it.
-fn lasts(arguments: &Arguments) -> Result<Option<Duration>, Failure> {
-    let Some(seconds) = arguments.seconds else { return Ok(None) };
-    Duration::try_from_secs_f64(seconds).map(Some).map_err(|error| {
-        Failure::new(
-            format!("--seconds {seconds}: {error}"),
-            "give a number of seconds, `--seconds 10`",
-        )
-    })
+fn lasts(arguments: &Arguments) -> Option<Duration> {
+    arguments.seconds.map(|lasts| Duration::from_nanos(lasts.as_nanos()))
 }
 
 /// A line that a MainDevice drives.
@@ -171,7 +173,7 @@ fn driven(
     if let Some(what) = arguments.clear {
         clear(path, what, output)?;
     }
-    let pace = Pace { interval: interval(arguments), lasts: lasts(arguments)? };
+    let pace = Pace { interval: interval(arguments), lasts: lasts(arguments) };
     if !arguments.live {
         if let Some(lasts) = pace.lasts {
             std::thread::sleep(lasts);
@@ -199,7 +201,7 @@ fn ask(path: &Path) -> Result<OnlineReport, Failure> {
         (None, None) => {
             let reason =
                 format!("{}: whoever listens there does not say how the line is", path.display());
-            Err(Failure::new(reason, "name the socket of `linesman run --control`"))
+            Err(Failure::new(reason, "name the socket of `linesman run --on NIC --control SOCKET`"))
         }
     }
 }
@@ -224,7 +226,7 @@ fn clear(path: &Path, what: What, output: &Output) -> Result<(), Failure> {
 /// A report that was kept.
 fn saved(path: &Path) -> Result<OnlineReport, Failure> {
     let bytes = files::bytes(path, "a report of `linesman online`", MOST)?;
-    let advice = "name a file that `linesman online --save` has written";
+    let advice = "name a file that `linesman online WHERE --save FILE.json` has written";
     let report: OnlineReport = serde_json::from_slice(&bytes)
         .map_err(|error| Failure::new(format!("{}: {error}", path.display()), advice))?;
     if report.schema != SCHEMA {

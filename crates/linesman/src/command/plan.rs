@@ -9,8 +9,10 @@ use std::path::PathBuf;
 
 use linesman_config::eni;
 use linesman_config::plan::Severity;
+use linesman_proto::time::Span;
 use linesman_runtime::plan_file::{PlanFile, PlanFileError};
 
+use crate::amount::cycle;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -26,6 +28,9 @@ pub(crate) struct Arguments {
     /// A project (TOML) or a network configuration of another tool (ENI, XML)
     #[arg(value_name = "PROJECT.toml|ENI.xml")]
     file: PathBuf,
+    /// Cycle time (500, 1ms), instead of that of the file, or where that has none
+    #[arg(long, visible_alias = "cycle", value_name = "US", value_parser = cycle())]
+    cycle_us: Option<Span>,
     /// Every SubDevice too: addresses, process data, what it adds to working counters
     #[arg(long, short)]
     verbose: bool,
@@ -45,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     for path in [&arguments.export, &arguments.segment].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
     }
-    let file = PlanFile::open(&arguments.file)?;
+    let file = PlanFile::open_with(&arguments.file, arguments.cycle_us)?;
     let doubts = file.plan.doubts();
     if arguments.json {
         output.json(&report::report(&file, &doubts));

@@ -14,6 +14,7 @@ use super::counters::names;
 use super::counters::samples::Samples;
 use super::diagnose;
 use super::service::Session;
+use crate::amount;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -29,9 +30,9 @@ const LONG: u16 = 0x05C0;
 pub(crate) struct Arguments {
     /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
     #[arg(value_name = "WHERE")]
-    line: String,
-    /// How many frames go over each link at least
-    #[arg(long, default_value_t = 1_000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(crate) line: String,
+    /// How many frames go over each link at least (1000, 10k, 1M)
+    #[arg(long, value_name = "COUNT", default_value = "1000", value_parser = amount::count(1, 10_000_000))]
     frames: u64,
     /// JSON, schema linesman.probe/1
     #[arg(long)]
@@ -72,8 +73,10 @@ struct LinkReport {
     back: Option<[u64; 2]>,
     /// Links lost at either end.
     lost_links: u64,
-    /// Whether nothing was counted.
+    /// Whether nothing was counted, by counters that could have.
     good: bool,
+    /// Whether a counter of this link stands at its end, 255, and counts no more.
+    full: bool,
 }
 
 /// Sends them.
@@ -89,8 +92,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let over = send(&mut session, &mut samples, &tree, arguments.frames)?;
     // Longer than any counter may take to be up to date; frames of a later reading are not of this try.
     samples.read(&mut session, Span::s(1))?;
-    let Some(inventory) = session.inventory() else { return Ok(Status::NotJudged) };
-    let diagnosis = samples.diagnosis(inventory, session.place());
+    let Some(diagnosis) = session.diagnosis() else { return Ok(Status::NotJudged) };
     let links = links(&session, &samples, &tree, &over);
     let status = diagnose::status(&diagnosis);
     if arguments.json {
@@ -137,6 +139,12 @@ fn links(session: &Session, samples: &Samples, tree: &Tree, over: &[u64]) -> Vec
         [ErrorCounter::InvalidFrame(port), ErrorCounter::PhysicalLayer(port)]
             .map(|counter| samples.rise(id, counter))
     };
+    let is_full = |node: usize, port: Port| {
+        let latest = samples.latest(DeviceId(node as u32));
+        let counters = [ErrorCounter::InvalidFrame(port), ErrorCounter::PhysicalLayer(port)];
+        let at_end = |counter| latest.and_then(|all| all.value(counter)) == Some(u8::MAX);
+        counters.into_iter().any(at_end)
+    };
     let lost = |end: End| match end {
         End::Controller(node, port) => {
             samples.rise(DeviceId(node as u32), ErrorCounter::LostLink(port))
@@ -161,6 +169,8 @@ fn links(session: &Session, samples: &Samples, tree: &Tree, over: &[u64]) -> Vec
         };
         let lost_links = lost(above.upstream) + lost(above.downstream);
         let errors: u64 = away.iter().chain(back.iter().flatten()).sum();
+        let full = is_full(*node, tree.entry(*node))
+            || matches!(above.upstream, End::Controller(parent, port) if is_full(parent, port));
         list.push(LinkReport {
             near: name(above.upstream),
             far: name(above.downstream),
@@ -168,7 +178,8 @@ fn links(session: &Session, samples: &Samples, tree: &Tree, over: &[u64]) -> Vec
             away,
             back,
             lost_links,
-            good: errors + lost_links == 0,
+            good: errors + lost_links == 0 && !full,
+            full,
         });
     }
     list
@@ -187,7 +198,11 @@ fn table(links: &[LinkReport], output: &Output) -> String {
             pair(link.away),
             link.back.map_or_else(|| "--".to_owned(), pair),
             link.lost_links.to_string(),
-            if link.good { paint.good("good") } else { paint.bad("errors") },
+            match (link.good, link.full) {
+                (true, _) => paint.good("good"),
+                (false, true) => paint.warning("counter full"),
+                (false, false) => paint.bad("errors"),
+            },
         ]);
     }
     table.render()

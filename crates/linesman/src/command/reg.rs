@@ -22,7 +22,7 @@ const MOST: u16 = 1_486;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    place: Place,
+    pub(crate) place: Place,
     #[command(subcommand)]
     action: Action,
     /// JSON, schema linesman.registers/1

@@ -9,8 +9,8 @@ use std::time::Duration;
 use linesman_config::eni::Eni;
 use linesman_config::plan::Plan;
 use linesman_config::project::Project;
-use linesman_diagnosis::Setup;
 use linesman_diagnosis::report::Verdict;
+use linesman_diagnosis::{InputKind, Setup};
 use linesman_link::clock::HostClock;
 use linesman_link::socket::Bell;
 use linesman_maindevice::watch::EntryKind;
@@ -30,6 +30,7 @@ use linesman_runtime::system_log::SystemLog;
 
 use self::told::{Logs, Teller};
 use super::driven;
+use crate::amount::{MICROSECOND, count as count_of, cycle, duration, lasting};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -47,8 +48,10 @@ const MOST: u64 = 256 * 1024 * 1024;
 #[derive(clap::Args, Debug)]
 #[command(
     after_help = "It drives every SubDevice to the target state, and at the end sets outputs to zero \
-                  and takes every SubDevice to the state of --leave. Ctrl-C ends it; a second one \
-                  ends it at once.\n\nWithout the rights for real time it runs all the same, as \
+                  and takes every SubDevice to the state of --leave. Ctrl-C ends it so, and also a \
+                  SIGTERM, a terminal or connection that is lost, and a reader of its output that \
+                  goes away; a second Ctrl-C ends it at once. To leave it running, start it with \
+                  nohup, as a service, or with its output in a file.\n\nWithout the rights for real time it runs all the same, as \
                   steadily as this host lets it, and says so."
 )]
 pub(crate) struct Arguments {
@@ -58,35 +61,47 @@ pub(crate) struct Arguments {
     file: Option<PathBuf>,
     /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
     #[arg(long, value_name = "WHERE")]
-    on: String,
-    /// End after so many seconds; else Ctrl-C ends it
-    #[arg(long, value_name = "N")]
-    seconds: Option<f64>,
+    pub(crate) on: String,
+    /// End after so long (60, 10m); else Ctrl-C ends it
+    #[arg(long, visible_alias = "for", value_name = "SECONDS", value_parser = lasting())]
+    seconds: Option<Span>,
     /// The state that SubDevices are driven to: PREOP, SAFEOP or OP
     #[arg(long, value_name = "STATE", default_value = "OP", value_parser = state)]
     to: AlState,
     /// The state in which they are left at the end
     #[arg(long, value_name = "STATE", default_value = "INIT", value_parser = state)]
     leave: AlState,
-    /// Cycle time in microseconds, instead of that of the project
-    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
-    cycle_us: Option<u64>,
+    /// Cycle time (500, 1ms), instead of that of the project or ENI file, or where that has none
+    #[arg(long, visible_alias = "cycle", value_name = "US", value_parser = cycle())]
+    cycle_us: Option<Span>,
     /// Keep the cycle on this CPU
     #[arg(long, value_name = "N")]
     cpu: Option<usize>,
     /// Real-time priority, 1 to 99; 0 for none
     #[arg(long, value_name = "N", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
     priority: u8,
-    /// Look again and again for so many microseconds before each cycle, instead of sleeping up to it
-    #[arg(long, value_name = "US", default_value_t = 0)]
-    spin_us: u64,
+    /// Look again and again for so long before each cycle (20, 20us), instead of sleeping up to it
+    #[arg(
+        long,
+        visible_alias = "spin",
+        value_name = "US",
+        default_value = "0",
+        value_parser = duration(MICROSECOND, Span::ZERO, Span::s(1))
+    )]
+    spin_us: Span,
     /// Another program is the application: it sees the process image in this file, such as
     /// /dev/shm/machine
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
-    /// How many cycles in a row that program may give no outputs before they are withheld
-    #[arg(long, value_name = "N", default_value_t = 10, requires = "image")]
-    misses: u32,
+    /// How many cycles in a row that program may give no outputs before they are withheld (10, 2k)
+    #[arg(
+        long,
+        value_name = "COUNT",
+        default_value = "10",
+        requires = "image",
+        value_parser = count_of(0, u32::MAX.into())
+    )]
+    misses: u64,
     /// Leave all SubDevices in PREOP until that program gives outputs for the first time
     #[arg(long, requires = "image")]
     wait_for_outputs: bool,
@@ -121,13 +136,12 @@ fn state(word: &str) -> Result<AlState, String> {
 /// Drives the line.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selector: Selector = arguments.on.parse()?;
-    let lasts = lasts(arguments.seconds)?;
+    let lasts = arguments.seconds;
     let source = match &arguments.file {
-        Some(path) => Source::read(path, output)?,
+        Some(path) => Source::read(path, arguments.cycle_us, output)?,
         None => Source::AsFound,
     };
-    let cycle = arguments.cycle_us.map(Span::us);
-    let choices = Choices { target: arguments.to, cycle, ..Choices::default() };
+    let choices = Choices { target: arguments.to, cycle: arguments.cycle_us, ..Choices::default() };
     let title = match (&source, &arguments.file) {
         (Source::Project(project), Some(path)) => {
             format!("{} of {}", count(project.devices.len() as u64, "SubDevice"), path.display())
@@ -138,6 +152,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         _ => "what is there".to_owned(),
     };
     let setup = (!arguments.no_diagnosis).then(|| Setup {
+        input: InputKind::Driven,
         project: match &source {
             Source::Project(project) => Some((**project).clone()),
             Source::AsFound | Source::Planned(_) => None,
@@ -150,13 +165,21 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         leave: arguments.leave,
         lasts,
         real_time: None,
-        allowed_misses: arguments.image.is_some().then_some(arguments.misses),
+        allowed_misses: arguments
+            .image
+            .is_some()
+            .then_some(u32::try_from(arguments.misses).unwrap_or(u32::MAX)),
         hold: arguments.wait_for_outputs,
         diagnose: setup,
     };
     let wanted = match source {
         Source::Project(project) => choices.project(*project),
-        Source::Planned(plan) => Wanted::Plan(plan),
+        Source::Planned(mut plan) => {
+            for device in &mut plan.devices {
+                device.target = device.target.min(arguments.to);
+            }
+            Wanted::Plan(plan)
+        }
         Source::AsFound => choices.as_found(),
     };
     let clock = HostClock::start();
@@ -190,7 +213,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Selector::Cards(names) => {
             driven::refuse(names)?;
             let mut line = Cards::open(names, clock)?;
-            line.set_spin(Span::us(arguments.spin_us));
+            line.set_spin(arguments.spin_us);
             stop.rings(&line.bell()).map_err(driven::no_bell)?;
             let desk = desk(arguments.control.as_deref(), line.bell(), board)?;
             let real_time = Some(RealTime {
@@ -209,9 +232,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let desk = desk(arguments.control.as_deref(), line.bell(), board)?;
             drive(line, wanted, &options, application, desk, &stop, &said, teller, output)
         }
-        Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
-            let reason = format!("`{selector}`: nothing can be driven there");
-            Err(Failure::new(reason, "name a network card, `--on eth0`, or `--on sim:plant.toml`"))
+        Selector::Listen(_) | Selector::File(_) => {
+            Err(driven::not_drivable(&arguments.on, &selector))
         }
     }
 }
@@ -224,22 +246,18 @@ enum Source {
 }
 
 impl Source {
-    fn read(path: &Path, output: &Output) -> Result<Self, Failure> {
-        let bytes = files::bytes(path, "a project or an ENI file", MOST)?;
-        if !Eni::is_one(&bytes) {
+    fn read(path: &Path, cycle: Option<Span>, output: &Output) -> Result<Self, Failure> {
+        if !Eni::is_one(&files::bytes(path, "a project or an ENI file", MOST)?) {
             let project = files::project(path)?;
-            // One that chooses more than who is where is planned from what it says.
-            if project.chooses() {
-                let PlanFile { plan, notes, .. } = PlanFile::open(path)?;
-                notes.iter().for_each(|note| output.warn(note));
-                return Ok(Self::Planned(Box::new(plan)));
+            if !project.chooses() {
+                return Ok(Self::Project(Box::new(project)));
             }
-            return Ok(Self::Project(Box::new(project)));
         }
-        let eni = Eni::parse(&bytes).map_err(|error| files::in_file(path, &error))?;
+        // What chooses more than who is where is planned from what it says.
+        let PlanFile { plan, notes, .. } = PlanFile::open_with(path, cycle)?;
         // What is left out of it is not found out only when it is missed.
-        eni.notes.iter().for_each(|note| output.warn(note));
-        Ok(Self::Planned(Box::new(eni.plan)))
+        notes.iter().for_each(|note| output.warn(note));
+        Ok(Self::Planned(Box::new(plan)))
     }
 }
 
@@ -275,11 +293,6 @@ fn with_source(
     options
 }
 
-fn lasts(seconds: Option<f64>) -> Result<Option<Span>, Failure> {
-    let until = super::sim::until(seconds)?;
-    Ok(seconds.map(|_| until.since(linesman_proto::time::Instant::ZERO)))
-}
-
 /// Runs the line in a thread of its own, and tells what happens meanwhile.
 #[allow(clippy::too_many_arguments, reason = "called twice, from above")]
 fn drive<L: Line + Send>(
@@ -305,8 +318,16 @@ fn drive<L: Line + Send>(
         loop {
             match told.recv_timeout(QUIET) {
                 Ok(note) => teller.note(&note, output),
-                Err(RecvTimeoutError::Timeout) => teller.flush(output),
+                Err(RecvTimeoutError::Timeout) => {
+                    teller.flush(output);
+                    output.look_for_reader();
+                }
                 Err(RecvTimeoutError::Disconnected) => break,
+            }
+            // A connection that broke, without a terminal, leaves nothing but this behind.
+            if output.is_closed() && !stop.is_set() {
+                output.warn("nobody reads standard output any more: the line is stopped");
+                stop.set();
             }
         }
         teller.flush(output);
@@ -322,16 +343,22 @@ fn drive<L: Line + Send>(
         let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
         output.warn(&format!("{} entries are missing in the event log: {why}", log.dropped));
     }
-    let Ended { report, diagnosis, error } =
+    let Ended { mut report, error } =
         ended.map_err(|error| driven::nobody(&error).at(&options.on))?;
+    if let Some(diagnosis) = &mut report.diagnosis {
+        diagnosis.tool = version::tool();
+    }
     if teller.is_json() {
         output.json(&report);
     } else {
         output.text(&told::summary(&report, output.paint()));
+        if let Some(diagnosis) = &report.diagnosis {
+            output.text(&told::findings(diagnosis, teller.names(), output));
+        }
     }
     if let Some(error) = error {
         return Err(driven::nobody(&error).at(&options.on));
     }
-    let faulty = diagnosis.is_some_and(|diagnosis| diagnosis.verdict == Verdict::Faulty);
+    let faulty = report.diagnosis.is_some_and(|diagnosis| diagnosis.verdict == Verdict::Faulty);
     Ok(if faulty || report.reached_ns.is_none() { Status::Findings } else { Status::Good })
 }

@@ -28,7 +28,7 @@ use crate::page;
 pub(crate) struct Arguments {
     /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
     #[arg(value_name = "WHERE")]
-    place: String,
+    pub(crate) place: String,
     /// Identities, controllers and error counters too
     #[arg(long, short)]
     verbose: bool,
@@ -69,10 +69,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let scan = match &selector {
         Selector::Cards(names) => on_cards(names)?,
         Selector::Segment(path) => on_segment(path)?,
-        Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
-            let reason = format!("`{selector}`: a scan sends frames, and nobody answers there");
-            let advice = format!("judge it with `linesman diagnose {}`", arguments.place);
-            return Err(Failure::new(reason, advice));
+        Selector::Listen(_) | Selector::File(_) => {
+            return Err(driven::not_drivable(&arguments.place, &selector));
         }
     };
     let Scan { inventory, start } = &scan;

@@ -13,13 +13,14 @@ use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
 
 use super::diagnose::follow::EventReport;
+use super::diagnose::several::Diagnoses;
 use super::interfaces;
 use super::lab::replay::ReplayReport;
 use super::log::LogReport;
 use super::plan::report::PlanReport;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
-use super::{counters, foe, history, host, probe, reg, service, sii, state};
+use super::{counters, explain, foe, history, host, probe, reg, service, sii, state};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::output::Output;
@@ -47,6 +48,8 @@ pub(crate) enum Name {
     Scan,
     /// `diagnose --json`
     Diagnosis,
+    /// `diagnose --json` of several files
+    Diagnoses,
     /// A line of `diagnose --follow --json`
     Event,
     /// `lab replay --json`
@@ -77,6 +80,8 @@ pub(crate) enum Name {
     Interfaces,
     /// `host --json`
     Host,
+    /// `explain --json`
+    Explain,
     /// `state --json`
     States,
     /// `sdo … read|write --json`
@@ -115,6 +120,7 @@ fn schema(name: Name) -> Schema {
         Name::Plan => schema_for!(PlanReport),
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
+        Name::Diagnoses => schema_for!(Diagnoses),
         Name::Event => schema_for!(EventReport<'_>),
         Name::Replay => schema_for!(ReplayReport),
         Name::Score => schema_for!(ScoreReport),
@@ -130,6 +136,7 @@ fn schema(name: Name) -> Schema {
         Name::Service => schema_for!(linesman_runtime::service::message::Answer),
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Host => schema_for!(host::Report),
+        Name::Explain => schema_for!(explain::Report),
         Name::States => schema_for!(state::Report),
         Name::Sdo => schema_for!(ReadReport),
         Name::Objects => schema_for!(ListReport),

@@ -16,6 +16,7 @@ use linesman_runtime::stop::Stop;
 use linesman_runtime::wiring::Wiring;
 
 use super::driven;
+use crate::amount::lasting;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files::Plant;
@@ -37,9 +38,9 @@ pub(crate) struct Arguments {
     /// The network card whose cable leads to the MainDevice, or two for a ring: eth1, eth1+eth2
     #[arg(long, value_name = "NIC[+NIC]", required = true)]
     on: Vec<String>,
-    /// End after so many seconds; else Ctrl-C ends it
-    #[arg(long, value_name = "N")]
-    seconds: Option<f64>,
+    /// End after so long (60, 10m); else Ctrl-C ends it
+    #[arg(long, visible_alias = "for", value_name = "SECONDS", value_parser = lasting())]
+    seconds: Option<Span>,
     /// Open a socket for `linesman fault`; it is there once the segment answers
     #[arg(long, value_name = "SOCKET")]
     control: Vec<PathBuf>,
@@ -59,7 +60,7 @@ struct Ready {
 
 /// Answers frames until asked to stop.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let until = until(arguments.seconds)?;
+    let until = arguments.seconds.map_or(Instant::MAX, |lasts| Instant::ZERO + lasts);
     let cards = cards(arguments)?;
     let stop = driven::stop()?;
     let mut ready = Vec::new();
@@ -89,8 +90,12 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 fn cards(arguments: &Arguments) -> Result<Vec<Vec<String>>, Failure> {
     let Arguments { segments, on, control, log, .. } = arguments;
     let refuse = |reason: String| {
-        let advice = "name each segment with its card, `linesman sim a.toml --on eth1 b.toml --on \
-                      eth2`, and --control and --log once for each or not at all";
+        let each = segments.iter().map(|path| format!(" {} --on NIC", path.display()));
+        let advice = format!(
+            "name each segment with its card, `linesman sim{}`, and --control and --log once for each or \
+             not at all",
+            each.collect::<String>()
+        );
         Failure::new(reason, advice)
     };
     if segments.len() != on.len() {
@@ -110,7 +115,7 @@ fn cards(arguments: &Arguments) -> Result<Vec<Vec<String>>, Failure> {
     for word in on {
         let Selector::Cards(names) = word.parse()? else {
             let reason = format!("`{word}`: expected a network card, or two for a ring");
-            return Err(Failure::new(reason, "say for example `--on eth1`"));
+            return Err(Failure::new(reason, "`linesman interfaces` lists the cards there are"));
         };
         all.push(names);
     }
@@ -218,16 +223,6 @@ fn serve(ready: Vec<Ready>, until: Instant, stop: &Stop) -> Vec<Ended> {
 
 fn from_link(error: LinkError) -> Failure {
     error.into()
-}
-
-/// The end of a run that lasts so many seconds.
-pub(crate) fn until(seconds: Option<f64>) -> Result<Instant, Failure> {
-    let Some(seconds) = seconds else { return Ok(Instant::MAX) };
-    if !(0.0..=1e9).contains(&seconds) {
-        let reason = format!("--seconds {seconds}: expected a number from 0 to 1,000,000,000");
-        return Err(Failure::new(reason, "leave it out to go on until Ctrl-C"));
-    }
-    Ok(Instant::ZERO + Span::ns((seconds * 1e9) as u64))
 }
 
 /// What went over the interfaces, and whether the host kept up: two lines and what is notable.

@@ -1,26 +1,34 @@
 //! Where answers go: text for people, JSON for programs, complaints and progress to the side.
 
+pub(crate) mod markdown;
 pub(crate) mod paint;
 pub(crate) mod progress;
 pub(crate) mod table;
 pub(crate) mod wrap;
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::os::fd::AsFd;
 
+use linesman_link::signal::is_without_reader;
 use serde::Serialize;
 
 pub(crate) use paint::Paint;
 pub(crate) use progress::Progress;
 pub(crate) use table::Table;
+use terminal_size::terminal_size_of;
+use wrap::fitted;
 pub(crate) use wrap::wrapped;
 
 use crate::cli::ColorChoice;
 use crate::failure::Failure;
+use crate::hint;
 
-/// Widest text, in columns: longer lines are hard to read.
+/// Widest text, in columns: longer lines are hard to read. Tables may be wider.
 const MAX_WIDTH: usize = 110;
 /// Width where no terminal says, such as in a file.
 const PLAIN_WIDTH: usize = 100;
+/// Narrower terminals break the lines themselves.
+const MIN_WIDTH: usize = 40;
 
 /// Standard output and standard error.
 pub(crate) struct Output {
@@ -31,19 +39,39 @@ pub(crate) struct Output {
     closed: bool,
     /// Why something of the answer could not be written, where somebody wants to read it.
     lost: Option<io::Error>,
+    /// Where the line is, as the user has named it: for commands that are advised.
+    place: String,
 }
 
 impl Output {
     /// An output that writes in colour when it should.
     pub(crate) fn new(color: ColorChoice) -> Self {
-        let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
+        let limit = limit_of(&io::stdout());
+        let aside = limit_of(&io::stderr());
         Self {
-            paint: Paint::for_stream(color, io::stdout().is_terminal()),
-            complaints: Paint::for_stream(color, io::stderr().is_terminal()),
-            width: width.map_or(PLAIN_WIDTH, |width| width.clamp(40, MAX_WIDTH)),
+            paint: Paint::for_stream(color, io::stdout().is_terminal()).with_limit(limit),
+            complaints: Paint::for_stream(color, io::stderr().is_terminal()).with_limit(aside),
+            width: limit.map_or(PLAIN_WIDTH, |width| width.min(MAX_WIDTH)),
             closed: false,
             lost: None,
+            place: String::new(),
         }
+    }
+
+    /// The same for a command at a place.
+    pub(crate) fn at(mut self, place: Option<&str>) -> Self {
+        place.unwrap_or_default().clone_into(&mut self.place);
+        self
+    }
+
+    /// A text whose commands can be run as they are printed.
+    pub(crate) fn hint(&self, text: &str) -> String {
+        hint::complete(text, &self.place)
+    }
+
+    /// A failure whose advice can be run as it is printed.
+    pub(crate) fn made(&self, failure: &Failure) -> Failure {
+        Failure::new(self.hint(&failure.reason), self.hint(&failure.next_step))
     }
 
     /// The colours of standard output.
@@ -61,8 +89,21 @@ impl Output {
         self.closed
     }
 
-    /// Writes text as it is.
+    /// Notices that the reader went away although nothing is written meanwhile.
+    pub(crate) fn look_for_reader(&mut self) {
+        self.closed |= is_without_reader(io::stdout());
+    }
+
+    /// Writes text for people: lines that are longer than the terminal is wide are broken at words.
     pub(crate) fn text(&mut self, text: &str) {
+        match self.paint.limit() {
+            Some(limit) => self.raw(&fitted(text, limit)),
+            None => self.raw(text),
+        }
+    }
+
+    /// Writes text for programs, as it is.
+    pub(crate) fn raw(&mut self, text: &str) {
         if self.closed {
             return;
         }
@@ -89,7 +130,7 @@ impl Output {
     /// Writes one JSON object.
     pub(crate) fn json<T: Serialize>(&mut self, value: &T) {
         match serde_json::to_string_pretty(value) {
-            Ok(text) => self.line(&text),
+            Ok(text) => self.raw(&format!("{text}\n")),
             Err(error) => self.warn(&format!("writing JSON: {error}")),
         }
     }
@@ -97,28 +138,38 @@ impl Output {
     /// Writes one JSON object on one line.
     pub(crate) fn json_line<T: Serialize>(&mut self, value: &T) {
         match serde_json::to_string(value) {
-            Ok(text) => self.line(&text),
+            Ok(text) => self.raw(&format!("{text}\n")),
             Err(error) => self.warn(&format!("writing JSON: {error}")),
         }
     }
 
     /// Says to the side why there is no answer.
     pub(crate) fn complain(&self, failure: &Failure) {
-        let paint = self.complaints;
+        let (failure, paint) = (self.made(failure), self.complaints);
         let mut text = format!("{} {}\n", paint.bad("error:"), failure.reason);
         if !failure.next_step.is_empty() {
             text.push_str(&format!("{} {}\n", paint.bold("do:"), failure.next_step));
         }
-        aside(&text);
+        self.aside(&text);
     }
 
     /// Says something to the side that does not belong to the answer.
     pub(crate) fn warn(&self, text: &str) {
-        aside(&format!("{} {text}\n", self.complaints.warning("note:")));
+        let text = self.hint(text);
+        self.aside(&format!("{} {text}\n", self.complaints.warning("note:")));
+    }
+
+    fn aside(&self, text: &str) {
+        let fitted = self.complaints.limit().map(|limit| fitted(text, limit));
+        // There is nobody left to tell when standard error is closed.
+        let _ = io::stderr().lock().write_all(fitted.as_deref().unwrap_or(text).as_bytes());
     }
 }
 
-fn aside(text: &str) {
-    // There is nobody left to tell when standard error is closed.
-    let _ = io::stderr().lock().write_all(text.as_bytes());
+/// Columns of the terminal behind a stream; where there is none, those that COLUMNS says. `None` in
+/// files and pipes: whoever searches there wants a line for each thing.
+fn limit_of(stream: &impl AsFd) -> Option<usize> {
+    let told = || std::env::var("COLUMNS").ok()?.parse().ok();
+    let terminal = terminal_size_of(stream).map(|(width, _)| usize::from(width.0));
+    terminal.or_else(told).filter(|width| *width > 0).map(|width| width.max(MIN_WIDTH))
 }

@@ -1,16 +1,30 @@
-//! Colour for terminals. Meaning never hangs on colour alone.
+//! Colour and columns of terminals. Meaning never hangs on colour alone.
 
 use crate::cli::ColorChoice;
 
-/// Whether to write in colour.
+/// What a stream can show: colours, and how many columns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Paint {
     on: bool,
+    /// Most columns of a line; `None` where lines may be as long as they are, as in a file.
+    limit: Option<usize>,
 }
 
 impl Paint {
-    /// Without colour.
-    pub(crate) const PLAIN: Self = Self { on: false };
+    /// Without colour, in lines of any length.
+    pub(crate) const PLAIN: Self = Self { on: false, limit: None };
+
+    /// The same with lines of so many columns at most.
+    #[must_use]
+    pub(crate) const fn with_limit(mut self, limit: Option<usize>) -> Self {
+        self.limit = limit;
+        self
+    }
+
+    /// Most columns of a line.
+    pub(crate) const fn limit(self) -> Option<usize> {
+        self.limit
+    }
 
     /// For a stream: see <https://no-color.org>.
     pub(crate) fn for_stream(choice: ColorChoice, is_terminal: bool) -> Self {
@@ -21,7 +35,7 @@ impl Paint {
             ColorChoice::Never => false,
             ColorChoice::Auto => is_terminal && !set("NO_COLOR") && !dumb,
         };
-        Self { on }
+        Self { on, limit: None }
     }
 
     fn with(self, code: &str, text: &str) -> String {
@@ -40,6 +54,11 @@ impl Paint {
     /// What matters less.
     pub(crate) fn faint(self, text: &str) -> String {
         self.with("2", text)
+    }
+
+    /// Code, commands and names to type.
+    pub(crate) fn code(self, text: &str) -> String {
+        self.with("36", text)
     }
 
     /// All is well.
@@ -79,7 +98,7 @@ mod tests {
 
     #[test]
     fn colours_take_no_columns() {
-        let paint = Paint { on: true };
+        let paint = Paint { on: true, limit: None };
         assert_eq!(paint.bad("ab"), "\x1b[1;31mab\x1b[0m");
         assert_eq!(columns(&paint.bad("ab")), 2);
         assert_eq!(Paint::PLAIN.bad("ab"), "ab");
@@ -88,8 +107,8 @@ mod tests {
 
     #[test]
     fn a_choice_beats_the_terminal() {
-        assert_eq!(Paint::for_stream(ColorChoice::Always, false), Paint { on: true });
-        assert_eq!(Paint::for_stream(ColorChoice::Never, true), Paint { on: false });
-        assert_eq!(Paint::for_stream(ColorChoice::Auto, false), Paint { on: false });
+        assert_eq!(Paint::for_stream(ColorChoice::Always, false), Paint { on: true, limit: None });
+        assert_eq!(Paint::for_stream(ColorChoice::Never, true), Paint { on: false, limit: None });
+        assert_eq!(Paint::for_stream(ColorChoice::Auto, false), Paint { on: false, limit: None });
     }
 }

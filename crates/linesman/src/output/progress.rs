@@ -3,6 +3,8 @@
 use std::io::{self, IsTerminal as _, Write as _};
 use std::time::{Duration, Instant};
 
+use terminal_size::terminal_size_of;
+
 /// Short work shows nothing.
 const FIRST: Duration = Duration::from_millis(700);
 /// Between two lines.
@@ -28,8 +30,11 @@ impl Progress {
         }
         self.next = Instant::now() + EVERY;
         self.shown = true;
+        let columns = terminal_size_of(io::stderr()).map_or(80, |(width, _)| usize::from(width.0));
+        // A line that is broken could not be taken away.
+        let line: String = line().chars().take(columns.saturating_sub(5)).collect();
         // There is nobody left to tell when standard error is closed.
-        let _ = write!(io::stderr().lock(), "\r\x1b[K  {} …", line());
+        let _ = write!(io::stderr().lock(), "\r\x1b[K  {line} …");
     }
 
     /// Takes the line away.

@@ -45,7 +45,7 @@ fn row(device: &Device) -> Markup {
             td class="number" { (lost(device)) }
             td { (told(device, |counter| device.counters.rise(counter))) }
             td class="faint" {
-                (told(device, |counter| device.counters.last().value(counter).map_or(0, u64::from)))
+                (told(device, |counter| device.counters.latest(counter).unwrap_or(0)))
             }
         }
     }

@@ -10,10 +10,11 @@ pub(crate) mod scene;
 mod timeline;
 
 use linesman_diagnosis::line::Line;
-use linesman_diagnosis::report::{Diagnosis, Verdict};
+use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_proto::time::Instant;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use crate::command::diagnose::READINGS;
 use crate::drawing;
 use crate::text::finding::{Writer, tally};
 use crate::text::quantity::count;
@@ -90,7 +91,7 @@ fn head(diagnosis: &Diagnosis, writer: &Writer<'_>) -> Markup {
             ul class="numbers" {
                 li { (count(network.devices.0, "SubDevice")) }
                 @if let Some(state) = &network.al_state_highest { li { "highest state " (state) } }
-                @if writer.timed {
+                @if writer.timed && diagnosis.clock != READINGS {
                     li { (count(network.frames.0, "frame")) }
                     li { (count(network.datagrams.0, "datagram")) ", " (network.unanswered.0) " unanswered" }
                     li { (count(network.lost.0, "frame")) " lost" }
@@ -99,6 +100,22 @@ fn head(diagnosis: &Diagnosis, writer: &Writer<'_>) -> Markup {
             }
             @if !diagnosis.complete {
                 p class="warning" { "The input could not be read to its end: judged as far as it goes." }
+            }
+            @if let Some(understood) = &diagnosis.understood { (reading_of(understood)) }
+        }
+    }
+}
+
+/// What was understood of a pasted text, and what not.
+fn reading_of(understood: &Understood) -> Markup {
+    html! {
+        ul {
+            @for block in &understood.blocks {
+                li { "understood, lines " (block.from) " to " (block.to) ": " (block.what.replace('`', "")) }
+            }
+            @for assumed in &understood.assumed { li { "assumed: " (assumed) } }
+            @if understood.ignored_count > 0 {
+                li { (count(understood.ignored_count as u64, "line")) " not understood" }
             }
         }
     }

@@ -2,14 +2,22 @@
 
 use linesman_diagnosis::report::{Diagnosis, Verdict};
 
+use super::coverage;
 use super::finding::{Writer, tally};
-use super::quantity::count;
+use super::quantity::{count, date};
+use crate::command::diagnose::READINGS;
+use crate::hint;
 use crate::output::wrapped;
 
 /// The diagnosis as text.
 pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
-    let mut text = verdict(diagnosis, writer);
+    let mut text = diagnosis
+        .understood
+        .as_ref()
+        .map_or_else(String::new, |understood| super::understood::write(understood, writer));
+    text.push_str(&verdict(diagnosis, writer));
     text.push_str(&network(diagnosis, writer));
+    text.push_str(&coverage::write(diagnosis, writer));
     for finding in &diagnosis.findings {
         text.push('\n');
         text.push_str(&writer.finding(finding));
@@ -19,7 +27,7 @@ pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
         let hint = format!("\n`linesman explain {code}` says how such a finding is made.\n");
         text.push_str(&writer.paint.faint(&hint));
         if writer.timed && diagnosis.network.devices.0 > 0 && !writer.names.has_any() {
-            text.push_str(&writer.paint.faint(NAMED));
+            text.push_str(&writer.paint.faint(&hint::complete(NAMED, writer.place)));
         }
     }
     text
@@ -32,10 +40,10 @@ const NAMED: &str = "`--project machine.toml`, as `linesman scan WHERE --save ma
 fn verdict(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     let paint = writer.paint;
     let (word, rest) = match diagnosis.verdict {
-        Verdict::Healthy => (paint.good("HEALTHY"), "nothing is wrong with the line"),
+        Verdict::Healthy => (paint.good("HEALTHY"), "nothing wrong was found in what was judged"),
         Verdict::Faulty => (paint.bad("FAULTY"), ""),
         Verdict::Inconclusive => {
-            (paint.warning("INCONCLUSIVE"), "too little was seen to call the line healthy")
+            (paint.warning("INCONCLUSIVE"), "too little was judged to call the line healthy")
         }
     };
     let tally = tally(&diagnosis.findings);
@@ -51,6 +59,8 @@ fn verdict(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
 /// The source without the directories of a file.
 fn short(source: &str) -> &str {
     match source.split_once(':') {
+        Some(("capture", "-")) => "standard input",
+        None if source == "-" => "standard input",
         Some(("capture" | "sim", path)) => path.rsplit('/').next().unwrap_or(path),
         Some(_) | None => source,
     }
@@ -60,7 +70,7 @@ fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     let network = &diagnosis.network;
     let mut parts = vec![count(network.devices.0, "SubDevice")];
     parts.extend(network.al_state_highest.as_ref().map(|state| format!("highest state {state}")));
-    if writer.timed {
+    if writer.timed && diagnosis.clock != READINGS {
         parts.push(count(network.frames.0, "frame"));
         parts.push(format!(
             "{} judged, {} unanswered",
@@ -78,7 +88,7 @@ fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     if let Some(start) = &diagnosis.start {
         text.push_str(&wrapped(
             "  ",
-            &format!("begun {start}; times count from there"),
+            &format!("begun {}; times count from there", date(start)),
             writer.width,
         ));
     }
@@ -91,6 +101,7 @@ fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use linesman_diagnosis::report::CoverageReport;
     use serde_json::json;
 
     use super::super::names::Names;
@@ -133,43 +144,81 @@ mod tests {
 
     #[test]
     fn a_diagnosis_reads_from_verdict_to_consequence() {
-        let names = Names::new(["K1".to_owned(), "B3".to_owned()]);
-        let writer = Writer { names: &names, paint: Paint::PLAIN, width: 100, timed: true };
+        let names =
+            Names::new([("K1", "EK1100"), ("B3", "")].map(|(a, b)| (a.to_owned(), b.to_owned())));
+        let writer =
+            Writer { names: &names, paint: Paint::PLAIN, width: 100, timed: true, place: "" };
         let expected = "\
 FAULTY  trace.pcapng: 1 error
   2 SubDevices, highest state OP, 40,000 frames, 20,000 datagrams judged, 3 unanswered, 1 frame lost
   the input could not be read to its end: judged as far as it goes
 
 ERROR   H104 port-errors (over)
-  where    link 1 (K1) port C → 2 (B3) port A, in this direction
+  where    link K1 (EK1100) port C → B3 port A, in this direction
   cause    cable-degraded (70 %): A cable, plug or contact is worn: symbol errors that come and go
            with movement and heat.
   or       emc-noise (20 %)
-  or       receiver-damaged (10 %), SubDevice 2 (B3)
+  or       receiver-damaged (10 %), B3
   when     from 2.000 ms to 5.000 ms, for 3.000 ms
-  evidence at 2.000 ms, frame 12: invalid frames rose (2 (B3) port A, register 0x0300, 3 → 18)
+  evidence at 2.000 ms, frame 12: invalid frames rose (B3 port A, register 0x0300, 3 → 18)
   do       1. Replace the cable.
            2. Check the plugs.
-  so also  S201 port-errors: link 1 (K1) port C → 2 (B3) port A, in this direction
+  so also  S201 port-errors: link K1 (EK1100) port C → B3 port A, in this direction
 
 `linesman explain H104` says how such a finding is made.
 ";
         assert_eq!(write(&sample(), &writer), expected);
     }
 
+    fn coverage(extents: &[(&str, &str)]) -> CoverageReport {
+        let gap = json!({
+            "reason": "counters-not-read", "essential": true, "places": [],
+            "text": "nobody read them", "next_step": "read them",
+        });
+        let subject = |(subject, extent): &(&str, &str)| {
+            let gaps = if *extent == "judged" { vec![] } else { vec![gap.clone()] };
+            json!({ "subject": subject, "extent": extent, "faults": [], "gaps": gaps })
+        };
+        let subjects: Vec<_> = extents.iter().map(subject).collect();
+        serde_json::from_value(json!({ "suffices": false, "subjects": subjects })).unwrap()
+    }
+
     #[test]
-    fn a_healthy_line_takes_two_lines() {
+    fn inconclusive_verdict_says_what_is_missing_and_the_next_step() {
+        let mut diagnosis = sample();
+        diagnosis.verdict = Verdict::Inconclusive;
+        diagnosis.findings.clear();
+        diagnosis.complete = true;
+        diagnosis.coverage = coverage(&[("frames", "judged"), ("signal-quality", "not-judged")]);
+        let names = Names::default();
+        let writer =
+            Writer { names: &names, paint: Paint::PLAIN, width: 100, timed: true, place: "" };
+        let text = write(&diagnosis, &writer);
+        assert!(
+            text.contains("\n  missing  nobody read them\n           do: read them\n"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn healthy_line_says_what_was_judged_and_what_not() {
         let mut diagnosis = sample();
         diagnosis.verdict = Verdict::Healthy;
         diagnosis.findings.clear();
         diagnosis.complete = true;
+        diagnosis.coverage = coverage(&[("frames", "judged"), ("signal-quality", "not-judged")]);
         let names = Names::default();
-        let writer = Writer { names: &names, paint: Paint::PLAIN, width: 100, timed: true };
+        let writer =
+            Writer { names: &names, paint: Paint::PLAIN, width: 100, timed: true, place: "" };
         let text = write(&diagnosis, &writer);
         assert!(
-            text.starts_with("HEALTHY  trace.pcapng: nothing is wrong with the line\n"),
+            text.starts_with("HEALTHY  trace.pcapng: nothing wrong was found in what was judged\n"),
             "{text}"
         );
-        assert_eq!(text.lines().count(), 2, "{text}");
+        let rest: Vec<&str> = text.lines().skip(2).collect();
+        assert_eq!(
+            rest,
+            ["  judged   lost frames", "  not      error counters (nobody read them)"]
+        );
     }
 }

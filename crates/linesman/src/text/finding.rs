@@ -8,6 +8,7 @@ use linesman_diagnosis::report::{
 
 use super::names::Names;
 use super::quantity::{grouped, time};
+use crate::hint;
 use crate::output::{Paint, wrapped};
 
 /// Most pieces of evidence that are shown; JSON has them all.
@@ -29,6 +30,8 @@ pub(crate) struct Writer<'a> {
     pub(crate) width: usize,
     /// Whether times mean something; an observation file has none.
     pub(crate) timed: bool,
+    /// Where the line is, as the user has named it: for commands that are advised.
+    pub(crate) place: &'a str,
 }
 
 impl Writer<'_> {
@@ -49,9 +52,24 @@ impl Writer<'_> {
         self.evidence(&mut text, &finding.evidence);
         for (index, action) in finding.actions.iter().enumerate() {
             let heading = if index == 0 { "do" } else { "" };
+            let action = hint::complete(action, self.place);
             self.add(&mut text, heading, &format!("{}. {action}", index + 1));
         }
         self.consequences(&mut text, finding);
+        text
+    }
+
+    /// What, where, why, when, and the first thing to do.
+    pub(crate) fn brief(&self, finding: &FindingReport) -> String {
+        let mut text = self.headline(finding);
+        self.add(&mut text, "where", &self.names.place(&finding.place));
+        self.add(&mut text, "cause", &cause(finding));
+        if self.timed {
+            self.add(&mut text, "when", &when(finding));
+        }
+        if let Some(action) = finding.actions.first() {
+            self.add(&mut text, "do", &hint::complete(action, self.place));
+        }
         text
     }
 
@@ -111,7 +129,7 @@ impl Writer<'_> {
         head.extend(evidence.frame.map(|Number(frame)| format!("frame {frame}")));
         let mut tail = Vec::new();
         // Most texts name the device themselves.
-        let named = |no: u32| evidence.text.contains(&format!("SubDevice {no}"));
+        let named = |no: u32| evidence.text.contains(&self.names.device(no));
         if let Some(no) = evidence.no.filter(|no| !named(*no)) {
             let port = evidence.port.map(|port| format!(" port {port}")).unwrap_or_default();
             tail.push(format!("{}{port}", self.names.device(no)));

@@ -1,7 +1,9 @@
 //! Answers as people read them: what the JSON says, in words and by names.
 
+pub(crate) mod coverage;
 pub(crate) mod diagnosis;
 pub(crate) mod drawing;
 pub(crate) mod finding;
 pub(crate) mod names;
 pub(crate) mod quantity;
+pub(crate) mod understood;

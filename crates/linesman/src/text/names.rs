@@ -4,42 +4,47 @@ use linesman_config::inventory::label;
 use linesman_diagnosis::report::{DirectionReport, EndReport, PlaceReport};
 use linesman_proto::address::DeviceId;
 
-/// Names by number; a SubDevice without one is called by its number alone.
+/// Labels by number ([`label`]); a SubDevice that is not among them is called by its number.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub(crate) struct Names(Vec<String>);
+pub(crate) struct Names(Vec<Called>);
+
+/// What one is called.
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct Called {
+    name: String,
+    label: String,
+}
 
 impl Names {
-    /// `names[0]` is number 1.
-    pub(crate) fn new(names: impl IntoIterator<Item = String>) -> Self {
-        Self(names.into_iter().collect())
+    /// From names and types, the first of number 1; either may be empty.
+    pub(crate) fn new(all: impl IntoIterator<Item = (String, String)>) -> Self {
+        let called = |((name, type_name), index): ((String, String), u32)| {
+            let label = label(DeviceId(index), &name, &type_name);
+            Called { name, label }
+        };
+        Self(all.into_iter().zip(0..).map(called).collect())
     }
 
-    /// `14 (B3)`, `14`, `MainDevice`.
+    /// `Term 4 (EL3104)`, `SubDevice 4`, `MainDevice`.
     pub(crate) fn device(&self, no: u32) -> String {
-        let index = (no as usize).checked_sub(1);
-        match index.map(|index| self.0.get(index).map_or("", String::as_str)) {
-            None => "MainDevice".to_owned(),
-            Some("") => no.to_string(),
-            // What files without names call them.
-            Some(name) if name == format!("SubDevice {no}") => no.to_string(),
-            Some(name) => label(DeviceId(no.saturating_sub(1)), name),
-        }
+        let Some(id) = DeviceId::from_no(no) else { return "MainDevice".to_owned() };
+        self.0.get(id.index()).map_or_else(|| label(id, "", ""), |called| called.label.clone())
     }
 
-    /// Whether any SubDevice has a name.
+    /// Whether any SubDevice has a name or a type.
     pub(crate) fn has_any(&self) -> bool {
-        let is_name =
-            |(name, no): (&String, u32)| !name.is_empty() && *name != format!("SubDevice {no}");
-        self.0.iter().zip(1..).any(is_name)
+        let is_told =
+            |(called, index): (&Called, u32)| called.label != label(DeviceId(index), "", "");
+        self.0.iter().zip(0..).any(is_told)
     }
 
     /// The bare name; empty when it has none.
     pub(crate) fn plain(&self, no: u32) -> &str {
-        let index = (no as usize).checked_sub(1);
-        index.and_then(|index| self.0.get(index)).map_or("", String::as_str)
+        let called = DeviceId::from_no(no).and_then(|id| self.0.get(id.index()));
+        called.map_or("", |called| called.name.as_str())
     }
 
-    /// `14 (B3) port A`, `MainDevice card A`.
+    /// `Term 4 (EL3104) port A`, `MainDevice card A`.
     pub(crate) fn end(&self, end: EndReport) -> String {
         let kind = if end.no == 0 { "card" } else { "port" };
         format!("{} {kind} {}", self.device(end.no), end.port)
@@ -63,7 +68,7 @@ impl Names {
                     None => format!("link {near} – {far}"),
                 }
             }
-            PlaceReport::Device { network: _, no } => format!("SubDevice {}", self.device(*no)),
+            PlaceReport::Device { network: _, no } => self.device(*no),
             PlaceReport::Network { network: 0 } => "the whole network".to_owned(),
             PlaceReport::Network { network } => format!("the whole network {network}"),
             PlaceReport::Host => "this computer".to_owned(),
@@ -75,29 +80,25 @@ impl Names {
 mod tests {
     use super::*;
 
-    // A saved scan calls SubDevices by number and type.
-    #[test]
-    fn a_name_with_its_number_is_said_once() {
-        let names = ["1 (EK1100)", "1 (EL1008)", "3 (left"].map(str::to_owned);
-        let names = Names::new(names);
-        let said = [1, 2, 3].map(|no| names.device(no));
-        assert_eq!(said, ["1 (EK1100)", "2 (1 (EL1008))", "3 (3 (left)"]);
-    }
-
     #[test]
     fn places_are_told_by_names_and_in_their_direction() {
-        let names = Names::new(["K1".to_owned(), String::new(), "B3".to_owned()]);
+        let rows = [("K1", "EK1100"), ("", ""), ("B3", "EL3104")];
+        let names =
+            Names::new(rows.map(|(name, type_name)| (name.to_owned(), type_name.to_owned())));
         let end = |no, port| EndReport { no, port };
         let link = |a, b, direction| PlaceReport::Link { network: 0, a, b, direction };
         let rows = [
             (
                 link(end(1, 'C'), Some(end(3, 'A')), Some(DirectionReport::BToA)),
-                "link 3 (B3) port A → 1 (K1) port C, in this direction",
+                "link B3 (EL3104) port A → K1 (EK1100) port C, in this direction",
             ),
-            (link(end(0, 'A'), Some(end(1, 'A')), None), "link MainDevice card A – 1 (K1) port A"),
+            (
+                link(end(0, 'A'), Some(end(1, 'A')), None),
+                "link MainDevice card A – K1 (EK1100) port A",
+            ),
             (
                 link(end(2, 'B'), None, Some(DirectionReport::Both)),
-                "link 2 port B ↔ a far end that was never seen, both directions",
+                "link SubDevice 2 port B ↔ a far end that was never seen, both directions",
             ),
             (PlaceReport::Device { network: 0, no: 9 }, "SubDevice 9"),
             (PlaceReport::Host, "this computer"),

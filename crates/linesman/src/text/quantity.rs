@@ -1,4 +1,6 @@
-//! Numbers with units, as people read them.
+//! Numbers with units, and dates, as people read them.
+
+use linesman_link::unix_time::UnixTime;
 
 /// A time since the start: `512 ns`, `3.250 ms`, `12.004 s`.
 pub(crate) fn time(nanos: u64) -> String {
@@ -8,6 +10,11 @@ pub(crate) fn time(nanos: u64) -> String {
         1_000_000..1_000_000_000 => format!("{:.3} ms", nanos as f64 / 1e6),
         _ => format!("{:.3} s", nanos as f64 / 1e9),
     }
+}
+
+/// A date of a report (RFC 3339) in the time zone of this host: `2026-03-01 11:16:50.182 +01:00`.
+pub(crate) fn date(rfc3339: &str) -> String {
+    UnixTime::parse(rfc3339).map_or_else(|| rfc3339.to_owned(), UnixTime::local)
 }
 
 /// A number with its digits in groups of three: `1,234,567`.

@@ -38,6 +38,21 @@ impl Pcap {
             self.frame(at_us + 40, &broadcast(0x02, number as u8, 2, [8, 0], 2));
         }
     }
+
+    /// `count` exchanges, then as many of which nothing comes back, and `count` again.
+    pub(crate) fn with_a_gap(count: u64) -> Self {
+        let mut capture = Self::new();
+        capture.exchanges(count);
+        for number in count..2 * count {
+            capture.frame(number * 1_000, &broadcast(0x00, number as u8, 0, [0, 0], 0));
+        }
+        for number in 2 * count..3 * count {
+            let at_us = number * 1_000;
+            capture.frame(at_us, &broadcast(0x00, number as u8, 0, [0, 0], 0));
+            capture.frame(at_us + 40, &broadcast(0x02, number as u8, 2, [8, 0], 2));
+        }
+        capture
+    }
 }
 
 /// A broadcast read of register 0x0130.

@@ -44,7 +44,8 @@ pub(crate) fn linesman<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) 
 
 /// Runs a command to its end.
 pub(crate) fn run(command: &mut Command) -> Run {
-    let Output { status, stdout, stderr } = command.output().expect("the program starts");
+    let Output { status, stdout, stderr } =
+        command.env_remove("COLUMNS").env("TZ", "UTC").output().expect("the program starts");
     let text = |bytes| String::from_utf8(bytes).expect("text is UTF-8");
     let run = Run {
         status: status.code().unwrap_or_else(|| panic!("killed: {status}")),

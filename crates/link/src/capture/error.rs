@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::{CaptureFormat, Damage};
+use crate::input::{InputError, InputErrorKind};
 use crate::unix_time::UnixTime;
 
 /// A capture that cannot be read at all: not even its first block.
@@ -25,19 +26,19 @@ impl CaptureError {
     }
 }
 
+impl From<InputError> for CaptureError {
+    fn from(InputError { name, kind }: InputError) -> Self {
+        Self::at_start(&name, CaptureErrorKind::Input(kind))
+    }
+}
+
 /// What is wrong with a capture that cannot be read at all.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaptureErrorKind {
-    /// There is no such file.
-    #[error("there is no such file. Do: check the path")]
-    Missing,
-    /// It is a directory.
-    #[error("it is a directory, expected a capture file. Do: name a file in it")]
-    Directory,
-    /// The operating system refuses.
-    #[error("cannot be opened: {0}. Do: check the rights of the file (`ls -l`)")]
-    Refused(io::Error),
+    /// It cannot be opened.
+    #[error(transparent)]
+    Input(InputErrorKind),
     /// There is nothing in it.
     #[error(
         "the file is empty, expected a pcapng or pcap capture. Do: record it again; a recorder \
@@ -47,7 +48,7 @@ pub enum CaptureErrorKind {
     /// It begins like no capture.
     #[error(
         "at byte 0: expected the first bytes of a capture (pcapng: 0a 0d 0d 0a; pcap: d4 c3 b2 a1, \
-         4d 3c b2 a1 or either backwards; gzip: 1f 8b), received {}. Do: check that this is a \
+         4d 3c b2 a1 or either backwards; packed by gzip, xz or zstd), received {}. Do: check that this is a \
          capture; record one with `tcpdump -i eth0 -w trace.pcap` or Wireshark",
         hex(.start)
     )]

@@ -4,12 +4,10 @@
 //! allocated but a short list for the options of a frame that has some. A damaged first block is an error; a later damage ends the capture, and
 //! [`CaptureReader::end`] tells where and why.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
 use std::mem;
 use std::path::{Path, PathBuf};
 
-use flate2::read::MultiGzDecoder;
 use pcap_parser::pcapng::SHB_MAGIC;
 
 use super::cooked;
@@ -24,6 +22,7 @@ use super::link_type::LinkType;
 use super::pcap::Pcap;
 use super::pcapng::{Item, Pcapng};
 use super::window::Window;
+use crate::input::{Input, Progress};
 use crate::unix_time::UnixTime;
 
 /// Longest frame that is read, in bytes; the limit of Wireshark too.
@@ -38,6 +37,7 @@ pub struct CaptureReader {
     frames: u64,
     skipped: Vec<SkippedLinkType>,
     end: Option<CaptureEnd>,
+    progress: Progress,
 }
 
 enum Format {
@@ -58,25 +58,12 @@ pub(super) struct Record {
 }
 
 impl CaptureReader {
-    /// Opens a pcapng or pcap file, gzip-compressed or not; its bytes tell, not its name.
+    /// Opens a pcapng or pcap file, packed or not; its bytes tell, not its name.
     ///
     /// # Errors
     /// When the file cannot be read, is no capture, or is damaged in its first block.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, CaptureError> {
-        let path = path.as_ref();
-        let refuse = |kind| CaptureError::at_start(path, kind);
-        let file = File::open(path).map_err(|error| {
-            let missing = error.kind() == io::ErrorKind::NotFound;
-            refuse(if missing {
-                CaptureErrorKind::Missing
-            } else {
-                CaptureErrorKind::Refused(error)
-            })
-        })?;
-        if file.metadata().is_ok_and(|metadata| metadata.is_dir()) {
-            return Err(refuse(CaptureErrorKind::Directory));
-        }
-        Self::from_source(path, file)
+        Self::of(Input::open(path)?)
     }
 
     /// Reads a capture from `source`, which errors call `name`.
@@ -87,19 +74,23 @@ impl CaptureReader {
         name: impl Into<PathBuf>,
         source: impl Read + Send + 'static,
     ) -> Result<Self, CaptureError> {
-        let file = name.into();
-        Self::begin(Window::new(Box::new(source)), Compression::MayBe)
-            .map_err(|kind| CaptureError::at_start(&file, kind))
+        Self::of(Input::of(name, source))
     }
 
-    fn begin(mut window: Window, compression: Compression) -> Result<Self, CaptureErrorKind> {
+    /// Reads a capture from an input.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn of(input: Input) -> Result<Self, CaptureError> {
+        let (name, progress) = (input.name().to_owned(), input.progress());
+        let window = Window::new(input.into_stream());
+        let begun = Self::begin(window).map_err(|kind| CaptureError::at_start(&name, kind))?;
+        Ok(Self { progress, ..begun })
+    }
+
+    fn begin(mut window: Window) -> Result<Self, CaptureErrorKind> {
         window.fill(4);
-        let start = window.view();
-        if let (Compression::MayBe, [0x1F, 0x8B, ..]) = (compression, start) {
-            let packed = MultiGzDecoder::new(window);
-            return Self::begin(Window::new(Box::new(packed)), Compression::Unpacked);
-        }
-        let Some(&magic) = start.first_chunk::<4>() else {
+        let Some(&magic) = window.view().first_chunk::<4>() else {
             return Err(too_short(&mut window));
         };
         if let Some((name, advice)) = other_format(&mut window) {
@@ -122,8 +113,8 @@ impl CaptureReader {
             interfaces.push(interface);
             Format::Pcap(file)
         };
-        let skipped = Vec::new();
-        Ok(Self { window, format, section, interfaces, frames: 0, skipped, end: None })
+        let (skipped, progress) = (Vec::new(), Progress::default());
+        Ok(Self { window, format, section, interfaces, frames: 0, skipped, end: None, progress })
     }
 
     /// The next frame that can carry EtherCAT; `None` at the end, which [`end`](Self::end) then
@@ -205,6 +196,12 @@ impl CaptureReader {
         &self.skipped
     }
 
+    /// The share of the file that has been read, 0 to 1; `None` where nobody knows the whole.
+    #[must_use]
+    pub fn progress(&self) -> Option<f64> {
+        self.progress.share()
+    }
+
     /// How the capture ended; `None` before [`next_frame`](Self::next_frame) gave `None`.
     #[must_use]
     pub fn end(&self) -> Option<&CaptureEnd> {
@@ -227,13 +224,6 @@ impl CaptureReader {
         };
         self.end = Some(CaptureEnd { damage, offset, frames: self.frames });
     }
-}
-
-/// Whether the bytes may still turn out to be compressed: a capture is packed once at most.
-#[derive(Clone, Copy)]
-enum Compression {
-    MayBe,
-    Unpacked,
 }
 
 /// The Ethernet frame in a record.
@@ -323,19 +313,20 @@ fn first_block(window: &mut Window, format: CaptureFormat, damage: Damage) -> Ca
 /// Names the formats that people mistake for a capture, with the way out.
 fn other_format(window: &mut Window) -> Option<(&'static str, &'static str)> {
     const EDITCAP: &str = "convert it with `editcap -F pcapng OLD NEW.pcapng`";
-    const UNPACK: &str = "unpack it first; only gzip is unpacked here";
+    const UNPACK: &str = "unpack it first; gzip, xz and zstd are unpacked here";
+    const TWICE: &str = "unpack it once by hand";
     const KNOWN: [(&[u8], &str, &str); 12] = [
         (b"GMBU", "a Microsoft Network Monitor capture", EDITCAP),
         (b"RTSS", "a Microsoft Network Monitor capture", EDITCAP),
         (b"snoop\0\0\0", "a snoop capture", EDITCAP),
         (b"\x34\xCD\xB2\xA1", "a patched variant of pcap", EDITCAP),
         (b"\xA1\xB2\xCD\x34", "a patched variant of pcap", EDITCAP),
-        (b"\x28\xB5\x2F\xFD", "compressed by zstd", UNPACK),
+        (b"\x28\xB5\x2F\xFD", "compressed twice", TWICE),
         (b"\x04\x22\x4D\x18", "compressed by lz4", UNPACK),
-        (b"\xFD7zXZ\0", "compressed by xz", UNPACK),
+        (b"\xFD7zXZ\0", "compressed twice", TWICE),
         (b"BZh", "compressed by bzip2", UNPACK),
         (b"PK\x03\x04", "a zip archive", UNPACK),
-        (b"\x1F\x8B", "compressed twice", UNPACK),
+        (b"\x1F\x8B", "compressed twice", TWICE),
         (b"<?xml", "an XML file", "name the capture, not its description"),
     ];
     window.fill(8);

@@ -116,19 +116,6 @@ impl Window {
     }
 }
 
-/// For what unpacks a stream whose first bytes were looked at already.
-impl Read for Window {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if buffer.is_empty() || !self.fill(1) {
-            return self.take_fault().map_or(Ok(0), Err);
-        }
-        let len = buffer.len().min(self.view().len());
-        buffer[..len].copy_from_slice(&self.view()[..len]);
-        self.pass(len);
-        Ok(len)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

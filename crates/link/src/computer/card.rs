@@ -180,7 +180,7 @@ fn losses(files: &Files, name: &str) -> Check {
     }
     Check::new(Area::Card, NAME, Outcome::Doubtful, format!("{name}: {}", risen.join(", ")))
         .effect("such frames look lost on the line although no cable is to blame; only what rises counts")
-        .mend("linesman diagnose or run on this card   # tells whether they rise, and when")
+        .mend(format!("linesman diagnose {name}   # tells whether they rise, and when; beside a MainDevice at work: listen:{name}"))
         .mend(format!("sudo ethtool -S {name} | grep -iE 'drop|miss|err'   # the driver's own counters"))
 }
 
@@ -202,7 +202,7 @@ fn damages(files: &Files, name: &str) -> Check {
             "frames came back damaged: by the cable between card and first SubDevice, by the card, or \
              anywhere on the line, since a damaged frame travels on to the card",
         )
-        .mend("linesman diagnose on this card   # tells where, from the SubDevices' counters")
+        .mend(format!("linesman diagnose {name}   # tells where, from the SubDevices' counters"))
 }
 
 /// Where the card's interrupts go. They should reach a processor that does nothing else, and stay there.

@@ -99,7 +99,7 @@ impl Event {
             }
             Self::AliasShared { id, alias, count } => vec![format!(
                 "{}: {count} SubDevices answer to its alias {} ({alias}): none of them is taken. Do: give \
-                 each an alias of its own (`linesman sii alias`)",
+                 each an alias of its own (`linesman sii WHERE DEVICE alias N`)",
                 name(*id),
                 alias.0
             )],

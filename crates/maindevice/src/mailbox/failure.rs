@@ -167,7 +167,7 @@ impl Why {
             Self::Busy { .. } => "wait until the SubDevice is done, then repeat",
             Self::Crowded { .. } => "wait for answers before you ask for more",
             Self::NoMailbox => "choose a SubDevice that has a mailbox (`linesman scan -v`)",
-            Self::NotOpen => "take it to PREOP first (`linesman state`)",
+            Self::NotOpen => "take it to PREOP first (`linesman state WHERE DEVICE --to PREOP`)",
             Self::NotSpoken { .. } => "choose a SubDevice that speaks it (`linesman scan -v`)",
             Self::TooLong { .. } => "check that it is the right object or file",
             Self::TooSmall(_) => "use a shorter name, or a smaller piece",

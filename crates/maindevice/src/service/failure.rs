@@ -51,7 +51,7 @@ pub enum ServiceFailure {
         error: SiiAccessError,
     },
     /// A register.
-    #[error("SubDevice {}: {error}. Do: check the address with `linesman explain`", id.no())]
+    #[error("SubDevice {}: {error}. Do: look at the line with `linesman diagnose`", id.no())]
     Register {
         /// Whose.
         id: DeviceId,

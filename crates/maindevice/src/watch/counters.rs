@@ -24,7 +24,7 @@ impl CounterTotals {
     pub fn rises(&self, reading: &ErrorCounters) -> Vec<(ErrorCounter, u64)> {
         let Some(last) = &self.last else { return Vec::new() };
         let risen = reading.since(last).filter(|(_, difference)| difference.rise > 0);
-        risen.map(|(counter, difference)| (counter, u64::from(difference.rise))).collect()
+        risen.map(|(counter, difference)| (counter, difference.rise)).collect()
     }
 
     /// Takes a reading.

@@ -74,11 +74,13 @@ pub enum EntryKind {
     Host,
     /// Distributed clocks.
     Clock,
+    /// What the diagnosis has found, and what became of it.
+    Finding,
 }
 
 impl EntryKind {
     /// All of them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::State,
         Self::AbnormalState,
         Self::StateAborted,
@@ -93,6 +95,7 @@ impl EntryKind {
         Self::Mailbox,
         Self::Host,
         Self::Clock,
+        Self::Finding,
     ];
 
     /// The word in files and filters.
@@ -113,6 +116,7 @@ impl EntryKind {
             Self::Mailbox => "mailbox",
             Self::Host => "host",
             Self::Clock => "clock",
+            Self::Finding => "finding",
         }
     }
 

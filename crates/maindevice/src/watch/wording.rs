@@ -3,6 +3,7 @@
 //! Reference: the message texts of the sources (`facts` 3.2): state change aborted, abnormal state
 //! change, communication interrupted and re-established, SDO abort, frames missed.
 
+use linesman_config::inventory::label;
 use linesman_config::plan::Plan;
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
@@ -227,11 +228,7 @@ fn named(plan: &Plan, task: usize) -> String {
 
 /// `'Term 5 (EL3154)' (1005)`.
 fn name(plan: &Plan, id: DeviceId) -> String {
-    let Some(device) = plan.device(id) else { return format!("SubDevice {}", id.no()) };
-    let label = match device.type_name.as_str() {
-        "" => device.name.clone(),
-        kind if device.name.contains(kind) => device.name.clone(),
-        kind => format!("{} ({kind})", device.name),
-    };
+    let Some(device) = plan.device(id) else { return label(id, "", "") };
+    let label = label(id, &device.name, &device.type_name);
     format!("'{label}' ({:04x})", device.station.0)
 }

@@ -6,7 +6,7 @@ pub mod size;
 pub mod view;
 
 pub use builder::FrameBuilder;
-pub use view::{Datagram, DatagramError, Datagrams, FrameError, FrameView};
+pub use view::{CutHeader, Datagram, DatagramError, Datagrams, FrameError, FrameView};
 
 /// Length of the EtherCAT header behind the Ethernet header, in bytes.
 pub const ETHERCAT_HEADER_LEN: usize = 2;

@@ -133,18 +133,42 @@ pub struct Datagrams<'a> {
     frame: &'a [u8],
     next_at: Option<usize>,
     number: usize,
+    cut_at: Option<usize>,
+}
+
+/// Header of a datagram of whose data, or working counter, a part is missing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct CutHeader {
+    /// Command code as sent.
+    pub code: u8,
+    /// The index byte.
+    pub index: u8,
+    /// Both address words, as a logical address.
+    pub address: u32,
+    /// Announced length of the data.
+    pub len: u16,
 }
 
 impl<'a> Datagrams<'a> {
     /// Walks the datagrams of `frame` whose first header lies at offset `first_at`.
     #[must_use]
     pub const fn new(frame: &'a [u8], first_at: usize) -> Self {
-        Self { frame, next_at: Some(first_at), number: 0 }
+        Self { frame, next_at: Some(first_at), number: 0, cut_at: None }
+    }
+
+    /// The header of the datagram at which the walk ended because the frame does, where the header is there.
+    #[must_use]
+    pub fn cut_header(&self) -> Option<CutHeader> {
+        let bytes = self.frame.get(self.cut_at?..)?.first_chunk::<8>()?;
+        let [code, index, a, b, c, d, low, high] = *bytes;
+        let address = u32::from_le_bytes([a, b, c, d]);
+        Some(CutHeader { code, index, address, len: u16::from_le_bytes([low, high]) & 0x07FF })
     }
 
     fn read(&mut self, at: usize) -> Result<Datagram<'a>, DatagramError> {
         let number = self.number;
         let left = self.frame.len().saturating_sub(at);
+        self.cut_at = Some(at);
         if left < DATAGRAM_OVERHEAD {
             let needed = DATAGRAM_OVERHEAD;
             return Err(DatagramError::HeaderCutOff { number, needed, left });
@@ -156,6 +180,7 @@ impl<'a> Datagrams<'a> {
         if announced > left {
             return Err(DatagramError::DataCutOff { number, announced, left });
         }
+        self.cut_at = None;
         let len = announced + DATAGRAM_OVERHEAD;
         self.next_at = datagram.more_follow().then_some(at + len);
         Ok(Datagram { bytes: &bytes[..len], at })

@@ -1,13 +1,14 @@
-//! What two readings of a one-byte error counter tell.
+//! Difference of two readings of an error counter, and the sum over many of them.
 //!
 //! Reference: S2 2.9. The counters stop at 255 and somebody else may clear them at any time, so a
-//! value by itself says little: only changes count, and a first reading is history.
+//! value by itself says little: only changes count, and a first reading is history. A tool that adds
+//! them up shows totals of any size, which do not stop.
 
 /// What happened to a counter between two readings.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug)]
 pub struct Difference {
     /// By how much it certainly rose. After a clear: what was counted since.
-    pub rise: u8,
+    pub rise: u64,
     /// It stands at 255 and counts no more: the true rise may be larger.
     pub saturated: bool,
     /// It fell: somebody cleared it, or the device lost its supply. What was counted between the
@@ -24,7 +25,7 @@ impl Difference {
     #[must_use]
     pub const fn between(before: u8, after: u8) -> Self {
         match after.checked_sub(before) {
-            Some(rise) => Self { rise, saturated: after == u8::MAX, cleared: false },
+            Some(rise) => Self { rise: rise as u64, saturated: after == u8::MAX, cleared: false },
             None => Self::since_clear(after),
         }
     }
@@ -32,7 +33,16 @@ impl Difference {
     /// What a reading tells when the counter is known to have been cleared since the last one.
     #[must_use]
     pub const fn since_clear(after: u8) -> Self {
-        Self { rise: after, saturated: after == u8::MAX, cleared: true }
+        Self { rise: after as u64, saturated: after == u8::MAX, cleared: true }
+    }
+
+    /// The same for totals that a tool keeps, which stop nowhere.
+    #[must_use]
+    pub const fn between_totals(before: u64, after: u64) -> Self {
+        match after.checked_sub(before) {
+            Some(rise) => Self { rise, saturated: false, cleared: false },
+            None => Self { rise: after, saturated: false, cleared: true },
+        }
     }
 
     /// Whether the rise is exact: no counts can have been lost at 255 or by a clear.
@@ -45,7 +55,7 @@ impl Difference {
 /// A running total over many readings, through clears by whomever.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug)]
 pub struct Total {
-    last: Option<u8>,
+    last: Option<u64>,
     rise: u64,
     clears: u32,
     lost: bool,
@@ -54,19 +64,22 @@ pub struct Total {
 impl Total {
     /// Takes a reading. `None` for the first one, which is history and adds nothing.
     pub fn record(&mut self, reading: u8) -> Option<Difference> {
+        let before = self.last.replace(reading.into())?;
+        let before = u8::try_from(before).unwrap_or(u8::MAX);
+        Some(self.add(Difference::between(before, reading)))
+    }
+
+    /// Takes a reading of a total that a tool keeps. `None` for the first one.
+    pub fn record_total(&mut self, reading: u64) -> Option<Difference> {
         let before = self.last.replace(reading)?;
-        let difference = Difference::between(before, reading);
-        self.add(difference);
-        Some(difference)
+        Some(self.add(Difference::between_totals(before, reading)))
     }
 
     /// Takes a reading of a counter that somebody else is known to have cleared since the last one,
     /// because another counter of its group fell.
     pub fn record_after_clear(&mut self, reading: u8) -> Option<Difference> {
-        self.last.replace(reading)?;
-        let difference = Difference::since_clear(reading);
-        self.add(difference);
-        Some(difference)
+        self.last.replace(reading.into())?;
+        Some(self.add(Difference::since_clear(reading)))
     }
 
     /// Notes that we cleared the counter ourselves right after the last reading, best in the same
@@ -95,14 +108,15 @@ impl Total {
 
     /// The last reading.
     #[must_use]
-    pub const fn last(&self) -> Option<u8> {
+    pub const fn last(&self) -> Option<u64> {
         self.last
     }
 
-    fn add(&mut self, difference: Difference) {
-        self.rise += u64::from(difference.rise);
+    fn add(&mut self, difference: Difference) -> Difference {
+        self.rise = self.rise.saturating_add(difference.rise);
         self.clears += u32::from(difference.cleared);
         self.lost |= !difference.is_exact();
+        difference
     }
 }
 
@@ -164,6 +178,16 @@ mod tests {
         let mut fresh = Total::default();
         fresh.note_own_clear();
         assert_eq!(fresh.record(2).unwrap().rise, 2);
+    }
+
+    #[test]
+    fn totals_of_a_tool_stop_nowhere() {
+        let mut total = Total::default();
+        assert_eq!(total.record_total(255), None);
+        let rise = total.record_total(154_656).unwrap();
+        assert_eq!((rise.rise, rise.is_exact()), (154_401, true));
+        assert_eq!(total.record_total(3).map(|fall| (fall.rise, fall.cleared)), Some((3, true)));
+        assert_eq!((total.rise(), total.clears()), (154_404, 1));
     }
 
     proptest! {

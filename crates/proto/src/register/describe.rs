@@ -116,6 +116,12 @@ pub fn decode(register: &Register, data: &[u8]) -> Vec<Reading> {
 /// Like [`decode`], for data that begin `offset` bytes behind the start of the register.
 #[must_use]
 pub fn decode_at(register: &Register, offset: u16, data: &[u8]) -> Vec<Reading> {
+    decode_fields(register.fields, offset, data)
+}
+
+/// Values of `data` in these fields, which need not be those of a register: objects have such, too.
+#[must_use]
+pub fn decode_fields(fields: &'static [Field], offset: u16, data: &[u8]) -> Vec<Reading> {
     let first = usize::from(offset) * 8;
     let behind = first + data.len() * 8;
     let read = |field: &'static Field| {
@@ -137,7 +143,7 @@ pub fn decode_at(register: &Register, offset: u16, data: &[u8]) -> Vec<Reading> 
         };
         Some(Reading { field, value, partial, text })
     };
-    register.fields.iter().filter_map(read).collect()
+    fields.iter().filter_map(read).collect()
 }
 
 /// What `data`, read from the start of a register, say in one line: set flags by name, values by

@@ -320,12 +320,12 @@ const fn field(
 }
 
 /// A field of one bit.
-pub(super) const fn flag(bit: u16, name: &'static str, meaning: &'static str) -> Field {
+pub(crate) const fn flag(bit: u16, name: &'static str, meaning: &'static str) -> Field {
     field(bit, bit, name, meaning, Form::Flag)
 }
 
 /// A field whose values have names.
-pub(super) const fn choice(
+pub(crate) const fn choice(
     high: u16,
     low: u16,
     name: &'static str,

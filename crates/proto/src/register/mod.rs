@@ -27,7 +27,8 @@ pub mod watchdog;
 pub use al::{AlControl, AlStatus};
 pub use counter::{Difference, Total};
 pub use describe::{
-    Description, Piece, Reading, address_by_name, by_name, decode, describe, pieces, summary,
+    Description, Piece, Reading, address_by_name, by_name, decode, decode_fields, describe, pieces,
+    summary,
 };
 pub use dl_control::{DlControl, LoopMode};
 pub use dl_status::{DlStatus, PortState};

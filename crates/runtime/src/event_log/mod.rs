@@ -9,5 +9,5 @@ pub mod store;
 pub mod writer;
 
 pub use filter::Filter;
-pub use store::{EventLog, EventLogError, Run, StoredEntry};
+pub use store::{EventLog, EventLogError, LoggedFinding, Run, StoredEntry};
 pub use writer::{EventLogWriter, WriterReport};

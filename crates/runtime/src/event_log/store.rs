@@ -11,10 +11,14 @@ use linesman_maindevice::watch::{EntryKind, Severity};
 use rusqlite::types::Value;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Row, params_from_iter};
 
+use serde::{Deserialize, Serialize};
+
 use super::filter::Filter;
 
 /// Version of the tables; a file of another one is refused rather than guessed at.
-const VERSION: i32 = 1;
+const VERSION: i32 = 2;
+/// The first version; it has no findings, and is read as it is.
+const WITHOUT_FINDINGS: i32 = 1;
 /// How long another writer is waited for.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Marks the file as ours (`PRAGMA application_id`): "LMLG".
@@ -37,17 +41,20 @@ const TABLES: &str = "
         kind TEXT NOT NULL,
         device_no INTEGER,
         device_name TEXT,
-        text TEXT NOT NULL
+        text TEXT NOT NULL,
+        finding TEXT
     );
     CREATE INDEX entry_at ON entry(at_ns);
     CREATE INDEX entry_run ON entry(run);
 ";
 
+const ADD_FINDINGS: &str = "ALTER TABLE entry ADD COLUMN finding TEXT; PRAGMA user_version = 2;";
+
 /// What goes wrong with the file.
 #[derive(Debug, thiserror::Error)]
 pub enum EventLogError {
     /// It is not there.
-    #[error("{}: there is no such event log. Do: `linesman run` writes one; say which with --file", path.display())]
+    #[error("{}: there is no such event log. Do: check the path; `linesman run --log FILE` writes one", path.display())]
     Missing {
         /// Which.
         path: PathBuf,
@@ -120,6 +127,28 @@ pub struct StoredEntry {
     pub device_name: Option<String>,
     /// What happened.
     pub text: String,
+    /// The finding that it is about.
+    pub finding: Option<LoggedFinding>,
+}
+
+/// What became of a finding; in the file as JSON.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoggedFinding {
+    /// Its name within the run: `F1`.
+    pub id: String,
+    /// `opened`, `confirmed`, `closed` or `withdrawn`.
+    pub event: String,
+    /// Its code: `H104`.
+    pub code: String,
+    /// Its name: `port-errors`.
+    pub name: String,
+    /// Where, in words.
+    pub place: String,
+    /// The most likely cause.
+    pub cause: String,
+    /// The finding that explains it, by its id.
+    pub follows_from: Option<String>,
 }
 
 /// The open file.
@@ -127,6 +156,8 @@ pub struct StoredEntry {
 pub struct EventLog {
     path: PathBuf,
     connection: Connection,
+    /// Version of its tables.
+    version: i32,
 }
 
 impl EventLog {
@@ -136,7 +167,7 @@ impl EventLog {
     /// [`EventLogError`]; a file that is something else is left as it is.
     pub fn create(path: &Path) -> Result<Self, EventLogError> {
         let connection = Connection::open(path).map_err(|error| at(path, "opening it", error))?;
-        let log = Self { path: path.to_owned(), connection };
+        let mut log = Self { path: path.to_owned(), connection, version: VERSION };
         log.prepare()?;
         if log.has_no_tables()? {
             log.batch("making its tables", TABLES)?;
@@ -144,6 +175,10 @@ impl EventLog {
             log.pragma("user_version", VERSION)?;
         }
         log.check()?;
+        if log.version == WITHOUT_FINDINGS {
+            log.batch("adding findings to its tables", ADD_FINDINGS)?;
+            log.version = VERSION;
+        }
         log.batch("preparing it", "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;")?;
         Ok(log)
     }
@@ -158,7 +193,7 @@ impl EventLog {
         }
         let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY)
             .map_err(|error| at(path, "opening it", error))?;
-        let log = Self { path: path.to_owned(), connection };
+        let mut log = Self { path: path.to_owned(), connection, version: VERSION };
         log.prepare()?;
         log.check()?;
         Ok(log)
@@ -208,8 +243,8 @@ impl EventLog {
         let fail = |error| at(path, "adding entries", error);
         let transaction = self.connection.transaction().map_err(fail)?;
         {
-            let sql = "INSERT INTO entry (run, at_ns, severity, kind, device_no, device_name, text) \
-                       VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+            let sql = "INSERT INTO entry (run, at_ns, severity, kind, device_no, device_name, text, \
+                       finding) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
             let mut insert = transaction.prepare_cached(sql).map_err(fail)?;
             for entry in entries {
                 let values = (
@@ -220,6 +255,7 @@ impl EventLog {
                     entry.device_no,
                     entry.device_name.as_deref(),
                     entry.text.as_str(),
+                    entry.finding.as_ref().and_then(|one| serde_json::to_string(one).ok()),
                 );
                 insert.execute(values).map_err(fail)?;
             }
@@ -258,14 +294,16 @@ impl EventLog {
         let (condition, values) = condition(filter);
         let limit = filter.limit.map_or(-1, i64::from);
         // The newest are chosen, and shown in the order in which they happened.
+        let finding = if self.version == WITHOUT_FINDINGS { "NULL" } else { "finding" };
         let sql = format!(
-            "SELECT * FROM (SELECT run, at_ns, severity, kind, device_no, device_name, text, id FROM entry \
-             {condition} ORDER BY at_ns DESC, id DESC LIMIT {limit}) ORDER BY at_ns, id"
+            "SELECT * FROM (SELECT run, at_ns, severity, kind, device_no, device_name, text, \
+             {finding}, id FROM entry {condition} ORDER BY at_ns DESC, id DESC LIMIT {limit}) ORDER BY at_ns, id"
         );
         let mut statement = self.connection.prepare(&sql).map_err(fail)?;
         let entry = |row: &Row<'_>| {
             let severity: u8 = row.get(2)?;
             let kind: String = row.get(3)?;
+            let finding: Option<String> = row.get(7)?;
             Ok(StoredEntry {
                 run: row.get(0)?,
                 at: time(row.get(1)?),
@@ -277,6 +315,7 @@ impl EventLog {
                 device_no: row.get(4)?,
                 device_name: row.get(5)?,
                 text: row.get(6)?,
+                finding: finding.and_then(|text| serde_json::from_str(&text).ok()),
             })
         };
         let entries = statement.query_map(params_from_iter(values), entry).map_err(fail)?;
@@ -305,7 +344,7 @@ impl EventLog {
         Ok(count == 0)
     }
 
-    fn check(&self) -> Result<(), EventLogError> {
+    fn check(&mut self) -> Result<(), EventLogError> {
         let read = |name| {
             (self.connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0)))
                 .map_err(|error| at(&self.path, "reading it", error))
@@ -314,7 +353,10 @@ impl EventLog {
             return Err(EventLogError::NotOurs { path: self.path.clone() });
         }
         match read("user_version")? {
-            VERSION => Ok(()),
+            found @ WITHOUT_FINDINGS..=VERSION => {
+                self.version = found;
+                Ok(())
+            }
             found => Err(EventLogError::TooNew { path: self.path.clone(), found }),
         }
     }

@@ -11,9 +11,9 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use linesman_link::unix_time::UnixTime;
-use linesman_maindevice::watch::{EntryKind, LogEntry, Severity};
+use linesman_maindevice::watch::LogEntry;
 
-use super::store::{EventLog, EventLogError, StoredEntry};
+use super::store::{EventLog, EventLogError, LoggedFinding, StoredEntry};
 
 /// So many entries may be on their way to the thread.
 const ON_THE_WAY: usize = 4_096;
@@ -80,23 +80,18 @@ impl EventLogWriter {
         self.run
     }
 
-    /// Hands an entry over; never waits.
-    pub fn write(&self, at: UnixTime, entry: LogEntry, device_name: Option<&str>) {
-        let LogEntry { severity, kind, device, text, .. } = entry;
-        self.hand_over(at, severity, kind, device.map(|id| id.no()), device_name, text);
-    }
-
-    fn hand_over(
+    /// Hands an entry over, and the finding that it is about; never waits.
+    pub fn write(
         &self,
         at: UnixTime,
-        severity: Severity,
-        kind: EntryKind,
-        device_no: Option<u32>,
+        entry: LogEntry,
         device_name: Option<&str>,
-        text: String,
+        finding: Option<LoggedFinding>,
     ) {
-        let device_name = device_name.map(str::to_owned);
-        let entry = StoredEntry { run: self.run, at, severity, kind, device_no, device_name, text };
+        let LogEntry { severity, kind, device, text, .. } = entry;
+        let (device_no, device_name) = (device.map(|id| id.no()), device_name.map(str::to_owned));
+        let run = self.run;
+        let entry = StoredEntry { run, at, severity, kind, device_no, device_name, text, finding };
         match self.orders.try_send(Order::Entry(Box::new(entry))) {
             Ok(()) => {}
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
@@ -201,6 +196,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 
 #[cfg(test)]
 mod tests {
+    use linesman_maindevice::watch::{EntryKind, Severity};
     use linesman_proto::address::DeviceId;
     use linesman_proto::time::Instant;
 
@@ -226,7 +222,7 @@ mod tests {
             EventLogWriter::start(log, UnixTime::EPOCH, "eth0", "plant", "linesman 1").unwrap();
         for number in 0..3_000 {
             let at = UnixTime::from_nanos(number);
-            writer.write(at, entry(format!("entry {number}")), Some("Term 5"));
+            writer.write(at, entry(format!("entry {number}")), Some("Term 5"), None);
         }
         let report = writer.finish(UnixTime::from_nanos(9_999));
         assert_eq!(report, WriterReport { written: 3_000, dropped: 0, failure: None });
@@ -249,7 +245,12 @@ mod tests {
         let other = rusqlite::Connection::open(&path).unwrap();
         other.execute_batch("DROP TABLE entry").unwrap();
         for number in 0..10 {
-            writer.write(UnixTime::from_nanos(number), entry(format!("entry {number}")), None);
+            writer.write(
+                UnixTime::from_nanos(number),
+                entry(format!("entry {number}")),
+                None,
+                None,
+            );
         }
         let report = writer.finish(UnixTime::from_nanos(9_999));
         assert_eq!((report.written, report.dropped), (0, 10));

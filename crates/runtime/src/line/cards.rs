@@ -3,6 +3,7 @@
 use linesman_diagnosis::HostObservation;
 use linesman_link::clock::{HostClock, tighten_timers};
 use linesman_link::error::LinkError;
+use linesman_link::interface::CardLock;
 use linesman_link::socket::{
     Bell, RawSocket, Ready, SocketOptions, Waitable, Waker, wait_any, wait_for,
 };
@@ -30,6 +31,8 @@ pub struct Cards {
     waker: Waker,
     /// So long before a deadline it no longer sleeps but looks again and again.
     spin: Span,
+    /// Nobody else sends on the cards meanwhile.
+    _locks: Vec<CardLock>,
 }
 
 struct Card {
@@ -39,12 +42,13 @@ struct Card {
 }
 
 impl Cards {
-    /// Opens the cards; nothing is sent.
+    /// Opens the cards, and locks them: nothing is sent.
     ///
     /// # Errors
-    /// When an interface cannot be used.
+    /// When an interface cannot be used, or is used by another process.
     pub fn open(names: &[String], clock: HostClock) -> Result<Self, LinkError> {
         tighten_timers();
+        let locks = names.iter().map(|name| CardLock::take(name)).collect::<Result<_, _>>()?;
         let open = |(path, name): (Path, &String)| {
             Ok(Card {
                 socket: RawSocket::open(name, &SocketOptions::default())?,
@@ -59,7 +63,15 @@ impl Cards {
             doing: "making a way to be woken",
             source,
         })?;
-        Ok(Self { clock, cards: cards?, expected: 0, ready: true, waker, spin: Span::ZERO })
+        Ok(Self {
+            clock,
+            cards: cards?,
+            expected: 0,
+            ready: true,
+            waker,
+            spin: Span::ZERO,
+            _locks: locks,
+        })
     }
 
     /// Looks again and again for so long before each deadline, instead of sleeping up to it: the

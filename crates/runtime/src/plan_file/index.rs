@@ -16,6 +16,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use linesman_config::esi::header::EsiHeader;
+use linesman_link::whole_file;
 
 /// First line; another version has another.
 const VERSION: &str = "linesman device descriptions 1";
@@ -111,13 +112,8 @@ impl Index {
             return;
         };
         let text = self.text();
-        let passing = place.with_extension(std::process::id().to_string());
-        let written = fs::create_dir_all(folder)
-            .and_then(|()| fs::write(&passing, text))
-            .and_then(|()| fs::rename(&passing, place));
-        if written.is_err() {
-            let _ = fs::remove_file(&passing);
-        }
+        let _ =
+            fs::create_dir_all(folder).and_then(|()| whole_file::replace(place, text.as_bytes()));
     }
 
     fn text(&self) -> String {

@@ -8,9 +8,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use linesman_config::eni::{Eni, EniError};
-use linesman_config::plan::Plan;
+use linesman_config::plan::{CycleError, Plan};
 use linesman_config::profile::ClockMode;
 use linesman_config::project::{Project, ProjectDevice, ProjectError, ResolveError};
+
+use linesman_proto::time::Span;
 
 use self::library::Library;
 use crate::named_files::read_at_most;
@@ -87,6 +89,16 @@ pub enum PlanFileError {
         /// Why.
         source: Box<ResolveError>,
     },
+    /// It does not take the cycle time that was wanted.
+    #[error("{path}: a cycle of {cycle} cannot be had: {source}")]
+    Cycle {
+        /// Which.
+        path: String,
+        /// The wanted one.
+        cycle: Span,
+        /// Why.
+        source: CycleError,
+    },
     /// Descriptions cannot be read.
     #[error(
         "{path}: esi = \"{folder}\": {reason}. Do: name a folder of XML files, or one of them, relative to the project"
@@ -114,6 +126,14 @@ impl PlanFile {
     /// # Errors
     /// [`PlanFileError`] says where and why.
     pub fn open(path: &Path) -> Result<Self, PlanFileError> {
+        Self::open_with(path, None)
+    }
+
+    /// The same with another cycle time than it says, or one where it says none.
+    ///
+    /// # Errors
+    /// [`PlanFileError`]; also when the plan does not take that cycle time.
+    pub fn open_with(path: &Path, cycle: Option<Span>) -> Result<Self, PlanFileError> {
         let shown = path.display().to_string();
         let read = |source| PlanFileError::Read { path: shown.clone(), source };
         let len = std::fs::metadata(path).map_err(read)?.len();
@@ -123,9 +143,13 @@ impl PlanFile {
         let bytes = read_at_most(path, MAX_LEN).map_err(read)?;
         let is_xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
         if is_xml || Eni::is_one(&bytes) {
-            let eni = Eni::parse(&bytes);
-            let Eni { name, plan, notes } =
-                eni.map_err(|source| PlanFileError::Eni { path: shown, source })?;
+            let eni = Eni::parse_with(&bytes, cycle);
+            let Eni { name, mut plan, notes } =
+                eni.map_err(|source| PlanFileError::Eni { path: shown.clone(), source })?;
+            if let Some(cycle) = cycle {
+                let refused = |source| PlanFileError::Cycle { path: shown, cycle, source };
+                plan.set_cycle(cycle).map_err(refused)?;
+            }
             return Ok(Self { name, plan, project: None, notes });
         }
         let text = String::from_utf8(bytes).map_err(|error| {
@@ -136,6 +160,10 @@ impl PlanFile {
             path: shown.clone(),
             source: Box::new(source),
         })?;
+        if let Some(cycle) = cycle {
+            let refused = |source| PlanFileError::Cycle { path: shown.clone(), cycle, source };
+            project.set_cycle(cycle).map_err(refused)?;
+        }
         let mut library = library_of(&project, path, &shown)?;
         let (mut rules, mut changed) = (BTreeMap::new(), Vec::new());
         let plan = project

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{DevicePlan, IoAt, Plan};
-use linesman_diagnosis::{Asked, Diagnosis, FrameSeen, HostObservation, Probe, Setup};
+use linesman_diagnosis::{Asked, FrameSeen, HostObservation, Probe, Setup};
 use linesman_link::error::LinkError;
 use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest, Target};
 use linesman_proto::state::AlState;
@@ -185,6 +185,7 @@ impl<A: Application> Operator<A> {
             },
             lateness: self.lateness.report(),
             host: (&self.granted).into(),
+            diagnosis: None,
         }
     }
 
@@ -343,8 +344,6 @@ impl<A: Application> Audience for Operator<A> {
 pub struct Ended {
     /// How it went.
     pub report: RunReport,
-    /// What was wrong with the line, where that was judged.
-    pub diagnosis: Option<Diagnosis>,
     /// What ended it, if it was not the time, a wish, or the application.
     pub error: Option<RunError>,
 }
@@ -432,10 +431,10 @@ pub fn run<L: Line, A: Application>(
     let planned = operator.plan.is_some();
     // Ends the tap, and with it the thread that judges.
     drop(operator);
-    let diagnosis = judging.and_then(|thread| thread.join().ok());
+    report.diagnosis = judging.and_then(|thread| thread.join().ok());
     match error {
         Some(error) if !planned => Err(error),
-        error => Ok(Ended { report, diagnosis, error }),
+        error => Ok(Ended { report, error }),
     }
 }
 

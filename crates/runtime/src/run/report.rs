@@ -1,6 +1,7 @@
 //! How a run went, as JSON and for people.
 
 use linesman_config::plan::Plan;
+use linesman_diagnosis::Diagnosis;
 use linesman_maindevice::{MainDevice, Statistics};
 use linesman_proto::time::{Instant, Span};
 use serde::{Deserialize, Serialize};
@@ -45,6 +46,8 @@ pub struct RunReport {
     pub lateness: LatenessReport,
     /// What the host granted.
     pub host: HostReport,
+    /// What was wrong with the line; `null` while it runs, and where it was not judged.
+    pub diagnosis: Option<Diagnosis>,
 }
 
 /// A SubDevice of a running plan.

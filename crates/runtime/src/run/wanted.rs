@@ -44,7 +44,7 @@ impl Choices {
                         return Err(format!(
                             "place {}: expected {} with {}, found {} with {}: another {what}. Do: \
                              check that the right SubDevice is there, or scan again with \
-                             `linesman scan --save`",
+                             `linesman scan WHERE --save FILE`",
                             at + 1,
                             wanted.name,
                             text(&identity),
@@ -74,7 +74,7 @@ impl Choices {
             options.clock_datagrams = true;
         }
         Plan::build(&planned, inventory.tree().clone(), &options)
-            .map_err(|error| format!("{error}. Do: see `linesman plan`"))
+            .map_err(|error| format!("{error}. Do: see `linesman plan FILE`"))
     }
 
     /// What is there is run, as it is.
@@ -115,7 +115,7 @@ fn clock(planned: &mut [PlannedDevice], cycle: Span) -> Result<(), String> {
 fn too_few(project: &Project, missing: &str, inventory: &Inventory) -> String {
     format!(
         "found {}, the project has {}; the first that is missing is {missing}. Do: check \
-         cable and supply there, or look with `linesman diagnose --project`",
+         cable and supply there, or look with `linesman diagnose WHERE --project FILE`",
         so_many(inventory.devices.len()),
         project.devices.len(),
     )

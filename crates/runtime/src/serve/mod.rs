@@ -15,6 +15,7 @@ pub mod report;
 
 use linesman_link::clock::{HostClock, tighten_timers};
 use linesman_link::error::LinkError;
+use linesman_link::interface::CardLock;
 use linesman_link::real_time::sched_fifo;
 use linesman_link::socket::{
     Batch, Bell, RawSocket, Ready, SocketOptions, Waitable, Waker, wait_any,
@@ -51,6 +52,8 @@ pub struct Server {
     batch: Batch,
     answer: Vec<u8>,
     tally: Tally,
+    /// Nobody else answers on the cards meanwhile.
+    _locks: Vec<CardLock>,
 }
 
 /// Who has a say in a segment that runs, and who writes down what happens.
@@ -79,13 +82,14 @@ struct Tally {
 }
 
 impl Server {
-    /// Opens the interfaces: the first is card A's cable, the second card B's. What the segment
-    /// puts out comes back to its inputs by `wiring`.
+    /// Opens the interfaces, and locks them: the first is card A's cable, the second card B's. What
+    /// the segment puts out comes back to its inputs by `wiring`.
     ///
     /// # Errors
-    /// When an interface cannot be used.
+    /// When an interface cannot be used, or is used by another process.
     pub fn open(segment: Segment, wiring: Wiring, names: &[String]) -> Result<Self, LinkError> {
         let options = SocketOptions::default();
+        let locks = names.iter().map(|name| CardLock::take(name)).collect::<Result<_, _>>()?;
         let cards: Result<Vec<_>, _> =
             names.iter().take(2).map(|name| RawSocket::open(name, &options)).collect();
         let waker = Waker::new().map_err(|source| LinkError::System {
@@ -102,6 +106,7 @@ impl Server {
             batch: Batch::new(BATCH),
             answer: Vec::new(),
             tally: Tally::default(),
+            _locks: locks,
         })
     }
 

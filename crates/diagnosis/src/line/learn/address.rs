@@ -4,6 +4,14 @@
 //! When fewer answer, positions have moved: on a line without branches the first ones are still
 //! where they were, elsewhere a position is known only where its station address was read since.
 //!
+//! A recording that begins in the middle of a run meets controllers by their station addresses alone. MainDevices give
+//! these in the order of positions, most of them from a number that is known; so the address tells the position once
+//! it is known how many there are. Until all of them were met the numbers are a guess: nothing is learnt of
+//! positions then but which station address is there.
+//!
+//! A station address that is asked again and again and never answers belongs to a SubDevice that is not there, or is
+//! cut off: it becomes a controller of its own, in the order of station addresses, so that the silence has a place.
+//!
 //! In a ring that is open each card has positions of its own. Those of card B begin at the gap, so they follow
 //! upon those of card A (S1 chapter 3: who is entered from behind is processed on the way back).
 
@@ -11,14 +19,30 @@ use std::collections::BTreeMap;
 
 use linesman_proto::address::{DeviceId, Path, Position, StationAddress};
 use linesman_proto::command::Addressing;
+use linesman_proto::time::{Instant, Span};
 
 use super::{Answer, word_at};
-use crate::line::{Line, Seen, SharedBy};
+use crate::line::{Device, Line, Seen, SharedBy};
 
 /// Most controllers that are learnt from frames.
 const MOST_DEVICES: usize = 4096;
 /// Configured station address.
 const STATION: u16 = 0x0010;
+/// First station addresses that MainDevices give: SOEM, ours and KickCAT; TwinCAT; IgH; ethercrab.
+const FIRST_STATIONS: [u16; 4] = [0x1001, 1001, 1, 0x1000];
+/// Asked so often in vain, and over so long, a station address is that of a SubDevice which should be there.
+const ASKED_IN_VAIN: u64 = 3;
+const ASKED_FOR: Span = Span::ms(20);
+/// Most station addresses without an answer that are followed.
+const MOST_UNANSWERED: usize = 512;
+
+/// A station address that never answered.
+#[derive(Clone, Copy, Debug)]
+struct Unanswered {
+    first: Seen<()>,
+    last: Instant,
+    times: u64,
+}
 
 /// What positions and station addresses mean at the moment.
 #[derive(Clone, Default, Debug)]
@@ -32,6 +56,12 @@ pub struct Addresses {
     halves: [Option<u16>; 2],
     /// Whether a station was taken for a controller's without any sign of its position.
     has_guessed: bool,
+    /// Whether controllers were put into order by their station addresses, without any sign of their positions.
+    is_by_address: bool,
+    /// Whether something was said of single controllers, so that they keep their numbers.
+    is_named: bool,
+    /// Station addresses that were asked and never answered.
+    unanswered: BTreeMap<StationAddress, Unanswered>,
 }
 
 impl Addresses {
@@ -157,9 +187,12 @@ impl Addresses {
         if !answers {
             return None;
         }
-        let free = line.devices.iter().find(|device| {
+        let is_free = |device: &&Device| {
             device.station.is_none() && !self.stations.values().any(|id| *id == device.id)
-        });
+        };
+        let by_number = self.by_number(line, station);
+        let by_number = by_number.and_then(|id| line.device(id)).filter(is_free);
+        let free = by_number.or_else(|| line.devices.iter().find(is_free));
         let id = match free.map(|device| device.id) {
             Some(id) => id,
             None if line.devices.len() < MOST_DEVICES => line.add_device(),
@@ -170,41 +203,157 @@ impl Addresses {
         Some(id)
     }
 
+    /// The controller whose place in the line a station address tells, where MainDevices count from a known number
+    /// on, and how many there are is known.
+    fn by_number(&self, line: &Line, station: StationAddress) -> Option<DeviceId> {
+        if line.devices.iter().any(|one| one.planned.is_some()) {
+            return None;
+        }
+        let count = usize::from(self.present?);
+        let known = self.stations.keys().chain([&station]);
+        let (least, most) =
+            known.fold((u16::MAX, 0), |(least, most), one| (least.min(one.0), most.max(one.0)));
+        let fits = |first: &u16| {
+            *first <= least && usize::from(most - *first) < count && self.order.len() == count
+        };
+        let first = FIRST_STATIONS.into_iter().find(fits)?;
+        self.order.get(usize::from(station.0 - first)).copied()
+    }
+
+    /// Whether single controllers were named, so that their numbers stay.
+    pub(super) const fn name(&mut self) {
+        self.is_named = true;
+    }
+
+    /// A station address of no controller was asked, and nobody answered.
+    pub(super) fn asked_in_vain(&mut self, station: StationAddress, seen: Seen<()>) {
+        let count = self.unanswered.len();
+        match self.unanswered.get_mut(&station) {
+            Some(known) => (known.last, known.times) = (seen.at, known.times + 1),
+            None if count < MOST_UNANSWERED => {
+                let unanswered = Unanswered { first: seen, last: seen.at, times: 1 };
+                self.unanswered.insert(station, unanswered);
+            }
+            None => {}
+        }
+    }
+
+    /// Makes controllers of station addresses that were asked often enough in vain, where others answer: somebody
+    /// expects a SubDevice there. Says whether there are new ones.
+    pub(super) fn expect_unanswered(&mut self, line: &mut Line) -> bool {
+        let is_planned = line.devices.iter().any(|one| one.planned.is_some());
+        if self.is_named || is_planned || self.stations.is_empty() {
+            return false;
+        }
+        let is_wanted = |one: &Unanswered| {
+            one.times >= ASKED_IN_VAIN && one.last.since(one.first.at) >= ASKED_FOR
+        };
+        let wanted: Vec<(StationAddress, Seen<()>)> = self
+            .unanswered
+            .iter()
+            .filter(|(_, one)| is_wanted(one))
+            .map(|(station, one)| (*station, one.first))
+            .collect();
+        for (station, first) in &wanted {
+            if line.devices.len() >= MOST_DEVICES {
+                break;
+            }
+            let id = line.add_device();
+            self.give(line, id, *station);
+            self.has_guessed = true;
+            if let Some(device) = line.device_mut(id) {
+                device.is_silent(first.at, first.frame);
+            }
+        }
+        !wanted.is_empty()
+    }
+
     /// Whether the order of controllers is known: from their positions, or by [`Self::settle`].
     pub(super) const fn is_settled(&self) -> bool {
         !self.has_guessed
     }
 
-    /// Puts controllers that were met by their station addresses in the middle of a run into order:
-    /// every known MainDevice gives these addresses in the order of positions. Identities change, so
-    /// this is only for a line of which nothing was said yet. Says whether it was done.
+    /// Puts controllers that were met by their station addresses in the middle of a run into order: every known
+    /// MainDevice gives these addresses in the order of positions. Identities change, so this is only for a line of
+    /// which nothing was said yet. Says whether any changed.
     pub(super) fn settle(&mut self, line: &mut Line) -> bool {
-        let count = line.devices.len();
-        let is_whole = self.present.map(usize::from) == Some(count)
-            && line.devices.iter().all(|device| device.station.is_some());
-        if !self.has_guessed || !is_whole || line.devices.iter().any(|one| one.planned.is_some()) {
+        let is_planned = line.devices.iter().any(|one| one.planned.is_some());
+        if self.is_named || !self.has_guessed || is_planned {
             return false;
         }
-        line.devices.sort_by_key(|device| device.station);
-        self.stations.clear();
-        self.order.clear();
-        for (index, device) in line.devices.iter_mut().enumerate() {
-            device.id = DeviceId(index as u32);
-            device.position = Some(Position(index as u16));
-            self.order.push(device.id);
-            if let Some(station) = device.station {
-                self.stations.insert(station, device.id);
+        let Some(places) = self.places(line) else { return false };
+        self.has_guessed = false;
+        self.is_by_address = true;
+        let is_in_order = line
+            .devices
+            .iter()
+            .all(|one| one.station.is_none_or(|at| places.get(&at) == Some(&one.id.index())));
+        if is_in_order {
+            return false;
+        }
+        let count = places.values().max().map_or(0, |last| last + 1).max(line.devices.len());
+        let mut sorted: Vec<Option<Device>> = vec![None; count];
+        let (addressed, others): (Vec<Device>, Vec<Device>) =
+            line.devices.drain(..).partition(|device| device.station.is_some());
+        for device in addressed {
+            if let Some(place) = device.station.and_then(|station| places.get(&station)) {
+                sorted[*place] = Some(device);
             }
         }
-        self.has_guessed = false;
+        // Of those without an address nothing is known but that they are there.
+        let mut others = others.into_iter();
+        self.stations.clear();
+        self.order.clear();
+        let mut position = 0;
+        for (index, place) in sorted.into_iter().enumerate() {
+            let id = DeviceId(index as u32);
+            let mut device = place.or_else(|| others.next()).unwrap_or_else(|| Device::new(id));
+            device.id = id;
+            let never_answered = device.answered.is_none() && device.silent.is_some();
+            device.position = (!never_answered).then_some(Position(position));
+            if let Some(station) = device.station {
+                self.stations.insert(station, id);
+            }
+            if !never_answered {
+                self.order.push(id);
+                position += 1;
+            }
+            line.devices.push(device);
+        }
         line.touch();
         true
+    }
+
+    /// The places that station addresses tell: by the number from which the MainDevice counts, else, once all are known,
+    /// by their order.
+    fn places(&self, line: &Line) -> Option<BTreeMap<StationAddress, usize>> {
+        let present = usize::from(self.present?);
+        if present > MOST_DEVICES {
+            return None;
+        }
+        let mut stations: Vec<StationAddress> =
+            line.devices.iter().filter_map(|device| device.station).collect();
+        stations.sort_unstable();
+        let silent = |one: &&Device| one.answered.is_none() && one.silent.is_some();
+        let count = present + line.devices.iter().filter(silent).count();
+        let (least, most) = (stations.first()?.0, stations.last()?.0);
+        let fits = |first: &u16| *first <= least && usize::from(most - *first) < count;
+        if let Some(first) = FIRST_STATIONS.into_iter().find(fits) {
+            let place = |station: StationAddress| (station, usize::from(station.0 - first));
+            return Some(stations.into_iter().map(place).collect());
+        }
+        (stations.len() == count).then(|| stations.into_iter().zip(0..).collect())
     }
 
     /// A controller's registers were read.
     pub(super) fn read(&mut self, line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         let Some(station) = word_at(answer.reply.data(), answer.ado, STATION) else { return };
         let station = StationAddress(station);
+        let may_be_wrong = self.has_guessed || self.is_by_address;
+        if may_be_wrong && answer.effect.addressing == Addressing::Position {
+            self.correct(line, id, station);
+            return;
+        }
         if let Some(owner) = self.is_shared(line, id, station, answer) {
             if let Some(owner) = line.device_mut(owner) {
                 let seen = Seen::new(SharedBy::Reading(id), answer.at, Some(answer.frame));
@@ -214,6 +363,29 @@ impl Addresses {
             return;
         }
         self.give(line, id, station);
+    }
+
+    /// A guess is put right: the controller at a position says its station address. What was learnt by that address
+    /// goes with it.
+    fn correct(&mut self, line: &mut Line, id: DeviceId, station: StationAddress) {
+        let guessed = self.stations.get(&station).copied().filter(|guessed| *guessed != id);
+        let Some(guessed) = guessed else { return self.give(line, id, station) };
+        let (one, other) = (id.index(), guessed.index());
+        if self.is_named || one.max(other) >= line.devices.len() {
+            return;
+        }
+        line.devices.swap(one, other);
+        for index in [one, other] {
+            let device = &mut line.devices[index];
+            device.id = DeviceId(index as u32);
+            if let Some(station) = device.station {
+                self.stations.insert(station, device.id);
+            }
+        }
+        let position = line.devices[one].position;
+        line.devices[one].position = line.devices[other].position;
+        line.devices[other].position = position;
+        line.touch();
     }
 
     /// Who has the station address that another controller, asked by its position, says is its own: only
@@ -246,7 +418,12 @@ impl Addresses {
             return;
         }
         self.stations.clear();
+        let was_guess = std::mem::take(&mut self.has_guessed) && !self.is_named;
         for device in &mut line.devices {
+            if was_guess && device.planned.is_none() {
+                // Whose it was that was learnt by addresses is never told any more.
+                *device = Device { position: device.position, ..Device::new(device.id) };
+            }
             device.station = None;
         }
         line.touch();
@@ -261,6 +438,7 @@ impl Addresses {
             return;
         }
         device.station = Some(station);
+        self.unanswered.remove(&station);
         self.stations.retain(|_, owner| *owner != id);
         if let Some(other) = self.stations.insert(station, id)
             && let Some(other) = line.device_mut(other)

@@ -7,6 +7,7 @@
 mod address;
 mod clock;
 mod coe;
+mod process_data;
 mod registers;
 mod sii;
 
@@ -25,8 +26,6 @@ use crate::observe::{Exchange, FrameCopy};
 const FIRST_OPTIONAL: RegisterAddress = RegisterAddress(0x0600);
 /// Process RAM begins here: mailboxes and process data.
 const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
-/// Most logical datagrams that are followed.
-const MOST_CYCLIC: usize = 256;
 
 /// Teaches one line.
 #[derive(Clone, Default, Debug)]
@@ -93,10 +92,15 @@ impl Learner {
     /// Puts controllers that were met in the middle of a run into order, as far as it can be told.
     /// Identities may change: only for a line of which nothing was said yet.
     pub fn settle(&mut self, line: &mut Line) {
-        if self.addresses.settle(line) {
+        if self.addresses.expect_unanswered(line) | self.addresses.settle(line) {
             // What was under way was noted by the identities of before.
             self.transfers = sii::Transfers::default();
         }
+    }
+
+    /// Notes that something was said of single controllers: they keep their numbers from now on.
+    pub const fn name(&mut self) {
+        self.addresses.name();
     }
 
     /// Whether the order of controllers is known, so that a tree can be made of them.
@@ -164,7 +168,7 @@ impl Learner {
     fn datagram(&mut self, line: &mut Line, answer: &Answer<'_>) {
         let is_expected = match answer.effect.addressing {
             Addressing::None => false,
-            Addressing::Logical => self.logical(line, answer),
+            Addressing::Logical => process_data::returned(line, &mut self.latest_cyclic, answer),
             Addressing::Broadcast => {
                 self.broadcast(line, answer);
                 answer.ado < FIRST_OPTIONAL
@@ -187,51 +191,6 @@ impl Learner {
                 line.traffic.answered += 1;
             }
         }
-    }
-
-    /// A datagram to whoever has an FMMU there. Says whether an answer was expected.
-    fn logical(&mut self, line: &mut Line, answer: &Answer<'_>) -> bool {
-        if !answer.is_last {
-            return true;
-        }
-        let (start, len) = (answer.reply.logical(), answer.reply.data_len() as u16);
-        let is_it = |cyclic: &Cyclic| {
-            cyclic.start == start && cyclic.len == len && cyclic.command == answer.command
-        };
-        let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
-        // They come in the same order each cycle.
-        let guess = (self.latest_cyclic + 1) % line.cyclic.len().max(1);
-        let found = if line.cyclic.get(guess).is_some_and(is_it) {
-            Some(guess)
-        } else {
-            line.cyclic.iter().position(is_it)
-        };
-        let Some(index) = found else {
-            if line.cyclic.len() < MOST_CYCLIC {
-                self.latest_cyclic = line.cyclic.len();
-                line.cyclic.push(Cyclic::new(answer.command, start, len, seen));
-                line.touch();
-            }
-            return false;
-        };
-        self.latest_cyclic = index;
-        let devices = &line.devices;
-        let cyclic = &mut line.cyclic[index];
-        let is_wanted = || {
-            let lower = |device: &super::Device| device.al.is_asked_down();
-            let mut owners = super::owners(devices, start, len).peekable();
-            if owners.peek().is_none() {
-                return devices.iter().any(lower);
-            }
-            owners.any(|owner| devices.get(owner.device.index()).is_some_and(lower))
-        };
-        let news = cyclic.record(seen, is_wanted);
-        let is_expected = cyclic.highest.value > 0;
-        let sent_off = answer.sent_at.is_some_and(|at| cyclic.sent.tick(at));
-        if news | sent_off | cyclic.returned.tick(answer.at) {
-            line.touch();
-        }
-        is_expected
     }
 
     fn broadcast(&mut self, line: &mut Line, answer: &Answer<'_>) {
@@ -306,7 +265,14 @@ impl Learner {
             let station = StationAddress(answer.reply.adp());
             self.addresses.at_station(line, station, answer.sum > 0)
         };
-        let Some(id) = device else { return };
+        let Some(id) = device else {
+            if !is_position && answer.is_last && answer.sum == 0 && answer.ado < FIRST_OPTIONAL {
+                let seen = Seen::new((), answer.at, Some(answer.frame));
+                self.addresses.asked_in_vain(StationAddress(answer.reply.adp()), seen);
+                line.touch();
+            }
+            return;
+        };
         let Some(device) = line.devices.get_mut(id.index()) else { return };
         if answer.effect.multiple_write {
             clock::handed_round(line, id, answer);
@@ -349,6 +315,16 @@ impl Learner {
             // The other copy was answered, and taught what there was to learn.
             return;
         }
+        if is_position && !self.addresses.is_settled() {
+            // Who is where is a guess so far: only that counts which puts it right.
+            if answer.effect.reads {
+                self.addresses.read(line, id, answer);
+            }
+            if answer.effect.writes {
+                self.addresses.written(line, id, answer);
+            }
+            return;
+        }
         let is_news = device.answered.is_none() || device.silent.is_some();
         device.answers(answer.at, Some(answer.frame));
         if is_news {
@@ -382,14 +358,15 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
         return;
     }
     if exchange.earlier.is_empty() && !exchange.is_cut_off {
-        line.traffic.record_lost(request.time, request.number, exchange.returns_before);
+        let by_order = line.is_lost_by_order(request.time);
+        line.traffic.record_lost(request.time, request.number, exchange.returns_before, by_order);
         line.touch();
     }
     if !exchange.earlier.is_empty() && exchange.earlier.iter().all(|wkc| *wkc == 0) {
         line.traffic.record_swallowed(request.time, request.number);
         line.touch();
     }
-    if let Some(card) = exchange.copy_lost {
+    if let Some(card) = exchange.copy_lost.filter(|_| !line.is_lost_by_order(request.time)) {
         line.traffic.copies_lost[card.index()].add(1, request.time);
         line.touch();
     }
@@ -427,6 +404,8 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
             });
             if let Some(write) = write {
                 line.note_loops(write);
+            } else if registers::is_dl_control(datagram.ado(), datagram.data()) {
+                line.loops_ordered = Some(request.time);
             }
         }
         let traffic = &mut line.traffic;

@@ -89,6 +89,9 @@ pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     if let Some(write) = loop_write(device, (answer.ado, answer.written()), seen) {
         line.note_loops(write);
     }
+    if is_dl_control(answer.ado, answer.written()) {
+        line.loops_ordered = Some(seen.at);
+    }
     if touches(answer.ado, answer.written(), CLOCK_SETTING) {
         for reference in line.references.iter_mut().filter(|one| one.device == id) {
             reference.set(answer.at);
@@ -100,6 +103,11 @@ pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     if is_news {
         line.touch();
     }
+}
+
+/// Whether a write is about DL control.
+pub(super) fn is_dl_control(start: RegisterAddress, data: &[u8]) -> bool {
+    touches(start, data, DL_CONTROL..DL_CONTROL + 4)
 }
 
 /// Whether DL control is written for temporary use: then by this write.
@@ -136,6 +144,7 @@ pub(super) fn broadcast_read(line: &mut Line, answer: &Answer<'_>) {
     let mut news = false;
     for device in &mut line.devices {
         let status = AlStatus::new(state);
+        device.al.latest_reading = device.al.latest_reading.max(Some(answer.at));
         // Other bits than state and error are not known from here.
         if device.al.state() != Some(state) || device.al.has_error() {
             news |= device.al.record_status(status, answer.at, Some(answer.frame));
@@ -160,7 +169,7 @@ pub(super) fn broadcast_write(line: &mut Line, answer: &Answer<'_>) {
         }
     }
     if touches(answer.ado, data, FMMUS) {
-        line.cyclic.clear();
+        line.cyclic.iter_mut().for_each(|cyclic| cyclic.lay_out_anew(answer.at));
     }
     if news {
         line.touch();
@@ -192,7 +201,7 @@ fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
                 ClearGroup::written_by(address) == Some(group)
             });
             if is_hit {
-                device.counters.note_clear(group);
+                device.counters.note_clear(group, answer.at);
             }
         }
     }
@@ -215,14 +224,18 @@ fn write_fmmus(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         let Some(bytes) = bytes.first_chunk() else { continue };
         let fmmu = FmmuConfig::from_bytes(*bytes);
         let before = device.fmmus.insert(index as u8, fmmu);
-        if before == Some(fmmu) {
-            continue;
-        }
-        // The process data are laid out anew: what was expected of them holds no longer.
-        line.cyclic.retain(|cyclic| {
+        // An FMMU of which nothing was known is no other layout: a SubDevice that comes back is set up as before.
+        let before = before.filter(|before| before.active && *before != fmmu);
+        for cyclic in &mut line.cyclic {
             let touches = |fmmu: &FmmuConfig| fmmu.overlap(cyclic.start, cyclic.len).is_some();
-            !touches(&fmmu) && !before.as_ref().is_some_and(touches)
-        });
+            match before {
+                Some(before) if touches(&fmmu) || touches(&before) => {
+                    cyclic.lay_out_anew(answer.at)
+                }
+                None if touches(&fmmu) => cyclic.set_up_again(),
+                Some(_) | None => {}
+            }
+        }
     }
     line.touch();
 }

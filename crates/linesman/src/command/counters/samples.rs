@@ -1,19 +1,13 @@
-//! Counters of all SubDevices, read again and again, and what they say together.
+//! Counters of all SubDevices, read again and again.
 
-use linesman_config::inventory::Inventory;
-use linesman_config::project::Project;
-use linesman_diagnosis::line::{Line, Seen};
-use linesman_diagnosis::{Diagnosis, Engine, engine::Setup};
 use linesman_maindevice::service::Service;
-use linesman_proto::address::{DeviceId, Network, RegisterAddress};
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::port::Port;
-use linesman_proto::register::{ClearGroup, DlStatus, ErrorCounter, ErrorCounters, table};
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::register::{ClearGroup, ErrorCounter, ErrorCounters, table};
+use linesman_proto::time::Span;
 
-use crate::command::diagnose::NO_CLOCK;
 use crate::command::service::{Session, Trouble};
 use crate::failure::Failure;
-use crate::version;
 
 /// What one SubDevice's counters read at one time.
 #[derive(Clone, Debug)]
@@ -24,8 +18,6 @@ pub(crate) struct Sample {
     pub(crate) id: DeviceId,
     /// What they read; `None` when it did not answer.
     pub(crate) counters: Option<ErrorCounters>,
-    /// Its ports at that time; `None` when it did not answer.
-    pub(crate) ports: Option<DlStatus>,
 }
 
 /// All readings, oldest first.
@@ -68,10 +60,11 @@ impl Samples {
             let len = ErrorCounters::LEN as u16;
             let data = session.try_read(id, ErrorCounters::START, len)?;
             let counters = data.map(|data| ErrorCounters::from_bytes(&data, ErrorCounters::START));
-            let status = session.try_read(id, table::DL_STATUS.address, 2)?;
-            let ports =
-                status.and_then(|data| data.first_chunk().copied()).map(DlStatus::from_bytes);
-            self.all.push(Sample { at, id, counters, ports });
+            // For the diagnosis, which sees the frames: links, and the state with its code.
+            for (register, len) in [(table::DL_STATUS, 2), (table::AL_STATUS, 6)] {
+                session.try_read(id, register.address, len)?;
+            }
+            self.all.push(Sample { at, id, counters });
         }
         Ok(())
     }
@@ -96,45 +89,6 @@ impl Samples {
     fn of(&self, id: DeviceId) -> impl Iterator<Item = &ErrorCounters> {
         let of = self.all.iter().filter(move |sample| sample.id == id);
         of.filter_map(|sample| sample.counters.as_ref())
-    }
-
-    /// What all of it says: only what rose counts.
-    pub(crate) fn diagnosis(&self, inventory: &Inventory, place: &str) -> Diagnosis {
-        let project = Project::from_inventory("", inventory);
-        let mut line = Line::planned(Network(0), &project);
-        for sample in &self.all {
-            let at = Instant::ZERO + sample.at;
-            line.now = line.now.max(at);
-            let Some(device) = line.device_mut(sample.id) else { continue };
-            if sample.counters.is_none() && sample.ports.is_none() {
-                device.is_silent(at, None);
-                continue;
-            }
-            device.answers(at, None);
-            if let Some(ports) = sample.ports {
-                device.dl.record(ports, at, None);
-            }
-            if let Some(counters) = &sample.counters {
-                device.counters.record_counters(counters, at, None);
-            }
-        }
-        for found in &inventory.devices {
-            if let (Some(device), Some(identity)) = (line.device_mut(found.id), found.identity) {
-                let seen = |value| Some(Seen::new(value, Instant::ZERO, None));
-                device.identity.vendor_id = seen(identity.vendor_id);
-                device.identity.product_code = seen(identity.product_code);
-                device.identity.revision = seen(identity.revision);
-            }
-        }
-        line.traffic.positions_seen = u16::try_from(inventory.devices.len()).unwrap_or(u16::MAX);
-        line.traffic.lost.add(self.lost, line.now);
-        line.touch();
-        let setup =
-            Setup { source: place.to_owned(), clock: NO_CLOCK.to_owned(), ..Setup::default() };
-        let mut engine = Engine::with_line(setup, line);
-        let end = self.all.last().map_or(Instant::ZERO, |sample| Instant::ZERO + sample.at);
-        engine.finish(end, true);
-        Diagnosis { tool: version::tool(), ..engine.diagnosis() }
     }
 
     /// All readings as a table for other programs: one row for each counter of each reading.

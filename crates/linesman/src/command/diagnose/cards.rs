@@ -1,6 +1,6 @@
 //! A line that nobody drives: reads again and again, and sees what changes.
 
-use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, Setup};
+use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, InputKind, Setup};
 use linesman_link::clock::HostClock;
 use linesman_maindevice::{Event, MainDevice, ProbeRequest, Target};
 use linesman_proto::time::{Instant, Span};
@@ -14,8 +14,8 @@ use crate::failure::Failure;
 use crate::output::{Output, Progress};
 use crate::text::quantity::{count, time};
 
-/// How long the line is looked at when nobody says, in seconds.
-const SECONDS: f64 = 5.0;
+/// How long the line is looked at when nobody says.
+const LASTS: Span = Span::s(5);
 /// Between two looks. Each is a few frames long, so that damage has something to hit.
 const LOOK_EVERY: Span = Span::ms(10);
 
@@ -30,9 +30,10 @@ pub(super) fn run(
     driven::refuse(names)?;
     let stop = driven::stop()?;
     let clock = HostClock::start();
-    let until = session.until(SECONDS)?;
+    let until = session.until(LASTS);
     let mut driver = Driver::open(names, clock)?;
     let setup = Setup {
+        input: InputKind::Driven,
         host_counters: true,
         start: clock.started_at().rfc3339(),
         clock: "host, monotonic".to_owned(),

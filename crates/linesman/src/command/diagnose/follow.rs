@@ -66,6 +66,11 @@ impl EventName {
     }
 }
 
+/// What happened to a finding, in a word.
+pub(crate) const fn event_word(kind: EventKind) -> &'static str {
+    EventName::of(kind).word()
+}
+
 /// For so long people are not told of a finding: what is explained or taken back by then has told nobody anything.
 const HELD: Span = Span::ms(50);
 

@@ -1,6 +1,6 @@
 //! Beside another MainDevice: listening without sending.
 
-use linesman_diagnosis::{Engine, Setup};
+use linesman_diagnosis::{Engine, InputKind, Setup};
 use linesman_link::clock::HostClock;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::listen::{Ears, Heard};
@@ -14,7 +14,7 @@ use crate::output::{Output, Progress};
 use crate::text::quantity::{count, time};
 
 /// How long is listened when nobody says.
-const SECONDS: f64 = 10.0;
+const LASTS: Span = Span::s(10);
 /// Longest wait, so that a wish to stop is noticed.
 const NAP: Span = Span::ms(100);
 
@@ -26,7 +26,7 @@ pub(super) fn run(
 ) -> Result<Status, Failure> {
     let stop = driven::stop()?;
     let clock = HostClock::start();
-    let until = session.until(SECONDS)?;
+    let until = session.until(LASTS);
     let mut ears = Ears::open(names, clock)?;
     let recorder = session.recorder(clock.started_at(), names)?;
     let mut listening = Listening { session, clock, recorder, engine: None, frames: 0 };
@@ -106,7 +106,13 @@ impl Listening {
 fn begin(session: &Session, clock: HostClock, host_counters: bool) -> Engine {
     let start = clock.started_at().rfc3339();
     let clock = "host, monotonic".to_owned();
-    Engine::new(Setup { host_counters, start, clock, ..session.setup.clone() })
+    Engine::new(Setup {
+        input: InputKind::Listened,
+        host_counters,
+        start,
+        clock,
+        ..session.setup.clone()
+    })
 }
 
 fn silence(names: &[String], heard_for: Instant) -> Failure {

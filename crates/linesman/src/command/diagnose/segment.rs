@@ -19,10 +19,10 @@ use crate::output::{Output, Progress};
 use crate::text::names::Names;
 use crate::text::quantity::{count, time};
 
-/// How long the line runs at least when nobody says, in seconds.
-const LEAST_SECONDS: f64 = 5.0;
-/// How long it runs behind the last beginning or end of a fault, in seconds.
-const BEHIND_FAULTS: f64 = 3.0;
+/// How long the line runs at least when nobody says.
+const LEAST: Span = Span::s(5);
+/// How long it runs behind the last beginning or end of a fault.
+const BEHIND_FAULTS: Span = Span::s(3);
 /// Between two looks for Ctrl-C and events.
 const STEP: Span = Span::ms(20);
 
@@ -35,7 +35,7 @@ pub(super) fn run(
     output: &mut Output,
 ) -> Result<Status, Failure> {
     let file = files::segment_file(path)?;
-    let until = session.until(seconds(&file))?;
+    let until = session.until(lasts(&file));
     let stop = driven::stop()?;
     let source = session.setup.source.clone();
     let options = LabOptions { target, active, source, ..LabOptions::default() };
@@ -51,7 +51,9 @@ pub(super) fn run(
             }
         }));
     }
-    let names = Names::new(lab.project().devices.iter().map(|device| device.name.clone()));
+    let names = Names::new(
+        lab.project().devices.iter().map(|device| (device.name.clone(), device.type_name.clone())),
+    );
     let mut progress = Progress::new();
     while lab.now() < until && !stop.is_set() && !output.is_closed() {
         let next = until.min(lab.now() + STEP);
@@ -81,10 +83,10 @@ fn follow(lab: &mut Lab, names: &Names, session: &mut Session, output: &mut Outp
 }
 
 /// Long enough to see every fault of the file.
-fn seconds(file: &SegmentFile) -> f64 {
+fn lasts(file: &SegmentFile) -> Span {
     let changes = file.faults.iter().flat_map(|fault| [fault.from_ms, fault.to_ms]).flatten();
     let last_ms = changes.fold(0.0, f64::max);
-    (last_ms / 1e3 + BEHIND_FAULTS).max(LEAST_SECONDS)
+    (Span::ns((last_ms * 1e6) as u64) + BEHIND_FAULTS).max(LEAST)
 }
 
 fn text(at: Instant) -> String {

@@ -1,11 +1,34 @@
-//! Topics: what a person at the cabinet wants to read about before there is any code.
+//! Topics: pages of the guide about a subject, and about the causes of AL status codes.
+
+use linesman_proto::state::AlStatusCode;
+
+use super::page::{Kind, Page};
 
 /// A page of the guide that `linesman explain NAME` shows.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Topic {
     /// Its name.
     pub(super) name: &'static str,
     /// The page, in Markdown.
     pub(super) text: &'static str,
+}
+
+impl Topic {
+    /// Its title.
+    pub(super) fn title(&self) -> &'static str {
+        let first = self.text.lines().next().unwrap_or_default();
+        first.trim_start_matches(['#', ' '])
+    }
+
+    /// The text beneath the title.
+    pub(super) fn body(&self) -> &'static str {
+        self.text.split_once('\n').map_or("", |(_, body)| body.trim())
+    }
+
+    /// As a page.
+    pub(super) fn page(&self) -> Page {
+        Page::new(Kind::Topic, self.title()).markdown(self.body())
+    }
 }
 
 macro_rules! topics {
@@ -19,20 +42,45 @@ macro_rules! topics {
 }
 
 topics! {
+    "clock-start-up",
     "counter-guide",
+    "interrupt-moderation",
     "lamps",
     "line-codes",
     "located",
     "lost-links",
+    "no-devices-found",
+    "out-of-step",
+    "outputs-stayed-away",
+    "own-frames",
     "running-errors",
     "start-up-errors",
+    "sync-not-seen",
+    "sync-settings",
+    "sync-stopped",
     "two-counters",
+    "uneven-cycle",
 }
+
+/// The topic that leads to the causes of an AL status code.
+const OF_STATUS: &[(AlStatusCode, &str)] = &[
+    (AlStatusCode::SYNCHRONIZATION_ERROR, "out-of-step"),
+    (AlStatusCode::SYNC_MANAGER_WATCHDOG, "outputs-stayed-away"),
+    (AlStatusCode::FATAL_SYNC_ERROR, "sync-stopped"),
+    (AlStatusCode::NO_SYNC_ERROR, "sync-not-seen"),
+    (AlStatusCode::INVALID_DC_SYNC_CONFIGURATION, "sync-settings"),
+];
 
 /// The topic of that name; words may be joined by spaces.
 pub(super) fn find(word: &str) -> Option<&'static Topic> {
-    let word = word.to_ascii_lowercase().replace(' ', "-");
+    let word = word.to_ascii_lowercase().replace([' ', '_'], "-");
     ALL.iter().find(|topic| topic.name == word)
+}
+
+/// The topic that leads to the causes of this code, if there is one.
+pub(super) fn of_status(code: AlStatusCode) -> Option<&'static Topic> {
+    let (_, name) = OF_STATUS.iter().find(|(of, _)| *of == code)?;
+    find(name)
 }
 
 #[cfg(test)]
@@ -67,10 +115,13 @@ mod tests {
     }
 
     #[test]
-    fn every_topic_has_a_title_and_short_lines() {
+    fn every_topic_has_a_title_and_is_found_by_its_name() {
         for topic in ALL {
             assert!(topic.text.starts_with("# "), "{}", topic.name);
             assert!(find(topic.name).is_some());
+        }
+        for (code, name) in OF_STATUS {
+            assert!(of_status(*code).is_some(), "{code}: {name}");
         }
     }
 }

@@ -1,18 +1,27 @@
 //! One message: its parameters, and its text with the parameters in it.
 
+use linesman_link::unix_time::UnixTime;
 use linesman_proto::mailbox::coe::diagnosis::{DiagnosisMessage, Parameter};
 
 use crate::command::sdo::value::{hex, show};
 
+/// From 1970 to 2000, where distributed clocks begin, in ns.
+const EPOCH_2000: i128 = 946_684_800_000_000_000;
+
+/// A time of the distributed clocks, RFC 3339.
+pub(crate) fn system_time(ns: u64) -> Option<String> {
+    UnixTime::from_nanos(EPOCH_2000 + i128::from(ns)).rfc3339()
+}
+
 /// What goes into a text.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) enum Value {
+pub(crate) enum Value {
     Number(i128, usize),
     Text(String),
 }
 
 /// The parameters of a message.
-pub(super) fn values(message: &DiagnosisMessage<'_>, texts: &[(u16, String)]) -> Vec<Value> {
+pub(crate) fn values(message: &DiagnosisMessage<'_>, texts: &[(u16, String)]) -> Vec<Value> {
     message.parameters().map(|parameter| value(&parameter, texts)).collect()
 }
 
@@ -48,7 +57,7 @@ fn value(parameter: &Parameter<'_>, texts: &[(u16, String)]) -> Value {
 
 impl Value {
     /// For people.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         match self {
             Self::Number(number, _) => number.to_string(),
             Self::Text(text) => text.clone(),

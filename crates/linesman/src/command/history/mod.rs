@@ -4,7 +4,7 @@
 //! 3: up to where was acknowledged; 4: whether there are new ones; 5: flags; messages from 6 on, in a
 //! ring.
 
-mod message;
+pub(crate) mod message;
 mod report;
 
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ const FIRST_MESSAGE: u8 = 6;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    place: Place,
+    pub(crate) place: Place,
     /// Only messages that nobody has acknowledged
     #[arg(long)]
     only_new: bool,

@@ -1,18 +1,14 @@
 //! A diagnosis history as JSON, as a table and as CSV.
 
-use linesman_link::unix_time::UnixTime;
 use linesman_proto::mailbox::coe::diagnosis::DiagnosisMessage;
 use serde::Serialize;
 
-use super::message::{Value, fill, values};
+use super::message::{Value, fill, system_time, values};
 use crate::command::sdo::value::hex;
 use crate::command::service::DeviceReport;
 use crate::output::{Output, Table};
-use crate::text::quantity::count as counted;
+use crate::text::quantity::{count as counted, date};
 use crate::version;
-
-/// From 1970 to 2000, where distributed clocks begin, in ns.
-const EPOCH_2000: i128 = 946_684_800_000_000_000;
 
 /// A diagnosis history.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
@@ -118,7 +114,7 @@ impl Report {
         let values = values(&message, texts);
         let pattern = texts.iter().find(|(id, _)| *id == message.text);
         let has_time = message.time_ns != 0;
-        let time = UnixTime::from_nanos(EPOCH_2000 + i128::from(message.time_ns)).rfc3339();
+        let time = system_time(message.time_ns);
         self.messages.push(MessageReport {
             subindex,
             new,
@@ -207,7 +203,7 @@ impl Report {
 impl MessageReport {
     fn when(&self) -> String {
         match (&self.time, &self.time_ns) {
-            (Some(time), _) => time.clone(),
+            (Some(time), _) => date(time),
             (None, Some(ns)) => {
                 let ns: u64 = ns.parse().unwrap_or(0);
                 format!("{:.6} s local", std::time::Duration::from_nanos(ns).as_secs_f64())

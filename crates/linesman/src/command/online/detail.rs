@@ -2,29 +2,36 @@
 
 use linesman_runtime::online::report::{Count, OnlineDevice, OnlineIdentity, OnlineReport};
 
+use linesman_config::inventory::label;
+use linesman_proto::address::DeviceId;
+
+use crate::command::service::{self, Called};
 use crate::failure::Failure;
 use crate::output::{Output, Table};
 use crate::text::quantity::{count, time};
 
-/// The SubDevice that a word means: its number, station address or name.
+/// The SubDevice that a word means, as in the commands for one of them.
 pub(super) fn find<'a>(report: &'a OnlineReport, word: &str) -> Result<&'a OnlineDevice, Failure> {
-    let station = word.strip_prefix("0x").and_then(|hex| u16::from_str_radix(hex, 16).ok());
-    let is_it = |device: &&OnlineDevice| {
-        device.name == word
-            || device.no.to_string() == word
-            || station.is_some_and(|station| station != 0 && device.station == station)
+    let called = |device: &'a OnlineDevice| {
+        Some(Called {
+            id: DeviceId::from_no(device.no)?,
+            station: device.station,
+            alias: 0,
+            name: &device.name,
+            type_name: &device.r#type,
+        })
     };
-    report.devices.iter().find(is_it).ok_or_else(|| {
-        let there = count(report.devices.len() as u64, "SubDevice");
-        let reason = format!("{}: `{word}`: none of its {there} is called so", report.on);
-        Failure::new(reason, "name it by number (3), station address (0x1003) or name")
-    })
+    let all: Vec<Called<'_>> = report.devices.iter().filter_map(called).collect();
+    let id = service::find(&all, &report.on, word)?;
+    let found = report.devices.iter().find(|device| device.no == id.no());
+    found.ok_or_else(|| Failure::new(format!("{}: `{word}` is not there", report.on), ""))
 }
 
 /// All that is known of it.
 pub(super) fn text(report: &OnlineReport, device: &OnlineDevice, output: &Output) -> String {
     let paint = output.paint();
-    let title = format!("{} {} (0x{:04X})", device.no, device.name, device.station);
+    let called = label(DeviceId(device.no.saturating_sub(1)), &device.name, &device.r#type);
+    let title = format!("{called}, 0x{:04X}", device.station);
     let mut text = format!("{} on {}: {}\n", paint.bold(&title), report.on, device.state.text);
     if let Some(meaning) = &device.al_code_text {
         text.push_str(&format!("  AL status code 0x{:04X}: {meaning}\n", device.al_code));

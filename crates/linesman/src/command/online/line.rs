@@ -58,7 +58,7 @@ fn look<L: Line>(
     let stop = driven::stop()?;
     let options = line.options();
     let mut driver = Driver::new(line, options);
-    let lasts = lasts(arguments)?;
+    let lasts = lasts(arguments);
     let span = lasts.map(|lasts| Span::ns(lasts.as_nanos() as u64));
     let looker = if arguments.live || lasts.is_some() { looker } else { looker.once() };
     let until = match (span, arguments.live) {

@@ -9,6 +9,8 @@ use crossterm::terminal::{
     LeaveAlternateScreen,
 };
 use crossterm::{cursor, execute, queue};
+use linesman_config::inventory::label;
+use linesman_proto::address::DeviceId;
 use linesman_runtime::online::report::{OnlineDevice, OnlineReport};
 
 use super::table;
@@ -186,7 +188,9 @@ fn changes(before: &OnlineReport, now: &OnlineReport) -> Vec<String> {
         let Some(old) = before.devices.iter().find(|old| old.no == device.no) else { continue };
         let what = changed(old, device);
         if !what.is_empty() {
-            lines.push(format!("{at}  {} ({}): {}", device.no, device.name, what.join("; ")));
+            let id = DeviceId(device.no.saturating_sub(1));
+            let called = label(id, &device.name, &device.r#type);
+            lines.push(format!("{at}  {called}: {}", what.join("; ")));
         }
     }
     for (what, old, new) in [
@@ -278,7 +282,7 @@ mod tests {
             changes(&before, &now),
             [
                 "     2.000 s  network: Not OK - at least one device in SAFEOP, was OK",
-                "     2.000 s  3 (T3): ERR SAFEOP, was OP; AL 0x001B sync manager watchdog; working \
+                "     2.000 s  T3: ERR SAFEOP, was OP; AL 0x001B sync manager watchdog; working \
                  counter wrong; 5 errors more, 5 in all; 2 links lost",
                 "     2.000 s  cyclic frames lost: 2 more, 2 in all",
             ]

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use linesman_config::attachment::Attachment;
@@ -22,12 +23,21 @@ pub(super) fn write(path: &Path, file: &PlanFile) -> Result<(), Failure> {
     for vendor in &vendors {
         files::refuse_to_overwrite(&beside(path, *vendor))?;
     }
-    files::write_new(path, "the segment", &text(path, file))?;
-    for vendor in vendors {
-        let text = descriptions::write(&file.plan, vendor);
-        files::write_new(&beside(path, vendor), "the device descriptions", &text)?;
+    let mut written = Vec::new();
+    let all = || {
+        // What the segment names is there before it.
+        for vendor in vendors {
+            let (path, text) = (beside(path, vendor), descriptions::write(&file.plan, vendor));
+            files::write_new(&path, "the device descriptions", &text)?;
+            written.push(path);
+        }
+        files::write_new(path, "the segment", &text(path, file))
+    };
+    let result = all();
+    if result.is_err() {
+        written.iter().for_each(|path| drop(fs::remove_file(path)));
     }
-    Ok(())
+    result
 }
 
 /// The file of a vendor's descriptions.

@@ -46,11 +46,11 @@ fn effect(found: &Description, len: usize) -> Option<String> {
         "Write protection and reset" => "the SubDevice restarts, or takes no more writes",
         "Data link layer" => "a port that is closed cuts off everything behind it",
         "Application layer" => {
-            "it changes the state of the SubDevice; `linesman state` does that step by step"
+            "it changes the state of the SubDevice; `linesman state WHERE DEVICE --to STATE` does that step by step"
         }
         "Watchdog" => "outputs fall, or stay as they are, when they should not",
         "SII EEPROM interface" => {
-            "it changes who may use the EEPROM, or what is in it; `linesman sii` does that with a backup"
+            "it changes who may use the EEPROM, or what is in it; `linesman sii WHERE DEVICE write FILE` does that with a backup"
         }
         "PHY management interface" => "it changes how a port makes its link",
         "FMMU" | "SyncManager" => "process data and mailbox messages go elsewhere",

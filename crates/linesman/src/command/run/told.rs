@@ -3,20 +3,22 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use linesman_diagnosis::report::Severity;
+use linesman_diagnosis::report::{Diagnosis, PlaceReport, Severity, Verdict};
+use linesman_diagnosis::{Event as FindingEvent, EventKind};
 use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::{EntryKind, LogEntry, Severity as EntrySeverity};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::event_log::{EventLogWriter, WriterReport};
+use linesman_runtime::event_log::{EventLogWriter, LoggedFinding, WriterReport};
 use linesman_runtime::online::Board;
 use linesman_runtime::run::Note;
 use linesman_runtime::run::bring_up::BringUpReport;
 use linesman_runtime::run::report::{Counts, RunReport};
 use linesman_runtime::system_log::SystemLog;
 
-use crate::command::diagnose::follow::Follower;
+use crate::command::diagnose::follow::{Follower, event_word};
 use crate::output::{Output, Paint, Table};
+use crate::text::finding::{Writer, percent, tally};
 use crate::text::names::Names;
 use crate::text::quantity::{count, grouped, time};
 
@@ -63,6 +65,11 @@ impl Teller {
         Self { json, names: Names::default(), follower, board, began, logs, counted }
     }
 
+    /// What the SubDevices are called.
+    pub(super) const fn names(&self) -> &Names {
+        &self.names
+    }
+
     /// Whether people are not to be told.
     pub(super) fn is_json(&self) -> bool {
         self.json
@@ -81,7 +88,9 @@ impl Teller {
             Note::Scanned(_) => {}
             Note::Planned(plan) => {
                 self.board.begin(Arc::clone(plan));
-                self.names = Names::new(plan.devices.iter().map(|device| device.name.clone()));
+                self.names = Names::new(
+                    plan.devices.iter().map(|one| (one.name.clone(), one.type_name.clone())),
+                );
                 for task in &plan.tasks {
                     let frames = count(task.frames.len() as u64, "frame");
                     let cycle = time(task.cycle.as_nanos());
@@ -97,12 +106,7 @@ impl Teller {
                 let entries = self.board.host(observation);
                 self.entries(entries, output);
             }
-            Note::Finding(event) if !self.json => {
-                if event.finding.severity != Severity::Info {
-                    self.follower.tell((**event).clone(), &self.names, output);
-                }
-            }
-            Note::Finding(_) => {}
+            Note::Finding(event) => self.finding(event, output),
             Note::Leaving(at) => self.said(*at, "stopping: outputs to zero", output),
         }
     }
@@ -114,20 +118,37 @@ impl Teller {
         self.entries(entries, output);
     }
 
+    /// Something happened to a finding: the logs have it at once, people a little later, when it is neither
+    /// explained by another one nor taken back.
+    fn finding(&mut self, event: &FindingEvent, output: &mut Output) {
+        if self.logs.without.contains(&EntryKind::Finding) {
+            return;
+        }
+        let (entry, logged) = logged(event, &self.names);
+        self.keep(entry, Some(logged));
+        if !self.json && event.finding.severity != Severity::Info {
+            self.follower.tell(event.clone(), &self.names, output);
+        }
+    }
+
     fn entries(&mut self, entries: Vec<LogEntry>, output: &mut Output) {
         for entry in entries {
-            if self.logs.without.contains(&entry.kind) {
-                continue;
+            if !self.logs.without.contains(&entry.kind) {
+                self.tell(&entry, output);
+                self.keep(entry, None);
             }
-            self.tell(&entry, output);
-            let name = entry.device.map(|id| self.names.plain(id.no()).to_owned());
-            if let Some(log) = &mut self.logs.system {
-                log.write(&entry, name.as_deref());
-            }
-            if let Some(log) = &self.logs.file {
-                let at = self.began + entry.at.since(Instant::ZERO);
-                log.write(at, entry, name.as_deref());
-            }
+        }
+    }
+
+    /// Hands an entry to the logs.
+    fn keep(&mut self, entry: LogEntry, finding: Option<LoggedFinding>) {
+        let name = entry.device.map(|id| self.names.plain(id.no()).to_owned());
+        if let Some(log) = &mut self.logs.system {
+            log.write(&entry, name.as_deref());
+        }
+        if let Some(log) = &self.logs.file {
+            let at = self.began + entry.at.since(Instant::ZERO);
+            log.write(at, entry, name.as_deref(), finding);
         }
     }
 
@@ -166,7 +187,8 @@ impl Teller {
             | EntryKind::Emergency
             | EntryKind::Mailbox
             | EntryKind::Host
-            | EntryKind::Clock => self.said(entry.at, &entry.text, output),
+            | EntryKind::Clock
+            | EntryKind::Finding => self.said(entry.at, &entry.text, output),
         }
     }
 
@@ -185,6 +207,77 @@ impl Teller {
     fn said(&self, at: Instant, words: &str, output: &mut Output) {
         self.line(&format!("{:>12}  {words}", time(at.as_nanos())), output);
     }
+}
+
+/// An entry of the log on a finding.
+fn logged(event: &FindingEvent, names: &Names) -> (LogEntry, LoggedFinding) {
+    let FindingEvent { at, kind, finding, follows_from } = event;
+    let (place, cause) = (names.place(&finding.place), finding.cause);
+    let what = event_word(*kind);
+    let behind = follows_from.as_ref().map(|id| format!(", follows from {id}")).unwrap_or_default();
+    let text = format!(
+        "{} {} {} {what}: {place}, {cause} ({}){behind}",
+        finding.id,
+        finding.code,
+        finding.name,
+        percent(finding.confidence)
+    );
+    let severity = match (kind, finding.severity) {
+        // That it is over is no error.
+        (EventKind::Closed | EventKind::Withdrawn, _) => EntrySeverity::Info,
+        (EventKind::Opened | EventKind::Confirmed, Severity::Info) => EntrySeverity::Info,
+        (EventKind::Opened | EventKind::Confirmed, Severity::Warning) => EntrySeverity::Warning,
+        (EventKind::Opened | EventKind::Confirmed, Severity::Error) => EntrySeverity::Error,
+    };
+    let device = device(&finding.place);
+    let entry = LogEntry { at: *at, severity, kind: EntryKind::Finding, device, text };
+    let logged = LoggedFinding {
+        id: finding.id.clone(),
+        event: what.to_owned(),
+        code: finding.code.clone(),
+        name: finding.name.clone(),
+        place,
+        cause: cause.to_string(),
+        follows_from: follows_from.clone(),
+    };
+    (entry, logged)
+}
+
+/// Whom a finding concerns; of a link the SubDevice behind it.
+fn device(place: &PlaceReport) -> Option<DeviceId> {
+    match place {
+        PlaceReport::Device { no, .. } => DeviceId::from_no(*no),
+        PlaceReport::Link { a, b, .. } => {
+            b.and_then(|b| DeviceId::from_no(b.no)).or(DeviceId::from_no(a.no))
+        }
+        PlaceReport::Network { .. } | PlaceReport::Host => None,
+    }
+}
+
+/// What was wrong with the line, each in a few lines.
+pub(super) fn findings(diagnosis: &Diagnosis, names: &Names, output: &Output) -> String {
+    let paint = output.paint();
+    let (verdict, tally) = (diagnosis.verdict, tally(&diagnosis.findings));
+    let mut text = match (verdict, tally.is_empty()) {
+        (Verdict::Healthy, true) => "\nNo findings.\n".to_owned(),
+        (Verdict::Inconclusive, true) => {
+            "\nNo findings, but too little was seen to call the line healthy.\n".to_owned()
+        }
+        (Verdict::Healthy | Verdict::Inconclusive | Verdict::Faulty, _) => {
+            format!("\nFindings: {tally}.\n")
+        }
+    };
+    let writer =
+        Writer { names, paint, width: output.width(), timed: true, place: &diagnosis.source };
+    for finding in &diagnosis.findings {
+        text.push('\n');
+        text.push_str(&writer.brief(finding));
+    }
+    if let Some(first) = diagnosis.findings.first() {
+        let hint = format!("\n`linesman explain {}` says more of such a finding.\n", first.code);
+        text.push_str(&paint.faint(&hint));
+    }
+    text
 }
 
 /// How it went.

@@ -127,8 +127,9 @@ struct Names<'a> {
 
 impl Names<'_> {
     fn planned(&self, node: usize) -> String {
-        let name = self.project.devices.get(node).map_or("", |device| device.name.as_str());
-        label(DeviceId(node as u32), name)
+        let id = DeviceId(node as u32);
+        let device = self.project.devices.get(node);
+        device.map_or_else(|| label(id, "", ""), |one| label(id, &one.name, &one.type_name))
     }
 
     fn found(&self, node: usize) -> String {
@@ -173,7 +174,8 @@ impl Names<'_> {
                 let (name, more) = (self.found(*found), more(all.len()));
                 let at = self.found_end(*on, comparison);
                 let text = format!("{name} of this scan{more}, at {at}: in no plan");
-                let action = format!("take it out, or plan it: `linesman scan … --save` ({name})");
+                let action =
+                    format!("take it out, or plan it: `linesman scan WHERE --save FILE` ({name})");
                 ("extra", None, no(*found), text, action)
             }
             Difference::Wrong { planned, found, what } => {
@@ -250,7 +252,7 @@ impl Against {
         for difference in &self.differences {
             let kind = paint.bad(&difference.kind);
             text.push_str(&wrapped("  x ", &format!("{kind}: {}", difference.text), width));
-            text.push_str(&wrapped("    do: ", &difference.action, width));
+            text.push_str(&wrapped("    do: ", &output.hint(&difference.action), width));
         }
         text.push_str(&wrapped("  ", HINT, width));
         text

@@ -28,7 +28,7 @@ pub(super) fn text(inventory: &Inventory, verbose: bool, output: &Output) -> Str
         text.push_str(&details(inventory, paint));
     }
     for note in notes(inventory) {
-        text.push_str(&wrapped("  ! ", &note, output.width()));
+        text.push_str(&wrapped("  ! ", &output.hint(&note), output.width()));
     }
     text
 }
@@ -107,7 +107,7 @@ fn notes(inventory: &Inventory) -> Vec<String> {
     if !old.is_empty() {
         notes.push(format!(
             "error counters are not 0, which may be history: {}. Whether they grow tells `linesman \
-             diagnose`",
+             diagnose WHERE`",
             old.join("; ")
         ));
     }

@@ -26,7 +26,7 @@ use report::{ObjectReport, ReadReport};
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    place: Place,
+    pub(crate) place: Place,
     #[command(subcommand)]
     action: Action,
     /// JSON: schema linesman.sdo/1 or linesman.objects/1; linesman.refusal/1 when it is refused

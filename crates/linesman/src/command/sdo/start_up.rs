@@ -1,7 +1,6 @@
 //! A value that was written becomes a start-up command of a project (SW-13): the file is added to, not written
 //! anew, so that comments and order stay.
 
-use std::fs;
 use std::path::Path;
 
 use linesman_config::project::{Project, ProjectDevice, StartUpEntry};
@@ -68,12 +67,7 @@ pub(super) fn add(
             format!("{}: the command cannot be added behind device `{name}`", path.display());
         return Err(Failure::new(reason, "write [[device.start_up]] there by hand"));
     }
-    let passing = path.with_extension("new");
-    fs::write(&passing, added).and_then(|()| fs::rename(&passing, path)).map_err(|error| {
-        let _ = fs::remove_file(&passing);
-        let reason = format!("{}: writing the project: {error}", path.display());
-        Failure::new(reason, "check the rights of the directory and its free space")
-    })?;
+    files::replace(path, "the project", &added)?;
     Ok(name)
 }
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use linesman_config::inventory::Inventory;
-use linesman_diagnosis::{FrameSeen, HostObservation};
+use linesman_diagnosis::{Diagnosis, Engine, FrameSeen, HostObservation, InputKind, Setup};
 use linesman_link::clock::HostClock;
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_maindevice::{Event, MainDevice};
@@ -33,8 +33,17 @@ pub(super) struct Cards {
 pub(super) fn open(names: &[String]) -> Result<(Cards, Inventory), Failure> {
     driven::refuse(names)?;
     let stop = driven::stop()?;
-    let driver = Driver::open(names, HostClock::start())?;
-    let mut cards = Cards { driver, stop, asking: Asking::default(), name: names.join("+") };
+    let clock = HostClock::start();
+    let driver = Driver::open(names, clock)?;
+    let setup = Setup {
+        input: InputKind::ReadOut,
+        host_counters: true,
+        start: clock.started_at().rfc3339(),
+        clock: "host, monotonic".to_owned(),
+        ..Setup::default()
+    };
+    let asking = Asking::new(Engine::new(setup));
+    let mut cards = Cards { driver, stop, asking, name: names.join("+") };
     cards.asking.order = Some(Order::Scan);
     cards.run(SCAN_PATIENCE)?;
     let inventory = match cards.asking.scanned.take() {
@@ -80,6 +89,12 @@ impl Line for Cards {
         Ok(!self.stop.is_set())
     }
 
+    fn diagnosis(&mut self) -> Option<Diagnosis> {
+        let engine = &mut self.asking.engine;
+        engine.finish(self.driver.clock().now(), true);
+        Some(engine.diagnosis())
+    }
+
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
         self.asking.emergencies.drain(..).collect()
     }
@@ -91,8 +106,9 @@ enum Order {
 }
 
 /// Gives one command at a time and waits for its end.
-#[derive(Default)]
 struct Asking {
+    /// Judges all frames.
+    engine: Engine,
     order: Option<Order>,
     service: Option<(DeviceId, Service)>,
     ticket: Option<ServiceTicket>,
@@ -102,10 +118,29 @@ struct Asking {
     emergencies: VecDeque<(DeviceId, String)>,
 }
 
-impl Audience for Asking {
-    fn frame(&mut self, _: &FrameSeen<'_>) {}
+impl Asking {
+    fn new(engine: Engine) -> Self {
+        Self {
+            engine,
+            order: None,
+            service: None,
+            ticket: None,
+            done: false,
+            scanned: None,
+            served: None,
+            emergencies: VecDeque::new(),
+        }
+    }
+}
 
-    fn host(&mut self, _: &HostObservation) {}
+impl Audience for Asking {
+    fn frame(&mut self, frame: &FrameSeen<'_>) {
+        self.engine.handle_frame(frame);
+    }
+
+    fn host(&mut self, observation: &HostObservation) {
+        self.engine.handle_host(observation);
+    }
 
     fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
         if let Event::Scanned(inventory) = event {
@@ -122,6 +157,7 @@ impl Audience for Asking {
     }
 
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
+        self.engine.handle_timeout(now);
         match self.order.take() {
             // It looks, with nothing but reads, before it writes.
             Some(Order::Scan) => main.scan(now),
@@ -135,6 +171,6 @@ impl Audience for Asking {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        None
+        self.engine.poll_timeout()
     }
 }

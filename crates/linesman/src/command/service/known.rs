@@ -2,7 +2,7 @@
 
 use linesman_config::inventory::{FoundDevice, Inventory, label};
 use linesman_proto::address::DeviceId;
-use linesman_proto::sii::Identity;
+use linesman_proto::sii::{Direction, Identity};
 
 use super::DeviceReport;
 
@@ -23,12 +23,16 @@ pub(crate) struct Known {
     pub(crate) identity: Option<Identity>,
     /// Whether it may have a mailbox.
     pub(crate) mailbox: bool,
+    /// Whether OP needs somebody who sends it outputs in every cycle; a running MainDevice does.
+    pub(crate) needs_cycle: bool,
+    /// Whether it may have a mailbox in BOOT.
+    pub(crate) boot: bool,
 }
 
 impl Known {
-    /// `3 (EL3204)`, or `3 (B3)` where it has a name.
+    /// `Term 4 (EL3104)`, or `SubDevice 4 (EL3104)` where it has no name.
     pub(crate) fn label(&self) -> String {
-        label(self.id, self.name.as_deref().unwrap_or(&self.type_name))
+        label(self.id, self.name.as_deref().unwrap_or_default(), &self.type_name)
     }
 
     /// For a report.
@@ -52,6 +56,8 @@ pub(super) fn all(inventory: &Inventory, names: &[String]) -> Vec<Known> {
         type_name: found.profile.type_name.clone(),
         identity: found.identity,
         mailbox: found.profile.mailbox.is_some(),
+        needs_cycle: found.profile.process_len(Direction::Outputs) > 0,
+        boot: found.profile.mailbox.is_some_and(|mailbox| mailbox.bootstrap.is_some()),
     };
     inventory.devices.iter().map(known).collect()
 }

@@ -8,8 +8,9 @@ mod refusal;
 mod segment;
 mod socket;
 
-use linesman_config::inventory::{FoundDevice, Inventory};
+use linesman_config::inventory::{FoundDevice, Inventory, label};
 use linesman_config::plan::{DevicePlan, Plan, PlanOptions};
+use linesman_diagnosis::Diagnosis;
 use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer, ServiceFailure};
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::state::AlState;
@@ -17,10 +18,14 @@ use linesman_proto::time::Span;
 use linesman_runtime::selector::Selector;
 use serde::Serialize;
 
+use crate::command::driven;
 use crate::exit::Status;
 use crate::failure::Failure;
+use crate::hint;
 use crate::output::Output;
+use crate::version;
 
+pub(crate) use address::{Called, find};
 pub(crate) use known::Known;
 pub(crate) use refusal::{Refusal, Report as RefusalReport};
 pub(crate) use socket::{is_one as is_socket, silent};
@@ -32,7 +37,8 @@ pub(crate) struct Place {
     /// esi:FILE.xml#TYPE for a device as its maker describes it, without the device (DEVICE: offline)
     #[arg(value_name = "WHERE")]
     pub(crate) line: String,
-    /// The SubDevice: its number (3), station address (0x1003), alias (alias:7), or name
+    /// The SubDevice: its number (3), station address (0x1003), alias (alias:7), position (position:2),
+    /// type, or name, also as answers write it ("Term 4 (EL3104)")
     #[arg(value_name = "DEVICE")]
     pub(crate) device: String,
 }
@@ -47,6 +53,8 @@ pub(crate) trait Line {
     ) -> Result<Result<ServiceAnswer, NotDone>, Failure>;
     /// Lets time pass. `false` when the user ended it.
     fn wait(&mut self, span: Span) -> Result<bool, Failure>;
+    /// What is wrong with the line, by all frames since it was opened; `None` where they were not seen.
+    fn diagnosis(&mut self) -> Option<Diagnosis>;
     /// Emergencies that SubDevices sent meanwhile, in words.
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)>;
 }
@@ -156,10 +164,8 @@ impl Session {
                 let (line, inventory, names) = segment::open(path)?;
                 (Box::new(line), known::all(&inventory, &names), Kind::Passing, inventory)
             }
-            Selector::Listen(_) | Selector::Capture(_) | Selector::Observations(_) => {
-                let reason =
-                    format!("`{selector}`: a service sends frames, and nobody answers there");
-                return Err(Failure::new(reason, "name a network card, or sim:plant.toml"));
+            Selector::Listen(_) | Selector::File(_) => {
+                return Err(driven::not_drivable(place, &selector));
             }
         };
         Ok(Self { line, devices, place: place.to_owned(), kind, inventory: Some(inventory) })
@@ -175,9 +181,24 @@ impl Session {
         self.inventory.as_ref()
     }
 
+    /// What is wrong with the line, by all frames since it was opened; `None` of a line that another process
+    /// drives.
+    pub(crate) fn diagnosis(&mut self) -> Option<Diagnosis> {
+        let diagnosis = self.line.diagnosis()?;
+        Some(Diagnosis { tool: version::tool(), source: self.place.clone(), ..diagnosis })
+    }
+
     /// What the line was called.
     pub(crate) fn place(&self) -> &str {
         &self.place
+    }
+
+    /// The command that looks closer at the line.
+    pub(crate) fn look_closer(&self) -> String {
+        match self.kind {
+            Kind::Cards | Kind::Passing => format!("linesman diagnose {}", self.place),
+            Kind::Driven => format!("linesman online {}", self.place),
+        }
     }
 
     /// Lets time pass. `false` when the user ended it.
@@ -205,7 +226,8 @@ impl Session {
 
     /// The SubDevice that a word means.
     pub(crate) fn device(&self, word: &str) -> Result<DeviceId, Failure> {
-        address::find(&self.devices, &self.place, word)
+        let called: Vec<Called<'_>> = self.devices.iter().map(Called::from).collect();
+        find(&called, &self.place, word)
     }
 
     /// What is known of a SubDevice.
@@ -213,9 +235,9 @@ impl Session {
         self.devices.iter().find(|known| known.id == id)
     }
 
-    /// `3 (EL3204)`, or `3 (B3)` where it has a name.
+    /// `Term 4 (EL3104)`, or `SubDevice 4 (EL3104)` where it has no name.
     pub(crate) fn label(&self, id: DeviceId) -> String {
-        self.known(id).map_or_else(|| id.no().to_string(), Known::label)
+        self.known(id).map_or_else(|| label(id, "", ""), Known::label)
     }
 
     /// A SubDevice for a report.
@@ -226,18 +248,32 @@ impl Session {
 
     /// Does one service.
     pub(crate) fn ask(&mut self, id: DeviceId, service: Service) -> Result<ServiceAnswer, Trouble> {
-        match self.line.ask(id, service)? {
-            Ok(answer) => Ok(answer),
-            Err(NotDone { told, refusal: Some(refusal) }) => {
-                let (device, label) = (self.report(id), self.label(id));
-                Err(Trouble::Refused(Box::new(Refusal::new(device, &label, refusal, told))))
+        self.attempt(id, service)?
+    }
+
+    /// Does one service. The outer error is about the line: nobody else can be asked there either.
+    pub(crate) fn attempt(
+        &mut self,
+        id: DeviceId,
+        service: Service,
+    ) -> Result<Result<ServiceAnswer, Trouble>, Failure> {
+        let NotDone { mut told, refusal } = match self.line.ask(id, service)? {
+            Ok(answer) => return Ok(Ok(answer)),
+            Err(not_done) => not_done,
+        };
+        told.next_step = hint::complete(&told.next_step, &self.place);
+        let label = self.label(id);
+        Ok(Err(match refusal {
+            Some(refusal) => {
+                let device = self.report(id);
+                Trouble::Refused(Box::new(Refusal::new(device, &label, refusal, told)))
             }
-            Err(NotDone { told, refusal: None }) => {
-                let reason = refusal::named(id, &self.label(id), &told.reason);
+            None => {
+                let reason = refusal::named(id, &label, &told.reason);
                 let reason = format!("{}: {reason}", self.place);
-                Err(Trouble::Failed(Failure { reason, ..told }))
+                Trouble::Failed(Failure { reason, ..told })
             }
-        }
+        }))
     }
 
     /// Does a service that gives bytes.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use linesman_config::inventory::Inventory;
+use linesman_diagnosis::Diagnosis;
 use linesman_lab::lab::Lab;
 use linesman_lab::options::{Begin, LabOptions};
 use linesman_maindevice::Event;
@@ -64,7 +65,8 @@ fn toml_string(word: &str) -> String {
 }
 
 fn serve(file: &SegmentFile, path: &Path) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
-    let options = LabOptions { begin: Begin::Idle, ..LabOptions::default() };
+    let options =
+        LabOptions { begin: Begin::Idle, project: false, probes: false, ..LabOptions::default() };
     let lab = Lab::new(file, options).map_err(|error| files::in_file(path, &error))?;
     let mut segment = Virtual { lab, path: path.to_owned(), seen: 0, told: 0 };
     let now = segment.lab.now();
@@ -147,6 +149,11 @@ impl Line for Virtual {
         let run = self.lab.run_while(span, STEP, |_| false);
         run.map_err(|error| files::in_file(&self.path, &error))?;
         Ok(true)
+    }
+
+    fn diagnosis(&mut self) -> Option<Diagnosis> {
+        self.lab.finish();
+        Some(self.lab.diagnosis())
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {

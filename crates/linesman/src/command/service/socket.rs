@@ -3,6 +3,7 @@
 use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
 
+use linesman_diagnosis::Diagnosis;
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
 use linesman_proto::sii::Identity;
@@ -57,6 +58,8 @@ pub(super) fn open(place: &str) -> Result<(Driven, Vec<Known>), Failure> {
                 serial_number: one.serial,
             }),
             mailbox: true,
+            needs_cycle: false,
+            boot: true,
         }
     };
     Ok((Driven { path }, run.devices.iter().map(known).collect()))
@@ -80,6 +83,11 @@ impl Line for Driven {
         Ok(true)
     }
 
+    fn diagnosis(&mut self) -> Option<Diagnosis> {
+        // Its frames are seen by the other process alone.
+        None
+    }
+
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
         // The run tells them itself.
         Vec::new()
@@ -89,6 +97,9 @@ impl Line for Driven {
 pub(crate) fn silent(path: &Path, error: &std::io::Error) -> Failure {
     Failure::new(
         format!("{}: asking the MainDevice behind this socket: {error}", path.display()),
-        "is it still running? `linesman run ... --control SOCKET` opens one",
+        format!(
+            "is it still running? `linesman run --on NIC --control {}` opens one",
+            path.display()
+        ),
     )
 }

@@ -26,7 +26,7 @@ const LARGEST: u64 = 512 << 10;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    place: Place,
+    pub(crate) place: Place,
     #[command(subcommand)]
     action: Action,
     /// JSON, schema linesman.sii/1
@@ -128,7 +128,10 @@ fn image(path: &Path) -> Result<Vec<u8>, Failure> {
             path.display(),
             bytes.len()
         );
-        return Err(Failure::new(reason, "name a file that `linesman sii … read --save` wrote"));
+        return Err(Failure::new(
+            reason,
+            "name a file that `linesman sii WHERE DEVICE read --save FILE` wrote",
+        ));
     }
     Ok(bytes)
 }
@@ -275,9 +278,11 @@ fn set_alias(
     let (there, backup) = back_up(session, id, 0, backup)?;
     let Some(guarded) = there.first_chunk::<14>() else {
         let reason = format!("the EEPROM of {} ends within its first words", session.label(id));
-        return Err(
-            Failure::new(reason, "write a whole image first: `linesman sii … write`").into()
-        );
+        return Err(Failure::new(
+            reason,
+            "write a whole image first: `linesman sii WHERE DEVICE write FILE`",
+        )
+        .into());
     };
     let mut guarded = *guarded;
     guarded[STATION_ALIAS.byte()..STATION_ALIAS.byte() + 2].copy_from_slice(&alias.to_le_bytes());

@@ -4,6 +4,8 @@
 //! (u32), flags (u16), text (u16), time (u64, ns), then parameters. The text is the number of a
 //! pattern in the device description, into which the parameters go.
 
+pub mod text_number;
+
 use super::data_type::DataType;
 use crate::mailbox::header::BufferTooSmall;
 
@@ -126,6 +128,51 @@ impl<'a> DiagnosisMessage<'a> {
             rest = behind;
             Some(parameter)
         })
+    }
+}
+
+/// The range that the code of a message belongs to, by its low word.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum CodeRange {
+    /// 0x0000 to 0xDFFF: not used.
+    Unused,
+    /// 0xE000 to 0xE7FF: the manufacturer's; the high word is often a product.
+    Manufacturer,
+    /// 0xE800: the high word is the code of an emergency.
+    Emergency,
+    /// 0xE801 to 0xEDFF: reserved for standards.
+    Reserved,
+    /// 0xEE00 to 0xEFFF: of the profile of the device.
+    Profile,
+    /// 0xF000 to 0xFFFF: not assigned.
+    Unassigned,
+}
+
+impl CodeRange {
+    /// The range of this code.
+    #[must_use]
+    pub const fn of(code: u32) -> Self {
+        match code as u16 {
+            0x0000..=0xDFFF => Self::Unused,
+            0xE000..=0xE7FF => Self::Manufacturer,
+            0xE800 => Self::Emergency,
+            0xE801..=0xEDFF => Self::Reserved,
+            0xEE00..=0xEFFF => Self::Profile,
+            0xF000..=0xFFFF => Self::Unassigned,
+        }
+    }
+
+    /// Its name, for people.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unused => "a range that is not used",
+            Self::Manufacturer => "of the manufacturer",
+            Self::Emergency => "of an emergency",
+            Self::Reserved => "reserved for standards",
+            Self::Profile => "of the profile of the device",
+            Self::Unassigned => "a range that is not assigned",
+        }
     }
 }
 

@@ -3,6 +3,8 @@
 //! Reference: ETG.1000.6, Emergency; the classes of codes are those of CiA 301. Code (u16), error
 //! register (u8), five bytes of the vendor.
 
+pub mod code;
+
 use std::fmt;
 
 use super::message::CoeError;

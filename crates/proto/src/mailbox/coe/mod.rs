@@ -11,6 +11,7 @@ pub mod information;
 pub mod message;
 pub mod object;
 pub mod sdo;
+pub mod standard_object;
 pub mod sync_types;
 
 pub use data_type::DataType;

@@ -41,6 +41,10 @@ impl ObjectIndex {
     pub const OUTPUT_SYNC: Self = Self(0x1C32);
     /// Synchronisation of inputs.
     pub const INPUT_SYNC: Self = Self(0x1C33);
+    /// Drives: code of the last error, as in an emergency.
+    pub const ERROR_CODE: Self = Self(0x603F);
+    /// Drives: statusword.
+    pub const STATUSWORD: Self = Self(0x6041);
     /// Modular devices: idents of the modules that are configured.
     pub const CONFIGURED_MODULES: Self = Self(0xF030);
     /// Modular devices: idents of the modules that are there.

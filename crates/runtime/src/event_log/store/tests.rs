@@ -9,6 +9,7 @@ fn entry(run: i64, s: i64, severity: Severity, kind: EntryKind, no: u32) -> Stor
         device_no: Some(no),
         device_name: Some(format!("Term {no}")),
         text: format!("'Term {no} (EL1008)' Something at {s}"),
+        finding: None,
     }
 }
 
@@ -92,4 +93,35 @@ fn one_writes_while_another_reads() {
     log.append(&[entry(run, 1, Severity::Info, EntryKind::State, 1)]).unwrap();
     assert_eq!(reader.count().unwrap(), 1);
     assert_eq!(reader.runs().unwrap()[0].ended, None);
+}
+
+#[test]
+fn a_log_without_findings_is_read_and_takes_findings_when_it_is_written_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.sqlite");
+    // As the first version wrote it.
+    let old = Connection::open(&path).unwrap();
+    old.execute_batch(&TABLES.replace("NOT NULL,\n        finding TEXT", "NOT NULL")).unwrap();
+    old.pragma_update(None, "application_id", APPLICATION).unwrap();
+    old.pragma_update(None, "user_version", WITHOUT_FINDINGS).unwrap();
+    let values = "INSERT INTO run VALUES (1, 0, NULL, 'eth0', '', 'linesman');
+        INSERT INTO entry VALUES (1, 1, 5, 0, 'state', 1, NULL, 'old');";
+    old.execute_batch(values).unwrap();
+    drop(old);
+    let read = || EventLog::open(&path).unwrap().entries(&Filter::default()).unwrap();
+    assert_eq!((read().len(), read()[0].text.as_str()), (1, "old"));
+    let finding = LoggedFinding {
+        id: "F1".to_owned(),
+        event: "opened".to_owned(),
+        code: "H300".to_owned(),
+        name: "link-open".to_owned(),
+        place: "link".to_owned(),
+        cause: "cable-broken".to_owned(),
+        follows_from: None,
+    };
+    let mut new = entry(1, 1, Severity::Error, EntryKind::Finding, 1);
+    new.finding = Some(finding.clone());
+    EventLog::create(&path).unwrap().append(&[new]).unwrap();
+    assert_eq!(read().len(), 2);
+    assert_eq!((read()[0].finding.clone(), read()[1].finding.clone()), (None, Some(finding)));
 }

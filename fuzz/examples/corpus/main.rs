@@ -19,6 +19,10 @@ use linesman_proto::sii::{
     SyncManager,
 };
 
+mod texts;
+
+use texts::{observation_files, pasted_texts};
+
 type Made = Vec<(&'static str, Vec<u8>)>;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -29,6 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("diagnosis", series(&frames)),
         ("segment_file", segment_files()),
         ("observation_file", observation_files()),
+        ("pasted", pasted_texts()),
         ("frame", frames),
         ("device_builder", [images()?, descriptions()].concat()),
         ("esi", descriptions()),
@@ -354,18 +359,6 @@ fn segment_files() -> Made {
         ("tree.toml", text(&["old_counters = true\n", coupler, tree])),
         ("unknown-key.toml", text(&[coupler, "colour = \"red\"\n"])),
     ]
-}
-
-fn observation_files() -> Made {
-    let counters = "[[device]]\nno = 1\nname = \"K1\"\non = \"maindevice\"\nstate = \"OP\"\n\
-        ports.A = { link = true, open = true, rx = \"0x0000\" }\n\
-        ports.B = { link = true, open = true, frame = 0, physical = 0 }\n\
-        [[device]]\nno = 2\nname = \"T2\"\non = \"K1.B\"\nstate = \"OP\"\n\
-        ports.A = { link = true, open = true, rx = \"0x0412\", forwarded = 3, lost_link = 1 }\n";
-    let refused = "[[device]]\nno = 1\nname = \"K1\"\non = \"maindevice\"\n\
-        state = \"ERR PREOP\"\nal_code = 0x001E\n";
-    let text = |text: &str| text.as_bytes().to_vec();
-    vec![("counters.toml", text(counters)), ("refused.toml", text(refused))]
 }
 
 /// Device descriptions: with and without mailbox, modular, odd.

@@ -1,0 +1,55 @@
+//! Presence of the SubDevices as evidence: how many there are, and whether all of them answer.
+
+use super::{Assessment, Basis, Extent, Gap, Reason, Subject};
+use crate::finding::Place;
+use crate::line::{Device, Line};
+
+/// Assesses who is there.
+pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
+    let line = basis.line;
+    let traffic = &line.traffic;
+    let mut all = Assessment::judged(Subject::Presence);
+    let is_counted = traffic.broadcast_answers > 0 || traffic.positions_seen > 0;
+    if line.device_count() == 0 {
+        let text = "no SubDevice was seen to answer";
+        let gap = Gap::new(Reason::NumberUnknown, text).essential().step(basis.look_longer());
+        all.lacks(Extent::NotJudged, gap);
+    } else if !is_counted && !line.tree_is_planned {
+        let text = format!(
+            "{} SubDevices answered; how many there should be was not seen",
+            line.device_count()
+        );
+        // Who asks each of them for its state asks all that it knows.
+        let gap = Gap::new(Reason::NumberUnknown, text)
+            .essential_if(!basis.states_read && !basis.expectations_known)
+            .step("name the project, `--project machine.toml` or an ENI, or record from the start of the MainDevice");
+        all.lacks(Extent::InPart, gap);
+    }
+    let silent: Vec<&Device> = line.devices.iter().filter(|one| is_missed(line, one)).collect();
+    if !silent.is_empty() {
+        let places = silent.iter().map(|one| Place::device(line.network, one.id)).collect();
+        let labels: Vec<String> = silent.iter().map(|one| line.label(one.id)).collect();
+        let text = format!("no answer from {}", labels.join(", "));
+        let gap = Gap::new(Reason::NoAnswer, text)
+            .essential()
+            .at(places)
+            .step("look at these SubDevices: supply, lamps, the cable before the first of them");
+        all.lacks(Extent::InPart, gap);
+    }
+    let now = traffic.broadcast_now.map_or(traffic.broadcast_answers, |now| now.value);
+    if now < traffic.broadcast_answers {
+        let text = format!(
+            "{now} SubDevices answered the last broadcast, {} an earlier one",
+            traffic.broadcast_answers
+        );
+        let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
+        all.lacks(Extent::InPart, gap);
+    }
+    all
+}
+
+/// Whether a SubDevice was asked in vain, or is planned and nothing was seen of it.
+fn is_missed(line: &Line, device: &Device) -> bool {
+    let is_unseen = device.answered.is_none() && line.device_count() < line.devices.len();
+    device.silent.is_some() || is_unseen
+}

@@ -1,0 +1,78 @@
+//! Working counters as evidence: whether it is known which one belongs to each cyclic datagram.
+
+use super::{Assessment, Basis, Extent, Gap, Reason, Subject};
+use crate::line::{Cyclic, Line};
+
+/// A datagram that came back less often is not yet cyclic.
+const FEW: u64 = 10;
+/// Datagrams that are named one by one.
+const NAMED: usize = 3;
+
+/// Whether process data are exchanged, and the working counter that belongs to each datagram is known.
+pub(super) fn all_known(line: &Line) -> bool {
+    !line.cyclic.is_empty() && line.cyclic.iter().all(|cyclic| is_known(line, cyclic))
+}
+
+/// Whether it was seen how a datagram came to its working counter: FMMUs that were set up for it, or a working
+/// counter that rose while SubDevices came to SAFEOP and OP.
+fn is_known(line: &Line, cyclic: &Cyclic) -> bool {
+    let has_risen = cyclic.highest.value > cyclic.first.value;
+    cyclic.highest.value > 0 && (has_risen || line.owners(cyclic).next().is_some())
+}
+
+/// Assesses what is known of the working counters.
+pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
+    let line = basis.line;
+    let mut all = Assessment::judged(Subject::ProcessData);
+    let cyclic = || line.cyclic.iter().filter(|cyclic| cyclic.count >= FEW);
+    if cyclic().next().is_none() {
+        let text = "no process data were exchanged";
+        all.lacks(Extent::NotJudged, Gap::new(Reason::NoProcessData, text));
+        return all;
+    }
+    let unanswered: Vec<&Cyclic> = cyclic().filter(|one| one.highest.value == 0).collect();
+    if !unanswered.is_empty() {
+        let text = format!("no SubDevice answered {}", names(&unanswered));
+        let gap = Gap::new(Reason::NoAnswer, text).essential().step(step());
+        all.lacks(Extent::NotJudged, gap);
+    }
+    let unseen: Vec<&Cyclic> =
+        cyclic().filter(|one| one.may_be_ordered.is_some_and(|at| at.at >= one.first.at)).collect();
+    if !unseen.is_empty() {
+        let text = format!(
+            "the working counter of {} fell when an order to leave OP may have been missed",
+            names(&unseen)
+        );
+        let gap = Gap::new(Reason::NoBringUp, text).essential().step(step());
+        all.lacks(Extent::InPart, gap);
+    }
+    let is_unknown = |one: &&Cyclic| one.highest.value > 0 && !is_known(line, one);
+    let unknown: Vec<&Cyclic> = cyclic().filter(is_unknown).collect();
+    if !unknown.is_empty() {
+        let text = format!(
+            "the working counter that belongs to {} is not known; it was the same all the time",
+            names(&unknown)
+        );
+        let gap = Gap::new(Reason::ExpectedWorkingCounterUnknown, text)
+            .essential_if(!basis.states_read)
+            .step(step());
+        all.lacks(Extent::InPart, gap);
+    }
+    all
+}
+
+fn step() -> &'static str {
+    "name the ENI of the MainDevice, `--project FILE.xml`, or record from its start"
+}
+
+/// `LRW at 0x00010000, 7 bytes (working counter 4)`.
+fn names(all: &[&Cyclic]) -> String {
+    let name = |one: &&Cyclic| {
+        format!("{} at {}, {} bytes (now {})", one.command, one.start, one.len, one.wkc.value)
+    };
+    let mut words: Vec<String> = all.iter().take(NAMED).map(name).collect();
+    if let Some(more) = all.len().checked_sub(NAMED).filter(|more| *more > 0) {
+        words.push(format!("{more} more"));
+    }
+    words.join(", ")
+}

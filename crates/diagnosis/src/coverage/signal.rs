@@ -1,0 +1,212 @@
+//! Signal quality and link status as evidence: registers of both ends of each link.
+
+use linesman_proto::address::DeviceId;
+use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::topology::route::Direction;
+use linesman_proto::topology::{End, Hop};
+
+use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
+use crate::finding::{LinkDirection, Place};
+use crate::line::{CounterTrack, Device, Line};
+use crate::locate::Survey;
+
+/// So many frames that came back, with none lost, show that a link whose counter is full spoils no frames.
+const MANY_FRAMES: u64 = 2_000;
+
+/// How well one port of a controller told of errors.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Told {
+    /// Every error would have been seen.
+    All,
+    /// Errors of which nobody knows when they were.
+    Once,
+    /// None: its counter is at its end.
+    Full,
+    /// Nothing: it was not read.
+    Unread,
+}
+
+/// Whether every port that checks frames told of errors.
+pub(super) fn all_tell(line: &Line) -> bool {
+    let Some(survey) = Survey::of(line, true) else { return false };
+    let mut ends = survey.routes().iter().flat_map(|route| route.hops()).map(|hop| hop.to);
+    ends.all(|end| match end {
+        End::Controller(node, port) => {
+            line.devices.get(node).is_some_and(|device| port_tells(device, port) == Told::All)
+        }
+        End::MainDevice(_) => true,
+    })
+}
+
+/// Error counters, link by link and direction by direction.
+pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
+    let line = basis.line;
+    let traffic = &line.traffic;
+    let mut all = Assessment::judged(Subject::SignalQuality);
+    // Frames that are spoiled are lost; enough that came back make up for counters that nobody read.
+    let frames_tell = traffic.lost.sum == 0 && traffic.damaged.sum == 0;
+    let is_shown_by_frames = basis.has_frames && frames_tell;
+    let Some(survey) = Survey::of(line, true) else {
+        let is_unread = line.devices.iter().all(|device| !device.counters.is_known());
+        let (reason, text) = if is_unread {
+            (Reason::CountersNotRead, "nobody read the error counters")
+        } else {
+            (Reason::WiringUnknown, "the wiring is not known, so no link can be told from another")
+        };
+        let gap =
+            Gap::new(reason, text).essential_if(!is_shown_by_frames).step(basis.read_counters());
+        all.lacks(Extent::NotJudged, gap);
+        return all;
+    };
+    let mut told: Vec<(Told, Place)> = Vec::new();
+    let mut last_hops = Vec::new();
+    for hop in survey.routes().iter().flat_map(|route| route.hops()) {
+        match hop.to {
+            End::Controller(node, port) => {
+                let device = line.devices.get(node);
+                told.push((
+                    device.map_or(Told::Unread, |one| port_tells(one, port)),
+                    place(&survey, hop),
+                ));
+            }
+            End::MainDevice(_) => last_hops.push(place(&survey, hop)),
+        }
+    }
+    let at = |wanted: Told| -> Vec<Place> {
+        let found = told.iter().filter(|(one, _)| *one == wanted);
+        found.map(|(_, place)| *place).collect()
+    };
+    let (full, once, unread) = (at(Told::Full), at(Told::Once), at(Told::Unread));
+    if unread.len() == told.len() {
+        let gap = Gap::new(Reason::CountersNotRead, "nobody read the error counters")
+            .essential_if(!is_shown_by_frames)
+            .step(basis.read_counters());
+        all.lacks(Extent::NotJudged, gap);
+    } else if !unread.is_empty() {
+        let text = format!("the error counters of {} were not read", ways(unread.len()));
+        let gap = Gap::new(Reason::CountersNotRead, text)
+            .essential_if(!is_shown_by_frames)
+            .at(unread)
+            .step(basis.read_counters());
+        all.lacks(Extent::InPart, gap);
+    }
+    if !full.is_empty() {
+        let text = format!(
+            "the error counter of {} stands at its end, 255, and counts no more",
+            ways(full.len())
+        );
+        let gap = Gap::new(Reason::CounterFull, text)
+            .essential_if(!frames_tell || traffic.returned < MANY_FRAMES)
+            .at(full)
+            .step("clear them and watch: `linesman counters WHERE --clear --for 60`");
+        all.lacks(Extent::InPart, gap);
+    }
+    if !once.is_empty() {
+        let text = format!(
+            "the error counters of {} were read once: what they hold may be old",
+            ways(once.len())
+        );
+        let gap = Gap::new(Reason::CountersReadOnce, text)
+            .essential_if(!is_shown_by_frames)
+            .at(once)
+            .step(basis.read_counters());
+        all.lacks(Extent::InPart, gap);
+    }
+    if !line.host.is_watched && !last_hops.is_empty() {
+        let text = "errors on the last way, from the first SubDevice to the card, are counted by the card alone; its \
+                    counters are not known";
+        let gap = Gap::new(Reason::HostCountersMissing, text).at(last_hops).step(host_step(basis));
+        all.lacks(Extent::InPart, gap);
+    }
+    all
+}
+
+/// DL status and lost-link counters, link by link.
+pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
+    let line = basis.line;
+    let mut all = Assessment::judged(Subject::LinkStatus);
+    let unread: Vec<&Device> = line.devices.iter().filter(|one| !tells_links(one)).collect();
+    if unread.is_empty() && !line.devices.is_empty() {
+        return all;
+    }
+    let is_none_read = unread.len() == line.devices.len();
+    let (extent, text) = if is_none_read {
+        (
+            Extent::NotJudged,
+            "nobody read link status (0x0110) or the counters of lost links".to_owned(),
+        )
+    } else {
+        let text = format!("the link status of {} SubDevices was not read", unread.len());
+        (Extent::InPart, text)
+    };
+    let places = unread.iter().map(|one| Place::device(line.network, one.id));
+    let places = if is_none_read { Vec::new() } else { places.collect() };
+    let step = match basis.input {
+        InputKind::Typed => "give `ports.A = { link = …, lost_link = … }` of each SubDevice",
+        InputKind::Driven | InputKind::ReadOut => "read it: `linesman counters WHERE --for 60`",
+        InputKind::Listened | InputKind::Recorded => {
+            "read DL status (0x0110) and 0x0310 to 0x0313 with the MainDevice's own tool"
+        }
+    };
+    all.lacks(extent, Gap::new(Reason::LinkStatusNotRead, text).at(places).step(step));
+    all
+}
+
+/// The next step that gets the counters of the card.
+pub(super) fn host_step(basis: &Basis<'_>) -> &'static str {
+    match basis.input {
+        InputKind::Driven | InputKind::ReadOut => {
+            "use a card whose driver counts errors: `linesman interfaces`"
+        }
+        InputKind::Listened | InputKind::Recorded => {
+            "read them on the MainDevice's computer: `ethtool -S CARD`"
+        }
+        InputKind::Typed => "give `[maindevice]` with `crc = …`",
+    }
+}
+
+fn port_tells(device: &Device, port: Port) -> Told {
+    let frames = device.counters.track(ErrorCounter::InvalidFrame(port));
+    let symbols = device.counters.track(ErrorCounter::PhysicalLayer(port));
+    let Some(frames) = frames else { return Told::Unread };
+    let tracks = || [Some(frames), symbols].into_iter().flatten();
+    if tracks().any(|track| track.is_at_end()) {
+        return Told::Full;
+    }
+    if tracks().any(is_read_once) { Told::Once } else { Told::All }
+}
+
+/// Whether nobody knows when a counter counted what it holds, or whether it went on.
+fn is_read_once(track: &CounterTrack) -> bool {
+    if track.may_be_old {
+        return track.last.value > 0;
+    }
+    track.first.at == track.last.at
+}
+
+fn tells_links(device: &Device) -> bool {
+    let is_watched = |port: Port| {
+        let track = device.counters.track(ErrorCounter::LostLink(port));
+        track.is_some_and(|track| track.first.at < track.last.at)
+    };
+    device.dl.latest_reading.is_some() || Port::ALL.into_iter().any(is_watched)
+}
+
+fn place(survey: &Survey<'_>, hop: &Hop) -> Place {
+    let line: &Line = survey.line();
+    let direction = match hop.direction {
+        Direction::Downstream => LinkDirection::AToB,
+        Direction::Upstream => LinkDirection::BToA,
+    };
+    let link = survey.tree().links()[hop.link].map(|node| DeviceId(node as u32));
+    Place::link(line.network, link, Some(direction))
+}
+
+/// `1 direction of a link`, `3 directions of links`.
+fn ways(count: usize) -> String {
+    match count {
+        1 => "1 direction of a link".to_owned(),
+        count => format!("{count} directions of links"),
+    }
+}

@@ -1,0 +1,91 @@
+//! Frames as evidence: lost frames, and the times at which frames leave and come back.
+
+use linesman_proto::time::Span;
+
+use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
+
+/// With fewer frames that came back nothing can be said of a line.
+const FEW_FRAMES: u64 = 50;
+/// From this share of returned frames on, in percent, frames that were cut off leave the rest unjudged.
+const CUT_PERCENT: u64 = 1;
+/// Two interfaces' clocks differ by less.
+const CLOCK_NOISE: Span = Span::ms(1);
+/// A line that works is never quiet for so long.
+const LONG_GAP: Span = Span::s(1);
+
+/// Lost frames.
+pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
+    let traffic = &basis.line.traffic;
+    let mut all = Assessment::judged(Subject::Frames);
+    if !basis.has_frames && basis.line.reported.lost.is_none() {
+        let shows_elsewhere = !basis.line.cyclic.is_empty() || basis.counters_tell;
+        let text = "the number of frames that the MainDevice lost was not given";
+        let gap = Gap::new(Reason::NotGiven, text).essential_if(!shows_elsewhere).step(
+            "give what the MainDevice counted, `[maindevice]` with `lost = …`, or its working counters",
+        );
+        all.lacks(Extent::NotJudged, gap);
+        return all;
+    }
+    if traffic.is_one_sided() {
+        let text = "frames of one direction only: lost frames cannot be told from answers";
+        let gap = Gap::new(Reason::OneDirection, text).essential().step(
+            "record both directions: on the MainDevice's own card, or with a tap that passes both",
+        );
+        all.lacks(Extent::NotJudged, gap);
+    }
+    // What a person typed was counted over a time of its own.
+    let is_few = basis.input != InputKind::Typed && traffic.returned < FEW_FRAMES;
+    if is_few {
+        let text = format!("{} frames came back: too few to judge a line by", traffic.returned);
+        let gap = Gap::new(Reason::TooFewFrames, text).essential().step(basis.look_longer());
+        all.lacks(Extent::InPart, gap);
+    }
+    if traffic.datagrams_cut > 0 {
+        let text = format!(
+            "{} of {} frames were recorded without their end: working counters and data behind it are missing",
+            traffic.datagrams_cut, traffic.frames
+        );
+        let is_much = traffic.datagrams_cut * 100 >= traffic.frames * CUT_PERCENT;
+        let gap = Gap::new(Reason::FramesCut, text)
+            .essential_if(is_much)
+            .step("record whole frames: `tcpdump -s 0`, no snap length");
+        all.lacks(Extent::InPart, gap);
+    }
+    let lost = traffic.lost.sum;
+    if lost > 0 {
+        let text = format!("{lost} frames did not come back, and nothing tells where they went");
+        let gap = Gap::new(Reason::FramesLost, text).essential_if(lost > 1).step(
+            "read the counters of the MainDevice's card (`ethtool -S`) and the error counters of the SubDevices",
+        );
+        all.lacks(Extent::InPart, gap);
+    }
+    all
+}
+
+/// Times.
+pub(super) fn timing(basis: &Basis<'_>) -> Assessment {
+    let traffic = &basis.line.traffic;
+    let mut all = Assessment::judged(Subject::Timing);
+    if !basis.has_frames {
+        let text = "no frame was seen, so nothing is known of their times";
+        all.lacks(Extent::NotJudged, Gap::new(Reason::NoFrames, text));
+        return all;
+    }
+    let has_cycle = basis.line.cyclic.iter().any(|cyclic| cyclic.sent.cycle().is_some());
+    if !has_cycle {
+        let text = "no process data were seen in a cycle";
+        all.lacks(Extent::NotJudged, Gap::new(Reason::NoProcessData, text));
+    }
+    if traffic.clock_back > CLOCK_NOISE {
+        let text =
+            format!("the clock of the recording runs backwards, by {} at most", traffic.clock_back);
+        let gap = Gap::new(Reason::ClockJumpsBack, text)
+            .step("record with one clock, and do not join recordings");
+        all.lacks(Extent::InPart, gap);
+    }
+    if traffic.longest_gap >= LONG_GAP {
+        let text = format!("no frame was seen for {} in between", traffic.longest_gap);
+        all.lacks(Extent::InPart, Gap::new(Reason::LongGap, text));
+    }
+    all
+}

@@ -1,0 +1,70 @@
+//! Process data: logical datagrams and the working counters that they come back with.
+
+use linesman_proto::time::Span;
+
+use super::Answer;
+use crate::line::{Cyclic, Device, Line, Ordered, Owner, Seen, owners};
+
+/// A working counter that falls so soon after the first frame may have been ordered to before.
+const JUST_BEGUN: Span = Span::ms(200);
+/// Most logical datagrams that are followed.
+const MOST_CYCLIC: usize = 256;
+
+/// A datagram to whoever has an FMMU there. Says whether an answer was expected.
+pub(super) fn returned(line: &mut Line, latest: &mut usize, answer: &Answer<'_>) -> bool {
+    if !answer.is_last {
+        return true;
+    }
+    let (start, len) = (answer.reply.logical(), answer.reply.data_len() as u16);
+    let is_it = |cyclic: &Cyclic| {
+        cyclic.start == start && cyclic.len == len && cyclic.command == answer.command
+    };
+    let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
+    // They come in the same order each cycle.
+    let guess = (*latest + 1) % line.cyclic.len().max(1);
+    let found = if line.cyclic.get(guess).is_some_and(is_it) {
+        Some(guess)
+    } else {
+        line.cyclic.iter().position(is_it)
+    };
+    let Some(index) = found else {
+        if line.cyclic.len() < MOST_CYCLIC {
+            *latest = line.cyclic.len();
+            line.cyclic.push(Cyclic::new(answer.command, start, len, seen));
+            line.touch();
+        }
+        return false;
+    };
+    *latest = index;
+    let devices = &line.devices;
+    let cyclic = &mut line.cyclic[index];
+    let cyclic_before = cyclic.returned.last();
+    let (traffic, sees_all) = (&line.traffic, line.sees_all_orders);
+    let highest = cyclic.highest.value;
+    let ordered = || {
+        let lower = |device: &Device| device.al.is_asked_down();
+        let owners: Vec<Owner> = owners(devices, start, len).collect();
+        let share = |owner: &Owner| answer.command.increment(owner.reads, owner.writes);
+        let are_all = owners.iter().map(share).sum::<u16>() >= highest;
+        let is_lower = |owner: &Owner| devices.get(owner.device.index()).is_some_and(lower);
+        // Whose FMMUs were set before the input began is an owner, too.
+        if owners.iter().any(is_lower) || (!are_all && devices.iter().any(lower)) {
+            return Ordered::Yes;
+        }
+        let since = traffic.first.unwrap_or(answer.at);
+        let is_early = !are_all && answer.at.since(since) < JUST_BEGUN;
+        let was_before = cyclic_before.unwrap_or(answer.at);
+        if !sees_all && (is_early || traffic.may_lack(was_before, answer.at)) {
+            Ordered::Unseen
+        } else {
+            Ordered::No
+        }
+    };
+    let news = cyclic.record(seen, ordered);
+    let is_expected = cyclic.highest.value > 0;
+    let sent_off = answer.sent_at.is_some_and(|at| cyclic.sent.tick(at));
+    if news | sent_off | cyclic.returned.tick(answer.at) {
+        line.touch();
+    }
+    is_expected
+}

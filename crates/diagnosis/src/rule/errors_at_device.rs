@@ -1,0 +1,90 @@
+//! # Errors at a SubDevice, of all its ports together
+//!
+//! A tool counts damaged frames of a SubDevice and does not say at which of its ports.
+//!
+//! **How it is found.** An observation file or a pasted list has one total of a SubDevice (`crc` outside of
+//! `ports`), and it rose, or is not 0. A frame that is damaged once is counted by the SubDevices behind, too, so
+//! the first of them in the order of the frames is nearest to the damage.
+//!
+//! **What it means.** One of the links of the named SubDevice damages frames, or one shortly before it. A total
+//! that nobody read before may be old: links that come up while the power is switched on count some errors.
+//!
+//! **What to do.** Read the counters of each port (0x0300 to 0x0307): they name the link and its direction. Clear
+//! the totals, wait, and look which of them rise.
+
+use linesman_config::fault::{Class, FaultName};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity};
+use crate::line::{Device, ErrorSum};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "H115",
+    name: "errors-at-device",
+    severity: Severity::Warning,
+    class: Class::Hardware,
+    source: include_str!("errors_at_device.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// So few errors of an unknown time are those of a start.
+const FEW: u64 = 3;
+/// So many SubDevices are named.
+const NAMED: usize = 6;
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    let order: Vec<usize> = match &line.tree {
+        Some(tree) => tree.order().to_vec(),
+        None => (0..line.devices.len()).collect(),
+    };
+    let risen = order.iter().filter_map(|node| line.devices.get(*node)).filter_map(|device| {
+        // Counters of ports say more.
+        let sum = device.error_sum.filter(|sum| sum.rise > 0 && !device.counters.is_known())?;
+        Some((device, sum))
+    });
+    let risen: Vec<(&Device, ErrorSum)> = risen.collect();
+    let Some((first, sum)) = risen.first() else { return };
+    let since = risen.iter().filter_map(|(_, sum)| sum.first_rise).min().unwrap_or(view.now);
+    let place = Place::device(line.network, first.id);
+    let mut condition = Condition::new(&PAGE, place, FaultName::CableDegraded, since)
+        .confidence(0.35)
+        .or(FaultName::EmcNoise, 0.25)
+        .or(FaultName::ReceiverDamaged, 0.1)
+        .or(FaultName::DeviceInternal, 0.1)
+        .confirmed(since)
+        .advise(format!(
+            "Read the error counters of each port (0x0300 to 0x0307) of {} and its neighbours.",
+            line.label(first.id)
+        ))
+        .advise(
+            "Clear the totals, wait some minutes, and look which of them rise, and which first.",
+        );
+    let is_old = risen.iter().all(|(_, sum)| sum.may_be_old);
+    if is_old && risen.iter().all(|(_, sum)| sum.rise <= FEW) {
+        condition.severity = Severity::Info;
+    }
+    for (device, sum) in risen.iter().take(NAMED) {
+        let label = line.label(device.id);
+        let text = match sum.may_be_old {
+            true => {
+                format!("{label} counts {} damaged frames, of whatever time", sum.rise)
+            }
+            false => format!("{label} counted {} damaged frames meanwhile", sum.rise),
+        };
+        condition = condition.shown_by(Evidence::host(sum.last_rise, text));
+    }
+    if let Some(more) = risen.len().checked_sub(NAMED).filter(|more| *more > 0) {
+        condition = condition.shown_by(Evidence::host(None, format!("and {more} others behind")));
+    }
+    if sum.last_rise.is_some_and(|last| last < line.now)
+        && let Some(last) = risen.iter().filter_map(|(_, sum)| sum.last_rise).max()
+        && last < line.now
+    {
+        condition = condition.ended(last);
+    }
+    conditions.push(condition);
+}

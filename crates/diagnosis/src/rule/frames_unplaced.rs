@@ -1,0 +1,212 @@
+//! # Frames are lost or damaged, and nothing says where
+//!
+//! The MainDevice misses frames, or its card drops damaged ones, and no counter of a SubDevice names a place.
+//!
+//! **How it is found.** An observation file or a pasted text tells of frames that did not come back, of datagrams
+//! that were not back in time and never came, or of damaged frames that the card dropped, while the error
+//! counters of the SubDevices were not read, or did not move. Other findings that explain lost frames take
+//! precedence.
+//!
+//! **What it means.** A frame that is damaged on the line comes back, and the card counts it: so many damaged
+//! frames at the card are damage somewhere on the way round. Frames that are missing while the card counts no
+//! damaged one were not damaged: the computer lost them, they came too late, or a link was open for a moment.
+//! Without the card's counters all of these are possible. A few lost frames of the time when the line started are
+//! no trouble.
+//!
+//! **What to do.** Read the error counters of all SubDevices (0x0300 to 0x0313) and those of the card
+//! (`ethtool -S eth0`), twice with some minutes between them, and give both readings: `linesman schema
+//! observations`. Live, `linesman counters eth0 --clear --for 60` does it.
+
+use linesman_config::fault::{Class, FaultName};
+
+use super::{Rule, RulePage, View};
+use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::{Line, Tally};
+
+/// The page.
+pub const PAGE: RulePage = RulePage {
+    code: "H114",
+    name: "frames-lost-unplaced",
+    severity: Severity::Warning,
+    class: Class::Hardware,
+    source: include_str!("frames_unplaced.rs"),
+};
+
+/// The rule.
+pub const RULE: Rule = Rule { pages: &[PAGE], judge };
+
+/// Of so many frames one may get lost on a good line.
+const RARE: u64 = 100_000;
+/// Of so many frames one is too much for a line that is to work.
+const OFTEN: u64 = 1_000;
+
+/// What is missing or damaged.
+struct Missing {
+    lost: u64,
+    /// Damaged frames that the card dropped; `None` when nobody told.
+    damaged: Option<u64>,
+    corrupted: u64,
+    first: Tally,
+}
+
+fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let line = view.line;
+    if !line.reported.tells_of_frames() && !line.host.is_watched {
+        return;
+    }
+    // Frames that were seen are judged one by one.
+    if line.traffic.frames > 0 {
+        return;
+    }
+    let explains = |symptom: Symptom| {
+        conditions
+            .iter()
+            .any(|one| one.explains.contains(&symptom) || one.symptoms.contains(&symptom))
+    };
+    let (lost_told, card_told) = (explains(Symptom::FramesLost), explains(Symptom::CardErrors));
+    let mut missing = missing(line);
+    if lost_told {
+        missing.lost = 0;
+    }
+    if card_told {
+        missing.damaged = missing.damaged.map(|_| 0);
+    }
+    let damaged = missing.damaged.unwrap_or(0).saturating_add(missing.corrupted);
+    if missing.lost == 0 && damaged == 0 {
+        return;
+    }
+    conditions.push(condition(view, &missing, damaged));
+}
+
+fn missing(line: &Line) -> Missing {
+    let reported = &line.reported;
+    let sum = |tally: Option<Tally>| tally.map_or(0, |tally| tally.sum);
+    // What was not back in time and came later was late.
+    let came = sum(reported.unmatched).saturating_add(sum(reported.late));
+    let vanished = sum(reported.timed_out).saturating_sub(came);
+    let crc = line.host.card(linesman_proto::address::Path::A).crc;
+    let tallies = [reported.lost, reported.timed_out, reported.corrupted, Some(crc)];
+    let first =
+        tallies.into_iter().flatten().filter(|tally| tally.sum > 0).min_by_key(|one| one.first);
+    Missing {
+        lost: sum(reported.lost).max(vanished),
+        damaged: line.host.is_watched.then_some(crc.sum),
+        corrupted: sum(reported.corrupted),
+        first: first.unwrap_or_default(),
+    }
+}
+
+fn condition(view: &View<'_>, missing: &Missing, damaged: u64) -> Condition {
+    let line = view.line;
+    let network = Place::Network { network: line.network };
+    let since = missing.first.first.unwrap_or(view.now);
+    let condition = if damaged > 0 {
+        Condition::new(&PAGE, network, FaultName::CableDegraded, since)
+            .confidence(0.35)
+            .or(FaultName::EmcNoise, 0.2)
+            .or_at(FaultName::NicDamaged, Place::Host, 0.15)
+            .or(FaultName::TransmitterDamaged, 0.1)
+            .or(FaultName::DeviceInternal, 0.1)
+    } else if missing.damaged.is_some() {
+        Condition::new(&PAGE, Place::Host, FaultName::HostDrops, since)
+            .confidence(0.4)
+            .or_at(FaultName::LinkFlapping, network, 0.2)
+            .or(FaultName::LateFrames, 0.15)
+            .or_at(FaultName::FalseLink, network, 0.1)
+    } else {
+        Condition::new(&PAGE, network, FaultName::CableDegraded, since)
+            .confidence(0.25)
+            .or_at(FaultName::HostDrops, Place::Host, 0.2)
+            .or(FaultName::LinkFlapping, 0.15)
+            .or(FaultName::EmcNoise, 0.15)
+            .or_at(FaultName::LateFrames, Place::Host, 0.1)
+    };
+    let mut condition = condition.confirmed(since).explaining([Symptom::FramesLost]);
+    condition.severity = severity(line, missing.lost.saturating_add(damaged), damaged);
+    for text in texts(line, missing) {
+        condition = condition.shown_by(Evidence::host(Some(since), text));
+    }
+    if line.devices.iter().all(|device| !device.counters.is_known()) {
+        condition = condition.advise(
+            "Read the error counters of all SubDevices (0x0300 to 0x0313), in order: they name the link.",
+        );
+    }
+    if missing.damaged.is_none() {
+        condition = condition.advise(
+            "Read the counters of the network card (`ethtool -S eth0`): damaged frames are counted there, \
+             dropped ones, too.",
+        );
+    } else if damaged == 0 {
+        condition = condition
+            .advise("Run `linesman host --measure 10`: it tells what makes this computer lose frames.")
+            .advise("Look at the lost-link counters (0x0310 to 0x0313): a contact that opens loses frames, too.");
+    }
+    condition.advise(
+        "Note the counts, wait some minutes, and read them again: only what rises is of now.",
+    )
+}
+
+/// One lost frame is worth knowing; what is rare, and not going on, too.
+fn severity(line: &Line, count: u64, damaged: u64) -> Severity {
+    let reported = &line.reported;
+    let is_over = reported.loss_rate.is_some_and(|rate| rate <= 0.0) && damaged == 0;
+    let is_rare = reported.sent.is_some_and(|sent| count.saturating_mul(RARE) <= sent);
+    let is_often = reported.sent.is_some_and(|sent| count.saturating_mul(OFTEN) >= sent.max(1));
+    if count == 1 || (is_rare && is_over) {
+        Severity::Info
+    } else if is_often && !is_over && count >= 10 {
+        Severity::Error
+    } else {
+        Severity::Warning
+    }
+}
+
+fn texts(line: &Line, missing: &Missing) -> Vec<String> {
+    let reported = &line.reported;
+    let mut texts = Vec::new();
+    if missing.lost > 0 {
+        let of = reported.sent.map_or(String::new(), |sent| format!(" of {sent}"));
+        let timed = reported.timed_out.map_or(0, |tally| tally.sum);
+        let what =
+            if reported.lost.is_some_and(|tally| tally.sum > 0) { "frames" } else { "datagrams" };
+        let late = match timed {
+            0 => String::new(),
+            timed => format!("; {timed} datagrams were not back in time"),
+        };
+        texts.push(format!(
+            "the MainDevice counts {} {what}{of} that did not come back{late}",
+            missing.lost
+        ));
+    }
+    match missing.damaged {
+        Some(0) if missing.lost > 0 => {
+            texts.push(
+                "its card counts no damaged frame: they were not damaged on the line".to_owned(),
+            );
+        }
+        Some(0) => {}
+        Some(damaged) => texts.push(format!("its card dropped {damaged} damaged frames")),
+        None => texts.push("the counters of its card are not known".to_owned()),
+    }
+    if missing.corrupted > 0 {
+        texts.push(format!("{} frames came back with a content that cannot be", missing.corrupted));
+    }
+    let read = line.devices.iter().filter(|device| device.counters.is_known()).count();
+    texts.push(match read {
+        0 => "no error counter of a SubDevice was read".to_owned(),
+        read if read == line.devices.len() => {
+            "no error counter of a SubDevice names a place".to_owned()
+        }
+        read => {
+            format!("the error counters of {read} of {} SubDevices were read", line.devices.len())
+        }
+    });
+    match reported.loss_rate {
+        Some(rate) if rate <= 0.0 => {
+            texts.push("none is being lost now: they may be old".to_owned())
+        }
+        Some(rate) => texts.push(format!("{rate} frames a second are being lost now")),
+        None => {}
+    }
+    texts
+}

@@ -1,0 +1,32 @@
+//! A file, a pipe or standard input: a capture, or a text with what was read.
+
+use std::path::Path;
+
+use linesman_link::capture::CaptureError;
+use linesman_link::input::{Content, Input};
+use linesman_runtime::stop::Stop;
+
+use super::{Judged, Session, capture, observations};
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// Judges the file by what is in it.
+pub(super) fn judge(
+    path: &Path,
+    stop: &Stop,
+    session: &mut Session,
+    output: &mut Output,
+) -> Result<Judged, Failure> {
+    let wish = stop.clone();
+    let input = Input::open_until(path, move || wish.is_set()).map_err(CaptureError::from)?;
+    match input.content() {
+        Content::Capture => {
+            session.setup.source = format!("capture:{}", path.display());
+            capture::judge(input, stop, session, output)
+        }
+        Content::Text => {
+            session.setup.source = path.display().to_string();
+            observations::judge(input, session)
+        }
+    }
+}
