@@ -220,10 +220,14 @@ pub enum Reason {
     NoAnswer,
     /// AL status was never read.
     StatesNotRead,
+    /// A state was asked for and not reached by the end, or an error was acknowledged that was not read.
+    StateUnsettled,
     /// AL status was read long before the end.
     StatesOld,
     /// DL status was never read.
     LinkStatusNotRead,
+    /// A port had no link at first and has one now: why was not seen.
+    LinkCameUp,
     /// Error counters were never read.
     CountersNotRead,
     /// Error counters were read once: what they hold may be history.

@@ -4,6 +4,9 @@ use super::{Assessment, Basis, Extent, Gap, Reason, Subject};
 use crate::finding::Place;
 use crate::line::{Device, Line};
 
+/// So many station addresses are named at most.
+const STATIONS_NAMED: usize = 8;
+
 /// Assesses who is there.
 pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
     let line = basis.line;
@@ -34,6 +37,15 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
             .essential()
             .at(places)
             .step("look at these SubDevices: supply, lamps, the cable before the first of them");
+        all.lacks(Extent::InPart, gap);
+    }
+    if !line.asked_in_vain.is_empty() {
+        let stations: Vec<String> =
+            line.asked_in_vain.iter().take(STATIONS_NAMED).map(ToString::to_string).collect();
+        let rest = line.asked_in_vain.len() - stations.len();
+        let more = if rest > 0 { format!(", and {rest} more") } else { String::new() };
+        let text = format!("nobody answered at station address {}{more}", stations.join(", "));
+        let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
     let now = traffic.broadcast_now.map_or(traffic.broadcast_answers, |now| now.value);

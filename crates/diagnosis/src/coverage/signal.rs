@@ -54,8 +54,12 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
         } else {
             (Reason::WiringUnknown, "the wiring is not known, so no link can be told from another")
         };
-        let gap =
-            Gap::new(reason, text).essential_if(!is_shown_by_frames).step(basis.read_counters());
+        let has_risen = line.devices.iter().any(has_risen);
+        let text =
+            if has_risen { format!("{text}, and some counted errors") } else { text.to_owned() };
+        let gap = Gap::new(reason, text)
+            .essential_if(!is_shown_by_frames || has_risen)
+            .step(basis.read_counters());
         all.lacks(Extent::NotJudged, gap);
         return all;
     };
@@ -126,6 +130,7 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
 pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
     let line = basis.line;
     let mut all = Assessment::judged(Subject::LinkStatus);
+    came_up(basis, &mut all);
     let unread: Vec<&Device> = line.devices.iter().filter(|one| !tells_links(one)).collect();
     if unread.is_empty() && !line.devices.is_empty() {
         return all;
@@ -153,6 +158,28 @@ pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
     all
 }
 
+/// Links that were away when the look at them began, and are there now.
+fn came_up(basis: &Basis<'_>, all: &mut Assessment) {
+    let line = basis.line;
+    for device in &line.devices {
+        let (Some(first), Some(last)) = (device.dl.first, device.dl.last) else { continue };
+        for port in Port::ALL {
+            if first.value.port_state(port).link || !last.value.port_state(port).link {
+                continue;
+            }
+            let text = format!(
+                "port {port} of {} had no link at first and has one now: why was not seen",
+                line.label(device.id)
+            );
+            let gap = Gap::new(Reason::LinkCameUp, text)
+                .essential()
+                .at(vec![Place::device(line.network, device.id)])
+                .step(basis.look_longer());
+            all.lacks(Extent::InPart, gap);
+        }
+    }
+}
+
 /// The next step that gets the counters of the card.
 pub(super) fn host_step(basis: &Basis<'_>) -> &'static str {
     match basis.input {
@@ -175,6 +202,16 @@ fn port_tells(device: &Device, port: Port) -> Told {
         return Told::Full;
     }
     if tracks().any(is_read_once) { Told::Once } else { Told::All }
+}
+
+/// Whether one of its counters of frames or symbols was seen to rise.
+fn has_risen(device: &Device) -> bool {
+    Port::ALL.into_iter().any(|port| {
+        [ErrorCounter::InvalidFrame(port), ErrorCounter::PhysicalLayer(port)]
+            .into_iter()
+            .filter_map(|counter| device.counters.track(counter))
+            .any(|track| !track.rises.is_empty())
+    })
 }
 
 /// Whether nobody knows when a counter counted what it holds, or whether it went on.

@@ -1,13 +1,20 @@
 //! States as evidence: AL status of each SubDevice, as it was read.
 
-use linesman_proto::time::Span;
+use linesman_proto::state::AlState;
+use linesman_proto::time::{Instant, Span};
 
 use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 use crate::finding::Place;
-use crate::line::{Device, Line};
+use crate::line::{Device, Line, StateRequest};
 
 /// A reading that is older says nothing of the end.
 const OLD: Span = Span::s(10);
+
+/// A state that was asked for so shortly before the end may still be reached.
+const SETTLES: Span = Span::ms(500);
+
+/// A MainDevice that starts anew sends all of them back within this time.
+const TOGETHER: Span = Span::s(1);
 
 /// Whether the state of every SubDevice is known by a reading of AL status, and none signals an error.
 pub(super) fn all_read(line: &Line) -> bool {
@@ -55,5 +62,48 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
             Gap::new(Reason::StatesOld, text).essential_if(!basis.expectations_known).at(places);
         all.lacks(Extent::InPart, gap);
     }
+    unsettled(basis, &mut all);
     all
+}
+
+/// Requests without an end, and what a MainDevice did about an error that nobody saw.
+fn unsettled(basis: &Basis<'_>, all: &mut Assessment) {
+    let line = basis.line;
+    for device in &line.devices {
+        let label = line.label(device.id);
+        let open = device.al.requests.back().filter(|one| one.ended.is_none());
+        let text = if let Some(untaken) = device.al.untaken {
+            format!("{label} did not take the request for {}, working counter 0", untaken.value)
+        } else if let Some(open) = open.filter(|one| is_unsettled(line, device, one)) {
+            let waited = line.now.since(open.asked.at);
+            format!(
+                "{label} was asked for {} {waited} before the end, and was still in {}",
+                open.to, open.from
+            )
+        } else if is_sent_back_alone(line, device) {
+            format!("the MainDevice sent {label} alone back to INIT: why was not seen")
+        } else {
+            continue;
+        };
+        let gap = Gap::new(Reason::StateUnsettled, text)
+            .essential()
+            .at(vec![Place::device(line.network, device.id)])
+            .step(basis.look_longer());
+        all.lacks(Extent::InPart, gap);
+    }
+}
+
+/// Whether a SubDevice has not gone where it was last asked to go, for some time.
+fn is_unsettled(line: &Line, device: &Device, open: &StateRequest) -> bool {
+    let asked = device.al.requested.and_then(|requested| requested.value.state());
+    asked == Some(open.to) && line.now.since(open.asked.at) >= SETTLES
+}
+
+/// Whether it was sent back to INIT and others were not, as they are when a MainDevice starts anew.
+fn is_sent_back_alone(line: &Line, device: &Device) -> bool {
+    let Some(sent) = device.al.sent_back else { return false };
+    let is_near = |other: Instant| other.since(sent.at).max(sent.at.since(other)) <= TOGETHER;
+    let others = line.devices.iter().filter(|other| other.id != device.id);
+    let mut stayed = others.filter(|other| !other.al.sent_back.is_some_and(|one| is_near(one.at)));
+    stayed.any(|other| other.al.state().is_some_and(AlState::has_mailbox))
 }

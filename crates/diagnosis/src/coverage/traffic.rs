@@ -8,6 +8,8 @@ use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 const FEW_FRAMES: u64 = 50;
 /// From this share of returned frames on, in percent, frames that were cut off leave the rest unjudged.
 const CUT_PERCENT: u64 = 1;
+/// Of so many frames that came back one may get lost on a good line.
+const RARE: u64 = 100_000;
 /// Two interfaces' clocks differ by less.
 const CLOCK_NOISE: Span = Span::ms(1);
 /// A line that works is never quiet for so long.
@@ -53,9 +55,27 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
     }
     let lost = traffic.lost.sum;
     if lost > 0 {
-        let text = format!("{lost} frames did not come back, and nothing tells where they went");
-        let gap = Gap::new(Reason::FramesLost, text).essential_if(lost > 1).step(
+        let frames = if lost == 1 { "frame" } else { "frames" };
+        let text = format!("{lost} {frames} did not come back, and nothing tells where");
+        let is_much = lost.saturating_mul(RARE) > traffic.returned;
+        let gap = Gap::new(Reason::FramesLost, text).essential_if(is_much).step(
             "read the counters of the MainDevice's card (`ethtool -S`) and the error counters of the SubDevices",
+        );
+        all.lacks(Extent::InPart, gap);
+    }
+    let copies = traffic.copies_lost[0].sum + traffic.copies_lost[1].sum;
+    if copies > 0 {
+        let text = format!("of {copies} frames the copy of one card alone came back");
+        let is_much = copies.saturating_mul(RARE) > traffic.returned;
+        let gap = Gap::new(Reason::FramesLost, text).essential_if(is_much).step(
+            "record both cards of the ring, each as an interface of its own, and read the error counters of the SubDevices",
+        );
+        all.lacks(Extent::InPart, gap);
+    }
+    if traffic.copies_gone.sum > 0 {
+        let text = "both copies of a frame came back through the ring, and later one alone";
+        let gap = Gap::new(Reason::FramesLost, text).essential().step(
+            "read DL status (0x0110) and the error counters of all SubDevices: something swallows what one card sends",
         );
         all.lacks(Extent::InPart, gap);
     }

@@ -34,6 +34,11 @@ pub struct AlHistory {
     /// Requests for a state and how they fared, oldest first: the latest, and at most
     /// [`CHANGES_KEPT`](super::CHANGES_KEPT) that waited longer than a step may take.
     pub requests: VecDeque<StateRequest>,
+    /// The latest order back to INIT in a higher state and without an error that was read.
+    pub sent_back: Option<Seen<()>>,
+    /// The latest request that the controller did not take (working counter 0): its processor had not fetched the one
+    /// before.
+    pub untaken: Option<Seen<StateValue>>,
 }
 
 /// A request for a state, and those that followed it before the controller moved.
@@ -247,6 +252,12 @@ impl AlHistory {
             error.ended.get_or_insert(requested.at);
         }
         let asked = requested.value.state();
+        if asked == Some(AlState::Init)
+            && self.errors.is_empty()
+            && self.state().is_some_and(|state| state.has_mailbox())
+        {
+            self.sent_back = Some(Seen::new((), requested.at, requested.frame));
+        }
         self.lowest_asked = match (self.lowest_asked, asked) {
             (Some(one), Some(other)) => Some(one.min(other)),
             (one, other) => one.or(other),
@@ -262,6 +273,7 @@ impl AlHistory {
     /// AL control was written, and the controller did not take it: its processor has not fetched what was
     /// written before. Reference: S2, AL control; the register can be written once until it was read.
     pub fn record_untaken(&mut self, requested: Seen<StateValue>) {
+        self.untaken = Some(requested);
         self.note_request(requested, false);
     }
 

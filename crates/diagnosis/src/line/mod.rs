@@ -110,6 +110,9 @@ pub struct Line {
     pub trips: Trips,
     /// Frames and datagrams.
     pub traffic: Traffic,
+    /// Station addresses that were asked without any answer, and that no SubDevice was seen to have: in the order of
+    /// the first request, some dozens at most.
+    pub asked_in_vain: Vec<StationAddress>,
     /// What another program says of the line.
     pub reported: Reported,
     /// The time of the latest frame or observation.

@@ -93,6 +93,9 @@ pub struct Traffic {
     pub lost_by_order: u64,
     /// Of those of which the copy of one card came back: how many did not come to this card.
     pub copies_lost: [Tally; 2],
+    /// In a ring that was whole before, frames of which one copy alone came back, with none after them of which both
+    /// did: some of them at least.
+    pub copies_gone: Tally,
     /// The first lost frame.
     pub first_lost: Option<Seen<()>>,
     /// The latest lost frame.

@@ -171,6 +171,7 @@ impl Pairing {
                 is_cut_off: false,
                 is_part: false,
                 copy_lost: None,
+                is_copy_gone: false,
                 sent_by: None,
             });
             self.returns += 1;
@@ -422,6 +423,7 @@ impl Pairing {
             is_cut_off: false,
             is_part: pending.is_part || is_alone,
             copy_lost: None,
+            is_copy_gone: false,
             sent_by,
         });
         if is_last {

@@ -42,6 +42,15 @@ struct Unanswered {
     first: Seen<()>,
     last: Instant,
     times: u64,
+    /// Whether others had answered at theirs before.
+    others_answer: bool,
+}
+
+impl Unanswered {
+    /// Whether it was asked often enough, and for long enough, that somebody expects a SubDevice there.
+    fn is_expected(&self) -> bool {
+        self.times >= ASKED_IN_VAIN && self.last.since(self.first.at) >= ASKED_FOR
+    }
 }
 
 /// What positions and station addresses mean at the moment.
@@ -226,13 +235,20 @@ impl Addresses {
     }
 
     /// A station address of no controller was asked, and nobody answered.
-    pub(super) fn asked_in_vain(&mut self, station: StationAddress, seen: Seen<()>) {
+    pub(super) fn asked_in_vain(
+        &mut self,
+        line: &mut Line,
+        station: StationAddress,
+        seen: Seen<()>,
+    ) {
         let count = self.unanswered.len();
         match self.unanswered.get_mut(&station) {
             Some(known) => (known.last, known.times) = (seen.at, known.times + 1),
             None if count < MOST_UNANSWERED => {
-                let unanswered = Unanswered { first: seen, last: seen.at, times: 1 };
+                let others_answer = !self.stations.is_empty();
+                let unanswered = Unanswered { first: seen, last: seen.at, times: 1, others_answer };
                 self.unanswered.insert(station, unanswered);
+                line.asked_in_vain.push(station);
             }
             None => {}
         }
@@ -245,13 +261,10 @@ impl Addresses {
         if self.is_named || is_planned || self.stations.is_empty() {
             return false;
         }
-        let is_wanted = |one: &Unanswered| {
-            one.times >= ASKED_IN_VAIN && one.last.since(one.first.at) >= ASKED_FOR
-        };
         let wanted: Vec<(StationAddress, Seen<()>)> = self
             .unanswered
             .iter()
-            .filter(|(_, one)| is_wanted(one))
+            .filter(|(_, one)| one.is_expected())
             .map(|(station, one)| (*station, one.first))
             .collect();
         for (station, first) in &wanted {
@@ -438,7 +451,15 @@ impl Addresses {
             return;
         }
         device.station = Some(station);
-        self.unanswered.remove(&station);
+        if let Some(asked) = self.unanswered.remove(&station) {
+            line.asked_in_vain.retain(|one| *one != station);
+            if asked.others_answer
+                && let Some(device) = line.device_mut(id)
+            {
+                // It was away, and has its address again.
+                device.is_silent(asked.first.at, asked.first.frame);
+            }
+        }
         self.stations.retain(|_, owner| *owner != id);
         if let Some(other) = self.stations.insert(station, id)
             && let Some(other) = line.device_mut(other)

@@ -268,7 +268,8 @@ impl Learner {
         let Some(id) = device else {
             if !is_position && answer.is_last && answer.sum == 0 && answer.ado < FIRST_OPTIONAL {
                 let seen = Seen::new((), answer.at, Some(answer.frame));
-                self.addresses.asked_in_vain(StationAddress(answer.reply.adp()), seen);
+                let station = StationAddress(answer.reply.adp());
+                self.addresses.asked_in_vain(line, station, seen);
                 line.touch();
             }
             return;
@@ -368,6 +369,10 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
     }
     if let Some(card) = exchange.copy_lost.filter(|_| !line.is_lost_by_order(request.time)) {
         line.traffic.copies_lost[card.index()].add(1, request.time);
+        line.touch();
+    }
+    if exchange.is_copy_gone && !line.is_lost_by_order(request.time) {
+        line.traffic.copies_gone.add(1, request.time);
         line.touch();
     }
     for (index, datagram) in view.datagrams().enumerate() {

@@ -43,13 +43,14 @@ impl Pairing {
         settle: &mut impl FnMut(&Exchange<'_>),
     ) {
         let Some(pending) = self.pending.get(index) else { return };
-        let mut copy_lost = None;
+        let (mut copy_lost, mut is_copy_gone) = (None, false);
         if pending.out == 1 && !pending.sums.is_empty() && !is_cut_off {
             // A ring that was opened loses all copies; one that is whole loses single ones.
             let since = pending.whole_before.map(|before| self.whole - before);
             if since.is_some_and(|since| since >= STILL_WHOLE) {
                 copy_lost = Some(if pending.came_to == Path::A { Path::B } else { Path::A });
             } else {
+                is_copy_gone = since.is_some();
                 self.was_whole = false;
             }
         }
@@ -62,6 +63,7 @@ impl Pairing {
             is_cut_off,
             is_part: pending.is_part,
             copy_lost,
+            is_copy_gone,
             sent_by: None,
         });
         self.remove(index);

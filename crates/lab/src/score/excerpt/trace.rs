@@ -1,10 +1,12 @@
 //! Traces of trouble in the frames of an excerpt, found without the diagnosis: by comparing what is left with the
 //! line's own best times.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::FrameView;
+use linesman_proto::register::table;
+use linesman_proto::time::Span;
 
 use super::TapedFrame;
 
@@ -29,6 +31,9 @@ pub enum Trace {
 
 /// Registers from here on are optional, so nobody needs to answer.
 const FIRST_OPTIONAL: u16 = 0x0600;
+
+/// A frame is back within this time.
+const ON_ITS_WAY: Span = Span::ms(1);
 
 /// Looks through the frames of an excerpt; `whole` is the recording from which it was taken.
 pub(super) fn find(whole: &[TapedFrame], left: &[TapedFrame], snap: Option<usize>) -> Vec<Trace> {
@@ -156,10 +161,18 @@ impl Seen {
             Some((first.index(), first.code(), frame.bytes.len()))
         };
         let mut open: Vec<(usize, (u8, u8, usize))> = Vec::new();
+        let mut closed = BTreeSet::new();
         for (number, frame) in left.iter().enumerate() {
             let Some(key) = key(frame) else { continue };
             if frame.is_sent {
-                open.push((number, key));
+                if note_closed(&frame.bytes, &mut closed) {
+                    // What is on its way then may be lost, too.
+                    open.retain(|(number, _)| frame.time.since(left[*number].time) > ON_ITS_WAY);
+                }
+                // What does not come back while ports are closed on purpose is no trouble.
+                if closed.is_empty() {
+                    open.push((number, key));
+                }
             } else if let Some(at) = open.iter().position(|(_, known)| *known == key) {
                 open.remove(at);
             }
@@ -170,4 +183,24 @@ impl Seen {
             self.traces.push(Trace::LostFrame);
         }
     }
+}
+
+/// Notes the stations that a request orders to close a port, or to leave all of them to themselves. Says whether it
+/// closes one.
+fn note_closed(bytes: &[u8], closed: &mut BTreeSet<u16>) -> bool {
+    let Ok(view) = FrameView::parse(bytes) else { return false };
+    let mut closes = false;
+    for datagram in view.datagrams().flatten() {
+        let writes = datagram.command().is_some_and(|command| command.effect().writes);
+        let is_control = datagram.ado() == table::DL_CONTROL.address;
+        if let (true, true, [_, loops, ..]) = (writes, is_control, datagram.data()) {
+            if *loops == 0 {
+                closed.remove(&datagram.adp());
+            } else {
+                closed.insert(datagram.adp());
+                closes = true;
+            }
+        }
+    }
+    closes
 }
