@@ -245,13 +245,17 @@ fn trailing_subdevices_that_a_foreign_maindevice_stops_reaching_are_one_link() {
         }
     };
     (0..5).for_each(|_| poll(&mut script, false));
-    (0..5).for_each(|_| poll(&mut script, true));
-    let report = report(&mut script);
-    let cut = only(&report);
-    assert_eq!(
-        (cut.code.as_str(), cut.cause, link(cut)),
-        ("H102", FaultName::LinkOpen, Some((2, 3)))
-    );
+    (0..250).for_each(|_| poll(&mut script, true));
+    let judged = |script: &mut Script, state: FindingState| {
+        let report = report(script);
+        let cut = only(&report);
+        assert_eq!((cut.code.as_str(), cut.cause), ("H102", FaultName::LinkOpen));
+        assert_eq!((link(cut), cut.state), (Some((2, 3)), state), "{}", text(&report));
+    };
+    judged(&mut script, FindingState::Confirmed);
+    // The same when they are back, all of them as they were.
+    (0..5).for_each(|_| poll(&mut script, false));
+    judged(&mut script, FindingState::Closed);
 }
 
 // fires: S210
@@ -332,6 +336,13 @@ fn an_error_from_before_the_start_is_a_note_once_acknowledged() {
     assert_eq!((note.severity, note.state), (Severity::Info, FindingState::Closed));
     assert_ne!(acknowledged.verdict, Verdict::Faulty);
     assert!(note.evidence[0].text.contains("left over from an earlier run"), "{note:#?}");
+    // Where process data went on already, it is of this run.
+    let mut script = Script::new();
+    cycles(&mut script, 20, 3);
+    script.exchange(&[fprd(0x1001, 0x0130, &[0x14, 0, 0, 0, 0x1B, 0])]);
+    script.exchange(&[fpwr(0x1001, 0x0120, &[0x14, 0])]);
+    let running = report(&mut script);
+    assert!(running.findings.iter().any(|one| one.severity == Severity::Error));
     let standing = play(false);
     assert_eq!((only(&standing).severity, standing.verdict), (Severity::Error, Verdict::Faulty));
 }
@@ -502,4 +513,30 @@ fn what_only_may_be_old_is_a_warning_and_notes_alone_are_no_fault() {
     let few = judge(&row(&["crc = 2", ""]));
     assert_eq!(only(&few).severity, Severity::Info);
     assert_ne!(few.verdict, Verdict::Faulty);
+}
+
+// silent: H100, H112
+#[test]
+fn a_burst_that_only_the_recording_lacks_blames_no_link() {
+    let play = |is_recorded: bool| {
+        let mut script = running();
+        cycles(&mut script, 400, 3);
+        for number in 0..40 {
+            // Of the requests every other one is missing in the recording, and all returns are.
+            match is_recorded || number % 2 == 0 {
+                true => script.vanish(&[lrw(PROCESS, 4, 3)]),
+                false => script.index = script.index.wrapping_add(1),
+            }
+        }
+        cycles(&mut script, 400, 3);
+        for station in 0x1001..=0x1003 {
+            script.exchange(&[fprd(station, 0x0300, &[0; 20])]);
+        }
+        cycles(&mut script, 100, 3);
+        report(&mut script)
+    };
+    let lost = play(true);
+    assert!(codes(&lost).contains(&"H100"), "{}", text(&lost));
+    let lacking = play(false);
+    assert!(!codes(&lacking).iter().any(|code| code.starts_with('H')), "{}", text(&lacking));
 }

@@ -19,7 +19,7 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::table;
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
 use super::link_lost::is_on_terminal_bus;
@@ -133,32 +133,52 @@ struct Branch {
     is_on_terminal_bus: bool,
     devices: Vec<DeviceId>,
     since: Seen<()>,
+    ended: Option<Instant>,
 }
 
-/// All branches that are silent as a whole, and lasting, while whoever is before them answers.
+/// All branches that are silent as a whole, or were a moment ago, while whoever is before them answers.
 fn silent_branches(view: &View<'_>) -> Vec<Branch> {
     let line = view.line;
-    let is_silent = |id: &DeviceId| line.device(*id).is_some_and(|one| one.silent.is_some());
-    // Who still counts in broadcasts is there, and has lost its address.
-    let traffic = &line.traffic;
-    let counted = traffic.broadcast_read.filter(|_| {
-        traffic.broadcast_now.is_some_and(|now| usize::from(now.value) >= line.devices.len())
-    });
-    let latest = line.devices.iter().filter_map(|one| one.silent).map(|one| one.at).max();
-    let all_count = counted.is_some_and(|read| latest.is_some_and(|silent| read >= silent));
+    let away: Vec<Option<Absence>> =
+        line.devices.iter().map(|device| absence(view, device)).collect();
+    let is_silent = |id: &DeviceId| away.get(id.index()).is_some_and(Option::is_some);
     // How many answer says the same, and where.
-    if all_count || line.reported.answering.is_some() {
+    if counts_all(line, &away) || line.reported.answering.is_some() {
         return Vec::new();
     }
     let branches = match line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) {
         Some(tree) if tree.closes_at().is_some() => return Vec::new(),
-        Some(tree) => in_tree(line, tree, &is_silent),
-        None => in_order(line, &is_silent).into_iter().collect(),
+        Some(tree) => in_tree(line, tree, &is_silent, &away),
+        None => in_order(line, &is_silent, &away).into_iter().collect(),
     };
-    branches.into_iter().filter(|branch| !is_up(line, branch)).collect()
+    // Who started anew was without supply, and a link tells nothing of that.
+    let has_restarted = |id: &DeviceId| line.device(*id).is_some_and(Device::has_restarted);
+    let is_open = |branch: &Branch| {
+        !is_up(line, branch)
+            && (branch.ended.is_none() || !branch.devices.iter().any(has_restarted))
+    };
+    branches.into_iter().filter(is_open).collect()
 }
 
-fn in_tree(line: &Line, tree: &Tree, is_silent: &dyn Fn(&DeviceId) -> bool) -> Vec<Branch> {
+/// Whether broadcasts went on counting all: who still counts is there, and has lost its address.
+fn counts_all(line: &Line, away: &[Option<Absence>]) -> bool {
+    let traffic = &line.traffic;
+    let (Some(now), Some(read)) = (traffic.broadcast_now, traffic.broadcast_read) else {
+        return false;
+    };
+    let since = || away.iter().flatten().map(|absence| absence.since.at);
+    let lasts = away.iter().flatten().any(|absence| absence.ended.is_none());
+    usize::from(now.value) >= line.devices.len()
+        && since().max().is_some_and(|latest| read >= latest)
+        && (lasts || since().min().is_some_and(|first| now.at < first))
+}
+
+fn in_tree(
+    line: &Line,
+    tree: &Tree,
+    is_silent: &dyn Fn(&DeviceId) -> bool,
+    away: &[Option<Absence>],
+) -> Vec<Branch> {
     let id = |node: usize| DeviceId(node as u32);
     let heads = tree.order().iter().copied().filter(|node| {
         let above = tree.upstream(*node).and_then(|end| end.node());
@@ -173,7 +193,8 @@ fn in_tree(line: &Line, tree: &Tree, is_silent: &dyn Fn(&DeviceId) -> bool) -> V
             b: link.downstream,
             is_wired: true,
             is_on_terminal_bus: is_on_terminal_bus(line, head),
-            since: since(line, &devices)?,
+            since: since(away, &devices)?,
+            ended: ended(away, &devices),
             devices,
         })
     };
@@ -181,7 +202,11 @@ fn in_tree(line: &Line, tree: &Tree, is_silent: &dyn Fn(&DeviceId) -> bool) -> V
 }
 
 /// Where nobody has seen the wiring: the last ones in the order of positions, as on a line.
-fn in_order(line: &Line, is_silent: &dyn Fn(&DeviceId) -> bool) -> Option<Branch> {
+fn in_order(
+    line: &Line,
+    is_silent: &dyn Fn(&DeviceId) -> bool,
+    away: &[Option<Absence>],
+) -> Option<Branch> {
     let order: Vec<DeviceId> = line.devices.iter().map(|device| device.id).collect();
     let silent = order.iter().rev().take_while(|id| is_silent(id)).count();
     let (there, devices) = order.split_at(order.len() - silent);
@@ -193,14 +218,22 @@ fn in_order(line: &Line, is_silent: &dyn Fn(&DeviceId) -> bool) -> Option<Branch
         b: End::Controller(*devices.first()?, Port::A),
         is_wired: false,
         is_on_terminal_bus: false,
-        since: since(line, devices)?,
+        since: since(away, devices)?,
+        ended: ended(away, devices),
         devices: devices.to_vec(),
     })
 }
 
-fn since(line: &Line, devices: &[DeviceId]) -> Option<Seen<()>> {
-    let silent = devices.iter().filter_map(|id| line.device(*id)?.silent);
-    silent.min_by_key(|seen| seen.at)
+fn since(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Seen<()>> {
+    let absences = devices.iter().filter_map(|id| away.get(id.index()).copied().flatten());
+    absences.map(|absence| absence.since).min_by_key(|seen| seen.at)
+}
+
+/// When all of them answered again.
+fn ended(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Instant> {
+    let absences = devices.iter().map(|id| away.get(id.index()).copied().flatten());
+    let ended: Option<Vec<Instant>> = absences.map(|absence| absence?.ended).collect();
+    ended?.into_iter().max()
 }
 
 /// Whether the near end says, after all fell silent, that the link is there, or that it is not: then another rule
@@ -234,8 +267,12 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
              them; the wiring was not seen and is taken for a line"
         ),
     };
+    let text = match branch.ended {
+        None => text,
+        Some(ended) => format!("{text}; for {}, then again", ended.since(since.at)),
+    };
     let all = branch.devices.iter().copied();
-    Condition::new(&PAGE, place, FaultName::LinkOpen, since.at)
+    let condition = Condition::new(&PAGE, place, FaultName::LinkOpen, since.at)
         .confidence(open)
         .or_at(FaultName::DeviceOff, device, off)
         .or_at(FaultName::SupplyOff, device, supply)
@@ -251,7 +288,11 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
         }))
         .shown_by(Evidence::register(first, table::AL_STATUS.address, &since, text))
         .advise(format!("Look at {label}: if no lamp is lit, measure its supply first."))
-        .advise(format!("Look at the plugs and the cable of {place}."))
+        .advise(format!("Look at the plugs and the cable of {place}."));
+    match branch.ended {
+        Some(ended) => condition.ended(ended),
+        None => condition,
+    }
 }
 
 /// What follows behind a silent SubDevice.

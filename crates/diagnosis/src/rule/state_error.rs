@@ -121,7 +121,16 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 /// acknowledges it.
 fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
     let is_new = view.now.since(error.status.at) < ACKNOWLEDGED_WITHIN && !view.has_ended;
-    is_new && view.line.traffic.frames > 0 && error.was_left_over() && error.ended.is_none()
+    is_new
+        && view.line.traffic.frames > 0
+        && was_left_over(view.line, error)
+        && error.ended.is_none()
+}
+
+/// Whether an error is of a time before this run: where process data went on already, it belongs to that.
+fn was_left_over(line: &Line, error: &AlError) -> bool {
+    let is_running = line.cyclic.iter().any(|cyclic| cyclic.first.at < error.status.at);
+    error.was_left_over() && !is_running
 }
 
 /// Watchdogs that expired in several SubDevices at about the same time, without anything that explains it of each:
@@ -252,7 +261,7 @@ fn condition(
     if let Some(ended) = over(view, device, error) {
         condition = condition.ended(ended);
     }
-    if error.was_left_over()
+    if was_left_over(line, error)
         && let Some(acknowledged) = error.ended
     {
         condition.severity = Severity::Info;
