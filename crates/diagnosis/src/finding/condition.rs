@@ -37,6 +37,10 @@ pub enum Severity {
 /// What to do, a sentence.
 pub type Action = String;
 
+/// The first step with counts of which no earlier value is known.
+const MAY_BE_OLD: &str = "The counts may be old, since no earlier values are known: clear the counters \
+                          and watch; only what rises is of now.";
+
 /// Something is wrong: what a rule says of the line as it stands.
 ///
 /// The same trouble must come back with the same page and spot each time the rule looks (see
@@ -210,6 +214,14 @@ impl Condition {
     #[must_use]
     pub const fn ended(mut self, at: Instant) -> Self {
         self.ended = Some(at);
+        self
+    }
+
+    /// What shows it may have been counted long ago: worth a look, and no error.
+    #[must_use]
+    pub fn may_be_old(mut self) -> Self {
+        self.severity = self.severity.min(Severity::Warning);
+        self.actions.insert(0, MAY_BE_OLD.to_owned());
         self
     }
 

@@ -104,6 +104,14 @@ pub struct AlError {
     pub ended: Option<Instant>,
 }
 
+impl AlError {
+    /// Whether it stood already when its controller was first read, and nobody had asked for anything yet.
+    #[must_use]
+    pub const fn was_left_over(&self) -> bool {
+        self.from.is_none() && self.requested.is_none()
+    }
+}
+
 /// A change of AL status.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct AlChange {
@@ -216,7 +224,9 @@ impl AlHistory {
     }
 
     fn record_error(&mut self, status: AlStatus, at: Instant, frame: Option<u64>) {
-        let is_error = status.error() && !self.is_echo(status);
+        // What a code belongs to is no echo, and goes on for as long as the bit does.
+        let goes_on = self.has_error_with_code() && self.state_bits() == Some(status.0);
+        let is_error = status.error() && (goes_on || !self.is_echo(status));
         let open = self.errors.back_mut().filter(|error| error.ended.is_none());
         if !is_error {
             if let Some(error) = open {
@@ -229,19 +239,37 @@ impl AlHistory {
         if open.is_some() {
             return;
         }
+        let from = self.status.and_then(|status| status.value.state().state());
+        self.push_error(Seen::new(status, at, frame), from);
+        // The code is read after the status; what was read earlier is about something else.
+        self.code = None;
+    }
+
+    fn push_error(&mut self, status: Seen<AlStatus>, from: Option<AlState>) {
         push_kept(
             &mut self.errors,
             AlError {
-                status: Seen::new(status, at, frame),
+                status,
                 code: None,
-                from: self.status.and_then(|status| status.value.state().state()),
+                from,
                 requested: self.requested,
                 had_arrived: self.has_arrived,
                 ended: None,
             },
         );
-        // The code is read after the status; what was read earlier is about something else.
-        self.code = None;
+    }
+
+    /// Whether the error that stands since `since` was acknowledged already.
+    fn is_acknowledged(&self, since: Instant) -> bool {
+        self.errors.back().is_some_and(|error| error.status.at >= since && error.ended.is_some())
+    }
+
+    fn has_error_with_code(&self) -> bool {
+        self.errors.back().is_some_and(|error| error.ended.is_none() && error.code.is_some())
+    }
+
+    fn state_bits(&self) -> Option<u16> {
+        Some(self.status?.value.0)
     }
 
     /// Takes a write to AL control.
@@ -297,6 +325,15 @@ impl AlHistory {
         }
         let seen = Seen::new(code, at, frame);
         self.code = Some(seen);
+        // An error bit that was taken for an echo: whoever has a code for it means it.
+        if let Some(status) = self.status.filter(|status| status.value.error())
+            && code.0 != 0
+            && !self.has_error()
+            && !self.is_acknowledged(status.at)
+        {
+            let from = self.changes.back().and_then(|change| change.from.state().state());
+            self.push_error(status, from);
+        }
         if code.0 != 0
             && let Some(error) = self.errors.back_mut()
             && error.ended.is_none()

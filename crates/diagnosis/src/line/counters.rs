@@ -26,6 +26,10 @@ pub struct CounterHistory {
     last_rise: Option<Instant>,
     /// When the counters of bad frames were last cleared by a write that was seen.
     cleared_by_order: Option<Instant>,
+    /// When a write that would clear a group was last sent, of which nobody saw whether it arrived.
+    may_be_cleared: [Option<Instant>; ClearGroup::ALL.len()],
+    /// When the counter that fell had been read before.
+    before_cleared: Instant,
 }
 
 /// One counter over time.
@@ -140,8 +144,17 @@ impl CounterHistory {
         fell: &mut [bool; ClearGroup::ALL.len()],
         seen: Seen<()>,
     ) {
-        if let Some(last) = self.latest(counter).filter(|last| value < *last) {
-            fell[counter.clear_group() as usize] = true;
+        let Some(track) = self.tracks.get(&counter) else { return };
+        let (last, read) = (track.last.value, track.last.at);
+        if value < last {
+            let group = counter.clear_group() as usize;
+            if self.may_be_cleared[group].is_some_and(|sent| sent >= read) {
+                // By a write of our own, whose return was lost.
+                self.note_clear(counter.clear_group(), read);
+                return;
+            }
+            fell[group] = true;
+            self.before_cleared = read;
             self.cleared = Some(Seen::new((counter, last), seen.at, seen.frame));
         }
     }
@@ -189,6 +202,21 @@ impl CounterHistory {
                 track.total.note_own_clear();
                 track.last.value = 0;
             }
+        }
+    }
+
+    /// Notes that a write which would clear a group was sent, and that its return was lost: it may have been
+    /// executed. A fall since then proves nothing of others.
+    pub fn note_lost_clear(&mut self, group: ClearGroup, sent: Instant) {
+        self.may_be_cleared[group as usize] = Some(sent);
+        let is_it = |cleared: &Seen<(ErrorCounter, u64)>| {
+            cleared.value.0.clear_group() == group
+                && self.before_cleared <= sent
+                && sent <= cleared.at
+        };
+        if self.cleared.is_some_and(|cleared| is_it(&cleared)) {
+            self.cleared = None;
+            self.clears = self.clears.saturating_sub(1);
         }
     }
 

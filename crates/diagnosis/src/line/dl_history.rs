@@ -17,6 +17,8 @@ pub struct DlHistory {
     pub last: Option<Seen<DlStatus>>,
     /// Time of the latest reading, whether or not it was news.
     pub latest_reading: Option<Instant>,
+    /// Whether the latest reading is but what follows from a state that a list names.
+    pub is_assumed: bool,
     /// Changes, oldest first, at most [`CHANGES_KEPT`](super::CHANGES_KEPT).
     pub changes: VecDeque<DlChange>,
     /// All changes, also those forgotten.

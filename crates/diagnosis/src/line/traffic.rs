@@ -53,6 +53,8 @@ impl Silence {
 
 /// Without any frame for so long nothing was sent, where process data are exchanged in a cycle.
 const QUIET: Span = Span::ms(20);
+/// A link that was open is missed for so long at least.
+const OPEN_LINK: Span = Span::ms(100);
 /// Gaps in the recording that are kept.
 const UNRECORDED_KEPT: usize = 256;
 /// With fewer requests than this it is no silence.
@@ -157,6 +159,8 @@ pub struct Traffic {
     pub broadcast_answers: u16,
     /// The working counter of the latest broadcast read, with when it last changed.
     pub broadcast_now: Option<Seen<u16>>,
+    /// When a broadcast read that all controllers answer last came back.
+    pub broadcast_read: Option<Instant>,
     /// In a ring, the latest broadcast read ever whose copies were both processed by somebody: by how many
     /// each, in the order in which they came back. Who is reached by card B alone gets no time of a reference
     /// clock that card A reaches.
@@ -226,6 +230,14 @@ impl Traffic {
     pub fn may_lack(&self, from: Instant, to: Instant) -> bool {
         let overlaps = |gap: &Pause| gap.from <= to && from <= gap.to;
         self.datagrams_cut > 0 || self.is_one_sided() || self.unrecorded_at.iter().any(overlaps)
+    }
+
+    /// Whether the recording itself lacks frames of a short stretch of time, as the numbers of the others tell: then
+    /// it has lost their returns, too. A link that was open would have been missed for longer.
+    #[must_use]
+    pub fn was_badly_recorded(&self, from: Instant, to: Instant) -> bool {
+        let overlaps = |gap: &Pause| gap.from <= to && from <= gap.to && gap.span() < OPEN_LINK;
+        to.since(from) < OPEN_LINK && self.unrecorded_at.iter().any(overlaps)
     }
 
     /// A request was lost that went out when `returns_before` frames had come back; `by_order`, if ports were opened or

@@ -270,9 +270,10 @@ impl Walk<'_, '_> {
         let apart = self.counting(Some(node)).is_some_and(|counting| counting.forwarded_apart);
         let frames = if before.frames == 0 || forwarded.total > 0 || apart {
             invalid.settled
-        } else if before.is_lower_bound || invalid.is_lower_bound {
+        } else if before.is_lower_bound {
             // Two counters that both stand at their end, or were cleared at different times, differ
-            // by chance: only symbols of its own show that a port has damage of its own.
+            // by chance: only symbols of its own show that a port has damage of its own. What one at
+            // its end counted beyond an exact one is damage of its own, at least.
             let own = invalid.settled.saturating_sub(before.frames);
             if physical.settled > 0 { own } else { 0 }
         } else {
@@ -414,8 +415,12 @@ impl Walk<'_, '_> {
         let was_searched =
             line.hole.is_some_and(|hole| first <= hole.since.at && hole.since.at <= last);
         let is_cut = line.traffic.datagrams_cut > 0;
-        let is_explained =
-            is_cut || is_first || was_searched || self.survey.any_link_changed(first, last);
+        let is_unrecorded = line.traffic.was_badly_recorded(first, last);
+        let is_explained = is_unrecorded
+            || is_cut
+            || is_first
+            || was_searched
+            || self.survey.any_link_changed(first, last);
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,
             card,

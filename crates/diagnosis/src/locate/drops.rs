@@ -37,6 +37,8 @@ pub struct Drops {
     pub last: Instant,
     /// Whether it is down now, as an end that answers says.
     pub is_down: bool,
+    /// Whether counters alone tell of it whose earlier values nobody knows.
+    pub may_be_old: bool,
 }
 
 /// One loss.
@@ -99,7 +101,10 @@ impl Drops {
         let (first, last) = (noticed().min()?, noticed().max()?);
         let count = losses.max(seen.len() as u64);
         let is_down = ends.into_iter().any(|end| is_down(line, end));
-        Some(Self { link, seen, count, first, last, is_down })
+        let may_be_old = !is_down
+            && seen.is_empty()
+            && tracks.iter().all(|track| track.may_be_old || track.total.rise() == 0);
+        Some(Self { link, seen, count, first, last, is_down, may_be_old })
     }
 
     /// How long the longest loss lasted, as far as is known: `None` while the link is down, zero for

@@ -5,7 +5,9 @@
 //! **How it is found.** Another tool told how many SubDevices answer a broadcast (`Slaves:` of `ethercat master`,
 //! `slave(s) responding` in a kernel log, `answering` in an observation file), and more are known: from a list,
 //! from a project, or from an earlier count. On a line without branches those answer that are nearest, so the
-//! break lies behind the last of them.
+//! break lies behind the last of them. The same is told of broadcasts that were seen, where their working counter
+//! falls and stays low, and nothing else says who is gone: then links are named behind which there are just as many
+//! SubDevices as are missing.
 //!
 //! **What it means.** A link is open, or a device is without power; all behind it is gone with it. On a line with
 //! branches the number alone does not say which.
@@ -15,8 +17,10 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
+use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::line::{Line, Seen};
@@ -33,9 +37,19 @@ pub const PAGE: RulePage = RulePage {
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
+/// Fewer that answer for so long are fewer for good.
+const LASTS: Span = Span::ms(500);
+/// Ports that were opened or closed so shortly before are why.
+const ORDERED: Span = Span::ms(500);
+/// What was on its way when a link was lost comes back by then.
+const ANSWERS_LATE: Span = Span::ms(100);
+/// So many links are named.
+const MOST_LINKS: usize = 4;
+
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
     let reported = &line.reported;
+    conditions.extend(seen(view, conditions));
     // Without a link nobody answers; where the wiring is known, the link itself is told.
     let carrier = line.host.card(Path::A).carrier.filter(|carrier| !carrier.value);
     let unlinked = carrier.filter(|_| line.devices.is_empty() && line.traffic.frames == 0);
@@ -119,4 +133,80 @@ fn place(line: &Line, count: usize) -> Place {
 
 fn is_chain(tree: &Tree) -> bool {
     tree.closes_at().is_none() && (0..tree.len()).all(|node| tree.children(node).count() <= 1)
+}
+
+/// Broadcasts that were seen: fewer SubDevices than before count in them, for good, and nothing else says who is gone.
+fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
+    let line = view.line;
+    let traffic = &line.traffic;
+    let now = traffic.broadcast_now.filter(|_| traffic.frames > 0)?;
+    let most = traffic.broadcast_answers;
+    let lasts = view.has_ended || view.now.since(now.at) >= LASTS;
+    // In a ring each card counts its own half; without any answer another rule tells.
+    let is_ring = traffic.was_processed_by_one
+        || traffic.broadcast_split.is_some()
+        || line.tree.as_ref().is_some_and(|tree| tree.closes_at().is_some());
+    let is_ordered = line.loops_ordered.is_some_and(|ordered| ordered >= now.at.before(ORDERED));
+    if now.value == 0 || now.value >= most || !lasts || is_ring || is_ordered {
+        return None;
+    }
+    let is_gone = |one: &Condition| {
+        one.ended.is_none()
+            && (one.explains.iter().chain(&one.symptoms).any(|symptom| {
+                matches!(
+                    symptom,
+                    Symptom::Silent(_) | Symptom::LinkDown(..) | Symptom::NobodyAnswers
+                )
+            }))
+    };
+    if conditions.iter().any(is_gone) {
+        return None;
+    }
+    let missing = usize::from(most - now.value);
+    let links = candidates(line, missing, now.at);
+    let network = Place::Network { network: line.network };
+    let at = links.first().copied().unwrap_or(network);
+    let share = 1.0 / links.len().max(1) as f64;
+    let text = format!("{} SubDevices answer a broadcast; it were {most} before", now.value);
+    let mut condition = Condition::new(&PAGE, at, FaultName::LinkOpen, now.at)
+        .confidence(if at == network { 0.4 } else { 0.55 * share })
+        .confirmed(now.at)
+        .shown_by(Evidence::frame(now.at, now.frame.unwrap_or(0), text));
+    for other in links.iter().skip(1) {
+        condition = condition.or_at(FaultName::LinkOpen, *other, 0.55 * share);
+    }
+    condition = condition.or(FaultName::DeviceOff, 0.25).or(FaultName::SupplyOff, 0.1);
+    condition = match at == network {
+        true => condition.advise(
+            "Compare the SubDevices that answer with the drawing: `linesman scan --against` says who is \
+             missing.",
+        ),
+        false => condition
+            .advise(format!("Look at {at}: the lamps on both sides, the plugs, the supply behind.")),
+    };
+    let gone = line.devices.iter().map(|device| device.id);
+    let follows = gone
+        .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
+    Some(condition.explaining(follows))
+}
+
+/// Links behind which there are just as many SubDevices as are missing, none of them heard since: cables before
+/// contacts of the terminal bus.
+fn candidates(line: &Line, missing: usize, since: Instant) -> Vec<Place> {
+    let Some(tree) = line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) else {
+        return Vec::new();
+    };
+    let is_heard = |node: &usize| {
+        line.devices[*node].answered.is_some_and(|answered| answered.at > since + ANSWERS_LATE)
+    };
+    let fits = |node: &usize| {
+        let branch = tree.subtree(*node);
+        branch.len() == missing && !branch.iter().any(is_heard)
+    };
+    let mut heads: Vec<usize> = tree.order().iter().copied().filter(fits).collect();
+    heads.sort_by_key(|node| is_on_terminal_bus(line, *node));
+    let link = |node: usize| tree.links().get(tree.link_above(node)?).copied();
+    let links = heads.into_iter().filter_map(link).take(MOST_LINKS);
+    let named = links.map(|link| link.map(|node| DeviceId(node as u32)));
+    named.map(|link| Place::link(line.network, link, Some(LinkDirection::Both))).collect()
 }

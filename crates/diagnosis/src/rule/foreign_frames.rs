@@ -77,6 +77,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         // Recorded beside the line, or sent by this computer itself: nobody says that it came in.
         condition.severity = Severity::Info;
     }
+    if seen.is_none() && destroyed.iter().all(|(device, _)| may_be_old(device)) {
+        condition = condition.may_be_old();
+    }
     if last + QUIET < view.now {
         condition = condition.ended(last);
     }
@@ -85,6 +88,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             .advise("Connect the card to the first SubDevice directly, without a switch.")
             .advise("Take IP addresses and services such as LLDP off this network interface."),
     );
+}
+
+/// Whether nobody knows what its processing unit had counted before.
+fn may_be_old(device: &Device) -> bool {
+    device.counters.track(ErrorCounter::ProcessingUnit).is_some_and(|track| track.may_be_old)
 }
 
 /// Who destroyed frames that were not damaged, with the rises that show it.

@@ -9,7 +9,8 @@
 //! (0x0308 to 0x030B) or, if its type does not have these counters, once more as bad. So the ports are
 //! put in the order in which a frame meets them, and the *first* one that counts lies directly behind
 //! the damage. Only rises during the watch count: old values, and errors at the moment a link comes or
-//! goes, are history.
+//! goes, are history. Counts that somebody typed in without earlier ones may be old: a warning, until they are
+//! cleared and rise again.
 //!
 //! **What it means.**
 //!
@@ -141,6 +142,9 @@ fn add(
     if let Some(last_hop) = &suspicion.last_hop {
         condition.evidence.push(card_evidence(last_hop));
     }
+    if is_history(survey, suspicion) {
+        condition = condition.may_be_old();
+    }
     // What follows from sums alone, while SubDevices went away and came back, is not claimed.
     if condition.evidence.is_empty() {
         return;
@@ -167,6 +171,25 @@ fn add(
     for other in &suspicion.beneath {
         add(view, survey, other, Some(suspicion), conditions);
     }
+}
+
+/// Whether all that shows a damage was read but once, and nothing says that it goes on: it may have been counted
+/// long ago.
+fn is_history(survey: &Survey<'_>, suspicion: &Suspicion) -> bool {
+    let may_be_old = |node: usize, counter: ErrorCounter| {
+        survey.track(node, counter).is_none_or(|track| track.may_be_old || track.total.rise() == 0)
+    };
+    let is_old = |damage: &Damage| {
+        let End::Controller(node, port) = damage.hop.to else { return false };
+        let own = [ErrorCounter::InvalidFrame(port), ErrorCounter::PhysicalLayer(port)];
+        own.into_iter().all(|counter| may_be_old(node, counter))
+            && damage
+                .shown_at
+                .is_none_or(|(node, port)| may_be_old(node, ErrorCounter::Forwarded(port)))
+    };
+    let goes_on = survey.line().reported.loss_rate.is_some_and(|rate| rate > 0.0);
+    let damages = &suspicion.damages;
+    !goes_on && suspicion.last_hop.is_none() && !damages.is_empty() && damages.iter().all(is_old)
 }
 
 /// SubDevices that lost nothing but time: frames that are damaged or lost bring neither outputs nor the

@@ -36,6 +36,7 @@ use linesman_proto::sii::PortKind;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
+use super::wiring::entry;
 use super::{Rule, RulePage, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::line::{Line, Seen, search};
@@ -70,6 +71,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let Some(tree) = &view.line.tree else { return };
     let all = Drops::all(view.line);
     for drops in &all {
+        // Who answers though its entry has no link is plugged in the other way round.
+        let ends = [tree.links()[drops.link].upstream, tree.links()[drops.link].downstream];
+        let only_entry = drops.seen.iter().all(|drop| Some(drop.end) == ends.get(1).copied());
+        if drops.is_down && only_entry && entry::is_reversed(view.line, ends[1]) {
+            continue;
+        }
         let mut condition = condition(view.line, tree, drops);
         if condition
             .alternatives
@@ -230,6 +237,9 @@ fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
     }
     if let Some(ended) = drops.ended() {
         condition = condition.ended(ended);
+    }
+    if drops.may_be_old {
+        condition = condition.may_be_old();
     }
     let far = match link.downstream {
         End::Controller(node, _) => line.label(DeviceId(node as u32)),

@@ -36,6 +36,7 @@ pub mod restarted;
 pub mod ring_reversed;
 pub mod second_maindevice;
 pub mod shared_address;
+pub mod state_behind;
 pub mod state_error;
 pub mod state_unanswered;
 pub mod watchdog_short;
@@ -137,6 +138,7 @@ pub const RULES: &[Rule] = &[
     //
     // What another tool tells, where nothing above explains it; and what was exchanged, of all above.
     reported_trouble::RULE,
+    state_behind::RULE,
     reported_late::RULE,
     long_delay::RULE,
     errors_at_device::RULE,

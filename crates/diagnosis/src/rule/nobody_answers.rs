@@ -73,13 +73,18 @@ const LINK_UP: Span = Span::us(330);
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
     let traffic = &line.traffic;
+    conditions.extend(told(view));
     // Of frames that were cut off nobody knows whether they were answered.
     if traffic.is_one_sided() || traffic.datagrams_cut * 2 > traffic.frames {
         return;
     }
     // One condition: the latest silence, or the one that lasts.
     let is_long = |silence: &&Silence| match silence.ended {
-        Some(ended) => silence.frames >= CERTAIN && ended.since(silence.since.at) >= LINK_UP,
+        Some(ended) => {
+            silence.frames >= CERTAIN
+                && ended.since(silence.since.at) >= LINK_UP
+                && !traffic.was_badly_recorded(silence.since.at, ended)
+        }
         None => silence.frames >= CERTAIN || (silence.frames >= FEW && view.has_ended),
     };
     let swallowed = traffic.swallowed.iter().rev().find(|silence| silence.frames >= CERTAIN);
@@ -97,6 +102,33 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     } else if traffic.answered == 0 && traffic.returned >= FEW && traffic.unanswered >= CERTAIN {
         conditions.push(ignored(view));
     }
+}
+
+/// Another tool says that none of the SubDevices it knows answers.
+fn told(view: &View<'_>) -> Option<Condition> {
+    let line = view.line;
+    let silent = line.devices.iter().map(|device| device.silent);
+    let silent: Vec<Seen<()>> = silent.collect::<Option<_>>()?;
+    // Frames tell it themselves; how many answer a broadcast is another rule's.
+    if line.traffic.frames > 0 || line.reported.answering.is_some() {
+        return None;
+    }
+    let at = silent.iter().map(|seen| seen.at).min()?;
+    let carrier = line.host.card(Path::A).carrier.map(|carrier| carrier.value);
+    let text = match silent.len() {
+        1 => "the only SubDevice does not answer".to_owned(),
+        count => format!("none of {count} SubDevices answers"),
+    };
+    let devices = line.devices.iter().map(|device| device.id);
+    let follows = devices
+        .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
+    let condition = cut(line, at, carrier)
+        .confirmed(at)
+        .shown_by(Evidence::host(Some(at), text))
+        .about([Symptom::NobodyAnswers])
+        .explaining(follows)
+        .explaining([Symptom::FramesLost, Symptom::NoCarrier]);
+    Some(advise(condition, carrier))
 }
 
 /// A silence as it is without the ports that were closed to find its place: frames that come back meanwhile

@@ -6,6 +6,9 @@
 //! every controller has, and for a tenth of a second at least no later one was answered; or an online list says so.
 //! A station address that is asked again and again and has never answered counts, too, where others answer.
 //!
+//! Where all behind one link are silent at once, it is one finding, at that link; unless the near end of it was read
+//! since and says otherwise, or broadcasts still count all of them.
+//!
 //! **What it means.** It is without power, cut off, or has lost its station address by starting anew.
 //! When the link to it is lost, that finding stands above this one.
 //!
@@ -13,12 +16,16 @@
 //! or in this one.
 
 use linesman_config::fault::{Class, FaultName};
+use linesman_proto::address::DeviceId;
+use linesman_proto::port::Port;
 use linesman_proto::register::table;
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::{End, Tree};
 
+use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
-use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Absence, Device};
+use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
+use crate::line::{Absence, Device, Line, Seen};
 use crate::locate::Drops;
 
 /// The page.
@@ -52,12 +59,22 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             way.any(|node| tree.link_above(node).is_some_and(|link| down.contains(&link)))
         })
     };
+    let branches = silent_branches(view);
+    for branch in &branches {
+        conditions.push(cut_off(line, branch));
+    }
     for (device, absence) in away() {
+        // The link says it all of one alone.
+        if branches.iter().any(|branch| branch.devices == [device.id]) {
+            continue;
+        }
         let silent = absence.since;
         let place = Place::device(line.network, device.id);
         let label = line.label(device.id);
         let new = |cause| Condition::new(&PAGE, place, cause, silent.at);
-        let mut condition = if is_cut_off(device.id.index()) {
+        let is_cut_off = is_cut_off(device.id.index())
+            || branches.iter().any(|branch| branch.devices.contains(&device.id));
+        let mut condition = if is_cut_off {
             // Why is for the finding above.
             new(FaultName::LinkOpen).confidence(0.6).or(FaultName::DeviceOff, 0.3)
         } else {
@@ -87,6 +104,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         if let Some(ended) = absence.ended {
             condition = condition.ended(ended);
         }
+        // Another tool's list says at once who is gone: those behind went with it.
+        if line.traffic.frames == 0 && !is_cut_off {
+            condition = condition.explaining(behind(line, device.id));
+        }
         conditions.push(condition);
     }
 }
@@ -101,4 +122,187 @@ fn absence(view: &View<'_>, device: &Device) -> Option<Absence> {
     let ended = latest.ended?;
     let is_told = ended.since(latest.since.at) >= LONG && view.now.since(ended) <= TOLD_FOR;
     is_told.then_some(*latest)
+}
+
+/// SubDevices that all fell silent behind one link, of which nobody says that it is up.
+struct Branch {
+    a: End<DeviceId>,
+    b: End<DeviceId>,
+    /// Whether the ports are those of the wiring, and not of a line in the order of positions.
+    is_wired: bool,
+    is_on_terminal_bus: bool,
+    devices: Vec<DeviceId>,
+    since: Seen<()>,
+    ended: Option<Instant>,
+}
+
+/// All branches that are silent as a whole, or were a moment ago, while whoever is before them answers.
+fn silent_branches(view: &View<'_>) -> Vec<Branch> {
+    let line = view.line;
+    let away: Vec<Option<Absence>> =
+        line.devices.iter().map(|device| absence(view, device)).collect();
+    let is_silent = |id: &DeviceId| away.get(id.index()).is_some_and(Option::is_some);
+    // How many answer says the same, and where.
+    if counts_all(line, &away) || line.reported.answering.is_some() {
+        return Vec::new();
+    }
+    let branches = match line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) {
+        Some(tree) if tree.closes_at().is_some() => return Vec::new(),
+        Some(tree) => in_tree(line, tree, &is_silent, &away),
+        None => in_order(line, &is_silent, &away).into_iter().collect(),
+    };
+    // Who started anew was without supply, and a link tells nothing of that.
+    let has_restarted = |id: &DeviceId| line.device(*id).is_some_and(Device::has_restarted);
+    let is_open = |branch: &Branch| {
+        !is_up(line, branch)
+            && (branch.ended.is_none() || !branch.devices.iter().any(has_restarted))
+    };
+    branches.into_iter().filter(is_open).collect()
+}
+
+/// Whether broadcasts went on counting all: who still counts is there, and has lost its address.
+fn counts_all(line: &Line, away: &[Option<Absence>]) -> bool {
+    let traffic = &line.traffic;
+    let (Some(now), Some(read)) = (traffic.broadcast_now, traffic.broadcast_read) else {
+        return false;
+    };
+    let since = || away.iter().flatten().map(|absence| absence.since.at);
+    let lasts = away.iter().flatten().any(|absence| absence.ended.is_none());
+    usize::from(now.value) >= line.devices.len()
+        && since().max().is_some_and(|latest| read >= latest)
+        && (lasts || since().min().is_some_and(|first| now.at < first))
+}
+
+fn in_tree(
+    line: &Line,
+    tree: &Tree,
+    is_silent: &dyn Fn(&DeviceId) -> bool,
+    away: &[Option<Absence>],
+) -> Vec<Branch> {
+    let id = |node: usize| DeviceId(node as u32);
+    let heads = tree.order().iter().copied().filter(|node| {
+        let above = tree.upstream(*node).and_then(|end| end.node());
+        above.is_some_and(|above| !is_silent(&id(above)))
+            && tree.subtree(*node).iter().all(|node| is_silent(&id(*node)))
+    });
+    let branch = |head: usize| {
+        let link = tree.links().get(tree.link_above(head)?)?.map(id);
+        let devices: Vec<DeviceId> = tree.subtree(head).iter().map(|node| id(*node)).collect();
+        Some(Branch {
+            a: link.upstream,
+            b: link.downstream,
+            is_wired: true,
+            is_on_terminal_bus: is_on_terminal_bus(line, head),
+            since: since(away, &devices)?,
+            ended: ended(away, &devices),
+            devices,
+        })
+    };
+    heads.filter_map(branch).collect()
+}
+
+/// Where nobody has seen the wiring: the last ones in the order of positions, as on a line.
+fn in_order(
+    line: &Line,
+    is_silent: &dyn Fn(&DeviceId) -> bool,
+    away: &[Option<Absence>],
+) -> Option<Branch> {
+    let order: Vec<DeviceId> = line.devices.iter().map(|device| device.id).collect();
+    let silent = order.iter().rev().take_while(|id| is_silent(id)).count();
+    let (there, devices) = order.split_at(order.len() - silent);
+    if devices.len() < 2 || there.iter().any(is_silent) {
+        return None;
+    }
+    Some(Branch {
+        a: End::Controller(*there.last()?, Port::B),
+        b: End::Controller(*devices.first()?, Port::A),
+        is_wired: false,
+        is_on_terminal_bus: false,
+        since: since(away, devices)?,
+        ended: ended(away, devices),
+        devices: devices.to_vec(),
+    })
+}
+
+fn since(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Seen<()>> {
+    let absences = devices.iter().filter_map(|id| away.get(id.index()).copied().flatten());
+    absences.map(|absence| absence.since).min_by_key(|seen| seen.at)
+}
+
+/// When all of them answered again.
+fn ended(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Instant> {
+    let absences = devices.iter().map(|id| away.get(id.index()).copied().flatten());
+    let ended: Option<Vec<Instant>> = absences.map(|absence| absence?.ended).collect();
+    ended?.into_iter().max()
+}
+
+/// Whether the near end says, after all fell silent, that the link is there, or that it is not: then another rule
+/// tells of it.
+fn is_up(line: &Line, branch: &Branch) -> bool {
+    let End::Controller(id, _) = branch.a else { return false };
+    let dl = line.device(id).map(|device| &device.dl).filter(|dl| !dl.is_assumed);
+    let read = dl.and_then(|dl| dl.latest_reading);
+    read.is_some_and(|read| read >= branch.since.at)
+}
+
+/// One link, and all behind it silent.
+fn cut_off(line: &Line, branch: &Branch) -> Condition {
+    let (a, b, since) = (branch.a, branch.b, branch.since);
+    let direction = Some(LinkDirection::Both);
+    let place = Place::Link { network: line.network, a, b: Some(b), direction };
+    let (open, off, supply) =
+        if branch.is_on_terminal_bus { (0.5, 0.35, 0.05) } else { (0.6, 0.25, 0.1) };
+    let first = branch.devices.first().copied().unwrap_or_default();
+    let device = Place::device(line.network, first);
+    let label = line.label(first);
+    let count = branch.devices.len();
+    let text = match (count, branch.is_wired) {
+        (1, _) => format!("{label} does not answer, and whoever is before it does"),
+        (_, true) => format!(
+            "{label} and {} behind it do not answer, and whoever is before them does",
+            count - 1
+        ),
+        (_, false) => format!(
+            "the last {count} SubDevices in the order of positions do not answer, {label} the first of \
+             them; the wiring was not seen and is taken for a line"
+        ),
+    };
+    let text = match branch.ended {
+        None => text,
+        Some(ended) => format!("{text}; for {}, then again", ended.since(since.at)),
+    };
+    let all = branch.devices.iter().copied();
+    let condition = Condition::new(&PAGE, place, FaultName::LinkOpen, since.at)
+        .confidence(open)
+        .or_at(FaultName::DeviceOff, device, off)
+        .or_at(FaultName::SupplyOff, device, supply)
+        .confirmed(since.at)
+        .about(all.clone().map(Symptom::Silent))
+        .explaining(all.flat_map(|id| {
+            [
+                Symptom::Silent(id),
+                Symptom::WorkingCounter(id),
+                Symptom::StateLost(id),
+                Symptom::Mailbox(id),
+            ]
+        }))
+        .shown_by(Evidence::register(first, table::AL_STATUS.address, &since, text))
+        .advise(format!("Look at {label}: if no lamp is lit, measure its supply first."))
+        .advise(format!("Look at the plugs and the cable of {place}."));
+    match branch.ended {
+        Some(ended) => condition.ended(ended),
+        None => condition,
+    }
+}
+
+/// What follows behind a silent SubDevice.
+fn behind(line: &Line, id: DeviceId) -> impl Iterator<Item = Symptom> {
+    let tree =
+        line.tree.as_ref().filter(|tree| tree.closes_at().is_none() && id.index() < tree.len());
+    let above = tree.and_then(|tree| tree.upstream(id.index())?.node());
+    let is_head =
+        above.and_then(|node| line.devices.get(node)).is_some_and(|one| one.silent.is_none());
+    let nodes = tree.filter(|_| is_head).map(|tree| tree.subtree(id.index())).unwrap_or_default();
+    let others = nodes.iter().map(|node| DeviceId(*node as u32)).filter(move |other| *other != id);
+    others.flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)])
 }

@@ -7,6 +7,10 @@
 //! (`S200`); if it had been there, it *left* that state by itself (`S201`, watchdog `S202`,
 //! synchronisation `T400`).
 //!
+//! An error that stood already when the SubDevice was first read, and that the MainDevice acknowledged, is left
+//! over from an earlier run: a note. Watchdogs of several SubDevices that expire at about the same time are one
+//! finding, of the network.
+//!
 //! **What it means.** A refusal is about settings in most cases: process data, SyncManagers, mailbox,
 //! start-up commands that do not fit the device. With 0x0018, 0x0019 and 0x002B its application has no values
 //! to exchange; where its outputs are sent, it is the application that stands still.
@@ -22,7 +26,7 @@
 //! **What to do.** The code says more than the state: its own page has the checks, most promising first.
 
 use linesman_config::fault::{Class, FaultName};
-use linesman_proto::address::RegisterAddress;
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::state::status_code::Class as CodeClass;
 use linesman_proto::state::{AlState, AlStatusCode, StatusCode};
 
@@ -79,6 +83,14 @@ const AL_STATUS_CODE: RegisterAddress = RegisterAddress(0x0134);
 /// Subindices of 0x1C32 and 0x1C33 (ETG.1020): SM event missed, cycle time too small.
 const EVENT_MISSED: u8 = 0x0B;
 const CYCLE_EXCEEDED: u8 = 0x0C;
+/// A MainDevice that starts has acknowledged old errors by then.
+const ACKNOWLEDGED_WITHIN: Span = Span::ms(500);
+/// States are read in turn: what is read within this time happened at once.
+const AT_ONCE: Span = Span::ms(1_500);
+/// So many watchdogs that expire at once have one cause.
+const SEVERAL: usize = 2;
+/// So many SubDevices are named.
+const NAMED: usize = 6;
 /// SyncManager watchdog.
 const WATCHDOG_CODE: AlStatusCode = AlStatusCode(0x001B);
 
@@ -97,9 +109,83 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             }
         }
         for (page, error, times) in pages {
-            conditions.push(condition(view, device, page, error, times));
+            if !may_be_left_over(view, error) {
+                conditions.push(condition(view, device, page, error, times));
+            }
         }
     }
+    conditions.extend(starved_together(view, conditions));
+}
+
+/// Whether an error stood already when its SubDevice was first read, a moment ago: a MainDevice that starts
+/// acknowledges it.
+fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
+    let is_new = view.now.since(error.status.at) < ACKNOWLEDGED_WITHIN && !view.has_ended;
+    is_new
+        && view.line.traffic.frames > 0
+        && was_left_over(view.line, error)
+        && error.ended.is_none()
+}
+
+/// Whether an error is of a time before this run: where process data went on already, it belongs to that.
+fn was_left_over(line: &Line, error: &AlError) -> bool {
+    let is_running = line.cyclic.iter().any(|cyclic| cyclic.first.at < error.status.at);
+    error.was_left_over() && !is_running
+}
+
+/// Watchdogs that expired in several SubDevices at about the same time, without anything that explains it of each:
+/// nobody has sent outputs.
+fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
+    let line = view.line;
+    let is_explained =
+        |id: DeviceId| conditions.iter().any(|one| one.explains.contains(&Symptom::StateLost(id)));
+    let starved = line.devices.iter().filter_map(|device| {
+        let mut errors = device.al.errors.iter().rev();
+        let error = errors.find(|error| page_of(error).code == WATCHDOG.code)?;
+        Some((device, error)).filter(|_| !is_explained(device.id))
+    });
+    let starved: Vec<(&Device, &AlError)> = starved.collect();
+    let latest = starved.iter().map(|(_, error)| error.status.at).max()?;
+    let together: Vec<(&Device, &AlError)> =
+        starved.into_iter().filter(|(_, error)| error.status.at + AT_ONCE >= latest).collect();
+    if together.len() < SEVERAL {
+        return None;
+    }
+    let since = together.iter().map(|(_, error)| error.status.at).min()?;
+    let ids = || together.iter().map(|(device, _)| device.id);
+    let names: Vec<String> = ids().take(NAMED).map(|id| line.label(id)).collect();
+    let more = match together.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} others"),
+    };
+    let text = format!(
+        "the watchdogs of {} SubDevices expired at about the same time: {}{more}",
+        together.len(),
+        names.join(", ")
+    );
+    let place = Place::Network { network: line.network };
+    let mut condition = Condition::new(&WATCHDOG, place, FaultName::WatchdogStarved, since)
+        .confidence(0.8)
+        .or_at(FaultName::HostJitter, Place::Host, 0.1)
+        .or(FaultName::LateFrames, 0.05)
+        .confirmed(since)
+        .about(ids().map(Symptom::StateLost))
+        .explaining(ids().flat_map(|id| {
+            [Symptom::StateLost(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)]
+        }))
+        .shown_by(Evidence::host(Some(since), text))
+        .advise(
+            "Look whether the MainDevice, or its cyclic task, stopped or paused: a debugger, a restart, a \
+             long call within the cycle.",
+        )
+        .advise("Run `linesman host --measure 10` on its computer: it tells what makes it pause.")
+        .advise("The SubDevices are well: do not exchange them for this.");
+    let ended: Option<Vec<Instant>> =
+        together.iter().map(|(device, error)| over(view, device, error)).collect();
+    if let Some(ended) = ended.and_then(|all| all.into_iter().max()) {
+        condition = condition.ended(ended);
+    }
+    Some(condition)
 }
 
 fn page_of(error: &AlError) -> &'static RulePage {
@@ -174,6 +260,14 @@ fn condition(
     }
     if let Some(ended) = over(view, device, error) {
         condition = condition.ended(ended);
+    }
+    if was_left_over(line, error)
+        && let Some(acknowledged) = error.ended
+    {
+        condition.severity = Severity::Info;
+        let text = "it stood before anything was asked of the SubDevice: left over from an earlier run, \
+                    and acknowledged";
+        condition = condition.shown_by(Evidence::host(Some(acknowledged), text));
     }
     for evidence in evidence(device, error, meaning, times) {
         condition = condition.shown_by(evidence);

@@ -7,7 +7,8 @@
 //! by which frames come in. It is laid upon the planned tree with the identities (SII words 0x08 to 0x0F,
 //! object 0x1018) and aliases (0x0012) of all SubDevices, at the least cost: one cable, or one device, at a
 //! time. Whole branches that are missing and nothing else are no matter of this rule: they may be without
-//! power, or cut off.
+//! power, or cut off. Without identities, and without a plan, links tell: who answers though its IN port has no link
+//! is entered by another one.
 //!
 //! **What it means.**
 //!
@@ -24,6 +25,7 @@
 //! **What to do.** Compare the cables at the named ports with the drawing, in the named order. IN is port A,
 //! the upper socket (X1) of most couplers. Where the wiring is what is wanted, scan anew and save the project.
 
+pub(super) mod entry;
 mod found;
 
 use linesman_config::compare::{Comparison, Difference, There, Unlike, Wanted};
@@ -83,6 +85,12 @@ pub(super) fn judges(line: &Line) -> bool {
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    compared(view, conditions);
+    let by_links = entry::conditions(view.line, conditions);
+    conditions.extend(by_links);
+}
+
+fn compared(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let Some(found) = Found::of(view.line) else { return };
     let comparison = found.compare();
     if !found.tells(&comparison) {

@@ -9,12 +9,15 @@
 //! that takes outputs adds 1 to an LWR and 2 to an LRW. The missing amount and what else is known of the
 //! owners (error or fallen state, a lost link on the way, no answer, a processor that has stopped) tell who it is: those whose shares
 //! add up to just what is missing, and as few as possible. When the MainDevice itself took a SubDevice
-//! out of SAFEOP or OP, a lower working counter is what it wanted.
+//! out of SAFEOP or OP, a lower working counter is what it wanted. Where nothing else is known, and what is missing is
+//! just the share of all behind one link, that link is open: nobody needs to poll states for that.
 //!
 //! **What it means.** By itself it says only *that* data are missing. Usually another finding says why,
 //! and this one is listed beneath it.
 //!
 //! **What to do.** Look at the SubDevice's state and at the way to it.
+
+mod trailing;
 
 use std::collections::BTreeMap;
 
@@ -23,7 +26,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View, processor_stopped};
-use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::line::{Cyclic, Deficit, Device, Line, Owner, Trouble};
 use crate::locate::Drops;
 
@@ -55,6 +58,8 @@ struct Suspects {
     /// They are the ones for sure; else one or some of them.
     is_certain: bool,
     devices: Vec<DeviceId>,
+    /// Where their shares are just those of all behind a link: such links, most likely first.
+    links: Vec<usize>,
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
@@ -116,11 +121,11 @@ fn suspects(
             .filter(|device| trouble(device, deficit, view.now).is_some())
             .map(|device| device.id)
             .collect();
-        return Suspects { is_certain: devices.len() == 1, devices };
+        return Suspects { is_certain: devices.len() == 1, devices, links: Vec::new() };
     }
     let shares: Vec<(DeviceId, Vec<u16>)> =
         owners.iter().map(|owner| (owner.device, shares(cyclic, owner))).collect();
-    let certain = |devices| Suspects { is_certain: true, devices };
+    let certain = |devices| Suspects { is_certain: true, devices, links: Vec::new() };
     let signs: Vec<Sign> =
         owners.iter().map(|owner| sign(view, lost, owner.device, deficit)).collect();
     for least in [Sign::Error, Sign::LinkLost, Sign::Absent, Sign::Stopped] {
@@ -141,6 +146,11 @@ fn suspects(
     if in_trouble().map(|(share, _)| full(share)).sum::<u16>() >= missing {
         return certain(in_trouble().map(|(share, _)| share.0).collect());
     }
+    if signs.iter().all(|sign| *sign == Sign::None)
+        && let Some(behind) = trailing::suspects(line, deficit)
+    {
+        return behind;
+    }
     if shares.iter().map(full).sum::<u16>() == missing {
         return certain(owners.iter().map(|owner| owner.device).collect());
     }
@@ -158,9 +168,10 @@ fn suspects(
         0 => Suspects {
             is_certain: false,
             devices: owners.iter().map(|owner| owner.device).collect(),
+            links: Vec::new(),
         },
         1 => certain(alone),
-        _ => Suspects { is_certain: false, devices: alone },
+        _ => Suspects { is_certain: false, devices: alone, links: Vec::new() },
     }
 }
 
@@ -269,13 +280,29 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     let lasts = deficits.iter().any(|(_, deficit)| deficit.ended.is_none());
     let ended = deficits.iter().filter_map(|(_, deficit)| deficit.ended).max();
     let first_suspect = suspects.devices.first().and_then(|id| line.device(*id));
+    let named = |link: &usize| {
+        let link = line.tree.as_ref()?.links().get(*link)?.map(|node| DeviceId(node as u32));
+        Some(Place::link(line.network, link, Some(LinkDirection::Both)))
+    };
+    let links: Vec<Place> = suspects.links.iter().filter_map(named).collect();
     let place = match first_suspect {
+        _ if !links.is_empty() => links[0],
         Some(device) if suspects.is_certain => Place::device(line.network, device.id),
         Some(_) | None => Place::Network { network: line.network },
     };
     let known = first_suspect
         .and_then(|device| deficits.iter().find_map(|(_, at)| trouble(device, at, view.now)));
+    let nobody_known = suspects.devices.is_empty() && lasts;
     let (cause, confidence, others) = match known {
+        // All behind a link, or nobody knows whose: a cable, or the supply of a device, takes shares for good.
+        _ if !links.is_empty() => {
+            (FaultName::LinkOpen, 0.5, [(FaultName::DeviceOff, 0.2), (FaultName::SupplyOff, 0.1)])
+        }
+        None if nobody_known => (
+            FaultName::LinkOpen,
+            0.3,
+            [(FaultName::DeviceOff, 0.2), (FaultName::FirmwareFault, 0.15)],
+        ),
         Some(Trouble::Absent(_)) => {
             (FaultName::DeviceOff, 0.4, [(FaultName::LinkOpen, 0.35), (FaultName::BrownOut, 0.1)])
         }
@@ -303,6 +330,14 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     }
     for (cause, confidence) in others {
         condition = condition.or(cause, confidence);
+    }
+    for other in links.iter().skip(1).take(3) {
+        condition = condition.or_at(FaultName::LinkOpen, *other, 0.05);
+    }
+    if let Some(link) = links.first() {
+        condition = condition.advise(format!(
+            "Look at {link}: the lamps on both sides, the plugs, the supply behind."
+        ));
     }
     for (cyclic, deficit) in deficits.iter().rev().take(3) {
         condition = condition.shown_by(evidence(line, cyclic, deficit));

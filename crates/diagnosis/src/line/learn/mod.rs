@@ -11,7 +11,7 @@ mod process_data;
 mod registers;
 mod sii;
 
-use linesman_proto::address::{Path, Position, RegisterAddress, StationAddress};
+use linesman_proto::address::{DeviceId, Path, Position, RegisterAddress, StationAddress};
 use linesman_proto::command::{Addressing, Command, Effect};
 use linesman_proto::frame::{Datagram, FrameView};
 use linesman_proto::time::Instant;
@@ -205,6 +205,7 @@ impl Learner {
         let counts = answer.command == Command::Brd && answer.ado < FIRST_OPTIONAL;
         if counts {
             line.traffic.broadcast_answers = line.traffic.broadcast_answers.max(answer.sum);
+            line.traffic.broadcast_read = line.traffic.broadcast_read.max(Some(answer.at));
             let split = (answer.sum - answer.own, answer.own);
             let is_split = split.0 > 0 && split.1 > 0;
             if is_split {
@@ -413,10 +414,26 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
                 line.loops_ordered = Some(request.time);
             }
         }
+        if datagram.command().is_some_and(|command| command.effect().writes) {
+            let ids = concerned(line, addressing, datagram.adp());
+            registers::may_be_cleared(line, &ids, (datagram.ado(), datagram.data()), request.time);
+        }
         let traffic = &mut line.traffic;
         if matches!(addressing, Some(Addressing::Station | Addressing::Logical)) {
             traffic.lost_addressed += 1;
         }
+    }
+}
+
+/// The controllers that a datagram with this address is for, as far as they are known.
+fn concerned(line: &Line, addressing: Option<Addressing>, adp: u16) -> Vec<DeviceId> {
+    match addressing {
+        Some(Addressing::Station) => line.by_station(StationAddress(adp)).into_iter().collect(),
+        Some(Addressing::Position) => {
+            line.by_position(Position::from_auto_increment(adp)).into_iter().collect()
+        }
+        Some(Addressing::Broadcast) => line.devices.iter().map(|device| device.id).collect(),
+        Some(_) | None => Vec::new(),
     }
 }
 

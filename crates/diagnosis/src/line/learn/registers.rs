@@ -7,7 +7,7 @@ use linesman_proto::register::{
     SystemTimeDifference, WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::state::{AlState, AlStatusCode};
-use linesman_proto::time::DcTime32;
+use linesman_proto::time::{DcTime32, Instant};
 
 use super::{Answer, part, word_at};
 use crate::line::{Device, Line, LoopWrite, Seen};
@@ -105,6 +105,36 @@ pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     }
 }
 
+/// Counters of these controllers were to be cleared, and the frame did not come back, or came back damaged: it may
+/// have been executed all the same.
+pub(super) fn may_be_cleared(
+    line: &mut Line,
+    ids: &[DeviceId],
+    (start, data): (RegisterAddress, &[u8]),
+    sent: Instant,
+) {
+    if !touches(start, data, COUNTERS) {
+        return;
+    }
+    for id in ids {
+        let Some(device) = line.device_mut(*id) else { continue };
+        for group in cleared_by(start, data) {
+            device.counters.note_lost_clear(group, sent);
+        }
+    }
+    line.touch();
+}
+
+/// The groups of counters that a write clears.
+fn cleared_by(start: RegisterAddress, data: &[u8]) -> impl Iterator<Item = ClearGroup> + use<'_> {
+    ClearGroup::ALL.into_iter().filter(move |group| {
+        (0..data.len() as u16).any(|offset| {
+            let address = RegisterAddress(start.0.saturating_add(offset));
+            ClearGroup::written_by(address) == Some(*group)
+        })
+    })
+}
+
 /// Whether a write is about DL control.
 pub(super) fn is_dl_control(start: RegisterAddress, data: &[u8]) -> bool {
     touches(start, data, DL_CONTROL..DL_CONTROL + 4)
@@ -195,14 +225,8 @@ fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
     }
     let is_set = watchdog(device, data, start, Seen::new((), answer.at, Some(answer.frame)));
     if touches(start, data, COUNTERS) {
-        for group in ClearGroup::ALL {
-            let is_hit = (0..data.len() as u16).any(|offset| {
-                let address = RegisterAddress(start.0.saturating_add(offset));
-                ClearGroup::written_by(address) == Some(group)
-            });
-            if is_hit {
-                device.counters.note_clear(group, answer.at);
-            }
+        for group in cleared_by(start, data) {
+            device.counters.note_clear(group, answer.at);
         }
     }
     is_set

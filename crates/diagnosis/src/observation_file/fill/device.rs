@@ -83,6 +83,14 @@ impl Values {
             || self.ports.iter().any(|(_, port)| port.is_some())
     }
 
+    fn names_links(&self) -> bool {
+        let mut ports = self.ports.iter().filter_map(|(_, port)| port.as_ref());
+        let flags =
+            [DeviceState::LINK_ERROR, DeviceState::MISSING_LINK, DeviceState::ADDITIONAL_LINK];
+        ports.any(ObservedPort::tells_link)
+            || self.state.is_some_and(|state| flags.into_iter().any(|flag| state.contains(flag)))
+    }
+
     fn tells_links(&self) -> bool {
         let ports = self.ports.iter().filter_map(|(_, port)| port.as_ref());
         self.state.is_some() || ports.into_iter().any(ObservedPort::tells_link)
@@ -212,6 +220,8 @@ impl ObservedDevice {
         for (at, read) in std::iter::once(first).chain(told) {
             last = dl_status(read, last, planned, &is_wired);
             device.dl.record(last, *at, None);
+            // A state alone is no reading of links.
+            device.dl.is_assumed = !read.names_links();
         }
     }
 }

@@ -17,7 +17,7 @@ use self::device::Values;
 use super::{ExchangedPart, ObservationFile, ObservedMainDevice, ObservedWorkingCounter};
 use crate::line::mailbox::Refusal;
 use crate::line::reported::{Outcome, Part, PartExchange, WiringBasis};
-use crate::line::{Line, Seen};
+use crate::line::{Line, Seen, SharedBy};
 
 /// Between earlier values and those of the file, since it does not say. Long enough that nothing in
 /// it is taken for one event.
@@ -58,6 +58,7 @@ impl ObservationFile {
             device.type_name = device.type_name.take().or_else(|| some_text(&observed.type_name));
             observed.teach(device, tree.as_ref(), &by_device[index], clock.end(), self.totals);
         }
+        share_addresses(&mut line, clock.base());
         states::teach(&mut line, &steps);
         main_device::teach(&mut line, &steps);
         process_data::teach(self, &mut line, &steps);
@@ -125,6 +126,20 @@ impl ObservationFile {
             };
             let outcome = if one.moved { Outcome::Moved } else { Outcome::Stayed };
             line.reported.exchanges.push(PartExchange { part, at, to, outcome });
+        }
+    }
+}
+
+/// Notes who has the station address of another one.
+fn share_addresses(line: &mut Line, at: Instant) {
+    for index in 0..line.devices.len() {
+        // 0 is the address of nobody.
+        let station = line.devices[index].station.filter(|station| station.0 != 0);
+        let Some(station) = station else { continue };
+        let owner = line.devices[..index].iter().position(|one| one.station == Some(station));
+        if let Some(owner) = owner {
+            let shared = SharedBy::Reading(DeviceId(index as u32));
+            line.devices[owner].shares_address(station, Seen::new(shared, at, None));
         }
     }
 }
