@@ -18,7 +18,7 @@ pub mod wanted;
 
 pub use io::{Application, Idle, Io, Next};
 pub use operator::{
-    Beside, Ended, MakePlan, NOTES, Note, Operator, RunError, RunOptions, Wanted, run,
+    Beside, Ended, MakePlan, NOTES, Note, Operator, RunError, RunOptions, Wanted, run, run_observed,
 };
 pub use real_time::RealTime;
 pub use scan::scan;
