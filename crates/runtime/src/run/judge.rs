@@ -9,7 +9,7 @@ use linesman_diagnosis::{Diagnosis, Engine, Event, Probe};
 use linesman_proto::address::Network;
 use linesman_proto::time::Instant;
 
-use super::operator::Note;
+use super::note::Note;
 use super::tap::{Listener, Log};
 use crate::part::{PartFailure, guard};
 

@@ -9,7 +9,6 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{DevicePlan, IoAt, Plan};
 use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, Probe, Setup};
-use linesman_link::error::LinkError;
 use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest, Target};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
@@ -17,6 +16,7 @@ use linesman_proto::time::{Instant, Span};
 use super::bring_up::BringUpReport;
 use super::io::{Application, Io, Next};
 use super::judge::{LineObserver, Told, judge};
+use super::note::{Note, RunError};
 use super::real_time::{Granted, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
 use super::scan;
@@ -67,48 +67,6 @@ const PROBES: usize = 64;
 
 /// Room for notes that are on their way to whoever listens.
 pub const NOTES: usize = 65_536;
-
-/// Something to be told while it runs.
-#[derive(Clone, Debug)]
-pub enum Note {
-    /// What the scan found.
-    Scanned(Box<Inventory>),
-    /// The plan that is started.
-    Planned(Arc<Plan>),
-    /// The MainDevice tells something.
-    Event(Instant, Box<Event>),
-    /// The host has noticed something.
-    Host(HostObservation),
-    /// The diagnosis tells something.
-    Finding(Box<linesman_diagnosis::Event>),
-    /// The diagnosis does not keep up: so many frames were left out so far.
-    Missed(Instant, u64),
-    /// A part of this program has failed.
-    Failed(PartFailure),
-    /// The line is being stopped.
-    Leaving(Instant),
-}
-
-/// Why a line cannot be run.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RunError {
-    /// The line does not answer.
-    #[error("{0}")]
-    Scan(String),
-    /// What is there is not what is wanted.
-    #[error("{0}")]
-    Plan(String),
-    /// The interface.
-    #[error(transparent)]
-    Link(#[from] LinkError),
-    /// The system has no more threads.
-    #[error("starting the diagnosis: {0}. Do: end other programs")]
-    Thread(std::io::Error),
-    /// A part of this program, or the application.
-    #[error(transparent)]
-    Failed(PartFailure),
-}
 
 /// A MainDevice's operator. It is the [`Audience`] of a [`Driver`].
 pub struct Operator<A> {

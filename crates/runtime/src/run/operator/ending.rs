@@ -10,7 +10,8 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
 use super::super::io::Application;
-use super::{Note, Operator, RunError};
+use super::super::note::{Note, RunError};
+use super::Operator;
 use crate::drive::Driver;
 use crate::line::Line;
 use crate::part::{PartFailure, guard};
