@@ -3,6 +3,7 @@
 use linesman_link::capture::CaptureError;
 use linesman_link::error::LinkError;
 use linesman_runtime::event_log::EventLogError;
+use linesman_runtime::part::PartFailure;
 use linesman_runtime::selector::SelectorError;
 use serde::Serialize;
 
@@ -81,7 +82,7 @@ macro_rules! failures {
     };
 }
 
-failures!(CaptureError, EventLogError, LinkError, SelectorError);
+failures!(CaptureError, EventLogError, LinkError, PartFailure, SelectorError);
 
 #[cfg(test)]
 mod tests {

@@ -4,9 +4,12 @@ use std::fs;
 use std::io::Read as _;
 use std::path::Path;
 
+use linesman_config::eni::Eni;
+use linesman_config::plan::PlannedExchange;
 use linesman_config::project::Project;
 use linesman_link::input::Input;
 use linesman_link::whole_file;
+use linesman_proto::time::Span;
 pub(crate) use linesman_runtime::named_files::NamedFiles;
 use linesman_runtime::named_files::{MAX_DESCRIPTION, read_at_most};
 use linesman_sim::segment::Segment;
@@ -16,6 +19,8 @@ use crate::failure::Failure;
 
 /// Longest text file that is read, in bytes; nobody writes more by hand.
 const MAX_TEXT: u64 = 16 * 1024 * 1024;
+/// Longest ENI file that is read, in bytes; the largest have some 20 MB.
+const MAX_ENI: u64 = 256 * 1024 * 1024;
 
 /// The text of a file.
 pub(crate) fn text(path: &Path, what: &str) -> Result<String, Failure> {
@@ -108,6 +113,61 @@ pub(crate) fn description(path: &Path) -> Result<Vec<u8>, Failure> {
 pub(crate) fn project(path: &Path) -> Result<Project, Failure> {
     let text = text(path, "a project")?;
     Project::parse(&text).map_err(|error| in_file(path, &error))
+}
+
+/// What a line is held against: a project (TOML), or a network configuration of another tool (ENI, XML).
+#[derive(Clone)]
+pub(crate) struct Planned {
+    /// The SubDevices and their wiring.
+    pub(crate) project: Project,
+    /// Their process data, where the file says them.
+    pub(crate) exchange: PlannedExchange,
+}
+
+impl Planned {
+    /// Reads a file; its content says which kind it is.
+    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+        if !is_xml(path)? {
+            let project = project(path)?;
+            return Ok(Self { project, exchange: PlannedExchange::default() });
+        }
+        let eni = eni(path)?;
+        if !eni.is_wired {
+            let reason = format!(
+                "{}: the ENI does not say how its {} SubDevices are wired (no PreviousPort)",
+                path.display(),
+                eni.plan.devices.len()
+            );
+            let advice = format!(
+                "export it again with the topology, or make a project of it, correct its wiring there and name that: \
+                 `linesman plan {} --save machine.toml`",
+                path.display()
+            );
+            return Err(Failure::new(reason, advice));
+        }
+        Ok(Self { project: eni.project(), exchange: eni.plan.exchange() })
+    }
+}
+
+/// A network configuration of another tool.
+pub(crate) fn eni(path: &Path) -> Result<Eni, Failure> {
+    let bytes = bytes(path, "a network configuration (ENI)", MAX_ENI)?;
+    // Who compares needs no cycle time, which a file need not have.
+    let eni = Eni::parse_with(&bytes, Some(Span::ms(1)));
+    let advice = "export the ENI again from the tool that wrote it, or correct it there";
+    eni.map_err(|error| in_file_of(path, &error, advice))
+}
+
+/// Whether a file is XML, in any of its encodings: it begins with `<`, which no TOML does.
+pub(crate) fn is_xml(path: &Path) -> Result<bool, Failure> {
+    let refuse = |error| unread(path, "a project or an ENI file", &error);
+    let mut head = Vec::new();
+    let file = fs::File::open(path).map_err(refuse)?;
+    file.take(256).read_to_end(&mut head).map_err(refuse)?;
+    let text = String::from_utf8_lossy(&head);
+    let first =
+        text.chars().find(|one| !one.is_whitespace() && !"\0\u{FEFF}\u{FFFD}".contains(*one));
+    Ok(first == Some('<'))
 }
 
 /// Refuses a path where something is already, or in a folder that is not there.

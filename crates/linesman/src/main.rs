@@ -20,6 +20,7 @@ mod version;
 use std::process::ExitCode;
 
 use clap::Parser;
+use linesman_runtime::part::guard;
 
 use crate::cli::Cli;
 use crate::failure::Failure;
@@ -32,7 +33,11 @@ fn main() -> ExitCode {
     };
     let mut output = Output::new(cli.color).at(cli.command.place());
     let json = cli.command.wants_json();
-    let ended = match command::run(cli.command, &mut output) {
+    // A fault of the program itself ends it like any other failure.
+    let ran = guard("linesman", "there is no answer", || command::run(cli.command, &mut output));
+    let ended = match ran.unwrap_or_else(|failure| Err(failure.into())) {
+        // What was said to have failed on the way keeps the command from being a success.
+        Ok(exit::Status::Good) if output.has_failed() => exit::Status::NotJudged.into(),
         Ok(status) => status.into(),
         Err(failure) => refuse(&failure, json, &mut output),
     };

@@ -8,15 +8,18 @@ use std::fs;
 use std::io::{self, BufRead as _, BufReader, Lines, Read as _, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use linesman_link::socket::Bell;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+
+use crate::kept_file::KeptFile;
+use crate::part::guard;
 
 /// Longest request in bytes.
 const MOST: u64 = 64 * 1024;
@@ -26,6 +29,8 @@ const RUBBISH: u64 = 16 * 1024 * 1024;
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Requests that may wait for the thread that does them.
 const WAITING: usize = 16;
+/// How long no connection is taken after one could not be: there may be too many open files.
+const REST: Duration = Duration::from_millis(100);
 /// Connections at a time.
 const CLIENTS: usize = 32;
 
@@ -64,6 +69,40 @@ pub(crate) trait Protocol: Send + Sync + 'static {
 pub(crate) struct Desk<P: Protocol> {
     path: PathBuf,
     requests: Receiver<Asked<P>>,
+    watch: DeskWatch,
+}
+
+/// Whether a socket can still be asked.
+#[derive(Clone, Debug)]
+pub struct DeskWatch {
+    socket: KeptFile,
+    /// Why nobody listens any more.
+    failed: Arc<Mutex<Option<String>>>,
+    /// Closed in order: nothing is wrong with that.
+    closed: Arc<AtomicBool>,
+}
+
+impl DeskWatch {
+    /// Why nobody can ask any more, with the next step; `None` while all is well.
+    #[must_use]
+    pub fn trouble(&self) -> Option<String> {
+        if self.closed.load(Ordering::Acquire) {
+            return None;
+        }
+        let failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let path = self.socket.path().display();
+        failed.map(|why| format!("{path}: {why}")).or_else(|| {
+            let error = self.socket.check().err()?;
+            // It may have been closed between the two.
+            if self.closed.load(Ordering::Acquire) {
+                return None;
+            }
+            Some(format!(
+                "{path}: the control socket: {error}, so nobody can ask any more. Do: start the command anew, and \
+                 leave the socket where it is"
+            ))
+        })
+    }
 }
 
 /// A request, and who waits for its answer.
@@ -102,16 +141,24 @@ impl<P: Protocol> Desk<P> {
         let (requests, receiver) = mpsc::sync_channel(WAITING);
         let clerk = Clerk { requests, bell, protocol, clients: AtomicUsize::default() };
         let clerk = Arc::new(clerk);
+        let failed = Arc::default();
+        let (socket, closed) = (KeptFile::at(path), Arc::default());
+        let watch = DeskWatch { socket, failed: Arc::clone(&failed), closed };
         // It ends with the process: nothing hangs on it.
-        thread::spawn(move || {
-            for stream in listener.incoming().flatten() {
-                let clerk = Arc::clone(&clerk);
-                // Whoever asked and went away needs no answer; a thread that cannot be had is as
-                // good as a full house.
-                let _ = thread::Builder::new().spawn(move || clerk.welcome(&stream));
+        thread::Builder::new().name("control".to_owned()).spawn(move || {
+            let listened = guard("the control socket", "nobody can ask any more", || {
+                listen(&listener, &clerk);
+            });
+            if let Err(failure) = listened {
+                *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure.to_string());
             }
-        });
-        Ok(Self { path: path.to_owned(), requests: receiver })
+        })?;
+        Ok(Self { path: path.to_owned(), requests: receiver, watch })
+    }
+
+    /// For whoever tells that nobody can ask any more.
+    pub(crate) fn watch(&self) -> DeskWatch {
+        self.watch.clone()
     }
 
     /// The next request.
@@ -122,8 +169,24 @@ impl<P: Protocol> Desk<P> {
 
 impl<P: Protocol> Drop for Desk<P> {
     fn drop(&mut self) {
-        // It may be gone already.
-        let _ = fs::remove_file(&self.path);
+        self.watch.closed.store(true, Ordering::Release);
+        // It may be gone already, and what is there now is somebody else's.
+        if self.watch.socket.check().is_ok() {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Takes one connection after another.
+fn listen<P: Protocol>(listener: &UnixListener, clerk: &Arc<Clerk<P>>) {
+    for stream in listener.incoming() {
+        let Ok(stream) = stream else {
+            thread::sleep(REST);
+            continue;
+        };
+        let clerk = Arc::clone(clerk);
+        // Whoever asked and went away needs no answer; a thread that cannot be had is as good as a full house.
+        let _ = thread::Builder::new().spawn(move || clerk.welcome(&stream));
     }
 }
 
@@ -155,7 +218,9 @@ impl<P: Protocol> Clerk<P> {
     fn welcome(&self, stream: &UnixStream) -> io::Result<()> {
         let others = self.clients.fetch_add(1, Ordering::Relaxed);
         let served = if others < CLIENTS {
-            self.serve(stream)
+            // Whoever asked sees that the connection ends; the next one is served.
+            guard("a connection to the control socket", "it is closed", || self.serve(stream))
+                .unwrap_or(Ok(()))
         } else {
             self.refuse(stream, format!("{CLIENTS} connections are open: close one"))
         };

@@ -9,6 +9,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -18,7 +19,9 @@ use linesman_sim::segment::Segment;
 use linesman_sim::truth::{Effect, Entry, FaultId, Place};
 use serde::{Deserialize, Serialize};
 
+use crate::kept_file::KeptFile;
 use crate::names::Names;
+use crate::part::guard;
 
 /// Name and version of a line's format.
 pub const SCHEMA: &str = "linesman.truth/1";
@@ -96,8 +99,25 @@ enum Note {
 pub struct Journal {
     sender: Sender<Note>,
     thread: Option<JoinHandle<io::Result<()>>>,
+    watch: JournalWatch,
     /// Faults that were told of so far.
     told: usize,
+}
+
+/// Whether all that happens is still written down.
+#[derive(Clone, Default, Debug)]
+pub struct JournalWatch(Arc<Mutex<Option<String>>>);
+
+impl JournalWatch {
+    /// Why not; `None` while all is well.
+    #[must_use]
+    pub fn trouble(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn set(&self, why: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(why);
+    }
 }
 
 /// Who may ask a journal to read from it.
@@ -110,12 +130,28 @@ impl Journal {
     /// # Errors
     /// When the file is there already or cannot be written.
     pub fn begin(segment: &Segment, file: Option<&Path>) -> io::Result<Self> {
+        let kept = file;
         let file = file.map(File::create_new).transpose()?.map(BufWriter::new);
+        let kept = kept.map(KeptFile::at);
         let (sender, notes) = mpsc::channel();
         let names = Names::of(segment);
-        let mut writer = Writer { names, file, ..Writer::default() };
-        let thread = thread::spawn(move || writer.run(&notes));
-        Ok(Self { sender, thread: Some(thread), told: 0 })
+        let watch = JournalWatch::default();
+        let mut writer = Writer { names, file, kept, watch: watch.clone(), ..Writer::default() };
+        let thread = thread::Builder::new().name("truth".to_owned()).spawn(move || {
+            let watch = writer.watch.clone();
+            let effect = "what happens is not written down any more";
+            guard("the truth log", effect, || writer.run(&notes)).unwrap_or_else(|failure| {
+                watch.set(failure.to_string());
+                Err(io::Error::other(failure))
+            })
+        })?;
+        Ok(Self { sender, thread: Some(thread), watch, told: 0 })
+    }
+
+    /// For whoever tells that not all is written down.
+    #[must_use]
+    pub fn watch(&self) -> JournalWatch {
+        self.watch.clone()
     }
 
     /// Takes what happened in a segment since the last call.
@@ -171,6 +207,8 @@ impl Reading {
 struct Writer {
     names: Names,
     file: Option<BufWriter<File>>,
+    kept: Option<KeptFile>,
+    watch: JournalWatch,
     faults: Vec<(FaultName, Vec<Place>)>,
     lines: VecDeque<Box<str>>,
     readers: Vec<UnixStream>,
@@ -266,14 +304,15 @@ impl Writer {
     }
 
     fn flush(&mut self) {
-        if let Some(file) = &mut self.file
-            && let Err(error) = file.flush()
-        {
+        let Some(file) = &mut self.file else { return };
+        let kept = self.kept.as_ref().map_or(Ok(()), KeptFile::check);
+        if let Err(error) = file.flush().and(kept) {
             self.fail(error);
         }
     }
 
     fn fail(&mut self, error: io::Error) {
+        self.watch.set(error.to_string());
         self.failed.get_or_insert(error);
         self.file = None;
     }

@@ -5,7 +5,8 @@
 //! asks about a card, [`record`] writes what was seen to a file. [`serve`] puts a segment on real
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
 //! outside, [`journal`] writes down what really happened, [`names`] says where. [`plan_file`] reads
-//! the file that a line is planned with, [`named_files`] the files that a file names. [`stop`] is the wish to stop.
+//! the file that a line is planned with, [`named_files`] the files that a file names. [`stop`] is the wish to stop,
+//! [`part`] says that a part of a command has failed.
 
 pub mod capture;
 pub mod control;
@@ -15,11 +16,13 @@ pub mod event_log;
 pub mod host_watch;
 pub mod image;
 pub mod journal;
+mod kept_file;
 pub mod line;
 pub mod listen;
 pub mod named_files;
 pub mod names;
 pub mod online;
+pub mod part;
 pub mod plan_file;
 pub mod record;
 pub mod run;

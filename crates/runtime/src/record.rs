@@ -11,7 +11,12 @@ use linesman_link::capture::{
 };
 use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Path;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
+
+use crate::kept_file::KeptFile;
+
+/// That the file is still there is looked up this often.
+const LOOK_EVERY: Span = Span::s(1);
 
 /// A capture that is being written.
 pub struct Recorder {
@@ -21,6 +26,8 @@ pub struct Recorder {
     names: Vec<String>,
     /// The first thing that went wrong; nothing is written after it.
     fault: Option<CaptureWriteError>,
+    file: KeptFile,
+    look_at: Instant,
 }
 
 impl Recorder {
@@ -37,14 +44,26 @@ impl Recorder {
     ) -> Result<Self, CaptureWriteError> {
         let file = BufWriter::new(File::create_new(path)?);
         let writer = PcapngWriter::new(file, application)?;
-        Ok(Self { writer, start, cards: [None; 2], names: names.to_vec(), fault: None })
+        let (names, file) = (names.to_vec(), KeptFile::at(path));
+        let look_at = Instant::ZERO;
+        Ok(Self { writer, start, cards: [None; 2], names, fault: None, file, look_at })
     }
 
-    /// Writes a frame. What goes wrong is told by [`finish`](Self::finish): the line comes first.
+    /// Writes a frame. What goes wrong is told by [`fault`](Self::fault).
     pub fn frame(&mut self, frame: &FrameSeen<'_>) {
         if self.fault.is_none() {
             self.fault = self.write(frame).err();
         }
+        if self.fault.is_none() && frame.time >= self.look_at {
+            self.look_at = frame.time + LOOK_EVERY;
+            self.fault = self.file.check().err().map(Into::into);
+        }
+    }
+
+    /// What went wrong first; nothing was written after it.
+    #[must_use]
+    pub const fn fault(&self) -> Option<&CaptureWriteError> {
+        self.fault.as_ref()
     }
 
     fn write(&mut self, frame: &FrameSeen<'_>) -> Result<(), CaptureWriteError> {
@@ -80,7 +99,10 @@ impl Recorder {
     pub fn finish(self) -> Result<(), CaptureWriteError> {
         match self.fault {
             Some(fault) => Err(fault),
-            None => self.writer.finish().map(drop),
+            None => {
+                self.writer.finish()?;
+                Ok(self.file.check()?)
+            }
         }
     }
 }

@@ -11,6 +11,7 @@ mod cyclic;
 mod error;
 mod image;
 mod own;
+mod project;
 mod state;
 mod sub_device;
 mod wiring;
@@ -39,6 +40,8 @@ pub struct Eni {
     pub name: String,
     /// What follows from the file.
     pub plan: Plan,
+    /// Whether the file says how the SubDevices are wired; a single one needs no word of it.
+    pub is_wired: bool,
     /// What the file says and the plan leaves out, for people.
     pub notes: Vec<String>,
 }
@@ -169,7 +172,8 @@ impl File {
             self.notes
                 .push("there is no Cyclic element: nothing is exchanged cyclically".to_owned());
         }
-        Ok(Eni { name: self.name, plan, notes: self.notes })
+        let is_wired = wiring::is_said(&self.devices);
+        Ok(Eni { name: self.name, plan, is_wired, notes: self.notes })
     }
 }
 

@@ -54,7 +54,11 @@ fn all_files_of_the_collection_load_and_come_back() {
             assert_eq!(one, other, "{name}");
         }
         assert_eq!(back.plan.tasks, eni.plan.tasks, "{name}");
-        assert_eq!(back, Eni { notes: back.notes.clone(), ..eni }, "{name}");
+        assert_eq!(
+            back,
+            Eni { notes: back.notes.clone(), is_wired: back.is_wired, ..eni },
+            "{name}"
+        );
     }
 }
 

@@ -34,6 +34,11 @@ pub(super) fn sort(devices: &mut [FileDevice]) -> Result<(), EsiError> {
     Ok(())
 }
 
+/// Whether the file says how they are wired.
+pub(super) fn is_said(devices: &[FileDevice]) -> bool {
+    devices.len() < 2 || devices.iter().any(|device| device.previous.is_some())
+}
+
 /// How they are wired. Where the file says nothing, one hangs on the next port of the one before it.
 pub(super) fn tree(devices: &[FileDevice]) -> Result<Tree, EsiError> {
     let nodes: BTreeMap<u16, usize> =

@@ -7,6 +7,7 @@
 //! is never a number here but a function: see [`expect`].
 
 mod cycle;
+mod exchange;
 pub mod expect;
 pub mod layout;
 pub mod lint;
@@ -34,6 +35,7 @@ use crate::profile::{DeviceProfile, Mailbox};
 use crate::start_up::StartUpCommand;
 
 pub use cycle::CycleError;
+pub use exchange::{PlannedCounter, PlannedExchange};
 pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
 pub use lint::{Doubt, Severity};

@@ -204,6 +204,8 @@ pub enum Reason {
     FramesCut,
     /// Frames did not come back, and nothing tells why.
     FramesLost,
+    /// Frames passed, and the diagnosis was too slow to look at them.
+    FramesMissed,
     /// Time stamps run backwards.
     ClockJumpsBack,
     /// Nothing was sent, or recorded, for a long time in between.

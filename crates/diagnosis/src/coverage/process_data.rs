@@ -17,7 +17,8 @@ pub(super) fn all_known(line: &Line) -> bool {
 /// counter that rose while SubDevices came to SAFEOP and OP.
 fn is_known(line: &Line, cyclic: &Cyclic) -> bool {
     let has_risen = cyclic.highest.value > cyclic.first.value;
-    cyclic.highest.value > 0 && (has_risen || line.owners(cyclic).next().is_some())
+    let is_planned = cyclic.planned.is_some_and(|planned| cyclic.highest.value >= planned);
+    cyclic.highest.value > 0 && (is_planned || has_risen || line.owners(cyclic).next().is_some())
 }
 
 /// Assesses what is known of the working counters.

@@ -53,6 +53,17 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
             .step("record whole frames: `tcpdump -s 0`, no snap length");
         all.lacks(Extent::InPart, gap);
     }
+    if traffic.missed > 0 {
+        let text = format!(
+            "the diagnosis did not keep up and missed {} of {} frames",
+            traffic.missed,
+            traffic.frames + traffic.missed
+        );
+        let gap = Gap::new(Reason::FramesMissed, text).essential().step(
+            "end other programs on this computer, or record the line and judge the recording: `--record`",
+        );
+        all.lacks(Extent::InPart, gap);
+    }
     let lost = traffic.lost.sum;
     if lost > 0 {
         let frames = if lost == 1 { "frame" } else { "frames" };

@@ -75,3 +75,41 @@ fn counting(line: &Line, now: Instant) -> Vec<DeviceId> {
     let is_several = links.iter().any(|link| Some(link) != links.first());
     if is_several { found } else { Vec::new() }
 }
+
+#[cfg(test)]
+mod tests {
+    use linesman_config::project::Project;
+    use linesman_proto::address::{Network, RegisterAddress};
+
+    use super::*;
+
+    /// Readings of all error counters of a SubDevice, the latter with physical-layer errors on ports A and B.
+    fn count_errors(line: &mut Line, id: DeviceId) {
+        let mut values = [0_u8; ErrorCounters::LEN];
+        for at in [Instant::ZERO, Instant::ZERO + Span::ms(1)] {
+            let start = RegisterAddress(COUNTERS.0);
+            line.device_mut(id).unwrap().counters.record(start, &values, at, None);
+            [values[1], values[3]] = [7, 7];
+        }
+    }
+
+    #[test]
+    fn a_subdevice_that_nobody_planned_may_count_errors_too() {
+        let text = "name = \"two of three\"\n\
+                    [[device]]\nname = \"first\"\non = \"maindevice\"\n\
+                    [[device]]\nname = \"second\"\non = \"first.B\"\n";
+        let mut line = Line::planned(Network::default(), &Project::parse(text).unwrap());
+        assert_eq!(line.tree.as_ref().unwrap().len(), 2);
+        let extra = line.add_device();
+        count_errors(&mut line, extra);
+        let now = Instant::ZERO + Span::ms(2);
+        // It hangs on no known link, so nothing says that there are several.
+        assert_eq!(counting(&line, now), []);
+        // What was planned is watched all the same.
+        let middle = line.devices[0].id;
+        count_errors(&mut line, middle);
+        assert_eq!(counting(&line, now), [middle]);
+        let mut watch = CloseWatch::default();
+        assert_eq!(watch.turn(&line, now), [(middle, COUNTERS)]);
+    }
+}

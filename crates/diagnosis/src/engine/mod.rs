@@ -62,6 +62,7 @@ impl Engine {
             Some(project) => Line::planned(Network(0), project),
             None => Line::new(Network(0)),
         };
+        line.expect_exchange(&setup.exchange);
         line.host.is_watched = setup.host_counters;
         line.sees_all_orders = setup.input == InputKind::Driven;
         Self {
@@ -108,6 +109,26 @@ impl Engine {
         line.now = now;
         line.touch();
         self.judge_if_due();
+    }
+
+    /// So many frames passed up to `at` and were not shown to the engine, because whoever judges did not keep up.
+    ///
+    /// Requests that are still out are given up, since their returns may be among them: nothing says that the line
+    /// lost them.
+    pub fn handle_missed(&mut self, network: Network, count: u64, at: Instant) {
+        if count == 0 {
+            return;
+        }
+        self.now = self.now.max(at);
+        let Watched { line, pairing, .. } = self.watched(network);
+        pairing.forget();
+        line.traffic.missed += count;
+        // The time to the next one says nothing.
+        for cyclic in &mut line.cyclic {
+            cyclic.sent.skip();
+            cyclic.returned.skip();
+        }
+        line.touch();
     }
 
     /// Time passes. Only for live input: the time of captures comes with their frames.

@@ -1,5 +1,6 @@
 //! What goes into the engine before it begins, and what comes out beside the report.
 
+use linesman_config::plan::PlannedExchange;
 use linesman_config::project::Project;
 use linesman_proto::address::{DeviceId, Network, RegisterAddress, StationAddress};
 use linesman_proto::mailbox::coe::ObjectAddress;
@@ -14,6 +15,8 @@ use crate::report::FindingReport;
 pub struct Setup {
     /// What was planned, for network 0.
     pub project: Option<Project>,
+    /// The process data that were planned, where that is known, for network 0.
+    pub exchange: PlannedExchange,
     /// The way by which evidence comes in.
     pub input: InputKind,
     /// Whether the counters of the host's cards will be reported, so that silence means zero.

@@ -312,6 +312,14 @@ impl AlHistory {
         requested.is_some_and(|state| !state.has_inputs())
     }
 
+    /// Whether it is in OP for all that was seen: neither read in another state, nor asked for one.
+    #[must_use]
+    pub fn may_be_in_op(&self) -> bool {
+        let is_op = |state: Option<AlState>| state == Some(AlState::Op);
+        self.status.is_none_or(|status| is_op(status.value.state().state()))
+            && self.requested.is_none_or(|requested| is_op(requested.value.state()))
+    }
+
     /// Whether it signals an error now.
     #[must_use]
     pub fn has_error(&self) -> bool {

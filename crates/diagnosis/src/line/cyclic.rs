@@ -31,6 +31,8 @@ pub struct Cyclic {
     /// The highest working counter since the process data were set up, when it was first reached:
     /// what is expected from then on.
     pub highest: Seen<u16>,
+    /// The working counter that was planned for it, where that is known.
+    pub planned: Option<u16>,
     /// When the working counter was too low, oldest first, at most [`DEFICITS_KEPT`].
     pub deficits: VecDeque<Deficit>,
     /// When it was sent.
@@ -94,6 +96,7 @@ impl Cyclic {
             first: wkc,
             wkc,
             highest: wkc,
+            planned: None,
             deficits: VecDeque::new(),
             sent: Beat::default(),
             returned: Beat::default(),
@@ -130,6 +133,25 @@ impl Cyclic {
     /// Notes that FMMUs of this datagram were set again: while SubDevices are brought up frames come unevenly.
     pub fn set_up_again(&mut self) {
         (self.sent, self.returned) = (Beat::default(), Beat::default());
+    }
+
+    /// Notes that the working counter is lower than planned although nothing explains it: the datagram came back so
+    /// from the first time on. Says whether that is news.
+    pub fn note_below_plan(&mut self) -> bool {
+        let Some(planned) = self.planned.filter(|planned| self.highest.value < *planned) else {
+            return false;
+        };
+        let lowest = self.wkc.value;
+        self.highest = Seen { value: planned, ..self.wkc };
+        if self.has_deficit() {
+            return false;
+        }
+        if self.deficits.len() == DEFICITS_KEPT {
+            self.deficits.pop_front();
+        }
+        let (expected, first, count) = (planned, self.wkc, 1);
+        self.deficits.push_back(Deficit { expected, first, lowest, count, ended: None });
+        true
     }
 
     /// Takes a working counter. `ordered` tells, when it falls, whether the MainDevice asked for it by taking a

@@ -22,6 +22,7 @@ pub mod trip;
 use std::collections::VecDeque;
 
 use linesman_config::inventory::label;
+use linesman_config::plan::PlannedExchange;
 use linesman_config::project::Project;
 use linesman_proto::address::{DeviceId, LogicalAddress, Network, Path, Position, StationAddress};
 use linesman_proto::port::Port;
@@ -100,6 +101,8 @@ pub struct Line {
     pub tree_is_planned: bool,
     /// Whether this program drives the line, so that no order to a SubDevice goes unseen.
     pub sees_all_orders: bool,
+    /// Process data that were planned: working counters that are expected from the start.
+    pub planned_exchange: PlannedExchange,
     /// What the host noticed.
     pub host: HostHistory,
     /// Logical datagrams that are sent again and again.
@@ -168,6 +171,16 @@ impl Line {
         let tree = project.tree().ok();
         let tree_is_planned = tree.is_some();
         Self { network, devices, tree, tree_is_planned, ..Self::default() }
+    }
+
+    /// Takes the process data that were planned: who has which FMMU, and the working counter of each datagram.
+    pub fn expect_exchange(&mut self, planned: &PlannedExchange) {
+        for (id, no, fmmu) in &planned.fmmus {
+            if let Some(device) = self.device_mut(*id) {
+                device.fmmus.insert(*no, *fmmu);
+            }
+        }
+        self.planned_exchange = planned.clone();
     }
 
     /// A number that grows whenever something was learnt that a rule may want to look at.

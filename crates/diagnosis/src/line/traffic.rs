@@ -142,6 +142,8 @@ pub struct Traffic {
     pub datagrams_cut: u64,
     /// Frames that end before their last datagram does, though they were recorded whole.
     pub cut_short: u64,
+    /// Frames that passed and were not shown to the diagnosis, because it did not keep up.
+    pub missed: u64,
     /// The largest step by which time stamps ran backwards.
     pub clock_back: Span,
     /// The longest time without any frame.

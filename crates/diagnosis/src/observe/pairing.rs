@@ -213,6 +213,11 @@ impl Pairing {
         }
     }
 
+    /// Forgets what is still out: frames were missed, and their returns may be among them.
+    pub fn forget(&mut self) {
+        self.pending.clear();
+    }
+
     /// Requests whose return is still awaited.
     #[must_use]
     pub fn outstanding(&self) -> usize {

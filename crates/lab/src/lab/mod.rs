@@ -116,6 +116,7 @@ impl Lab {
         let network = Network(0);
         let paths = if file.ring.is_some() { 2 } else { 1 };
         let setup = Setup {
+            exchange: linesman_config::plan::PlannedExchange::default(),
             project: options.project.then(|| project.clone()),
             input: InputKind::Driven,
             host_counters: options.host_counters,

@@ -9,9 +9,8 @@ mod observations;
 mod segment;
 pub(crate) mod several;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use linesman_config::project::Project;
 use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_diagnosis::{Engine, Setup};
 use linesman_link::unix_time::UnixTime;
@@ -26,7 +25,7 @@ use crate::amount::lasting;
 use crate::drawing;
 use crate::exit::Status;
 use crate::failure::Failure;
-use crate::files;
+use crate::files::{self, Planned};
 use crate::output::{Output, Paint};
 use crate::page;
 use crate::text;
@@ -56,8 +55,9 @@ pub(crate) struct Arguments {
     /// seen: trace.pcapng, observations.toml, a text with what other tools print, - (standard input)
     #[arg(value_name = "WHERE|FILE", required = true)]
     pub(crate) places: Vec<String>,
-    /// What was planned (TOML): names, wiring and identities to hold the line against
-    #[arg(long, value_name = "FILE")]
+    /// What was planned (TOML or ENI): names, wiring and identities to hold the line against; from an ENI the expected
+    /// working counters, too
+    #[arg(long, value_name = "PROJECT.toml|ENI.xml")]
     project: Option<PathBuf>,
     /// Tell findings as they open and close; with --json one linesman.event/1 per line
     #[arg(long)]
@@ -120,7 +120,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     for path in [&arguments.html, &arguments.svg].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
     }
-    let project = arguments.project.as_deref().map(files::project).transpose()?;
+    let project = arguments.project.as_deref().map(Planned::open).transpose()?;
     match &selector {
         Selector::File(path) => {
             let stop = driven::stop()?;
@@ -179,6 +179,8 @@ pub(crate) struct Session {
     follower: Option<Follower>,
     lasts: Option<Span>,
     record: Option<PathBuf>,
+    /// That it has failed was said.
+    recording_failed: bool,
     html: Option<PathBuf>,
     svg: Option<PathBuf>,
     json: bool,
@@ -187,14 +189,18 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    fn new(arguments: &Arguments, selector: &Selector, project: Option<Project>) -> Self {
-        let setup = Setup { project, source: selector.to_string(), ..Setup::default() };
+    fn new(arguments: &Arguments, selector: &Selector, planned: Option<Planned>) -> Self {
+        let (project, exchange) =
+            planned.map(|Planned { project, exchange }| (project, exchange)).unzip();
+        let exchange = exchange.unwrap_or_default();
+        let setup = Setup { project, exchange, source: selector.to_string(), ..Setup::default() };
         let follower = arguments.follow.then(|| Follower::new(arguments.json));
         Self {
             setup,
             follower,
             lasts: arguments.seconds,
             record: arguments.record.clone(),
+            recording_failed: false,
             html: arguments.html.clone(),
             svg: arguments.svg.clone(),
             json: arguments.json,
@@ -210,11 +216,22 @@ impl Session {
         recorder.map(Some).map_err(|error| files::in_file(path, &error))
     }
 
+    /// Says at once that the recording has come to an end before the line was judged.
+    fn look_at_recording(&mut self, recorder: Option<&Recorder>, output: &Output) {
+        let fault = recorder.and_then(Recorder::fault);
+        if let (Some(fault), Some(path), false) = (fault, &self.record, self.recording_failed) {
+            self.recording_failed = true;
+            output.fail(&unrecorded(path, fault));
+        }
+    }
+
     /// Ends the recording.
     fn end_recording(&self, recorder: Option<Recorder>, output: &Output) {
         let (Some(recorder), Some(path)) = (recorder, &self.record) else { return };
-        if let Err(error) = recorder.finish() {
-            output.warn(&files::in_file(path, &error).reason);
+        if let Err(error) = recorder.finish()
+            && !self.recording_failed
+        {
+            output.fail(&unrecorded(path, &error));
         }
     }
 
@@ -277,7 +294,7 @@ impl Session {
         }
         // What was found holds, even if no file can be written of it.
         if let Err(failure) = self.write_files(&diagnosis, engine, names, at) {
-            output.warn(&failure.reason);
+            output.fail(&failure);
         }
         status(&diagnosis)
     }
@@ -313,6 +330,12 @@ impl Session {
         }
         Ok(())
     }
+}
+
+/// Why a recording is not whole.
+fn unrecorded(path: &Path, error: &dyn std::error::Error) -> Failure {
+    let reason = format!("{}: recording the line: {error}", path.display());
+    Failure::new(reason, "make room there, leave the file where it is, and record anew")
 }
 
 /// The diagnosis as text.

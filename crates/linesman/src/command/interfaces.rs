@@ -112,7 +112,7 @@ fn judge(interfaces: Vec<Interface>) -> Vec<Judged> {
             .collect();
         let judged = listening.into_iter().map(|(interface, thread)| Judged {
             assessment: interface.assess(),
-            heard: thread.join().unwrap_or(Ok(0)),
+            heard: thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
             interface,
         });
         judged.collect()

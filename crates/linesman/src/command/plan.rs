@@ -5,7 +5,7 @@ pub(crate) mod report;
 mod segment;
 mod table;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use linesman_config::eni;
 use linesman_config::plan::Severity;
@@ -37,6 +37,9 @@ pub(crate) struct Arguments {
     /// Write the plan as a network configuration (ENI) for the MainDevices of others
     #[arg(long, value_name = "F.xml")]
     export: Option<PathBuf>,
+    /// Write a project made of an ENI: names, identities, addresses and wiring; says what the ENI does not hold
+    #[arg(long, value_name = "machine.toml")]
+    save: Option<PathBuf>,
     /// Write a virtual segment made of the plan, to run on it; its descriptions go beside it
     #[arg(long, value_name = "SEGMENT.toml")]
     segment: Option<PathBuf>,
@@ -47,8 +50,12 @@ pub(crate) struct Arguments {
 
 /// Makes the plan and shows it.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    for path in [&arguments.export, &arguments.segment].into_iter().flatten() {
+    for path in [&arguments.export, &arguments.segment, &arguments.save].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
+    }
+    if arguments.save.is_some() && !files::is_xml(&arguments.file)? {
+        let reason = format!("{}: it is a project already", arguments.file.display());
+        return Err(Failure::new(reason, "leave out `--save`, or name an ENI (XML)"));
     }
     let file = PlanFile::open_with(&arguments.file, arguments.cycle_us)?;
     let doubts = file.plan.doubts();
@@ -67,8 +74,24 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         let advice = format!("\nSegment in {}: try `linesman scan sim:{0}`.", path.display());
         say(&advice, arguments.json, output);
     }
+    if let Some(path) = &arguments.save {
+        save(path, &arguments.file, arguments.json, output)?;
+    }
     let bad = doubts.iter().any(|doubt| doubt.severity >= Severity::Warning);
     Ok(if bad { Status::Findings } else { Status::Good })
+}
+
+/// Writes the project that an ENI makes.
+fn save(path: &Path, file: &Path, json: bool, output: &mut Output) -> Result<(), Failure> {
+    let eni = files::eni(file)?;
+    files::write_new(path, "the project", &eni.project().to_toml())?;
+    say(&format!("\nSaved as {}. The ENI does not hold:", path.display()), json, output);
+    for lack in eni.lacks() {
+        say(&format!("- {lack}"), json, output);
+    }
+    let rest = "Process data, start-up commands and clocks stay in the ENI: `linesman run` takes it as it is.";
+    say(rest, json, output);
+    Ok(())
 }
 
 fn say(text: &str, json: bool, output: &mut Output) {

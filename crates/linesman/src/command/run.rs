@@ -7,7 +7,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
 use linesman_config::eni::Eni;
-use linesman_config::plan::Plan;
+use linesman_config::plan::{Plan, PlannedExchange};
 use linesman_config::project::Project;
 use linesman_diagnosis::report::Verdict;
 use linesman_diagnosis::{InputKind, Setup};
@@ -24,7 +24,7 @@ use linesman_runtime::run::{
     self as running, Beside, Choices, Ended, Idle, NOTES, RealTime, RunOptions, Shared, Wanted,
 };
 use linesman_runtime::selector::Selector;
-use linesman_runtime::service::ServiceDesk;
+use linesman_runtime::service::{DeskWatch, ServiceDesk};
 use linesman_runtime::stop::Stop;
 use linesman_runtime::system_log::SystemLog;
 
@@ -40,6 +40,9 @@ use crate::version;
 
 /// After so long without news, what was waited with is told.
 const QUIET: Duration = Duration::from_millis(100);
+
+/// So often it is looked whether logs and socket still work.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// Longest ENI file that is read, in bytes.
 const MOST: u64 = 256 * 1024 * 1024;
@@ -156,6 +159,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         project: match &source {
             Source::Project(project) => Some((**project).clone()),
             Source::AsFound | Source::Planned(_) => None,
+        },
+        exchange: match &source {
+            Source::Planned(plan) => plan.exchange(),
+            Source::AsFound | Source::Project(_) => PlannedExchange::default(),
         },
         source: arguments.on.clone(),
         ..Setup::default()
@@ -308,6 +315,13 @@ fn drive<L: Line + Send>(
 ) -> Result<Status, Failure> {
     teller.line(said, output);
     let (notes, told) = mpsc::sync_channel(NOTES);
+    let socket = desk.as_ref().map(ServiceDesk::watch);
+    let look = |teller: &mut Teller, output: &Output| {
+        teller.look_at_logs(output);
+        if let Some(why) = socket.as_ref().and_then(DeskWatch::trouble) {
+            teller.complain(&why, output);
+        }
+    };
     let ended = std::thread::scope(|scope| {
         let beside = Beside { stop, notes, desk };
         let work = move || match image {
@@ -315,7 +329,12 @@ fn drive<L: Line + Send>(
             Some(path) => running::run(line, wanted, Shared::at(path), options, beside),
         };
         let thread = scope.spawn(work);
+        let mut looked = std::time::Instant::now();
         loop {
+            if looked.elapsed() >= LOOK_EVERY {
+                looked = std::time::Instant::now();
+                look(&mut teller, output);
+            }
             match told.recv_timeout(QUIET) {
                 Ok(note) => teller.note(&note, output),
                 Err(RecvTimeoutError::Timeout) => {
@@ -335,15 +354,17 @@ fn drive<L: Line + Send>(
     });
     let lasted = ended.as_ref().map_or(Span::ZERO, |ended| Span::ns(ended.report.time_ns));
     if let Some((lost, why)) = teller.lost() {
-        output.warn(&format!("{lost} entries are missing in the system's log: {why}"));
+        teller.complain(&format!("{lost} entries are missing in the system's log: {why}"), output);
     }
     if let Some(log) = teller.finish(lasted)
         && (log.dropped > 0 || log.failure.is_some())
     {
         let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
-        output.warn(&format!("{} entries are missing in the event log: {why}", log.dropped));
+        teller.complain(&why, output);
+        let lost = format!("{} missing in the event log", count(log.dropped, "entry"));
+        teller.complain(&lost, output);
     }
-    let Ended { mut report, error } =
+    let Ended { mut report, error, failed } =
         ended.map_err(|error| driven::nobody(&error).at(&options.on))?;
     if let Some(diagnosis) = &mut report.diagnosis {
         diagnosis.tool = version::tool();
@@ -356,9 +377,28 @@ fn drive<L: Line + Send>(
             output.text(&told::findings(diagnosis, teller.names(), output));
         }
     }
+    if report.counts.untold > 0 {
+        let lost = count(report.counts.untold, "event");
+        teller.complain(
+            &format!("{lost} neither told nor logged. Do: end other programs on this computer"),
+            output,
+        );
+    }
     if let Some(error) = error {
         return Err(driven::nobody(&error).at(&options.on));
     }
-    let faulty = report.diagnosis.is_some_and(|diagnosis| diagnosis.verdict == Verdict::Faulty);
-    Ok(if faulty || report.reached_ns.is_none() { Status::Findings } else { Status::Good })
+    if let Some(failure) = failed {
+        // It was said when it happened.
+        teller.failed(&failure, output);
+        return Ok(Status::NotJudged);
+    }
+    let faulty =
+        report.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.verdict == Verdict::Faulty);
+    Ok(if faulty || report.reached_ns.is_none() {
+        Status::Findings
+    } else if report.counts.undiagnosed > 0 {
+        Status::Inconclusive
+    } else {
+        Status::Good
+    })
 }

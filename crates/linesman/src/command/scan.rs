@@ -19,7 +19,7 @@ use super::driven;
 use crate::drawing;
 use crate::exit::Status;
 use crate::failure::Failure;
-use crate::files;
+use crate::files::{self, Planned};
 use crate::output::Output;
 use crate::page;
 
@@ -35,8 +35,8 @@ pub(crate) struct Arguments {
     /// Write what was found as a project, to hold the line against later
     #[arg(long, value_name = "machine.toml")]
     save: Option<PathBuf>,
-    /// Hold what was found against this project: exit status 1 when it differs
-    #[arg(long, value_name = "machine.toml", conflicts_with = "save")]
+    /// Hold what was found against this project (TOML) or ENI (XML): exit status 1 when it differs
+    #[arg(long, value_name = "machine.toml|ENI.xml", conflicts_with = "save")]
     against: Option<PathBuf>,
     /// Write a drawing of the line
     #[arg(long, value_name = "FILE.svg")]
@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     }
     let planned = match &arguments.against {
         Some(path) => {
-            let project = files::project(path)?;
+            let project = Planned::open(path)?.project;
             let tree = project.tree().map_err(|error| files::in_file(path, &error))?;
             Some((project, tree))
         }

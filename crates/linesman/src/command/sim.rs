@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use std::thread;
+use std::time::Duration;
 
 use linesman_lab::drawing;
 use linesman_link::error::LinkError;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::control::Control;
-use linesman_runtime::journal::Journal;
+use linesman_runtime::control::{Control, DeskWatch};
+use linesman_runtime::journal::{Journal, JournalWatch};
+use linesman_runtime::part::guard;
 use linesman_runtime::selector::Selector;
 use linesman_runtime::serve::lateness::LatenessReport;
 use linesman_runtime::serve::report::Status as SimStatus;
@@ -23,6 +25,9 @@ use crate::files::Plant;
 use crate::output::Output;
 use crate::text::drawing::labels;
 use crate::text::quantity::{count, time};
+
+/// So often it is looked whether sockets and logs still work, and whether segments have ended.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -73,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     if !arguments.json {
         output.line("Ctrl-C ends it.");
     }
-    let ended = serve(ready, until, &stop);
+    let ended = serve(ready, until, &stop, output);
     let mut failure = None;
     for one in ended {
         if arguments.json {
@@ -196,9 +201,12 @@ struct Ended {
 
 /// Runs all segments, each in a thread of its own, to their end. When one cannot go on, all end:
 /// the MainDevices would not learn of it otherwise.
-fn serve(ready: Vec<Ready>, until: Instant, stop: &Stop) -> Vec<Ended> {
+fn serve(ready: Vec<Ready>, until: Instant, stop: &Stop, output: &Output) -> Vec<Ended> {
+    let mut watch = Watch::of(&ready);
     let one = |Ready { mut server, mut beside }: Ready| {
-        let result = server.run(until, stop, &mut beside);
+        const EFFECT: &str = "all segments end";
+        let served = guard("the segment", EFFECT, || server.run(until, stop, &mut beside));
+        let result = served.map_err(Failure::from).and_then(|ran| ran.map_err(from_link));
         if result.is_err() {
             stop.set();
         }
@@ -209,16 +217,55 @@ fn serve(ready: Vec<Ready>, until: Instant, stop: &Stop) -> Vec<Ended> {
             let reason = format!("writing down what happened: {error}: the log is not complete");
             Failure::new(reason, "check the free space")
         };
-        let failure = result.map_err(from_link).err().or(written.map_err(unwritten).err());
+        let failure = result.err().or(written.map_err(unwritten).err());
         Ended { status, failure }
     };
     thread::scope(|scope| {
         let threads: Vec<_> = ready.into_iter().map(|ready| scope.spawn(|| one(ready))).collect();
+        while threads.iter().any(|thread| !thread.is_finished()) {
+            thread::sleep(LOOK_EVERY);
+            watch.look(output);
+        }
         let joined = threads
             .into_iter()
             .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         joined.collect()
     })
+}
+
+/// Sockets and logs that are looked after while segments run.
+struct Watch {
+    sockets: Vec<DeskWatch>,
+    logs: Vec<JournalWatch>,
+}
+
+impl Watch {
+    fn of(ready: &[Ready]) -> Self {
+        let controls = ready.iter().filter_map(|one| one.beside.control.as_ref());
+        let journals = ready.iter().filter_map(|one| one.beside.journal.as_ref());
+        Self {
+            sockets: controls.map(Control::watch).collect(),
+            logs: journals.map(Journal::watch).collect(),
+        }
+    }
+
+    /// Says once what does not work any more.
+    fn look(&mut self, output: &Output) {
+        self.sockets.retain(|socket| match socket.trouble() {
+            Some(why) => {
+                output.fail(&Failure::from_text(&why));
+                false
+            }
+            None => true,
+        });
+        self.logs.retain(|log| match log.trouble() {
+            Some(why) => {
+                output.warn(&format!("writing down what happens: {why}: the log ends here"));
+                false
+            }
+            None => true,
+        });
+    }
 }
 
 fn from_link(error: LinkError) -> Failure {

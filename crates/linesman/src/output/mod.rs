@@ -6,6 +6,7 @@ pub(crate) mod progress;
 pub(crate) mod table;
 pub(crate) mod wrap;
 
+use std::cell::Cell;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::os::fd::AsFd;
 
@@ -39,6 +40,8 @@ pub(crate) struct Output {
     closed: bool,
     /// Why something of the answer could not be written, where somebody wants to read it.
     lost: Option<io::Error>,
+    /// Whether a part of the command failed, which was said.
+    failed: Cell<bool>,
     /// Where the line is, as the user has named it: for commands that are advised.
     place: String,
 }
@@ -54,6 +57,7 @@ impl Output {
             width: limit.map_or(PLAIN_WIDTH, |width| width.min(MAX_WIDTH)),
             closed: false,
             lost: None,
+            failed: Cell::new(false),
             place: String::new(),
         }
     }
@@ -115,6 +119,17 @@ impl Output {
         }
     }
 
+    /// Says at once that a part of the command has failed, though the rest goes on: it does not end with success.
+    pub(crate) fn fail(&self, failure: &Failure) {
+        self.failed.set(true);
+        self.complain(failure);
+    }
+
+    /// Whether a part of the command has failed.
+    pub(crate) fn has_failed(&self) -> bool {
+        self.failed.get()
+    }
+
     /// Why the answer could not be written to its end, if it could not.
     pub(crate) fn loss(&self) -> Option<Failure> {
         let lost = self.lost.as_ref()?;
@@ -131,7 +146,7 @@ impl Output {
     pub(crate) fn json<T: Serialize>(&mut self, value: &T) {
         match serde_json::to_string_pretty(value) {
             Ok(text) => self.raw(&format!("{text}\n")),
-            Err(error) => self.warn(&format!("writing JSON: {error}")),
+            Err(error) => self.fail(&unwritable(&error)),
         }
     }
 
@@ -139,7 +154,7 @@ impl Output {
     pub(crate) fn json_line<T: Serialize>(&mut self, value: &T) {
         match serde_json::to_string(value) {
             Ok(text) => self.raw(&format!("{text}\n")),
-            Err(error) => self.warn(&format!("writing JSON: {error}")),
+            Err(error) => self.fail(&unwritable(&error)),
         }
     }
 
@@ -164,6 +179,14 @@ impl Output {
         // There is nobody left to tell when standard error is closed.
         let _ = io::stderr().lock().write_all(fitted.as_deref().unwrap_or(text).as_bytes());
     }
+}
+
+/// What cannot be put into JSON.
+fn unwritable(error: &serde_json::Error) -> Failure {
+    Failure::new(
+        format!("the answer cannot be written as JSON: {error}"),
+        "repeat it without --json",
+    )
 }
 
 /// Columns of the terminal behind a stream; where there is none, those that COLUMNS says. `None` in

@@ -94,8 +94,8 @@ struct Place {
 
 /// A line, or as much of it as could be put together.
 ///
-/// Methods that take the index of a controller panic when the tree has no such controller, as
-/// slices do; indices come from the tree, so a wrong one is a fault of the caller.
+/// A controller beyond the tree, such as one that answers although nobody planned it, is treated as detached:
+/// it hangs on nothing, nothing hangs on it, and it has no link and no position.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Tree {
     nodes: Vec<Node>,
@@ -246,52 +246,51 @@ impl Tree {
     /// The end that `node` hangs on, `None` if it is detached from all others.
     #[must_use]
     pub fn upstream(&self, node: usize) -> Option<End> {
-        self.nodes[node].on
+        self.nodes.get(node)?.on
     }
 
     /// The controller that `node` hangs on, `None` if that is the MainDevice.
     #[must_use]
     pub fn parent(&self, node: usize) -> Option<usize> {
-        self.nodes[node].on.and_then(End::node)
+        self.upstream(node).and_then(End::node)
     }
 
-    /// The port through which frames come in to `node`.
+    /// The port through which frames come in to `node`; A, as planned everywhere, for one beyond the tree.
     #[must_use]
     pub fn entry(&self, node: usize) -> Port {
-        self.nodes[node].entry
+        self.nodes.get(node).map_or(Port::A, |node| node.entry)
     }
 
     /// Whether frames come in to `node` at another port than A: the cable to it is plugged into the
     /// wrong socket, so its processing unit is met after what hangs behind port A.
     #[must_use]
     pub fn is_reversed(&self, node: usize) -> bool {
-        self.nodes[node].entry != Port::A
+        self.entry(node) != Port::A
     }
 
     /// The controller that hangs on `port` of `node`.
     #[must_use]
     pub fn child(&self, node: usize, port: Port) -> Option<usize> {
-        self.nodes[node].children[port]
+        self.nodes.get(node)?.children[port]
     }
 
     /// What hangs on `node`, with the port it hangs on, in the order a frame gets there.
     pub fn children(&self, node: usize) -> impl Iterator<Item = (Port, usize)> {
-        let node = &self.nodes[node];
-        ports_after(node.entry)
+        ports_after(self.entry(node))
             .into_iter()
-            .filter_map(|port| node.children[port].map(|child| (port, child)))
+            .filter_map(move |port| self.child(node, port).map(|child| (port, child)))
     }
 
     /// Whether `port` of `node` has a link: entry, child, or the one that closes the ring.
     #[must_use]
     pub fn is_open(&self, node: usize, port: Port) -> bool {
-        let entry = self.nodes[node].on.is_some() && self.nodes[node].entry == port;
+        let entry = self.upstream(node).is_some() && self.entry(node) == port;
         entry || self.child(node, port).is_some() || self.closes_at == Some((node, port))
     }
 
     /// Ports of `node` that have a link, in the order a frame gets there: entry first.
     pub fn open_ports(&self, node: usize) -> impl Iterator<Item = Port> {
-        let entry = self.nodes[node].entry;
+        let entry = self.entry(node);
         let all = std::iter::once(entry).chain(ports_after(entry));
         all.filter(move |port| self.is_open(node, *port))
     }
@@ -306,7 +305,7 @@ impl Tree {
     /// The index in [`Tree::links`] of the link between `node` and what it hangs on.
     #[must_use]
     pub fn link_above(&self, node: usize) -> Option<usize> {
-        self.link_above[node]
+        self.link_above.get(node).copied().flatten()
     }
 
     /// The index in [`Tree::links`] of the link that is plugged in at `end`.
@@ -314,7 +313,7 @@ impl Tree {
     pub fn link_at(&self, end: End) -> Option<usize> {
         match end {
             End::MainDevice(path) => match (self.first(path), path) {
-                (Some(first), _) => self.link_above[first],
+                (Some(first), _) => self.link_above(first),
                 (None, Path::A) => None,
                 (None, Path::B) => self.ring_link(),
             },
@@ -322,9 +321,9 @@ impl Tree {
                 if self.closes_at == Some((node, port)) {
                     self.ring_link()
                 } else if self.entry(node) == port {
-                    self.link_above[node]
+                    self.link_above(node)
                 } else {
-                    self.child(node, port).and_then(|child| self.link_above[child])
+                    self.child(node, port).and_then(|child| self.link_above(child))
                 }
             }
         }
@@ -348,7 +347,12 @@ impl Tree {
     /// Where `node` comes in [`Tree::order`], counted from 0.
     #[must_use]
     pub fn position(&self, node: usize) -> Option<usize> {
-        self.places[node].position
+        self.place(node).position
+    }
+
+    /// Where `node` lies in the walk; nowhere, for one beyond the tree.
+    fn place(&self, node: usize) -> Place {
+        self.places.get(node).copied().unwrap_or_default()
     }
 
     /// Controllers in the order in which a frame first reaches them: each before all that hangs on
@@ -361,7 +365,7 @@ impl Tree {
     /// `node` and all that hangs on it, in the order a frame first gets there.
     #[must_use]
     pub fn subtree(&self, node: usize) -> &[usize] {
-        let place = self.places[node];
+        let place = self.place(node);
         &self.reached[place.reached_from..place.reached_to]
     }
 
@@ -375,7 +379,7 @@ impl Tree {
     /// the MainDevice, 0 for a detached one.
     #[must_use]
     pub fn depth(&self, node: usize) -> usize {
-        self.places[node].depth
+        self.place(node).depth
     }
 
     /// The controllers from the MainDevice's to `node` itself.
@@ -391,7 +395,7 @@ impl Tree {
     /// itself.
     #[must_use]
     pub fn is_downstream_of(&self, node: usize, other: usize) -> bool {
-        let (inner, outer) = (self.places[node], self.places[other]);
+        let (inner, outer) = (self.place(node), self.place(other));
         node != other
             && self.is_attached(node)
             && (outer.reached_from..outer.reached_to).contains(&inner.reached_from)
@@ -400,7 +404,7 @@ impl Tree {
     /// Whether `node` is connected to the MainDevice.
     #[must_use]
     pub fn is_attached(&self, node: usize) -> bool {
-        self.places[node].position.is_some()
+        self.place(node).position.is_some()
     }
 
     /// Controllers for which no place was found. Only a derived tree can have some.
@@ -518,6 +522,29 @@ mod tests {
         assert_eq!(refused(&[FIRST, on(2, B), on(1, B)]), WiringError::Detached { node: 1 });
         let text = refused(&[FIRST, FIRST]).to_string();
         assert_eq!(text, "MainDevice.A is wired twice, to controllers 0 and 1: move one of them");
+    }
+
+    #[test]
+    fn a_controller_beyond_the_tree_is_detached_like_one_without_a_place() {
+        let tree = branched();
+        let ring = tree.closed_at(2, B).unwrap();
+        for tree in [tree, ring, Tree::from_wiring(&[], None).unwrap()] {
+            for node in [tree.len(), usize::MAX] {
+                assert_eq!((tree.upstream(node), tree.parent(node)), (None, None));
+                assert_eq!((tree.link_above(node), tree.position(node)), (None, None));
+                assert_eq!((tree.depth(node), tree.subtree(node)), (0, &[][..]));
+                assert_eq!(tree.path_to(node), [node]);
+                assert!(!tree.is_attached(node) && !tree.is_reversed(node));
+                assert!(!tree.is_downstream_of(node, 0) && !tree.is_downstream_of(0, node));
+                assert_eq!(tree.children(node).count() + tree.open_ports(node).count(), 0);
+                assert_eq!(tree.in_a_row(node, |_| true), [0; 0]);
+                for port in Port::ALL {
+                    let end = End::Controller(node, port);
+                    assert_eq!((tree.link_at(end), tree.opposite(end)), (None, None));
+                    assert_eq!((tree.child(node, port), tree.behind(node, port)), (None, &[][..]));
+                }
+            }
+        }
     }
 
     #[test]

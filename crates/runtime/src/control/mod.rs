@@ -17,6 +17,7 @@ use serde::de::DeserializeOwned;
 
 use self::message::{Answer, Faults, Request};
 pub(crate) use self::obey::obey;
+pub use crate::desk::DeskWatch;
 use crate::desk::{Asked, Desk, Protocol, ask_line, ask_lines};
 use crate::journal::Reading;
 
@@ -59,6 +60,12 @@ impl Control {
     /// When somebody listens there already, something else is there, or the system refuses.
     pub fn open(path: &Path, bell: Bell, reading: Reading) -> io::Result<Self> {
         Desk::open(path, bell, Faulting(reading)).map(Self)
+    }
+
+    /// For whoever tells that nobody can ask any more.
+    #[must_use]
+    pub fn watch(&self) -> DeskWatch {
+        self.0.watch()
     }
 
     /// The next request.

@@ -81,6 +81,22 @@ pub enum EventLogError {
         /// Which.
         path: PathBuf,
     },
+    /// It was there, and is gone.
+    #[error("{}: {source}: what was logged is lost. Do: leave the file where it is while it is written", path.display())]
+    Gone {
+        /// Which.
+        path: PathBuf,
+        /// What was noticed.
+        source: std::io::Error,
+    },
+    /// The system has no more threads.
+    #[error("{}: starting to write it: {source}. Do: end other programs", path.display())]
+    Thread {
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
     /// Anything else.
     #[error("{}: {doing}: {source}. Do: check the path and its permissions", path.display())]
     Database {

@@ -13,6 +13,8 @@ use std::time::Duration;
 use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::LogEntry;
 
+use super::super::kept_file::KeptFile;
+use super::super::part::guard;
 use super::store::{EventLog, EventLogError, LoggedFinding, StoredEntry};
 
 /// So many entries may be on their way to the thread.
@@ -65,12 +67,17 @@ impl EventLogWriter {
         let (orders, receiver) = sync_channel(ON_THE_WAY);
         let report = Arc::new(Mutex::new(WriterReport::default()));
         let shared = Arc::clone(&report);
-        let thread = thread::Builder::new()
-            .name("event-log".into())
-            .spawn(move || {
-                Keeper { log, run, waiting: VecDeque::new(), report: shared }.work(&receiver)
-            })
-            .ok();
+        let (path, file) = (log.path().to_owned(), KeptFile::at(log.path()));
+        let thread = thread::Builder::new().name("event-log".into()).spawn(move || {
+            let report = Arc::clone(&shared);
+            let keeper = Keeper { log, run, file, waiting: VecDeque::new(), report };
+            let worked =
+                guard("the event log", "nothing more is logged", || keeper.work(&receiver));
+            if let Err(failure) = worked {
+                lock(&shared).failure = Some(failure.to_string());
+            }
+        });
+        let thread = Some(thread.map_err(|source| EventLogError::Thread { path, source })?);
         Ok(Self { run, orders, thread, report })
     }
 
@@ -120,6 +127,7 @@ impl EventLogWriter {
 struct Keeper {
     log: EventLog,
     run: i64,
+    file: KeptFile,
     waiting: VecDeque<StoredEntry>,
     report: Arc<Mutex<WriterReport>>,
 }
@@ -160,6 +168,12 @@ impl Keeper {
 
     /// Writes what waits; says how long to wait before the next time.
     fn flush(&mut self) -> Duration {
+        // What is written to a file that was removed is lost without an error.
+        if let Err(source) = self.file.check() {
+            let path = self.file.path().to_owned();
+            lock(&self.report).failure = Some(EventLogError::Gone { path, source }.to_string());
+            return RETRY;
+        }
         if self.waiting.is_empty() {
             return GATHER;
         }
@@ -182,7 +196,8 @@ impl Keeper {
     fn end(mut self, ended: Option<UnixTime>) {
         self.flush();
         lock(&self.report).dropped += self.waiting.len() as u64;
-        if let Some(ended) = ended
+        if self.file.check().is_ok()
+            && let Some(ended) = ended
             && let Err(error) = self.log.end(self.run, ended)
         {
             lock(&self.report).failure = Some(error.to_string());

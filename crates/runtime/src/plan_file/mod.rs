@@ -144,7 +144,7 @@ impl PlanFile {
         let is_xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
         if is_xml || Eni::is_one(&bytes) {
             let eni = Eni::parse_with(&bytes, cycle);
-            let Eni { name, mut plan, notes } =
+            let Eni { name, mut plan, notes, .. } =
                 eni.map_err(|source| PlanFileError::Eni { path: shown.clone(), source })?;
             if let Some(cycle) = cycle {
                 let refused = |source| PlanFileError::Cycle { path: shown, cycle, source };

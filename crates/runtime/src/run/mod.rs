@@ -8,6 +8,7 @@
 pub mod bring_up;
 pub mod io;
 pub mod judge;
+pub mod note;
 pub mod operator;
 pub mod real_time;
 pub mod report;
@@ -17,8 +18,9 @@ pub mod tap;
 pub mod wanted;
 
 pub use io::{Application, Idle, Io, Next};
+pub use note::{Note, RunError};
 pub use operator::{
-    Beside, Ended, MakePlan, NOTES, Note, Operator, RunError, RunOptions, Wanted, run,
+    Beside, Ended, MakePlan, NOTES, Operator, RunOptions, Wanted, run, run_observed,
 };
 pub use real_time::RealTime;
 pub use scan::scan;

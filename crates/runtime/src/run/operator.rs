@@ -1,34 +1,35 @@
 //! Who runs a machine: finds the line, makes the plan, starts, calls the application, stops.
 
-use std::cell::Cell;
+mod ending;
+
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{DevicePlan, IoAt, Plan};
-use linesman_diagnosis::{Asked, FrameSeen, HostObservation, Probe, Setup};
-use linesman_link::error::LinkError;
+use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, Probe, Setup};
 use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest, Target};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
 use super::bring_up::BringUpReport;
 use super::io::{Application, Io, Next};
-use super::judge::judge;
+use super::judge::{LineObserver, Told, judge};
+use super::note::{Note, RunError};
 use super::real_time::{Granted, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
 use super::scan;
 use super::tap::{Passed, Tap, tap};
 use crate::drive::{Audience, Driver};
 use crate::line::Line;
+use crate::part::PartFailure;
 use crate::serve::lateness::Lateness;
 use crate::service::ServiceDesk;
 use crate::stop::Stop;
 
-/// How long SubDevices may take to go down at the end.
-const LEAVE_PATIENCE: Span = Span::s(5);
-/// So many cycles carry zeros before the exchange ends.
-const SAFE_CYCLES: u64 = 3;
+/// That the diagnosis does not keep up is told no more often than this.
+const MISSED_EVERY: Span = Span::s(10);
 
 /// What is to be run.
 pub enum Wanted {
@@ -67,41 +68,6 @@ const PROBES: usize = 64;
 /// Room for notes that are on their way to whoever listens.
 pub const NOTES: usize = 65_536;
 
-/// Something to be told while it runs.
-#[derive(Clone, Debug)]
-pub enum Note {
-    /// What the scan found.
-    Scanned(Box<Inventory>),
-    /// The plan that is started.
-    Planned(Arc<Plan>),
-    /// The MainDevice tells something.
-    Event(Instant, Box<Event>),
-    /// The host has noticed something.
-    Host(HostObservation),
-    /// The diagnosis tells something.
-    Finding(Box<linesman_diagnosis::Event>),
-    /// The line is being stopped.
-    Leaving(Instant),
-}
-
-/// Why a line cannot be run.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RunError {
-    /// The line does not answer.
-    #[error("{0}")]
-    Scan(String),
-    /// What is there is not what is wanted.
-    #[error("{0}")]
-    Plan(String),
-    /// The interface.
-    #[error(transparent)]
-    Link(#[from] LinkError),
-    /// The system has no more threads.
-    #[error("starting the diagnosis: {0}. Do: end other programs")]
-    Thread(std::io::Error),
-}
-
 /// A MainDevice's operator. It is the [`Audience`] of a [`Driver`].
 pub struct Operator<A> {
     wanted: Option<Wanted>,
@@ -125,7 +91,9 @@ pub struct Operator<A> {
     scan_until: Instant,
     desk: Option<ServiceDesk>,
     /// Notes for which there was no room.
-    untold: Cell<u64>,
+    untold: Arc<AtomicU64>,
+    /// Left-out frames that were told, and nothing of more before that time.
+    missed_told: (u64, Instant),
     begun_at: Instant,
     granted: Granted,
     on: String,
@@ -147,7 +115,17 @@ impl<A: Application> Operator<A> {
     fn note(&self, note: Note) {
         // Whoever listened may have gone, or be busy: the machine runs on.
         if let Err(TrySendError::Full(_)) = self.notes.try_send(note) {
-            self.untold.set(self.untold.get() + 1);
+            self.untold.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Says that the diagnosis does not keep up.
+    #[cold]
+    fn tell_missed(&mut self, now: Instant, left_out: u64) {
+        let (told, until) = self.missed_told;
+        if left_out > told && now >= until {
+            self.missed_told = (left_out, now + MISSED_EVERY);
+            self.note(Note::Missed(now, left_out));
         }
     }
 
@@ -180,11 +158,12 @@ impl<A: Application> Operator<A> {
             frames,
             responding: main.responding().map(|count| count.0),
             counts: Counts {
-                untold: self.untold.get(),
+                untold: self.untold.load(Ordering::Relaxed),
                 ..Counts::of(&main.statistics(), left_out)
             },
             lateness: self.lateness.report(),
             host: (&self.granted).into(),
+            failed: Vec::new(),
             diagnosis: None,
         }
     }
@@ -303,6 +282,10 @@ impl<A: Application> Audience for Operator<A> {
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
         if let Some(tap) = &mut self.tap {
             tap.turn(now);
+            let left_out = tap.left_out();
+            if left_out > self.missed_told.0 {
+                self.tell_missed(now, left_out);
+            }
         }
         if !self.begun {
             self.begun = true;
@@ -346,6 +329,8 @@ pub struct Ended {
     pub report: RunReport,
     /// What ended it, if it was not the time, a wish, or the application.
     pub error: Option<RunError>,
+    /// A part of this program that failed while the line was driven on.
+    pub failed: Option<PartFailure>,
 }
 
 /// Who has a say in a run, and who is told.
@@ -371,16 +356,35 @@ pub fn run<L: Line, A: Application>(
     options: &RunOptions,
     beside: Beside<'_>,
 ) -> Result<Ended, RunError> {
+    let observer = |setup| Box::new(Engine::new(setup)) as Box<dyn LineObserver>;
+    run_observed(line, wanted, application, options, beside, observer)
+}
+
+/// The same with a diagnosis of one's own, made of [`RunOptions::diagnose`].
+///
+/// # Errors
+/// As [`run`].
+pub fn run_observed<L: Line, A: Application>(
+    line: L,
+    wanted: Wanted,
+    application: A,
+    options: &RunOptions,
+    beside: Beside<'_>,
+    observer: impl FnOnce(Setup) -> Box<dyn LineObserver>,
+) -> Result<Ended, RunError> {
     let Beside { stop, notes, desk } = beside;
     let is_virtual = options.real_time.is_none();
     let (ask, probes) = sync_channel(PROBES);
+    let untold = Arc::<AtomicU64>::default();
     let (tap, judging) = match &options.diagnose {
         None => (None, None),
         Some(setup) => {
             let (tap, listener) = tap(is_virtual);
             // In virtual time the judge has no time of its own: when it asked would be chance.
             let setup = Setup { probes: !is_virtual, ..setup.clone() };
-            let thread = judge(setup, listener, notes.clone(), ask).map_err(RunError::Thread)?;
+            let (notes, untold) = (notes.clone(), Arc::clone(&untold));
+            let told = Told { notes, untold, probes: ask };
+            let thread = judge(observer(setup), listener, told).map_err(RunError::Thread)?;
             (Some(tap), Some(thread))
         }
     };
@@ -409,21 +413,24 @@ pub fn run<L: Line, A: Application>(
         held: options.hold,
         scan_until: Instant::MAX,
         desk,
-        untold: Cell::new(0),
+        untold,
+        missed_told: (0, Instant::ZERO),
         begun_at: begun,
         granted,
         on: options.on.clone(),
     };
     let until = options.lasts.map_or(Instant::MAX, |lasts| begun + lasts);
-    let ran = driver.run(until, stop, &mut operator);
+    let ran = operator.drive(&mut driver, until, stop);
     let now = driver.now();
     let mut report = operator.report(now, driver.main_mut());
     let times = operator.plan.as_deref().zip(driver.main_mut().bring_up_times());
     report.bring_up = times.map(|(plan, times)| BringUpReport::of(plan, &times));
     let error = match (operator.failure.take(), ran) {
         (Some(failure), _) => Some(failure),
-        (None, Err(error)) => Some(error.into()),
-        (None, Ok(())) => leave(&mut driver, &mut operator, options.leave).err().map(Into::into),
+        // Where the interface has failed, nothing can be left in order.
+        (None, Err(error @ RunError::Link(_))) => Some(error),
+        (None, Err(error)) => operator.leave(&mut driver, options.leave).err().or(Some(error)),
+        (None, Ok(())) => operator.leave(&mut driver, options.leave).err(),
     };
     if let Some(error) = &error {
         report.error = Some(error.to_string());
@@ -431,31 +438,18 @@ pub fn run<L: Line, A: Application>(
     let planned = operator.plan.is_some();
     // Ends the tap, and with it the thread that judges.
     drop(operator);
-    report.diagnosis = judging.and_then(|thread| thread.join().ok());
+    let judged = judging.map(|thread| match thread.join() {
+        Ok(judged) => judged,
+        Err(panic) => Err(PartFailure::of_panic("the diagnosis", "nothing was judged", &*panic)),
+    });
+    let (diagnosis, failed) = match judged.transpose() {
+        Ok(diagnosis) => (diagnosis, None),
+        Err(failure) => (None, Some(failure)),
+    };
+    report.diagnosis = diagnosis;
+    report.failed.extend(failed.iter().map(PartFailure::to_string));
     match error {
         Some(error) if !planned => Err(error),
-        error => Ok(Ended { report, error }),
+        error => Ok(Ended { report, error, failed }),
     }
-}
-
-/// Outputs to zero, then the exchange ends, then the states.
-fn leave<L: Line, A: Application>(
-    driver: &mut Driver<L>,
-    operator: &mut Operator<A>,
-    to: AlState,
-) -> Result<(), LinkError> {
-    let Some(plan) = operator.plan.clone() else { return Ok(()) };
-    // A second wish ends the program at once; until then it takes the time it takes.
-    let nobody = Stop::default();
-    (operator.leaving, operator.ended) = (true, false);
-    let now = driver.now();
-    operator.note(Note::Leaving(now));
-    let cycle = plan.tasks.iter().map(|task| task.cycle).max().unwrap_or_default();
-    for count in 1..=SAFE_CYCLES {
-        driver.main_mut().outputs_mut().fill(0);
-        driver.run(now + cycle * count, &nobody, operator)?;
-    }
-    let now = driver.now();
-    driver.main_mut().stop(now, to);
-    driver.run(now + LEAVE_PATIENCE, &nobody, operator)
 }

@@ -46,6 +46,9 @@ pub struct RunReport {
     pub lateness: LatenessReport,
     /// What the host granted.
     pub host: HostReport,
+    /// Parts of this program that failed while the line was driven on, each with the reason and the next step.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failed: Vec<String>,
     /// What was wrong with the line; `null` while it runs, and where it was not judged.
     pub diagnosis: Option<Diagnosis>,
 }

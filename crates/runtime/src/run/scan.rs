@@ -5,7 +5,7 @@ use linesman_diagnosis::{FrameSeen, HostObservation};
 use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::time::{Instant, Span};
 
-use super::operator::RunError;
+use super::note::RunError;
 use crate::drive::{Audience, Driver};
 use crate::line::Line;
 use crate::stop::Stop;

@@ -39,18 +39,26 @@ pub struct Log {
     bytes: Box<[u8; ROOM]>,
     len: usize,
     host: Vec<HostObservation>,
+    /// Frames that passed behind these and were left out.
+    missed: u64,
 }
 
 impl Log {
     fn new() -> Self {
         // Not on the stack.
         let bytes = vec![0; ROOM].into_boxed_slice().try_into();
-        Self { bytes: bytes.unwrap_or_else(|_| Box::new([0; ROOM])), len: 0, host: Vec::new() }
+        Self {
+            bytes: bytes.unwrap_or_else(|_| Box::new([0; ROOM])),
+            len: 0,
+            host: Vec::new(),
+            missed: 0,
+        }
     }
 
     fn clear(&mut self) {
         self.len = 0;
         self.host.clear();
+        self.missed = 0;
     }
 
     /// Whether there is no room for another entry.
@@ -93,6 +101,12 @@ impl Log {
                 bytes: behind.get(..len)?,
             })
         })
+    }
+
+    /// Frames that passed behind these and were left out, because the other side did not keep up.
+    #[must_use]
+    pub const fn missed(&self) -> u64 {
+        self.missed
     }
 
     /// What the host noticed meanwhile.
@@ -274,6 +288,7 @@ impl Tap {
     #[cold]
     fn leave_out(&mut self) {
         self.left_out += 1;
+        self.log.missed += 1;
     }
 
     /// The log is full: the next one takes the frame, if there is one.
@@ -325,8 +340,9 @@ impl Tap {
         let log = std::mem::replace(&mut self.log, next);
         match self.full.try_send(log) {
             Ok(()) => self.bell.ring(),
-            // As many logs as there is room for: it cannot be full.
+            // As many logs as there is room for: it cannot be full, so nobody judges any more.
             Err(TrySendError::Full(log) | TrySendError::Disconnected(log)) => {
+                self.left_out += log.frames().count() as u64;
                 self.log = log;
                 self.log.clear();
             }
@@ -396,8 +412,9 @@ mod tests {
         }
         let left_out = tap.left_out();
         drop(tap);
-        let (mut seen, mut last, mut done) = (0, None, None);
+        let (mut seen, mut missed, mut last, mut done) = (0, 0, None, None);
         while let Some(log) = listener.next(done.take()) {
+            missed += log.missed();
             for frame in log.frames() {
                 assert!(last < Some(frame.number));
                 assert_eq!(frame.bytes, &bytes[..60 + (frame.number as usize % 1_400)]);
@@ -408,6 +425,7 @@ mod tests {
         }
         assert!(left_out > 0, "nobody listened");
         assert_eq!(seen + left_out, sent);
+        assert_eq!(missed, left_out, "who judges is told of each");
     }
 
     #[test]
@@ -431,5 +449,18 @@ mod tests {
         assert_eq!(tap.left_out(), 0);
         drop(tap);
         assert_eq!(judge.join().unwrap(), sent);
+    }
+
+    #[test]
+    fn frames_that_nobody_takes_any_more_are_counted() {
+        let (mut tap, listener) = tap(true);
+        drop(listener);
+        for number in 0..2_000 {
+            let time = Instant::ZERO + Span::ms(20) * number;
+            tap.frame(&FrameSeen { time, ..frame(number, &[0; 1_000]) });
+            tap.turn(time);
+        }
+        // The last log is not full yet.
+        assert!(tap.left_out() > 1_000, "{}", tap.left_out());
     }
 }

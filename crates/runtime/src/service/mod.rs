@@ -20,6 +20,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 
 use self::message::{Answer, Asked as AskedService, Request};
+pub use crate::desk::DeskWatch;
 use crate::desk::{Asked, Desk, Protocol, ask_line};
 use crate::online::{Board, Rates, Snapshot};
 use crate::run::report::RunReport;
@@ -106,6 +107,12 @@ impl ServiceDesk {
     pub fn open(path: &Path, bell: Bell, board: Board) -> io::Result<Self> {
         let desk = Desk::open(path, bell, Serving { board })?;
         Ok(Self { desk, pending: Vec::new(), rates: Rates::default() })
+    }
+
+    /// For whoever tells that nobody can ask any more.
+    #[must_use]
+    pub fn watch(&self) -> DeskWatch {
+        self.desk.watch()
     }
 
     /// Takes what is asked for. `report` tells how the run goes.

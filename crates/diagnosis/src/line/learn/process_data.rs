@@ -7,6 +7,8 @@ use crate::line::{Cyclic, Device, Line, Ordered, Owner, Seen, owners};
 
 /// A working counter that falls so soon after the first frame may have been ordered to before.
 const JUST_BEGUN: Span = Span::ms(200);
+/// A working counter that is lower than planned for so long, while nobody is seen in a lower state than OP, is not on its way up.
+const BELOW_PLAN: Span = Span::s(1);
 /// Most logical datagrams that are followed.
 const MOST_CYCLIC: usize = 256;
 
@@ -30,7 +32,10 @@ pub(super) fn returned(line: &mut Line, latest: &mut usize, answer: &Answer<'_>)
     let Some(index) = found else {
         if line.cyclic.len() < MOST_CYCLIC {
             *latest = line.cyclic.len();
-            line.cyclic.push(Cyclic::new(answer.command, start, len, seen));
+            let planned = line.planned_exchange.counter(answer.command, start, len);
+            let mut cyclic = Cyclic::new(answer.command, start, len, seen);
+            cyclic.planned = planned;
+            line.cyclic.push(cyclic);
             line.touch();
         }
         return false;
@@ -60,7 +65,14 @@ pub(super) fn returned(line: &mut Line, latest: &mut usize, answer: &Answer<'_>)
             Ordered::No
         }
     };
-    let news = cyclic.record(seen, ordered);
+    let mut news = cyclic.record(seen, ordered);
+    if cyclic.planned.is_some_and(|planned| cyclic.highest.value < planned) {
+        let since = cyclic.wkc.at.max(cyclic.first.at);
+        let is_up = |device: &Device| device.al.may_be_in_op();
+        if answer.at.since(since) >= BELOW_PLAN && devices.iter().all(is_up) {
+            news |= cyclic.note_below_plan();
+        }
+    }
     let is_expected = cyclic.highest.value > 0;
     let sent_off = answer.sent_at.is_some_and(|at| cyclic.sent.tick(at));
     if news | sent_off | cyclic.returned.tick(answer.at) {

@@ -115,6 +115,7 @@ impl Audience for Looking<'_> {
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
         self.engine.handle_timeout(now);
         self.session.follow(&mut self.engine, self.output);
+        self.session.look_at_recording(self.recorder.as_ref(), self.output);
         while let Some(probe) = self.engine.poll_probe() {
             let line = self.engine.line(probe.network);
             let station = line.and_then(|line| line.device(probe.device)?.station);

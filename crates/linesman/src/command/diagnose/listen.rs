@@ -95,6 +95,7 @@ impl Listening {
                 session.follow(engine, output);
             }
         })?;
+        session.look_at_recording(recorder.as_ref(), output);
         if let Some(engine) = engine {
             engine.handle_timeout(clock.now());
             session.follow(engine, output);

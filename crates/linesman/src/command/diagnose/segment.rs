@@ -59,6 +59,9 @@ pub(super) fn run(
         let next = until.min(lab.now() + STEP);
         lab.run_until(next).map_err(|error| files::in_file(path, &error))?;
         follow(&mut lab, &names, &mut session, output);
+        let recording = recorder.lock().unwrap_or_else(PoisonError::into_inner);
+        session.look_at_recording(recording.as_ref(), output);
+        drop(recording);
         let (now, frames) = (lab.now(), lab.frames());
         progress.show(|| format!("{} of {}, {}", text(now), text(until), count(frames, "frame")));
     }

@@ -1,6 +1,5 @@
 //! Several files, told in a line each.
 
-use linesman_config::project::Project;
 use linesman_diagnosis::report::{Diagnosis, Verdict};
 use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
@@ -9,7 +8,7 @@ use serde::Serialize;
 use super::{Arguments, Session, driven, file, status};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
-use crate::files;
+use crate::files::Planned;
 use crate::output::{Output, Paint, Table};
 use crate::text::finding::{severity_word, tally};
 use crate::text::names::Names;
@@ -49,7 +48,7 @@ struct Looked {
 /// Judges each file for itself.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selectors = selectors(arguments)?;
-    let project = arguments.project.as_deref().map(files::project).transpose()?;
+    let project = arguments.project.as_deref().map(Planned::open).transpose()?;
     let stop = driven::stop()?;
     let mut all = Vec::new();
     for (selector, name) in selectors.iter().zip(&arguments.places) {
@@ -100,7 +99,7 @@ fn selectors(arguments: &Arguments) -> Result<Vec<Selector>, Failure> {
 fn judge(
     selector: &Selector,
     arguments: &Arguments,
-    project: Option<Project>,
+    project: Option<Planned>,
     stop: &Stop,
     output: &mut Output,
 ) -> Result<(Diagnosis, Names), Failure> {

@@ -11,12 +11,14 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::event_log::{EventLogWriter, LoggedFinding, WriterReport};
 use linesman_runtime::online::Board;
+use linesman_runtime::part::PartFailure;
 use linesman_runtime::run::Note;
 use linesman_runtime::run::bring_up::BringUpReport;
 use linesman_runtime::run::report::{Counts, RunReport};
 use linesman_runtime::system_log::SystemLog;
 
 use crate::command::diagnose::follow::{Follower, event_word};
+use crate::failure::Failure;
 use crate::output::{Output, Paint, Table};
 use crate::text::finding::{Writer, percent, tally};
 use crate::text::names::Names;
@@ -33,6 +35,8 @@ pub(super) struct Teller {
     logs: Logs,
     /// Whose error counters people were told of.
     counted: HashMap<DeviceId, Counted>,
+    /// What was said to have failed, each once.
+    failures: Vec<String>,
 }
 
 /// Rising error counters of a SubDevice are told no more often than this: under steady noise they rise with every reading.
@@ -61,8 +65,8 @@ pub(super) struct Logs {
 impl Teller {
     pub(super) fn new(json: bool, began: UnixTime, logs: Logs, board: Board) -> Self {
         let follower = Follower::new(false);
-        let counted = HashMap::new();
-        Self { json, names: Names::default(), follower, board, began, logs, counted }
+        let (counted, failures) = (HashMap::new(), Vec::new());
+        Self { json, names: Names::default(), follower, board, began, logs, counted, failures }
     }
 
     /// What the SubDevices are called.
@@ -107,7 +111,42 @@ impl Teller {
                 self.entries(entries, output);
             }
             Note::Finding(event) => self.finding(event, output),
+            Note::Missed(at, left_out) => self.missed(*at, *left_out, output),
+            Note::Failed(failure) => self.failed(failure, output),
             Note::Leaving(at) => self.said(*at, "stopping: outputs to zero", output),
+        }
+    }
+
+    /// The diagnosis does not keep up.
+    fn missed(&mut self, at: Instant, left_out: u64, output: &Output) {
+        let text =
+            format!("the diagnosis does not keep up: {} left out so far", count(left_out, "frame"));
+        self.keep(of_host(at, &text), None);
+        output.warn(&format!("{text}; its verdict says so"));
+    }
+
+    /// A part of this program has failed.
+    pub(super) fn failed(&mut self, failure: &PartFailure, output: &Output) {
+        self.complain(&failure.to_string(), output);
+    }
+
+    /// Looks whether the logs are still written, and says at once if they are not.
+    pub(super) fn look_at_logs(&mut self, output: &Output) {
+        if let Some(why) = self.logs.file.as_ref().and_then(|log| log.report().failure) {
+            self.complain(&why, output);
+        }
+        if self.logs.system.as_ref().is_some_and(|log| log.lost().is_some()) {
+            let text = "--system-log: journald does not take what happens. Do: look at `systemctl status \
+                        systemd-journald`, or keep a log of its own: `--log FILE`";
+            self.complain(text, output);
+        }
+    }
+
+    /// Says once that something has failed.
+    pub(super) fn complain(&mut self, why: &str, output: &Output) {
+        if !self.failures.iter().any(|said| said == why) {
+            self.failures.push(why.to_owned());
+            output.fail(&Failure::from_text(why));
         }
     }
 
@@ -207,6 +246,12 @@ impl Teller {
     fn said(&self, at: Instant, words: &str, output: &mut Output) {
         self.line(&format!("{:>12}  {words}", time(at.as_nanos())), output);
     }
+}
+
+/// An entry of the log on this computer.
+fn of_host(at: Instant, text: &str) -> LogEntry {
+    let (severity, kind) = (EntrySeverity::Warning, EntryKind::Host);
+    LogEntry { at, severity, kind, device: None, text: text.to_owned() }
 }
 
 /// An entry of the log on a finding.

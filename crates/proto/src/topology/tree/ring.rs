@@ -40,9 +40,10 @@ impl Tree {
     #[must_use]
     pub fn is_on_ring(&self, link: usize) -> bool {
         let Some((last, _)) = self.closes_at else { return false };
-        match self.links[link].downstream {
-            End::MainDevice(_) => true,
-            End::Controller(node, _) => node == last || self.is_downstream_of(last, node),
+        match self.links.get(link).map(|link| link.downstream) {
+            None => false,
+            Some(End::MainDevice(_)) => true,
+            Some(End::Controller(node, _)) => node == last || self.is_downstream_of(last, node),
         }
     }
 
