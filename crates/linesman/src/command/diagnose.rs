@@ -82,6 +82,8 @@ pub(crate) struct Arguments {
     /// Write a drawing of the line with what is wrong marked in it
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
+    #[command(flatten)]
+    origin: page::Origin,
     /// JSON, schema linesman.diagnosis/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -181,6 +183,7 @@ pub(crate) struct Session {
     record: Option<PathBuf>,
     html: Option<PathBuf>,
     svg: Option<PathBuf>,
+    origin: page::Origin,
     json: bool,
     /// Of a pasted text: what was understood.
     understood: Option<Understood>,
@@ -197,6 +200,7 @@ impl Session {
             record: arguments.record.clone(),
             html: arguments.html.clone(),
             svg: arguments.svg.clone(),
+            origin: arguments.origin.clone(),
             json: arguments.json,
             understood: None,
         }
@@ -300,7 +304,7 @@ impl Session {
                 timed,
                 place: &diagnosis.source,
             };
-            let page = page::page(diagnosis, line, &writer, at);
+            let page = page::page(diagnosis, line, &writer, at, &self.origin);
             files::write_new(path, "the report", &page)?;
         }
         if let Some(path) = &self.svg {

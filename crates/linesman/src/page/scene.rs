@@ -6,6 +6,7 @@ use linesman_diagnosis::report::{Diagnosis, FindingReport};
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 
+use super::prose::plain;
 use crate::command::scan::report::state_name;
 use crate::drawing::{Label, Mark, Scene, State};
 use crate::text::finding::percent;
@@ -73,7 +74,7 @@ fn mark(finding: &FindingReport, names: &Names) -> Mark {
         id: finding.id.clone(),
         severity: finding.severity,
         place: finding.place.clone(),
-        title: format!(
+        title: plain(&format!(
             "{} {} {}: {}, {} ({})",
             finding.id,
             finding.code,
@@ -81,6 +82,6 @@ fn mark(finding: &FindingReport, names: &Names) -> Mark {
             names.place(&finding.place),
             finding.cause,
             percent(finding.confidence)
-        ),
+        )),
     }
 }
