@@ -70,12 +70,20 @@ pub(crate) fn page(
                     @if let Some(scene) = &scene {
                         section {
                             h2 { "The line" }
-                            div class="picture" { (drawing::draw(scene, false)) }
+                            @let is_wide = scene.tree.len() >= drawing::NARROW;
+                            div class={ "picture" @if is_wide { " spread" } } {
+                                (drawing::draw(scene, drawing::WIDE, false))
+                            }
+                            @if is_wide {
+                                div class="picture narrow" aria-hidden="true" {
+                                    (drawing::draw(scene, drawing::NARROW, false))
+                                }
+                            }
                             p class="faint" {
                                 "Boxes are SubDevices in their last known state, letters the ports of a \
-                                 link. A disc marks the place of a finding, → away from the \
-                                 MainDevice, ← towards it. +n: errors counted at that port during \
-                                 this look."
+                                 link. F1 marks the place of a finding; its arrow is the direction \
+                                 of the frames that are concerned. A +12: errors counted at port A \
+                                 during this look. From: a branch, drawn in a row of its own."
                             }
                         }
                     }
