@@ -84,6 +84,9 @@ pub(crate) struct Arguments {
     svg: Option<PathBuf>,
     #[command(flatten)]
     origin: page::Origin,
+    /// List the SubDevices with vendor, product and revision, as far as the input says them
+    #[arg(long)]
+    devices: bool,
     /// JSON, schema linesman.diagnosis/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -184,6 +187,7 @@ pub(crate) struct Session {
     html: Option<PathBuf>,
     svg: Option<PathBuf>,
     origin: page::Origin,
+    devices: bool,
     json: bool,
     /// Of a pasted text: what was understood.
     understood: Option<Understood>,
@@ -201,6 +205,7 @@ impl Session {
             html: arguments.html.clone(),
             svg: arguments.svg.clone(),
             origin: arguments.origin.clone(),
+            devices: arguments.devices,
             json: arguments.json,
             understood: None,
         }
@@ -277,7 +282,13 @@ impl Session {
         match (&self.follower, self.json) {
             (Some(follower), true) => follower.end(at, &diagnosis, output),
             (None, true) => output.json(&diagnosis),
-            (_, false) => print(&diagnosis, names, output),
+            (_, false) => {
+                print(&diagnosis, names, output);
+                if self.devices || text::devices::is_wanted(&diagnosis) {
+                    let table = text::devices::write(&diagnosis, output.paint());
+                    output.text(&format!("\n{table}"));
+                }
+            }
         }
         // What was found holds, even if no file can be written of it.
         if let Err(failure) = self.write_files(&diagnosis, engine, names, at) {

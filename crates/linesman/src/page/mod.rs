@@ -86,10 +86,15 @@ pub(crate) fn page(
                                  during this look. From: a branch, drawn in a row of its own."
                             }
                         }
+                    } @else if !diagnosis.devices.is_empty() {
+                        section {
+                            h2 { "The line" }
+                            p class="faint" { "No drawing: how the line is wired was not seen." }
+                        }
                     }
                     @if writer.timed { (timeline::section(&diagnosis.findings, at, clock, writer)) }
                     (findings::section(&diagnosis.findings, clock, writer))
-                    @if let Some(line) = line { (devices::section(line)) }
+                    (devices::section(&diagnosis.devices, line))
                 }
                 footer { (foot(diagnosis, writer)) }
             }

@@ -54,7 +54,7 @@ pub(crate) fn of_scan(inventory: &Inventory) -> Scene<'_> {
 }
 
 /// The last state that was seen, or that it does not answer.
-pub(super) fn state(device: &Device) -> Option<State> {
+fn state(device: &Device) -> Option<State> {
     if device.silent.is_some() {
         return Some(State { state: None, text: "no answer".to_owned(), error: true });
     }

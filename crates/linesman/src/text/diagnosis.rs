@@ -2,9 +2,9 @@
 
 use linesman_diagnosis::report::{Diagnosis, Verdict};
 
-use super::coverage;
 use super::finding::{Writer, tally};
 use super::quantity::{count, date, grouped};
+use super::{coverage, devices};
 use crate::command::diagnose::READINGS;
 use crate::hint;
 use crate::output::wrapped;
@@ -26,7 +26,8 @@ pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
         let code = &diagnosis.findings[0].code;
         let hint = format!("\n`linesman explain {code}` says how such a finding is made.\n");
         text.push_str(&writer.paint.faint(&hint));
-        if writer.timed && diagnosis.network.devices.0 > 0 && !writer.names.has_any() {
+        let can_scan = writer.timed && !devices::is_recording(diagnosis);
+        if can_scan && diagnosis.network.devices.0 > 0 && !writer.names.has_any() {
             text.push_str(&writer.paint.faint(&hint::complete(NAMED, writer.place)));
         }
     }
