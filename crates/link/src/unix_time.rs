@@ -65,9 +65,25 @@ impl UnixTime {
     /// `2026-03-01 11:16:50.182 +01:00`.
     #[must_use]
     pub fn local(self) -> String {
+        self.local_as("%Y-%m-%d %H:%M:%S%.3f %:z")
+    }
+
+    /// Its date in the time zone of this host, with the offset from UTC: `2026-03-01 +01:00`.
+    #[must_use]
+    pub fn local_date(self) -> String {
+        self.local_as("%Y-%m-%d %:z")
+    }
+
+    /// Its time of day in the time zone of this host, to the millisecond: `11:16:50.182`.
+    #[must_use]
+    pub fn local_time_of_day(self) -> String {
+        self.local_as("%H:%M:%S%.3f")
+    }
+
+    fn local_as(self, format: &str) -> String {
         let zoned = |stamp: Timestamp| stamp.to_zoned(TimeZone::system());
         match Timestamp::from_nanosecond(self.0).map(zoned) {
-            Ok(zoned) => zoned.strftime("%Y-%m-%d %H:%M:%S%.3f %:z").to_string(),
+            Ok(zoned) => zoned.strftime(format).to_string(),
             Err(_) => self.to_string(),
         }
     }

@@ -194,6 +194,7 @@ impl Engine {
             complete: self.is_complete,
             verdict: self.verdict(&coverage),
             network: self.network_report(),
+            devices: report::device::reports(self.line(Network(0))),
             coverage: report::coverage::report(&coverage),
             understood: None,
             findings: roots

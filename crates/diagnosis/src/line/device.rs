@@ -7,7 +7,9 @@ use linesman_config::inventory::label;
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias};
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::port::PortMap;
-use linesman_proto::register::{DlControl, FmmuConfig, WatchdogDivider, WatchdogTime};
+use linesman_proto::register::{
+    ControllerType, DlControl, EscInformation, FmmuConfig, WatchdogDivider, WatchdogTime,
+};
 use linesman_proto::sii::Identity;
 use linesman_proto::time::{DcTime32, Instant, Span};
 use linesman_proto::topology::SeenController;
@@ -25,12 +27,14 @@ pub struct Device {
     pub id: DeviceId,
     /// Its name in the project.
     pub name: Option<String>,
-    /// Its type: from the project, or from its SII.
+    /// Its type: from the project, from its SII, or from CoE 0x1008.
     pub type_name: Option<String>,
     /// What was planned for it.
     pub planned: Option<Planned>,
     /// What it says of itself.
     pub identity: SeenIdentity,
+    /// The type of its EtherCAT chip: registers 0x0000 and 0x0001.
+    pub chip: Option<Seen<Chip>>,
     /// When another tool reported that it is not the planned one, without saying what it is instead.
     pub reported_wrong: Option<Seen<()>>,
     /// Its station address now.
@@ -84,6 +88,24 @@ pub struct Device {
     pub sii: SiiImage,
     /// What that says of the E-bus.
     pub power: Option<Seen<Power>>,
+}
+
+/// The type of an EtherCAT chip.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Chip {
+    /// Register 0x0000.
+    pub kind: ControllerType,
+    /// Register 0x0001; 0 when it was not read.
+    pub revision: u8,
+}
+
+impl Chip {
+    /// The name of the chip.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        let (controller, revision) = (self.kind, self.revision);
+        EscInformation { controller, revision, ..EscInformation::default() }.controller_name()
+    }
 }
 
 /// The process data watchdog of a controller: registers 0x0400 and 0x0420; what was not seen is as after
@@ -212,6 +234,7 @@ impl Device {
             type_name: None,
             planned: None,
             identity: SeenIdentity::default(),
+            chip: None,
             reported_wrong: None,
             station: None,
             alias: None,

@@ -35,7 +35,7 @@ pub use beat::{Beat, Off, Pause};
 pub use clock::{ClockHistory, Reference};
 pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cyclic::{Cyclic, Deficit, Ordered, Owner};
-pub use device::{Absence, Device, Planned, SeenIdentity, SharedAddress, SharedBy, Trouble};
+pub use device::{Absence, Chip, Device, Planned, SeenIdentity, SharedAddress, SharedBy, Trouble};
 pub use dl_history::{DlChange, DlHistory};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;

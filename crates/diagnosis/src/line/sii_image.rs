@@ -4,10 +4,15 @@ use std::ops::Range;
 
 use linesman_proto::port::PortMap;
 use linesman_proto::sii::word;
-use linesman_proto::sii::{CategoryKind, General, Image, PortKind, WordAddress};
+use linesman_proto::sii::{CategoryKind, General, PortKind, WordAddress};
 
 /// Most words kept: categories with names lie near the front.
 const MOST_WORDS: usize = 2048;
+
+/// Category General: numbers of the strings that hold the order designation and the name, by byte.
+/// Reference: ETG.2010 table 7.
+const ORDER: usize = 2;
+const NAME: usize = 3;
 
 /// What the SII says of the E-bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -62,14 +67,46 @@ impl SiiImage {
         Some(u32::from(high) << 16 | u32::from(low))
     }
 
-    /// The order designation, else the name, once the categories that hold them were read.
+    /// The order designation, the type of the device, once it was read with all that leads to it: a
+    /// MainDevice often reads one string only.
+    #[must_use]
+    pub fn order(&self) -> Option<String> {
+        self.string(self.byte(self.find(CategoryKind::General)?.start + ORDER)?)
+    }
+
+    /// The name of the device, often longer than its type, once it was read.
+    #[must_use]
+    pub fn name(&self) -> Option<String> {
+        self.string(self.byte(self.find(CategoryKind::General)?.start + NAME)?)
+    }
+
+    /// The order designation, else the name.
     #[must_use]
     pub fn type_name(&self) -> Option<String> {
-        let (strings, general) =
-            (self.category(CategoryKind::Strings)?, self.category(CategoryKind::General)?);
-        let image = Image::parse(self.bytes.get(..strings.end.max(general.end))?).ok()?;
-        let text = image.order().filter(|text| !text.is_empty()).or(image.name())?;
-        Some(text.trim().to_owned()).filter(|text| !text.is_empty())
+        self.order().or_else(|| self.name())
+    }
+
+    /// A string by its number, counted from 1; `None` for one that is empty or was not read.
+    fn string(&self, number: u8) -> Option<String> {
+        let content = self.find(CategoryKind::Strings)?;
+        let count = self.byte(content.start)?;
+        if number == 0 || number > count {
+            return None;
+        }
+        let mut at = content.start + 1;
+        for _ in 1..number {
+            at += 1 + usize::from(self.byte(at)?);
+        }
+        let text = at + 1..at + 1 + usize::from(self.byte(at)?);
+        let bytes: Option<Vec<u8>> = text.map(|at| self.byte(at)).collect();
+        let text = String::from_utf8_lossy(&bytes?).trim_matches(['\0', ' ']).to_owned();
+        Some(text).filter(|text| !text.is_empty())
+    }
+
+    /// A byte, if it was read.
+    fn byte(&self, at: usize) -> Option<u8> {
+        let is_known = *self.known.get(at / 2)?;
+        is_known.then(|| self.bytes[at])
     }
 
     /// What its controller hangs on, once category General was read.
@@ -82,6 +119,12 @@ impl SiiImage {
 
     /// Where the content of a category lies, in bytes, if all of it was read.
     fn category(&self, wanted: CategoryKind) -> Option<Range<usize>> {
+        let content = self.find(wanted)?;
+        content.clone().all(|at| self.byte(at).is_some()).then_some(content)
+    }
+
+    /// Where the content of a category lies, in bytes, if the heads of those before it were read.
+    fn find(&self, wanted: CategoryKind) -> Option<Range<usize>> {
         let mut at = word::FIRST_CATEGORY.value();
         while (at as usize) < MOST_WORDS {
             let kind = CategoryKind::from_code(self.word(WordAddress(at))?);
@@ -90,8 +133,7 @@ impl SiiImage {
                 return None;
             }
             if kind == wanted {
-                let is_whole = content.clone().all(|word| self.word(WordAddress(word)).is_some());
-                return is_whole.then(|| 2 * content.start as usize..2 * content.end as usize);
+                return Some(2 * content.start as usize..2 * content.end as usize);
             }
             at = content.end;
         }
@@ -113,6 +155,39 @@ mod tests {
         bytes[content + 12..content + 14].copy_from_slice(&(-2000i16).to_le_bytes());
         bytes.extend([0xFF, 0xFF, 0, 0]);
         bytes
+    }
+
+    /// An image with the strings `EL2004` and `4 outputs`, then category General that names both.
+    fn named_image() -> Vec<u8> {
+        let mut bytes = vec![0; 2 * word::FIRST_CATEGORY.value() as usize];
+        let strings = b"\x02\x06EL2004\x094 outputs";
+        bytes.extend([10, 0, (strings.len() / 2) as u8, 0]);
+        bytes.extend(strings);
+        bytes.extend([30, 0, 16, 0, 0, 0, 1, 2]);
+        bytes.extend([0; 28]);
+        bytes.extend([0xFF, 0xFF, 0, 0]);
+        bytes
+    }
+
+    #[test]
+    fn type_is_told_by_the_one_string_that_was_read() {
+        let bytes = named_image();
+        let (mut sii, first) = (SiiImage::default(), word::FIRST_CATEGORY.value());
+        // The heads of both categories and the string numbers of General.
+        let strings = first + 2;
+        let general = strings + 9;
+        let take = |sii: &mut SiiImage, from: u32, words: u32| {
+            sii.record(from, &bytes[2 * from as usize..2 * (from + words) as usize])
+        };
+        assert!(take(&mut sii, first, 2) && take(&mut sii, general, 4));
+        assert_eq!(sii.type_name(), None, "no string was read");
+        // Number of strings, the length of the first, and the second.
+        assert!(take(&mut sii, strings, 1) && take(&mut sii, strings + 4, 5));
+        assert_eq!(sii.type_name().as_deref(), Some("4 outputs"), "the type is not read yet");
+        assert_eq!(sii.order(), None);
+        assert!(take(&mut sii, strings + 1, 3));
+        assert_eq!(sii.type_name().as_deref(), Some("EL2004"));
+        assert_eq!(sii.name().as_deref(), Some("4 outputs"));
     }
 
     #[test]

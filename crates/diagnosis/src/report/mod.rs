@@ -6,6 +6,7 @@
 pub mod build;
 mod calibration;
 pub mod coverage;
+pub mod device;
 pub mod number;
 
 use linesman_config::fault::{Class, FaultName};
@@ -14,6 +15,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::finding::{EvidenceKind, Severity};
 pub use crate::pasted::Understood;
 pub use coverage::CoverageReport;
+pub use device::DeviceReport;
 pub use number::Number;
 
 /// Name and version of the format.
@@ -39,6 +41,9 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The network as a whole.
     pub network: NetworkReport,
+    /// The SubDevices, as far as the input says who they are.
+    #[serde(default)]
+    pub devices: Vec<DeviceReport>,
     /// What could be judged, and what not.
     #[serde(default)]
     pub coverage: CoverageReport,

@@ -82,6 +82,11 @@ pub(crate) struct Arguments {
     /// Write a drawing of the line with what is wrong marked in it
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
+    #[command(flatten)]
+    origin: page::Origin,
+    /// List the SubDevices with vendor, product and revision, as far as the input says them
+    #[arg(long)]
+    devices: bool,
     /// JSON, schema linesman.diagnosis/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -183,6 +188,8 @@ pub(crate) struct Session {
     recording_failed: bool,
     html: Option<PathBuf>,
     svg: Option<PathBuf>,
+    origin: page::Origin,
+    devices: bool,
     json: bool,
     /// Of a pasted text: what was understood.
     understood: Option<Understood>,
@@ -203,6 +210,8 @@ impl Session {
             recording_failed: false,
             html: arguments.html.clone(),
             svg: arguments.svg.clone(),
+            origin: arguments.origin.clone(),
+            devices: arguments.devices,
             json: arguments.json,
             understood: None,
         }
@@ -290,7 +299,13 @@ impl Session {
         match (&self.follower, self.json) {
             (Some(follower), true) => follower.end(at, &diagnosis, output),
             (None, true) => output.json(&diagnosis),
-            (_, false) => print(&diagnosis, names, output),
+            (_, false) => {
+                print(&diagnosis, names, output);
+                if self.devices || text::devices::is_wanted(&diagnosis) {
+                    let table = text::devices::write(&diagnosis, output.paint());
+                    output.text(&format!("\n{table}"));
+                }
+            }
         }
         // What was found holds, even if no file can be written of it.
         if let Err(failure) = self.write_files(&diagnosis, engine, names, at) {
@@ -317,7 +332,7 @@ impl Session {
                 timed,
                 place: &diagnosis.source,
             };
-            let page = page::page(diagnosis, line, &writer, at);
+            let page = page::page(diagnosis, line, &writer, at, &self.origin);
             files::write_new(path, "the report", &page)?;
         }
         if let Some(path) = &self.svg {

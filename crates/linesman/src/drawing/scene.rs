@@ -25,6 +25,8 @@ pub(crate) struct Label {
     pub(crate) type_name: String,
     /// Its state; `None` when nobody saw it.
     pub(crate) state: Option<State>,
+    /// It was planned, and is not there.
+    pub(crate) is_missing: bool,
     /// What its error counters rose by, by port; those that did not rise are left out.
     pub(crate) rises: Vec<(Port, u64)>,
 }

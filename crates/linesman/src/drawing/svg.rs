@@ -1,204 +1,164 @@
-//! The strokes.
+//! The drawing as SVG: boxes, references, the keys to the colours.
 
-use linesman_diagnosis::report::DirectionReport;
 use linesman_proto::address::Path;
 use linesman_proto::state::AlState;
 use linesman_proto::topology::{End, Link};
 use maud::{Markup, PreEscaped, html};
 
-use super::layout::{Cell, Layout};
-use super::scene::{Label, Mark, Scene, direction};
+use super::badge::{self, Group, badges};
+use super::layout::{Cell, Course, Item, Layout, below, item_at};
+use super::scene::{Label, Mark, Scene};
+use super::wire::{ASIDE_AT, DOWN_AT, letter};
 use crate::text::finding::severity_word;
 use crate::text::quantity::grouped;
 
 /// Pixels from one box to the next.
-const CELL: (usize, usize) = (156, 92);
+pub(super) const CELL: (usize, usize) = (184, 110);
 /// Pixels of a box.
-const BOX: (usize, usize) = (116, 62);
+pub(super) const BOX: (usize, usize) = (120, 66);
 /// Pixels around all.
-const MARGIN: usize = 24;
+const MARGIN: usize = 28;
 /// Letters that fit in a box.
-const LETTERS: usize = 17;
+const LETTERS: usize = 16;
+
+/// Columns of boxes on a screen or a sheet of paper, and on a telephone.
+pub(crate) const WIDE: usize = 7;
+pub(crate) const NARROW: usize = 2;
 
 /// Colours and strokes, for the page or file that the picture is part of. Severity is told by words
 /// and dashes too, not by colour alone.
 pub(crate) const STYLE: &str = "\
 .line{font:11px system-ui,sans-serif;background:#fff}\
-.line .box{fill:#f7f7f8;stroke:#767b85;stroke-width:1.2}\
-.line .key{stroke:#767b85;stroke-width:1}\
+.line .box,.line .card{fill:#f7f7f8;stroke:#767b85;stroke-width:1.2}\
+.line .key{fill:#f7f7f8;stroke:#767b85;stroke-width:1}\
 .line .op{fill:#dbe8fb}.line .safeop{fill:#dff2e2}.line .preop{fill:#fdf0c4}.line .init{fill:#fbdcd9}\
-.line .unseen{fill:#f7f7f8}.line .error{stroke:#b3261e;stroke-width:2.6}\
+.line .unseen{fill:#f7f7f8;stroke-dasharray:4 3}.line .error{stroke:#b3261e;stroke-width:2.6}\
 .line .gone{fill:#fff;stroke:#b3261e;stroke-width:2.6;stroke-dasharray:5 3}\
+.line .missing{fill:#fbe9e7;stroke:#b3261e;stroke-width:2.6;stroke-dasharray:2 4}\
+.line text.absent{fill:#b3261e;font-weight:700}\
+.line .reference{fill:#fff;stroke:#767b85;stroke-dasharray:3 2}\
 .line text{fill:#1b1d21}.line .name{font-weight:600}.line .faint{fill:#5b606b}\
 .line .port{fill:#5b606b;font-size:9px}.line .rises{fill:#b3261e;font-weight:600}\
-.line .link{fill:none;stroke:#4c515b;stroke-width:1.6}.line .closing{stroke-dasharray:6 3}\
+.line .link,.line .stub{fill:none;stroke:#4c515b;stroke-width:1.6}.line .closing{stroke-dasharray:6 3}\
 .line .at-error{stroke:#b3261e;stroke-width:4}\
 .line .at-warning{stroke:#b26a00;stroke-width:4;stroke-dasharray:10 3}\
 .line .at-info{stroke:#3b6ea8;stroke-width:3;stroke-dasharray:3 3}\
 .line .badge-error{fill:#b3261e}.line .badge-warning{fill:#b26a00}.line .badge-info{fill:#3b6ea8}\
 .line .badge{fill:#fff;font-weight:700;font-size:10px;text-anchor:middle}";
 
-/// The picture by itself, as a file.
+/// The drawing by itself, as a file.
 pub(crate) fn file(scene: &Scene<'_>) -> String {
-    format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n", draw(scene, true).into_string())
+    let drawing = draw(scene, WIDE, true).into_string();
+    format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{drawing}\n")
 }
 
-/// The picture; with its own colours, or as part of a page that has [`STYLE`].
-pub(crate) fn draw(scene: &Scene<'_>, styled: bool) -> Markup {
-    let layout = Layout::of(scene.tree);
-    let ring = scene.tree.closes_at().is_some();
-    let width = layout.size.column * CELL.0 + 2 * MARGIN;
-    // The line that closes a ring runs beneath all.
-    let floor = layout.size.row * CELL.1 + MARGIN + if ring { MARGIN } else { 0 };
-    let width = width.max(KEYS.iter().map(|(_, _, key)| key).sum::<usize>() + 2 * MARGIN);
-    let height = floor + MARGIN + LEGEND;
-    let pen = Pen { scene, layout, floor };
+/// The drawing in so many columns; with its own colours, or as part of a page that has [`STYLE`].
+pub(crate) fn draw(scene: &Scene<'_>, columns: usize, styled: bool) -> Markup {
+    let layout = Layout::of(scene.tree, columns);
+    let width = (layout.size.column - 1) * CELL.0 + BOX.0 + 2 * MARGIN;
+    let width = width.max(CELL.0 + BOX.0 + 2 * MARGIN);
+    let floor = MARGIN + layout.size.row * CELL.1;
+    let keys = keys(scene, floor, width);
+    let height = keys.last().map_or(floor, |key| key.at.1 + LEGEND) + MARGIN / 2;
+    let pen = Pen { scene, layout };
     html! {
         svg xmlns="http://www.w3.org/2000/svg" class="line" role="img"
             viewBox={ "0 0 " (width) " " (height) } width=(width) height=(height) {
             title { "The line: " (scene.tree.len()) " SubDevices" }
             @if styled { style { (PreEscaped(STYLE)) } }
-            @for link in scene.tree.links() { (pen.link(link)) }
-            (pen.main_device())
+            @for link in scene.tree.links() { (pen.reference(link)) (pen.link(link)) }
+            @for path in Path::ALL { (pen.card(path)) }
             @for (node, label) in scene.boxes.iter().enumerate() { (pen.device(node, label)) }
-            (legend(scene, height))
+            @for key in keys {
+                @let (x, y) = key.at;
+                rect class={ "key " (key.class) } x=(x) y=(y) width="10" height="10" rx="2" {}
+                text class="port" x=(x + 14) y=(y + 9) { (key.text) }
+            }
         }
     }
 }
 
-struct Pen<'a> {
-    scene: &'a Scene<'a>,
-    layout: Layout,
-    floor: usize,
+/// What is drawn, and where.
+pub(super) struct Pen<'a> {
+    pub(super) scene: &'a Scene<'a>,
+    pub(super) layout: Layout,
 }
 
 /// The upper left corner of a box.
-const fn corner(cell: Cell) -> (usize, usize) {
+pub(super) const fn corner(cell: Cell) -> (usize, usize) {
     (MARGIN + cell.column * CELL.0, MARGIN + cell.row * CELL.1)
 }
 
-/// A way over the paper: corners from its begin to its end.
-type Way = Vec<(usize, usize)>;
-
 impl Pen<'_> {
-    fn cell(&self, end: End) -> Option<Cell> {
-        match end {
-            End::MainDevice(path) => Some(self.layout.cards[path.index()]),
-            End::Controller(node, _) => self.layout.cells.get(node).copied().flatten(),
-        }
-    }
-
-    /// How a link runs between two boxes.
-    fn way(&self, link: &Link) -> Option<Way> {
-        let (from, to) = (self.cell(link.upstream)?, self.cell(link.downstream)?);
-        let (a, b) = (corner(from), corner(to));
-        let middle = BOX.1 / 2;
-        if matches!(link.downstream, End::MainDevice(_)) {
-            // Back to the second card: beneath all, and up at the left edge.
-            let edge = MARGIN / 2;
-            let x = a.0 + BOX.0;
-            return Some(vec![
-                (x, a.1 + middle + 12),
-                (x + 10, a.1 + middle + 12),
-                (x + 10, self.floor),
-                (edge, self.floor),
-                (edge, b.1 + middle + 12),
-                (b.0, b.1 + middle + 12),
-            ]);
-        }
-        Some(if from.row == to.row {
-            vec![(a.0 + BOX.0, a.1 + middle), (b.0, b.1 + middle)]
-        } else if from.column >= to.column && self.goes_on(link) {
-            // The row goes on in the next.
-            let between = b.1 - (CELL.1 - BOX.1) / 2;
-            vec![
-                (a.0 + BOX.0, a.1 + middle),
-                (a.0 + BOX.0 + 10, a.1 + middle),
-                (a.0 + BOX.0 + 10, between),
-                (b.0 - 20, between),
-                (b.0 - 20, b.1 + middle),
-                (b.0, b.1 + middle),
-            ]
-        } else {
-            // A branch: down in the gap at the left.
-            vec![
-                (a.0 + 10, a.1 + BOX.1),
-                (a.0 + 10, a.1 + BOX.1 + 8),
-                (a.0 - 10, a.1 + BOX.1 + 8),
-                (a.0 - 10, b.1 + middle),
-                (b.0, b.1 + middle),
-            ]
-        })
-    }
-
-    /// Whether the lower end is the first child, which continues its parent's chain.
-    fn goes_on(&self, link: &Link) -> bool {
-        match (link.upstream, link.downstream) {
-            (End::Controller(parent, _), End::Controller(child, _)) => {
-                self.scene.tree.children(parent).next().is_some_and(|(_, first)| first == child)
-            }
-            _ => true,
-        }
-    }
-
-    fn link(&self, link: &Link) -> Markup {
-        let Some(way) = self.way(link) else { return html! {} };
-        let marks: Vec<&Mark> = self.scene.on_link((link.upstream, link.downstream)).collect();
-        let worst = marks.iter().map(|mark| mark.severity).max();
-        let closing = matches!(link.downstream, End::MainDevice(_));
-        let class = format!(
-            "link{}{}",
-            if closing { " closing" } else { "" },
-            worst.map(|severity| format!(" at-{}", severity_word(severity))).unwrap_or_default()
-        );
-        let points: Vec<String> = way.iter().map(|(x, y)| format!("{x},{y}")).collect();
-        let letter = |end: End| match end {
-            End::MainDevice(Path::A) => 'A',
-            End::MainDevice(Path::B) => 'B',
-            End::Controller(_, port) => port.letter(),
+    /// A small copy of the box that a branch hangs on, and beneath that box the number of the branch;
+    /// nothing where a wire leads there.
+    fn reference(&self, link: &Link) -> Markup {
+        let lower_end = item_at(link.downstream);
+        let course = self.layout.placed(lower_end).and_then(|placed| placed.course);
+        let Some(Course::Referred(cell)) = course else { return html! {} };
+        let (x, y) = corner(cell);
+        let (port, number) = (letter(link.upstream), |node: usize| node + 1);
+        let upper = match link.upstream {
+            End::MainDevice(_) => "MainDevice".to_owned(),
+            End::Controller(node, _) => self
+                .scene
+                .boxes
+                .get(node)
+                .map_or_else(|| number(node).to_string(), |label| headed(node, label)),
         };
-        let (first, last) = (way.first().copied(), way.last().copied());
+        let branch = match lower_end {
+            Item::Card(path) => format!("MainDevice {path}"),
+            Item::Node(node) => number(node).to_string(),
+        };
+        let from = self.layout.placed(item_at(link.upstream)).map(|placed| corner(placed.cell));
+        // The first and the second branch of a box lead away where their wires would.
+        let is_second = self.is_second(link);
+        let at = if is_second { ASIDE_AT - 40 } else { DOWN_AT - 16 };
         html! {
-            polyline class=(class) points=(points.join(" ")) {
-                title { (ends(link)) @for mark in &marks { "\n" (mark.title) } }
+            g {
+                title { "SubDevice " (upper) " again: the branch at its port " (port) }
+                rect class="reference" x=(x) y=(y + 13) width=(BOX.0) height=(BOX.1 - 26) rx="3" {}
+                text class="faint" x=(x + 8) y=(y + 29) { "from" }
+                text class="faint" x=(x + 8) y=(y + 43) { (short(&upper)) }
             }
-            @if let Some((x, y)) = first {
-                @if way.get(1).is_some_and(|next| next.0 == x) {
-                    text class="port" x=(x + 4) y=(y + 10) { (letter(link.upstream)) }
-                } @else {
-                    text class="port" x=(x + 3) y=(y - 4) { (letter(link.upstream)) }
-                }
+            @if let Some((x, y)) = from {
+                polyline class="stub" points={ (x + at) "," (y + BOX.1) " " (x + at) "," (y + BOX.1 + 12) } {}
+                text class="port" x=(x + at + 4) y=(y + BOX.1 + 11) { (port) " → " (branch) }
             }
-            @if let Some((x, y)) = last {
-                text class="port" x=(x - 9) y=(y - 4) { (letter(link.downstream)) }
-            }
-            @if let Some((x, y)) = badge_at(&way) { (badges(&marks, x, y)) }
         }
     }
 
-    fn main_device(&self) -> Markup {
-        let second = self.scene.tree.first(Path::B).is_some();
+    /// Whether the link leads to a further branch of its box.
+    fn is_second(&self, link: &Link) -> bool {
+        let all = below(self.scene.tree, item_at(link.upstream));
+        all.get(2) == Some(&item_at(link.downstream))
+    }
+
+    /// A card of the MainDevice; findings on the MainDevice stand on the first.
+    fn card(&self, path: Path) -> Markup {
+        let Some(placed) = self.layout.placed(Item::Card(path)) else { return html! {} };
+        let (x, y) = corner(placed.cell);
         let marks: Vec<&Mark> = self.scene.on_main_device().collect();
+        // The card that closes a ring is the MainDevice again.
+        let class = if placed.course.is_some() { "card" } else { "box" };
         html! {
-            @for path in Path::ALL {
-                @if path == Path::A || second {
-                    @let (x, y) = corner(self.layout.cards[path.index()]);
-                    g {
-                        rect class="box" x=(x) y=(y) width=(BOX.0) height=(BOX.1) rx="3" {}
-                        text class="name" x=(x + 8) y=(y + 18) { "MainDevice" }
-                        text class="faint" x=(x + 8) y=(y + 34) {
-                            @if path == Path::A { "card A" } @else { "card B" }
-                        }
-                        @if path == Path::A { (badges(&marks, x + BOX.0 - 12, y + 12)) }
-                    }
-                }
+            g {
+                rect class=(class) x=(x) y=(y) width=(BOX.0) height=(BOX.1) rx="3" {}
+                text class="name" x=(x + 8) y=(y + 22) { "MainDevice" }
+                text class="faint" x=(x + 8) y=(y + 38) { "card " (path) }
+                @if path == Path::A { (self.on_box(&marks, (x, y))) }
             }
         }
+    }
+
+    /// Badges on the upper edge of a box, clear of its text and of wires.
+    fn on_box(&self, marks: &[&Mark], (x, y): (usize, usize)) -> Markup {
+        badges(marks, Group::Before { x: x + BOX.0 - 3, y }, badge::RIGHT)
     }
 
     fn device(&self, node: usize, label: &Label) -> Markup {
-        let Some(cell) = self.layout.cells.get(node).copied().flatten() else { return html! {} };
-        let (x, y) = corner(cell);
+        let Some(placed) = self.layout.placed(Item::Node(node)) else { return html! {} };
+        let (x, y) = corner(placed.cell);
         let marks: Vec<&Mark> = self.scene.on_device(node).collect();
         let worst = marks.iter().map(|mark| mark.severity).max();
         let class = format!(
@@ -207,11 +167,14 @@ impl Pen<'_> {
             if label.state.as_ref().is_some_and(|state| state.error) { " error" } else { "" },
             worst.map(|severity| format!(" at-{}", severity_word(severity))).unwrap_or_default()
         );
-        let head = match label.name.as_str() {
-            "" => (node + 1).to_string(),
-            name => format!("{} {name}", node + 1),
+        let class = if label.is_missing { "box missing".to_owned() } else { class };
+        let head = headed(node, label);
+        let state = match &label.state {
+            _ if label.is_missing => "missing",
+            None => "not seen",
+            Some(state) => state.text.as_str(),
         };
-        let state = label.state.as_ref().map_or("not seen", |state| state.text.as_str());
+        let is_absent = label.is_missing || fill(label) == "gone";
         let rises: Vec<String> =
             label.rises.iter().map(|(port, rise)| format!("{port} +{}", grouped(*rise))).collect();
         html! {
@@ -222,57 +185,64 @@ impl Pen<'_> {
                     @for mark in &marks { "\n" (mark.title) }
                 }
                 rect class=(class) x=(x) y=(y) width=(BOX.0) height=(BOX.1) rx="3" {}
-                text class="name" x=(x + 8) y=(y + 16) { (short(&head)) }
-                text class="faint" x=(x + 8) y=(y + 30) { (short(&label.type_name)) }
-                text x=(x + 8) y=(y + 44) { (short(state)) }
+                text class="name" x=(x + 8) y=(y + 19) { (short(&head)) }
+                text class="faint" x=(x + 8) y=(y + 33) { (short(&label.type_name)) }
+                text class=[is_absent.then_some("absent")] x=(x + 8) y=(y + 47) { (short(state)) }
                 @if !rises.is_empty() {
-                    text class="rises" x=(x + 8) y=(y + 57) { (short(&rises.join(" "))) }
+                    text class="rises" x=(x + 8) y=(y + 60) { (short(&rises.join(" "))) }
                 }
-                (badges(&marks, x + BOX.0 - 12, y + 12))
+                (self.on_box(&marks, (x, y)))
             }
         }
     }
 }
 
-/// `1.B – 2.A`.
-fn ends(link: &Link) -> String {
-    let end = |end: End| match end {
-        End::MainDevice(path) => format!("MainDevice {path}"),
-        End::Controller(node, port) => format!("{}.{port}", node + 1),
-    };
-    format!("{} – {}", end(link.upstream), end(link.downstream))
+/// `4 Press feed`: number and name.
+fn headed(node: usize, label: &Label) -> String {
+    match label.name.as_str() {
+        "" => (node + 1).to_string(),
+        name => format!("{} {name}", node + 1),
+    }
 }
 
-/// Height of the keys to the colours.
+/// Height of a line of keys to the colours.
 const LEGEND: usize = 18;
 
 /// What the colours mean; those that people know from other tools (S0: INIT red, PREOP yellow, SAFEOP
-/// green, OP blue).
-const KEYS: [(&str, &str, usize); 6] = [
+/// green, OP blue), each with the width of its text.
+const KEYS: [(&str, &str, usize); 7] = [
     ("init", "INIT", 52),
     ("preop", "PREOP, BOOT", 96),
     ("safeop", "SAFEOP", 68),
     ("op", "OP", 42),
     ("error", "error", 54),
-    ("gone", "no answer", 76),
+    ("gone", "no answer", 80),
+    ("missing", "missing", 70),
 ];
 
-/// The keys to the colours, beneath all. A drawing of a plan, which nobody has looked at, has none.
-fn legend(scene: &Scene<'_>, bottom: usize) -> Markup {
-    let mut x = MARGIN;
-    let places = KEYS.map(|(_, _, width)| {
-        let at = x;
-        x += width;
-        at
-    });
-    html! {
-        @if scene.boxes.iter().any(|label| label.state.is_some()) {
-            @for ((class, text, _), x) in KEYS.into_iter().zip(places) {
-                rect class={ "key " (class) } x=(x) y=(bottom - 16) width="10" height="10" rx="2" {}
-                text class="port" x=(x + 14) y=(bottom - 7) { (text) }
-            }
-        }
+/// A key to a colour.
+struct Key {
+    class: &'static str,
+    text: &'static str,
+    at: (usize, usize),
+}
+
+/// The keys to the colours, beneath all, in lines of the drawing's width. A drawing of a plan, which
+/// nobody has looked at, has none.
+fn keys(scene: &Scene<'_>, floor: usize, width: usize) -> Vec<Key> {
+    if scene.boxes.iter().all(|label| label.state.is_none()) {
+        return Vec::new();
     }
+    let mut at = (MARGIN, floor);
+    let place = |(class, text, length): (&'static str, &'static str, usize)| {
+        if at.0 + length > width {
+            at = (MARGIN, at.1 + LEGEND);
+        }
+        let key = Key { class, text, at };
+        at.0 += length;
+        key
+    };
+    KEYS.into_iter().map(place).collect()
 }
 
 fn fill(label: &Label) -> &'static str {
@@ -288,46 +258,14 @@ fn fill(label: &Label) -> &'static str {
     }
 }
 
-/// In the middle of the last stretch of a way, or of the one before where that is too short.
-fn badge_at(way: &Way) -> Option<(usize, usize)> {
-    let pairs = way.windows(2).rev();
-    let longest =
-        pairs.max_by_key(|pair| pair[0].0.abs_diff(pair[1].0) + pair[0].1.abs_diff(pair[1].1))?;
-    Some(((longest[0].0 + longest[1].0) / 2, (longest[0].1 + longest[1].1) / 2))
-}
-
-/// The names of findings in discs, with an arrow for the direction.
-fn badges(marks: &[&Mark], x: usize, y: usize) -> Markup {
-    html! {
-        @for (index, mark) in marks.iter().enumerate() {
-            @let y = y + index * 20;
-            g {
-                title { (mark.title) }
-                circle class={ "badge-" (severity_word(mark.severity)) } cx=(x) cy=(y) r="11" {}
-                text class="badge" x=(x) y=(y + 4) { (mark.id) }
-                @if let Some(arrow) = arrow(mark) {
-                    text class="port" x=(x - 5) y=(y + 21) { (arrow) }
-                }
-            }
-        }
-    }
-}
-
-/// Away from the MainDevice, or towards it.
-fn arrow(mark: &Mark) -> Option<&'static str> {
-    Some(match direction(mark)? {
-        DirectionReport::AToB => "→",
-        DirectionReport::BToA => "←",
-        DirectionReport::Both => "↔",
-    })
-}
-
-/// So much of a text as fits in a box.
+/// So much of a text as fits in a box: its begin and its end, which tell names of a row apart.
 fn short(text: &str) -> String {
-    if text.chars().count() <= LETTERS {
+    let count = text.chars().count();
+    if count <= LETTERS {
         return text.to_owned();
     }
-    text.chars().take(LETTERS - 1).chain(['…']).collect()
+    let (begin, end) = (LETTERS / 2, LETTERS - LETTERS / 2 - 1);
+    text.chars().take(begin).chain(['…']).chain(text.chars().skip(count - end)).collect()
 }
 
 #[cfg(test)]
@@ -353,7 +291,8 @@ mod tests {
         let states = [AlState::Init, AlState::PreOp, AlState::SafeOp, AlState::Op];
         let mut boxes: Vec<Label> = states.map(|state| label(Some(state), false)).into();
         boxes.push(label(None, false));
-        let drawn = draw(&Scene { tree: &tree, boxes: boxes.clone(), marks: Vec::new() }, true);
+        let drawn =
+            draw(&Scene { tree: &tree, boxes: boxes.clone(), marks: Vec::new() }, WIDE, true);
         let drawn = drawn.into_string();
         for (class, colour) in
             [("init", "fbdcd9"), ("preop", "fdf0c4"), ("safeop", "dff2e2"), ("op", "dbe8fb")]
@@ -366,10 +305,14 @@ mod tests {
         assert!(drawn.contains(".line .gone{fill:#fff;stroke:#b3261e"), "has a red border");
         boxes[2] = label(Some(AlState::SafeOp), true);
         boxes[3].rises.push((Port::B, 12));
-        let drawn = draw(&Scene { tree: &tree, boxes, marks: Vec::new() }, true).into_string();
+        let drawn =
+            draw(&Scene { tree: &tree, boxes, marks: Vec::new() }, WIDE, true).into_string();
         assert!(drawn.contains("class=\"box safeop error\"") && drawn.contains("B +12"), "{drawn}");
-        let offline =
-            draw(&Scene { tree: &tree, boxes: vec![Label::default(); 5], marks: Vec::new() }, true);
+        let offline = draw(
+            &Scene { tree: &tree, boxes: vec![Label::default(); 5], marks: Vec::new() },
+            WIDE,
+            true,
+        );
         assert!(!offline.into_string().contains("class=\"key"), "a plan has no states");
     }
 
@@ -390,7 +333,7 @@ mod tests {
             mark("F3", Severity::Warning),
         ];
         let scene = Scene { tree: &tree, boxes: vec![Label::default()], marks };
-        let drawn = draw(&scene, false).into_string();
+        let drawn = draw(&scene, WIDE, false).into_string();
         assert!(drawn.contains("class=\"link at-error\""), "{drawn}");
         assert!(["F1", "F2", "F3"].iter().all(|id| drawn.contains(id)), "{drawn}");
     }

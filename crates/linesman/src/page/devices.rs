@@ -1,51 +1,61 @@
-//! What every SubDevice showed.
+//! Table of the SubDevices: identities, states, counters.
 
 use linesman_diagnosis::line::{Device, Line};
+use linesman_diagnosis::report::DeviceReport;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use maud::{Markup, html};
 
-use super::scene::state;
+use crate::text::devices::{number, state, station, vendor};
 
-/// A row for each SubDevice.
-pub(super) fn section(line: &Line) -> Markup {
+/// A row for each SubDevice: who it is, and what it showed.
+pub(super) fn section(devices: &[DeviceReport], line: Option<&Line>) -> Markup {
     html! {
-        @if !line.devices.is_empty() {
+        @if !devices.is_empty() {
             section {
                 h2 { "SubDevices" }
-                table class="devices" {
-                    thead {
-                        tr {
-                            th { "no" } th { "name" } th { "type" } th { "station" } th { "state" }
-                            th { "ports with a link" } th { "lost links" }
-                            th { "errors counted meanwhile" } th { "counters as last read" }
+                div class="wide" {
+                    table class="devices" {
+                        thead {
+                            tr {
+                                th { "no" } th { "name" } th { "type" } th { "station" }
+                                th { "vendor" } th { "product" } th { "revision" } th { "serial" }
+                                th { "chip" } th { "state" } th { "links" } th { "lost links" }
+                                th { "errors counted meanwhile" } th { "counters as last read" }
+                            }
                         }
+                        tbody { @for device in devices { (row(device, line)) } }
                     }
-                    tbody { @for device in &line.devices { (row(device)) } }
                 }
             }
         }
     }
 }
 
-fn row(device: &Device) -> Markup {
-    let state = state(device);
-    let error = state.as_ref().is_some_and(|state| state.error);
-    let rose = Port::ALL.into_iter().any(|port| device.counters.port_rose(port));
+fn row(device: &DeviceReport, line: Option<&Line>) -> Markup {
+    let seen = line.and_then(|line| line.devices.iter().find(|seen| seen.id.no() == device.no));
+    let has_risen = |seen: &Device| Port::ALL.into_iter().any(|port| seen.counters.port_rose(port));
+    let has_error = device.answers == Some(false) || device.al_status_code.is_some();
+    let is_marked = has_error || seen.is_some_and(has_risen);
+    // A serial number of 0 is none.
+    let serial = device.serial.filter(|serial| *serial != 0);
     html! {
-        tr class=[(error || rose).then_some("marked")] {
-            td class="number" { (device.id.no()) }
+        tr class=[is_marked.then_some("marked")] {
+            td class="number" { (device.no) }
             td { (device.name.as_deref().unwrap_or("")) }
             td { (device.type_name.as_deref().unwrap_or("")) }
-            td class="number" {
-                @if let Some(station) = device.station { (format!("0x{:04X}", station.value())) }
-            }
-            td { @if let Some(state) = &state { (state.text) } }
-            td { (links(device)) }
-            td class="number" { (lost(device)) }
-            td { (told(device, |counter| device.counters.rise(counter))) }
-            td class="faint" {
-                (told(device, |counter| device.counters.latest(counter).unwrap_or(0)))
+            td class="number" { (station(device)) }
+            td class="number" { (vendor(device)) }
+            td class="number" { (number(device.product_code)) }
+            td class="number" { (number(device.revision)) }
+            td class="number" { (serial.map(|serial| serial.to_string()).unwrap_or_default()) }
+            td { (device.chip.as_deref().unwrap_or("")) }
+            td { (state(device)) }
+            @if let Some(seen) = seen {
+                td { (links(seen)) }
+                td class="number" { (lost(seen)) }
+                td { (told(seen, |counter| seen.counters.rise(counter))) }
+                td class="faint" { (told(seen, |counter| seen.counters.latest(counter).unwrap_or(0))) }
             }
         }
     }

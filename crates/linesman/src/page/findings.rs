@@ -3,7 +3,10 @@
 use linesman_diagnosis::report::{EvidenceReport, FindingReport, FindingState, Number};
 use maud::{Markup, html};
 
-use crate::text::finding::{Writer, others, percent, register_value, severity_word, when};
+use super::prose::prose;
+use super::wall_clock::WallClock;
+use crate::hint;
+use crate::text::finding::{Writer, others, percent, register_value, severity_word, when_by};
 use crate::text::quantity::time;
 
 /// Most pieces of evidence in a table; a page with thousands of rows helps nobody.
@@ -23,7 +26,7 @@ pub(super) fn overview(findings: &[FindingReport], writer: &Writer<'_>) -> Marku
                             (finding.cause) " (" (percent(finding.confidence)) ")"
                             ul {
                                 @for action in &finding.actions {
-                                    li { span class="tick" {} (action) }
+                                    li { span class="tick" {} (prose(&hint::complete(action, writer.place))) }
                                 }
                             }
                         }
@@ -35,18 +38,18 @@ pub(super) fn overview(findings: &[FindingReport], writer: &Writer<'_>) -> Marku
 }
 
 /// Each finding in full.
-pub(super) fn section(findings: &[FindingReport], writer: &Writer<'_>) -> Markup {
+pub(super) fn section(findings: &[FindingReport], clock: WallClock, writer: &Writer<'_>) -> Markup {
     html! {
         @if !findings.is_empty() {
             section {
                 h2 { "Findings" }
-                @for finding in findings { (article(finding, writer)) }
+                @for finding in findings { (article(finding, clock, writer)) }
             }
         }
     }
 }
 
-fn article(finding: &FindingReport, writer: &Writer<'_>) -> Markup {
+fn article(finding: &FindingReport, clock: WallClock, writer: &Writer<'_>) -> Markup {
     html! {
         article id=(finding.id) class=(severity_word(finding.severity)) {
             h3 {
@@ -66,35 +69,39 @@ fn article(finding: &FindingReport, writer: &Writer<'_>) -> Markup {
                         b { (other.cause) } " (" (percent(other.confidence)) "): " (other.cause.meaning())
                         @if let Some(place) = &other.place { " There: " (writer.names.place(place)) "." }
                         @if let Some(by) = &other.told_apart_by {
-                            br; span class="faint" { "Told apart by: " (by) "." }
+                            br; span class="faint" { "Told apart by: " (prose(by)) "." }
                         }
                     }
                 }
-                @if writer.timed { dt { "When" } dd { (when(finding)) } }
+                @if writer.timed { dt { "When" } dd { (when_by(finding, |ns| clock.both(ns))) } }
             }
-            (evidence(&finding.evidence, writer))
-            (consequences(&finding.consequences, writer))
+            (evidence(&finding.evidence, clock, writer))
+            (consequences(&finding.consequences, clock, writer))
         }
     }
 }
 
-fn evidence(all: &[EvidenceReport], writer: &Writer<'_>) -> Markup {
+fn evidence(all: &[EvidenceReport], clock: WallClock, writer: &Writer<'_>) -> Markup {
     html! {
         @if !all.is_empty() {
             details open[all.len() <= 12] {
                 summary { "How it is known (" (all.len()) ")" }
-                table {
+                div class="wide" { table {
                     thead {
                         tr {
-                            @if writer.timed { th { "time" } th { "frame" } }
+                            @if writer.timed {
+                                th { "time" }
+                                @if clock.is_known() { th { "clock" } }
+                                th { "frame" }
+                            }
                             th { "SubDevice" } th { "register" } th { "before" } th { "after" }
                             th { "what was seen" }
                         }
                     }
                     tbody {
-                        @for one in all.iter().take(MOST_EVIDENCE) { (row(one, writer)) }
+                        @for one in all.iter().take(MOST_EVIDENCE) { (row(one, clock, writer)) }
                     }
-                }
+                } }
                 @if all.len() > MOST_EVIDENCE {
                     p class="faint" {
                         "and " (all.len() - MOST_EVIDENCE) " more, in the JSON of the same diagnosis"
@@ -105,12 +112,14 @@ fn evidence(all: &[EvidenceReport], writer: &Writer<'_>) -> Markup {
     }
 }
 
-fn row(one: &EvidenceReport, writer: &Writer<'_>) -> Markup {
+fn row(one: &EvidenceReport, clock: WallClock, writer: &Writer<'_>) -> Markup {
+    let moment = one.time_ns.and_then(|Number(at)| clock.time_of_day(at));
     let value = |value: Option<Number>| value.map(|Number(value)| register_value(one, value));
     html! {
         tr {
             @if writer.timed {
                 td class="number" { @if let Some(Number(at)) = one.time_ns { (time(at)) } }
+                @if clock.is_known() { td class="number" { (moment.unwrap_or_default()) } }
                 td class="number" { @if let Some(Number(frame)) = one.frame { (frame) } }
             }
             td {
@@ -121,12 +130,12 @@ fn row(one: &EvidenceReport, writer: &Writer<'_>) -> Markup {
             td { @if let Some(register) = one.register { (format!("0x{register:04X}")) } }
             td class="number" { (value(one.before).unwrap_or_default()) }
             td class="number" { (value(one.after).unwrap_or_default()) }
-            td { (one.text) }
+            td { (prose(&one.text)) }
         }
     }
 }
 
-fn consequences(all: &[FindingReport], writer: &Writer<'_>) -> Markup {
+fn consequences(all: &[FindingReport], clock: WallClock, writer: &Writer<'_>) -> Markup {
     html! {
         @if !all.is_empty() {
             details open[all.len() <= 8] {
@@ -135,8 +144,8 @@ fn consequences(all: &[FindingReport], writer: &Writer<'_>) -> Markup {
                     @for one in all {
                         li {
                             (one.id) " " (one.code) " " (one.name) ": " (writer.names.place(&one.place))
-                            @if writer.timed { ", " (when(one)) }
-                            (consequences(&one.consequences, writer))
+                            @if writer.timed { ", " (when_by(one, |ns| clock.both(ns))) }
+                            (consequences(&one.consequences, clock, writer))
                         }
                     }
                 }

@@ -4,23 +4,39 @@
 //! [`timeline`] when, the [`drawing`](crate::drawing) where; [`devices`] lists what every SubDevice
 //! showed.
 
+mod coverage;
 mod devices;
 mod findings;
+mod prose;
 pub(crate) mod scene;
 mod timeline;
+mod wall_clock;
 
 use linesman_diagnosis::line::Line;
 use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_proto::time::Instant;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::command::diagnose::READINGS;
+use self::prose::prose;
+use self::wall_clock::WallClock;
 use crate::drawing;
-use crate::text::finding::{Writer, tally};
-use crate::text::quantity::count;
+use crate::text::diagnosis::{NOT_COMPLETE, numbers, source_name, told, word};
+use crate::text::finding::Writer;
+use crate::text::quantity::{count, date};
 
 /// What the page looks like; on paper it is black on white, with boxes to tick.
 const STYLE: &str = include_str!("style.css");
+
+/// Statements of the user on the page's origin.
+#[derive(Clone, Default, Debug, clap::Args)]
+pub(crate) struct Origin {
+    /// On the page: the machine that the line belongs to
+    #[arg(long, value_name = "NAME", requires = "html")]
+    machine: Option<String>,
+    /// On the page: the person who made it
+    #[arg(long, value_name = "NAME", requires = "html")]
+    author: Option<String>,
+}
 
 /// The whole page. `at` is the end of the run.
 pub(crate) fn page(
@@ -28,9 +44,13 @@ pub(crate) fn page(
     line: Option<&Line>,
     writer: &Writer<'_>,
     at: Instant,
+    origin: &Origin,
 ) -> String {
+    let clock = WallClock::of(diagnosis.start.as_deref());
     let scene = line.and_then(|line| scene::of_diagnosis(line, diagnosis, writer.names));
-    let title = format!("{}: {}", diagnosis.source, word(diagnosis.verdict));
+    let subject = origin.machine.as_deref().unwrap_or_else(|| source_name(&diagnosis.source));
+    let title = format!("{subject}: {}", word(diagnosis.verdict));
+    let is_inconclusive = diagnosis.verdict == Verdict::Inconclusive;
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -42,24 +62,39 @@ pub(crate) fn page(
                 style { (PreEscaped(STYLE)) (PreEscaped(drawing::STYLE)) }
             }
             body {
-                (head(diagnosis, writer))
+                (head(diagnosis, origin, writer))
                 main {
+                    @if is_inconclusive { (coverage::section(diagnosis, writer)) }
                     (findings::overview(&diagnosis.findings, writer))
+                    @if !is_inconclusive { (coverage::section(diagnosis, writer)) }
                     @if let Some(scene) = &scene {
                         section {
                             h2 { "The line" }
-                            div class="picture" { (drawing::draw(scene, false)) }
+                            @let is_wide = scene.tree.len() >= drawing::NARROW;
+                            div class={ "picture" @if is_wide { " spread" } } {
+                                (drawing::draw(scene, drawing::WIDE, false))
+                            }
+                            @if is_wide {
+                                div class="picture narrow" aria-hidden="true" {
+                                    (drawing::draw(scene, drawing::NARROW, false))
+                                }
+                            }
                             p class="faint" {
                                 "Boxes are SubDevices in their last known state, letters the ports of a \
-                                 link. A disc marks the place of a finding, → away from the \
-                                 MainDevice, ← towards it. +n: errors counted at that port during \
-                                 this look."
+                                 link. F1 marks the place of a finding; its arrow is the direction \
+                                 of the frames that are concerned. A +12: errors counted at port A \
+                                 during this look. From: a branch, drawn in a row of its own."
                             }
                         }
+                    } @else if !diagnosis.devices.is_empty() {
+                        section {
+                            h2 { "The line" }
+                            p class="faint" { "No drawing: how the line is wired was not seen." }
+                        }
                     }
-                    @if writer.timed { (timeline::section(&diagnosis.findings, at, writer)) }
-                    (findings::section(&diagnosis.findings, writer))
-                    @if let Some(line) = line { (devices::section(line)) }
+                    @if writer.timed { (timeline::section(&diagnosis.findings, at, clock, writer)) }
+                    (findings::section(&diagnosis.findings, clock, writer))
+                    (devices::section(&diagnosis.devices, line))
                 }
                 footer { (foot(diagnosis, writer)) }
             }
@@ -68,7 +103,8 @@ pub(crate) fn page(
     .into_string()
 }
 
-const fn word(verdict: Verdict) -> &'static str {
+/// The style class of a verdict.
+const fn class(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Healthy => "healthy",
         Verdict::Faulty => "faulty",
@@ -76,31 +112,24 @@ const fn word(verdict: Verdict) -> &'static str {
     }
 }
 
-fn head(diagnosis: &Diagnosis, writer: &Writer<'_>) -> Markup {
-    let network = &diagnosis.network;
-    let told = match diagnosis.verdict {
-        Verdict::Healthy => "Nothing is wrong with the line.".to_owned(),
-        Verdict::Faulty => format!("{}.", tally(&diagnosis.findings)),
-        Verdict::Inconclusive => "Too little was seen to call the line healthy.".to_owned(),
-    };
+fn head(diagnosis: &Diagnosis, origin: &Origin, writer: &Writer<'_>) -> Markup {
+    let start = diagnosis.start.as_deref().map(date);
+    let origin = [("Machine", &origin.machine), ("Author", &origin.author)];
     html! {
-        header class=(word(diagnosis.verdict)) {
-            h1 { (word(diagnosis.verdict).to_uppercase()) }
-            p class="told" { (told) }
-            p { (diagnosis.source) @if let Some(start) = &diagnosis.start { ", begun " (start) } }
-            ul class="numbers" {
-                li { (count(network.devices.0, "SubDevice")) }
-                @if let Some(state) = &network.al_state_highest { li { "highest state " (state) } }
-                @if writer.timed && diagnosis.clock != READINGS {
-                    li { (count(network.frames.0, "frame")) }
-                    li { (count(network.datagrams.0, "datagram")) ", " (network.unanswered.0) " unanswered" }
-                    li { (count(network.lost.0, "frame")) " lost" }
-                    li { (count(network.damaged.0, "frame")) " seen damaged" }
+        header class=(class(diagnosis.verdict)) {
+            h1 { (word(diagnosis.verdict)) }
+            p class="told" { (told(diagnosis)) }
+            dl class="origin" {
+                @for (field, name) in origin {
+                    @if let Some(name) = name { dt { (field) } dd { (name) } }
+                }
+                dt { "Input" } dd { (source_name(&diagnosis.source)) }
+                @if let Some(start) = &start {
+                    dt { "Begun" } dd { (start) "; times count from there" }
                 }
             }
-            @if !diagnosis.complete {
-                p class="warning" { "The input could not be read to its end: judged as far as it goes." }
-            }
+            ul class="numbers" { @for number in numbers(diagnosis, writer.timed) { li { (number) } } }
+            @if !diagnosis.complete { p class="warning" { (NOT_COMPLETE) } }
             @if let Some(understood) = &diagnosis.understood { (reading_of(understood)) }
         }
     }
@@ -111,9 +140,9 @@ fn reading_of(understood: &Understood) -> Markup {
     html! {
         ul {
             @for block in &understood.blocks {
-                li { "understood, lines " (block.from) " to " (block.to) ": " (block.what.replace('`', "")) }
+                li { "understood, lines " (block.from) " to " (block.to) ": " (prose(&block.what)) }
             }
-            @for assumed in &understood.assumed { li { "assumed: " (assumed) } }
+            @for assumed in &understood.assumed { li { "assumed: " (prose(assumed)) } }
             @if understood.ignored_count > 0 {
                 li { (count(understood.ignored_count as u64, "line")) " not understood" }
             }
@@ -125,7 +154,6 @@ fn foot(diagnosis: &Diagnosis, writer: &Writer<'_>) -> Markup {
     html! {
         p {
             (diagnosis.tool) ". Times count from the start of the run"
-            @if let Some(start) = &diagnosis.start { " (" (start) ")" }
             @if writer.timed { "; clock: " (diagnosis.clock) }
             ". How each finding is made: " code { "linesman explain CODE" } "."
         }

@@ -1,11 +1,13 @@
 //! What is drawn of a diagnosis, and of a scan.
 
+use linesman_config::fault::FaultName;
 use linesman_config::inventory::Inventory;
 use linesman_diagnosis::line::{Device, Line};
-use linesman_diagnosis::report::{Diagnosis, FindingReport};
+use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, PlaceReport};
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 
+use super::prose::plain;
 use crate::command::scan::report::state_name;
 use crate::drawing::{Label, Mark, Scene, State};
 use crate::text::finding::percent;
@@ -22,6 +24,7 @@ pub(crate) fn of_diagnosis<'a>(
         name: device.name.clone().unwrap_or_default(),
         type_name: device.type_name.clone().unwrap_or_default(),
         state: state(device),
+        is_missing: is_missing(&diagnosis.findings, device),
         rises: Port::ALL
             .into_iter()
             .map(|port| (port, errors_at(device, port)))
@@ -43,6 +46,7 @@ pub(crate) fn of_scan(inventory: &Inventory) -> Scene<'_> {
             name: String::new(),
             type_name: found.profile.type_name.clone(),
             state: Some(State { state: value.state(), text, error }),
+            is_missing: false,
             rises: Vec::new(),
         }
     });
@@ -50,7 +54,7 @@ pub(crate) fn of_scan(inventory: &Inventory) -> Scene<'_> {
 }
 
 /// The last state that was seen, or that it does not answer.
-pub(super) fn state(device: &Device) -> Option<State> {
+fn state(device: &Device) -> Option<State> {
     if device.silent.is_some() {
         return Some(State { state: None, text: "no answer".to_owned(), error: true });
     }
@@ -60,6 +64,15 @@ pub(super) fn state(device: &Device) -> Option<State> {
         device.al.code.filter(|_| error).map(|code| format!(" 0x{:04X}", code.value.value()));
     let text = format!("{}{}", state.name(), code.unwrap_or_default());
     Some(State { state: Some(state), text, error })
+}
+
+/// Whether a finding that is not over says that the device is not there.
+fn is_missing(findings: &[FindingReport], device: &Device) -> bool {
+    findings.iter().any(|finding| {
+        finding.cause == FaultName::DeviceMissing
+            && finding.state != FindingState::Closed
+            && matches!(finding.place, PlaceReport::Device { no, .. } if no == device.id.no())
+    })
 }
 
 /// Damaged frames and symbols that were counted at a port meanwhile.
@@ -73,7 +86,7 @@ fn mark(finding: &FindingReport, names: &Names) -> Mark {
         id: finding.id.clone(),
         severity: finding.severity,
         place: finding.place.clone(),
-        title: format!(
+        title: plain(&format!(
             "{} {} {}: {}, {} ({})",
             finding.id,
             finding.code,
@@ -81,6 +94,6 @@ fn mark(finding: &FindingReport, names: &Names) -> Mark {
             names.place(&finding.place),
             finding.cause,
             percent(finding.confidence)
-        ),
+        )),
     }
 }

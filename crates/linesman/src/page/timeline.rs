@@ -1,69 +1,104 @@
-//! When each finding was there: a bar on the time of the run.
+//! Time line: a bar for each finding on the time of the run.
 
 use linesman_diagnosis::report::{FindingReport, Number};
 use linesman_proto::time::Instant;
 use maud::{Markup, html};
 
+use super::wall_clock::WallClock;
 use crate::text::finding::{Writer, severity_word};
 use crate::text::quantity::time;
 
 /// Most bars; consequences beyond are left out.
 const MOST: usize = 60;
-/// Pixels of a row.
-const ROW: usize = 20;
-/// Where the time begins and how wide it is, in pixels.
-const LEFT: usize = 300;
-const WIDTH: usize = 640;
-/// The narrowest bar, in pixels.
-const LEAST: f64 = 3.0;
+/// Most steps of the axis.
+const STEPS: u64 = 5;
+/// The narrowest bar, in per cent of the run.
+const LEAST: f64 = 0.5;
 
 /// The bars, causes in front of what follows from them.
-pub(super) fn section(findings: &[FindingReport], at: Instant, writer: &Writer<'_>) -> Markup {
+pub(super) fn section(
+    findings: &[FindingReport],
+    at: Instant,
+    clock: WallClock,
+    writer: &Writer<'_>,
+) -> Markup {
     let mut rows = Vec::new();
     for finding in findings {
         flatten(finding, 0, &mut rows);
     }
+    let left_out = rows.len().saturating_sub(MOST);
     rows.truncate(MOST);
     let latest = rows.iter().flat_map(|(_, one)| [Some(one.opened_ns), one.closed_ns]);
     let end =
         latest.flatten().map(|Number(ns)| ns).chain([at.as_nanos()]).max().unwrap_or(0).max(1);
-    let x = |ns: u64| LEFT as f64 + ns as f64 / end as f64 * WIDTH as f64;
-    let height = rows.len() * ROW + 30;
+    let ticks: Vec<u64> = ticks(end).collect();
     html! {
         @if !rows.is_empty() {
-            section {
+            section class="timeline" {
                 h2 { "Time line" }
-                div class="picture" {
-                    svg class="timeline" xmlns="http://www.w3.org/2000/svg" role="img"
-                        width=(LEFT + WIDTH + 40) height=(height)
-                        viewBox={ "0 0 " (LEFT + WIDTH + 40) " " (height) } {
-                        title { "When each finding was there" }
-                        @for quarter in 0..=4u64 {
-                            @let ns = end / 4 * quarter;
-                            line class="grid" x1=(tenth(x(ns))) x2=(tenth(x(ns))) y1="0" y2=(height - 20) {}
-                            text class="faint" x=(tenth(x(ns))) y=(height - 6) text-anchor="middle" { (time(ns)) }
+                @for (depth, one) in &rows {
+                    @let closed = one.closed_ns.map_or(end, |Number(ns)| ns);
+                    @let (from, to) = (share(one.opened_ns.0, end), share(closed, end));
+                    @let width = (to - from).max(LEAST);
+                    div class="row" {
+                        span class="label" style=[(*depth > 0).then(|| format!("padding-left:{}em", depth))] {
+                            (one.id) " " (one.code) " " (one.name)
                         }
-                        @for (index, (depth, one)) in rows.iter().enumerate() {
-                            @let y = index * ROW;
-                            @let from = x(one.opened_ns.0);
-                            @let to = x(one.closed_ns.map_or(end, |Number(ns)| ns));
-                            g {
-                                title { (one.id) " " (writer.names.place(&one.place)) }
-                                text x=(8 + depth * 14) y=(y + 14) { (one.id) " " (one.code) " " (one.name) }
-                                rect class={ "bar " (severity_word(one.severity)) } x=(tenth(from)) y=(y + 4)
-                                    width=(tenth((to - from).max(LEAST))) height=(ROW - 8) {}
+                        svg class="track" role="img" width="100%" height="14" {
+                            title { (one.id) " " (writer.names.place(&one.place)) }
+                            @for tick in &ticks {
+                                @let x = percent(share(*tick, end));
+                                line class="grid" x1=(x) x2=(x) y1="0" y2="14" {}
+                            }
+                            rect class={ "bar " (severity_word(one.severity)) } y="2" height="10"
+                                x=(percent(from.min(100.0 - width))) width=(percent(width)) {}
+                        }
+                    }
+                }
+                div class="row axis" {
+                    span class="label" { (caption(clock, end)) }
+                    div class="ticks" {
+                        @for tick in &ticks {
+                            span style={ "left:" (percent(share(*tick, end))) } {
+                                (time(*tick))
+                                @if let Some(clock) = clock.time_of_day(*tick) { br; (clock) }
                             }
                         }
                     }
                 }
+                @if left_out > 0 { p class="faint" { "and " (left_out) " more that follow" } }
             }
         }
     }
 }
 
-/// Tenths of a pixel are fine enough, and the same on every machine.
-fn tenth(pixels: f64) -> String {
-    format!("{pixels:.1}")
+/// `since the start`, and the date that clock times belong to.
+fn caption(clock: WallClock, end: u64) -> Markup {
+    html! {
+        "since the start"
+        @if let Some(first) = clock.date(0) {
+            br; "clock, " (first)
+            @if let Some(last) = clock.date(end).filter(|last| *last != first) { " to " (last) }
+        }
+    }
+}
+
+/// Round times from the start to the end: steps of 1, 2 or 5 of a decimal unit.
+fn ticks(end: u64) -> impl Iterator<Item = u64> {
+    let decades = std::iter::successors(Some(1u64), |unit| unit.checked_mul(10));
+    let steps = decades.flat_map(|unit| [1, 2, 5].map(|times| unit.saturating_mul(times)));
+    let step = steps.into_iter().find(|step| end / step <= STEPS).unwrap_or(u64::MAX);
+    (0..=end / step).map(move |index| index * step)
+}
+
+/// A time as a share of the run, in per cent.
+fn share(ns: u64, end: u64) -> f64 {
+    (ns as f64 / end as f64 * 100.0).min(100.0)
+}
+
+/// Hundredths are fine enough, and the same on every machine.
+fn percent(share: f64) -> String {
+    format!("{share:.2}%")
 }
 
 fn flatten<'a>(
@@ -74,5 +109,22 @@ fn flatten<'a>(
     rows.push((depth, finding));
     for one in &finding.consequences {
         flatten(one, depth + 1, rows);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axis_has_round_steps_from_the_start() {
+        let of = |end| ticks(end).collect::<Vec<_>>();
+        assert_eq!(of(1), [0, 1]);
+        assert_eq!(of(6_500_000_000), [0, 2_000_000_000, 4_000_000_000, 6_000_000_000]);
+        assert_eq!(of(3_306_000_000), [0, 1_000_000_000, 2_000_000_000, 3_000_000_000]);
+        for end in [7, 99, 12_345_678, 86_400_000_000_000, u64::MAX] {
+            let count = of(end).len();
+            assert!((2..=6).contains(&count), "{end}: {count}");
+        }
     }
 }

@@ -5,19 +5,73 @@ use linesman_diagnosis::report::coverage::{GapReport, SubjectReport};
 use linesman_diagnosis::report::{Diagnosis, PlaceReport, Verdict};
 
 use super::finding::Writer;
+use crate::hint;
 use crate::output::wrapped;
 
 /// Places that are named one by one.
 const NAMED: usize = 3;
 
-/// What was judged and what not.
+/// A statement on the coverage, for text and page alike.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Row {
+    /// The kind of statement.
+    pub(crate) kind: Kind,
+    /// The statement.
+    pub(crate) words: String,
+}
+
+/// Kinds of statements on the coverage.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Kind {
+    /// Evidence without which the line cannot be called healthy.
+    Missing,
+    /// The step that gets the evidence named before.
+    NextStep,
+    /// Subjects that were judged.
+    Judged,
+    /// Subjects that were judged in part, with the reasons.
+    InPart,
+    /// Subjects that were not judged, with the reasons.
+    NotJudged,
+}
+
+impl Kind {
+    /// The heading of the statement.
+    pub(crate) const fn heading(self) -> &'static str {
+        match self {
+            Self::Missing => "missing",
+            Self::NextStep => "do",
+            Self::Judged => "judged",
+            Self::InPart => "in part",
+            Self::NotJudged => "not",
+        }
+    }
+}
+
+/// The coverage as lines of text.
 pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     let mut text = String::new();
+    for row in rows(diagnosis, writer) {
+        match row.kind {
+            // It belongs to what is missing, above it.
+            Kind::NextStep => add(&mut text, "", &format!("do: {}", row.words), writer),
+            kind @ (Kind::Missing | Kind::Judged | Kind::InPart | Kind::NotJudged) => {
+                add(&mut text, kind.heading(), &row.words, writer);
+            }
+        }
+    }
+    text
+}
+
+/// All statements on the coverage, in the order in which they are read.
+pub(crate) fn rows(diagnosis: &Diagnosis, writer: &Writer<'_>) -> Vec<Row> {
+    let mut rows = Vec::new();
+    let mut add = |kind: Kind, words: String| rows.push(Row { kind, words });
     if diagnosis.verdict == Verdict::Inconclusive {
         for gap in diagnosis.coverage.essential_gaps() {
-            add(&mut text, "missing", &with_places(gap, writer), writer);
+            add(Kind::Missing, with_places(gap, writer));
             if let Some(step) = &gap.next_step {
-                add(&mut text, "", &format!("do: {step}"), writer);
+                add(Kind::NextStep, hint::complete(step, writer.place));
             }
         }
     }
@@ -25,15 +79,15 @@ pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     let of = |extent: Extent| subjects.iter().filter(move |one| one.extent == extent);
     let names: Vec<&str> = of(Extent::Judged).map(|one| one.subject.words()).collect();
     if !names.is_empty() {
-        add(&mut text, "judged", &names.join(", "), writer);
+        add(Kind::Judged, names.join(", "));
     }
-    for (heading, extent) in [("in part", Extent::InPart), ("not", Extent::NotJudged)] {
+    for (kind, extent) in [(Kind::InPart, Extent::InPart), (Kind::NotJudged, Extent::NotJudged)] {
         let lacking: Vec<String> = of(extent).map(|one| with_reasons(one, writer)).collect();
         if !lacking.is_empty() {
-            add(&mut text, heading, &lacking.join("; "), writer);
+            add(kind, lacking.join("; "));
         }
     }
-    text
+    rows
 }
 
 /// `error counters (nobody read them)`.

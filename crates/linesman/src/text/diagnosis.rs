@@ -2,9 +2,9 @@
 
 use linesman_diagnosis::report::{Diagnosis, Verdict};
 
-use super::coverage;
 use super::finding::{Writer, tally};
-use super::quantity::{count, date};
+use super::quantity::{count, date, grouped};
+use super::{coverage, devices};
 use crate::command::diagnose::READINGS;
 use crate::hint;
 use crate::output::wrapped;
@@ -26,7 +26,8 @@ pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
         let code = &diagnosis.findings[0].code;
         let hint = format!("\n`linesman explain {code}` says how such a finding is made.\n");
         text.push_str(&writer.paint.faint(&hint));
-        if writer.timed && diagnosis.network.devices.0 > 0 && !writer.names.has_any() {
+        let can_scan = writer.timed && !devices::is_recording(diagnosis);
+        if can_scan && diagnosis.network.devices.0 > 0 && !writer.names.has_any() {
             text.push_str(&writer.paint.faint(&hint::complete(NAMED, writer.place)));
         }
     }
@@ -38,26 +39,44 @@ const NAMED: &str = "`--project machine.toml`, as `linesman scan WHERE --save ma
                      SubDevices names.\n";
 
 fn verdict(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
-    let paint = writer.paint;
-    let (word, rest) = match diagnosis.verdict {
-        Verdict::Healthy => (paint.good("HEALTHY"), "nothing wrong was found in what was judged"),
-        Verdict::Faulty => (paint.bad("FAULTY"), ""),
-        Verdict::Inconclusive => {
-            (paint.warning("INCONCLUSIVE"), "too little was judged to call the line healthy")
-        }
+    let (paint, word) = (writer.paint, word(diagnosis.verdict));
+    let word = match diagnosis.verdict {
+        Verdict::Healthy => paint.good(word),
+        Verdict::Faulty => paint.bad(word),
+        Verdict::Inconclusive => paint.warning(word),
+    };
+    let source = source_name(&diagnosis.source);
+    wrapped(&format!("{word}  "), &format!("{source}: {}", told(diagnosis)), writer.width)
+}
+
+/// The verdict in a word.
+pub(crate) const fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Healthy => "HEALTHY",
+        Verdict::Faulty => "FAULTY",
+        Verdict::Inconclusive => "INCONCLUSIVE",
+    }
+}
+
+/// Meaning of the verdict, and the number of findings.
+pub(crate) fn told(diagnosis: &Diagnosis) -> String {
+    let meaning = match diagnosis.verdict {
+        Verdict::Healthy => "nothing wrong was found in what was judged",
+        Verdict::Faulty => "",
+        Verdict::Inconclusive => "too little was judged to call the line healthy",
     };
     let tally = tally(&diagnosis.findings);
     let parts: Vec<&str> =
-        [rest, tally.as_str()].into_iter().filter(|part| !part.is_empty()).collect();
-    wrapped(
-        &format!("{word}  "),
-        &format!("{}: {}", short(&diagnosis.source), parts.join("; ")),
-        writer.width,
-    )
+        [meaning, tally.as_str()].into_iter().filter(|part| !part.is_empty()).collect();
+    parts.join("; ")
 }
 
+/// Said of an input that could not be read to its end.
+pub(crate) const NOT_COMPLETE: &str =
+    "the input could not be read to its end: judged as far as it goes";
+
 /// The source without the directories of a file.
-fn short(source: &str) -> &str {
+pub(crate) fn source_name(source: &str) -> &str {
     match source.split_once(':') {
         Some(("capture", "-")) => "standard input",
         None if source == "-" => "standard input",
@@ -66,16 +85,17 @@ fn short(source: &str) -> &str {
     }
 }
 
-fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
+/// The network in numbers, each with its unit.
+pub(crate) fn numbers(diagnosis: &Diagnosis, timed: bool) -> Vec<String> {
     let network = &diagnosis.network;
     let mut parts = vec![count(network.devices.0, "SubDevice")];
     parts.extend(network.al_state_highest.as_ref().map(|state| format!("highest state {state}")));
-    if writer.timed && diagnosis.clock != READINGS {
+    if timed && diagnosis.clock != READINGS {
         parts.push(count(network.frames.0, "frame"));
         parts.push(format!(
             "{} judged, {} unanswered",
             count(network.datagrams.0, "datagram"),
-            network.unanswered.0
+            grouped(network.unanswered.0)
         ));
     }
     if network.lost.0 > 0 {
@@ -84,6 +104,11 @@ fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     if network.damaged.0 > 0 {
         parts.push(format!("{} damaged", count(network.damaged.0, "frame")));
     }
+    parts
+}
+
+fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
+    let parts = numbers(diagnosis, writer.timed);
     let mut text = wrapped("  ", &parts.join(", "), writer.width);
     if let Some(start) = &diagnosis.start {
         text.push_str(&wrapped(
@@ -93,8 +118,7 @@ fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
         ));
     }
     if !diagnosis.complete {
-        let words = "the input could not be read to its end: judged as far as it goes";
-        text.push_str(&wrapped("  ", &writer.paint.warning(words), writer.width));
+        text.push_str(&wrapped("  ", &writer.paint.warning(NOT_COMPLETE), writer.width));
     }
     text
 }

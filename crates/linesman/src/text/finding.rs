@@ -212,10 +212,15 @@ pub(crate) fn percent(confidence: f64) -> String {
 
 /// From when to when a finding was there.
 pub(crate) fn when(finding: &FindingReport) -> String {
-    let mut text = format!("from {}", time(finding.opened_ns.0));
+    when_by(finding, time)
+}
+
+/// From when to when a finding was there, each time as `at` writes it.
+pub(crate) fn when_by(finding: &FindingReport, at: impl Fn(u64) -> String) -> String {
+    let mut text = format!("from {}", at(finding.opened_ns.0));
     if let Some(Number(closed)) = finding.closed_ns {
         let lasted = closed.saturating_sub(finding.opened_ns.0);
-        text = format!("{text} to {}, for {}", time(closed), time(lasted));
+        text = format!("{text} to {}, for {}", at(closed), time(lasted));
     }
     text
 }

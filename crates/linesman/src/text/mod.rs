@@ -1,6 +1,7 @@
 //! Answers as people read them: what the JSON says, in words and by names.
 
 pub(crate) mod coverage;
+pub(crate) mod devices;
 pub(crate) mod diagnosis;
 pub(crate) mod drawing;
 pub(crate) mod finding;

@@ -4,6 +4,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod capture;
+pub(crate) mod drawing;
 pub(crate) mod running;
 pub(crate) mod schema;
 

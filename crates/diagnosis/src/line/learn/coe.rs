@@ -10,7 +10,7 @@ use linesman_proto::mailbox::{Header, MailboxType};
 
 use super::Answer;
 use crate::line::mailbox::{HistoryMessage, Refusal};
-use crate::line::{Line, Seen};
+use crate::line::{Device, Line, Seen};
 
 /// The diagnosis history.
 const HISTORY: ObjectIndex = ObjectIndex(0x10F3);
@@ -36,8 +36,15 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         MailboxType::Coe => match Message::parse(body) {
             Ok(Message::SdoResponse(response)) => {
                 let mut news = device.mailbox.answered(at, frame);
-                if let Response::Upload { object, complete: false, initial } = response {
-                    news |= uploaded(line, id, answer, object, initial.data());
+                if let Response::Upload { object, complete, initial } = response {
+                    let (data, seen) = (initial.data(), Seen::new((), at, Some(frame)));
+                    let is_whole = initial.size() as usize == data.len();
+                    news |= match (complete, object.index) {
+                        (true, ObjectIndex::IDENTITY) => identified_whole(line, id, seen, data),
+                        (true, _) => false,
+                        (false, ObjectIndex::DEVICE_NAME) if is_whole => named(line, id, data),
+                        (false, _) => uploaded(line, id, answer, object, data),
+                    };
                 }
                 news
             }
@@ -128,12 +135,41 @@ fn uploaded(
         device.sync_counts.insert((object.index.0, object.subindex), seen);
         return true;
     }
-    let Some(bytes) = data.first_chunk() else { return false };
     if object.index != ObjectIndex::IDENTITY {
         return false;
     }
-    let seen = Some(Seen::new(u32::from_le_bytes(*bytes), answer.at, Some(answer.frame)));
-    let field = match object.subindex {
+    let seen = Seen::new((), answer.at, Some(answer.frame));
+    identified(device, seen, object.subindex, data)
+}
+
+/// The object of the identity was read at once: the number of its entries in two bytes, then the entries.
+fn identified_whole(line: &mut Line, id: DeviceId, seen: Seen<()>, data: &[u8]) -> bool {
+    let Some(device) = line.devices.get_mut(id.index()) else { return false };
+    let entries = data.get(2..).unwrap_or_default().chunks_exact(4);
+    let mut is_new = false;
+    for (subindex, entry) in (1..=4).zip(entries) {
+        is_new |= identified(device, seen, subindex, entry);
+    }
+    is_new
+}
+
+/// The name of the device (0x1008) was read: its type, where nothing else says it.
+fn named(line: &mut Line, id: DeviceId, data: &[u8]) -> bool {
+    let Some(device) = line.devices.get_mut(id.index()) else { return false };
+    let text = String::from_utf8_lossy(data);
+    let name = text.trim_matches(|letter: char| letter == '\0' || letter.is_whitespace());
+    let is_new = device.type_name.is_none() && !name.is_empty() && !name.contains(char::is_control);
+    if is_new {
+        device.type_name = Some(name.to_owned());
+    }
+    is_new
+}
+
+/// An entry of the identity was read.
+fn identified(device: &mut Device, seen: Seen<()>, subindex: u8, data: &[u8]) -> bool {
+    let Some(bytes) = data.first_chunk() else { return false };
+    let seen = Some(Seen::new(u32::from_le_bytes(*bytes), seen.at, seen.frame));
+    let field = match subindex {
         1 => &mut device.identity.vendor_id,
         2 => &mut device.identity.product_code,
         3 => &mut device.identity.revision,
@@ -154,3 +190,41 @@ const fn is_sync_object(index: ObjectIndex) -> bool {
 const HEADER_LEN: usize = 6;
 /// CoE header and emergency.
 const EMERGENCY_LEN: usize = 2 + Emergency::LEN;
+
+#[cfg(test)]
+mod tests {
+    use linesman_proto::address::Network;
+    use linesman_proto::time::Instant;
+
+    use super::*;
+
+    fn line() -> (Line, DeviceId) {
+        let mut line = Line::new(Network(0));
+        let id = line.add_device();
+        (line, id)
+    }
+
+    #[test]
+    fn identity_read_at_once_is_that_of_its_entries() {
+        let (mut line, id) = line();
+        let mut data = vec![4, 0];
+        for value in [0x2u32, 0x0BBC_3052, 0x0015_0000, 77] {
+            data.extend(value.to_le_bytes());
+        }
+        let seen = Seen::new((), Instant::ZERO, Some(9));
+        assert!(identified_whole(&mut line, id, seen, &data));
+        assert!(!identified_whole(&mut line, id, seen, &data), "nothing new");
+        let identity = line.devices[id.index()].identity.identity().unwrap();
+        assert_eq!((identity.vendor_id, identity.product_code), (2, 0x0BBC_3052));
+        assert_eq!((identity.revision, identity.serial_number), (0x0015_0000, 77));
+    }
+
+    #[test]
+    fn device_name_is_the_type_where_nothing_else_says_it() {
+        let (mut line, id) = line();
+        assert!(!named(&mut line, id, b"\0\0"), "no name");
+        assert!(named(&mut line, id, b"EL3004\0"));
+        assert!(!named(&mut line, id, b"Other"), "the first stays");
+        assert_eq!(line.devices[id.index()].type_name.as_deref(), Some("EL3004"));
+    }
+}

@@ -3,15 +3,17 @@
 use linesman_proto::address::{DeviceId, RegisterAddress, StationAlias};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
-    AlControl, AlStatus, ClearGroup, DlControl, DlStatus, ErrorCounters, FmmuConfig, PortState,
-    SystemTimeDifference, WatchdogDivider, WatchdogTime,
+    AlControl, AlStatus, ClearGroup, ControllerType, DlControl, DlStatus, ErrorCounters,
+    FmmuConfig, PortState, SystemTimeDifference, WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{DcTime32, Instant};
 
 use super::{Answer, part, word_at};
-use crate::line::{Device, Line, LoopWrite, Seen};
+use crate::line::{Chip, Device, Line, LoopWrite, Seen};
 
+const CHIP_TYPE: u16 = 0x0000;
+const CHIP_REVISION: u16 = 0x0001;
 const ALIAS: u16 = 0x0012;
 const DL_CONTROL: u16 = 0x0100;
 const DL_STATUS: u16 = 0x0110;
@@ -38,6 +40,15 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     let Some(device) = line.devices.get_mut(id.index()) else { return };
     let mut news = false;
     if start.0 <= AL_STATUS_CODE {
+        if let Some([kind]) = part(data, start, CHIP_TYPE, 1) {
+            let revision = part(data, start, CHIP_REVISION, 1).map_or(0, |byte| byte[0]);
+            let chip = Chip { kind: ControllerType(*kind), revision };
+            // A shorter read does not take back what a longer one has told.
+            let is_known = device.chip.is_some_and(|known| known.value.revision != 0);
+            if revision != 0 || !is_known {
+                device.chip = Some(Seen::new(chip, at, frame));
+            }
+        }
         if let Some(alias) = word_at(data, start, ALIAS) {
             device.alias = Some(StationAlias(alias));
         }

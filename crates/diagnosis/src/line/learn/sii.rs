@@ -91,8 +91,10 @@ fn learn(device: &mut Device, answer: &Answer<'_>) {
     if device.alias.is_none() {
         device.alias = device.sii.word(word::STATION_ALIAS).map(StationAlias);
     }
-    if device.type_name.is_none() {
-        device.type_name = device.sii.type_name();
+    let (order, name) = (device.sii.order(), device.sii.name());
+    // The name stands in until the type is read.
+    if device.type_name.is_none() || order.is_some() && device.type_name == name {
+        device.type_name = order.or(name);
     }
     if device.power.is_none() {
         let seen = |value| Seen::new(value, answer.at, Some(answer.frame));

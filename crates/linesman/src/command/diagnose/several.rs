@@ -71,6 +71,7 @@ fn selectors(arguments: &Arguments) -> Result<Vec<Selector>, Failure> {
     let misplaced = [
         ("--html", arguments.html.is_some()),
         ("--svg", arguments.svg.is_some()),
+        ("--devices", arguments.devices),
         ("--record", arguments.record.is_some()),
         ("--seconds", arguments.seconds.is_some()),
         ("--follow", arguments.follow),
