@@ -1,6 +1,7 @@
 //! Parts of real captures: what begins late or ends early has no error that the whole does not have.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![allow(clippy::disallowed_methods, reason = "tests read files")]
 
 mod support;
 

@@ -28,6 +28,17 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
             .step("name the project, `--project machine.toml` or an ENI, or record from the start of the MainDevice");
         all.lacks(Extent::InPart, gap);
     }
+    let planned = line.devices.iter().filter(|one| one.planned.is_some()).count();
+    if planned > 0 && usize::from(traffic.broadcast_answers) > planned {
+        let text = format!(
+            "{} SubDevices answered a broadcast, {planned} are planned",
+            traffic.broadcast_answers
+        );
+        let gap = Gap::new(Reason::NumberUnknown, text)
+            .essential()
+            .step("compare the line with what was planned: `linesman scan WHERE --against FILE`");
+        all.lacks(Extent::InPart, gap);
+    }
     let silent: Vec<&Device> = line.devices.iter().filter(|one| is_missed(line, one)).collect();
     if !silent.is_empty() {
         let places = silent.iter().map(|one| Place::device(line.network, one.id)).collect();

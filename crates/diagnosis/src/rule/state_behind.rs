@@ -63,7 +63,10 @@ fn is_behind(view: &View<'_>, device: &Device) -> bool {
     let is_low = status.value.state().state().is_some_and(|state| state != AlState::Op);
     let is_list = view.line.traffic.frames == 0;
     let lasts = is_list || view.has_ended || view.now.since(status.at) >= LASTS;
-    is_low && lasts && (is_list || device.al.requested.is_none())
+    // It may have gone on since, in frames that are not in the recording.
+    let read = device.al.latest_reading.unwrap_or(status.at);
+    let is_fresh = || !view.line.traffic.may_lack(read, view.now);
+    is_low && lasts && (is_list || (device.al.requested.is_none() && is_fresh()))
 }
 
 /// Whether another finding tells of its state, or of the device itself.

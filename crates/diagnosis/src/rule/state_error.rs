@@ -127,9 +127,10 @@ fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
         && error.ended.is_none()
 }
 
-/// Whether an error is of a time before this run: where process data went on already, it belongs to that.
+/// Whether an error is of a time before this run: where process data went on while it stood, it belongs to them.
 fn was_left_over(line: &Line, error: &AlError) -> bool {
-    let is_running = line.cyclic.iter().any(|cyclic| cyclic.first.at < error.status.at);
+    let ended = error.ended.unwrap_or(error.status.at);
+    let is_running = line.cyclic.iter().any(|cyclic| cyclic.first.at < ended);
     error.was_left_over() && !is_running
 }
 

@@ -1,6 +1,7 @@
 //! `linesman sim`: virtual segments on real interfaces, for any MainDevice.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::Duration;
 
@@ -26,8 +27,8 @@ use crate::output::Output;
 use crate::text::drawing::labels;
 use crate::text::quantity::{count, time};
 
-/// So often it is looked whether sockets and logs still work, and whether segments have ended.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// So often it is looked whether sockets and logs still work: an idle segment costs next to nothing.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -221,9 +222,18 @@ fn serve(ready: Vec<Ready>, until: Instant, stop: &Stop, output: &Output) -> Vec
         Ended { status, failure }
     };
     thread::scope(|scope| {
-        let threads: Vec<_> = ready.into_iter().map(|ready| scope.spawn(|| one(ready))).collect();
-        while threads.iter().any(|thread| !thread.is_finished()) {
-            thread::sleep(LOOK_EVERY);
+        // Nothing is ever sent: the channel ends when the last thread lets go of it.
+        let (running, ended) = mpsc::channel::<()>();
+        let start = |ready| {
+            let running = running.clone();
+            scope.spawn(|| {
+                let _running = running;
+                one(ready)
+            })
+        };
+        let threads: Vec<_> = ready.into_iter().map(start).collect();
+        drop(running);
+        while ended.recv_timeout(LOOK_EVERY) == Err(RecvTimeoutError::Timeout) {
             watch.look(output);
         }
         let joined = threads
