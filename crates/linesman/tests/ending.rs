@@ -12,6 +12,7 @@ const DRIVING: &str = r#"
     states() { "$LINESMAN" state near0 --json | grep -o '"al_state": "[A-Z]*"' | sort | uniq -c; }
 "#;
 
+/// Runs have a long cycle where their exit status is looked at: a busy host that leaves cycles out is a finding.
 fn driven(script: &str) -> Option<support::Run> {
     beside_segment(&format!("{DRIVING}{script}"))
 }
@@ -23,7 +24,7 @@ fn a_lost_terminal_that_is_told_twice_brings_the_devices_down() {
     // The kernel and the shell both tell it; whoever ends the session sends SIGTERM behind.
     let Some(run) = driven(
         r#"
-        "$LINESMAN" run --on near0 > $out & run=$!
+        "$LINESMAN" run --on near0 --cycle 20ms > $out & run=$!
         up
         kill -HUP $run; kill -HUP $run; sleep 0.01; kill -TERM $run
         wait $run; echo "status $?"
@@ -41,7 +42,7 @@ fn a_lost_terminal_that_is_told_twice_brings_the_devices_down() {
 fn a_run_under_nohup_outlives_its_terminal() {
     let Some(run) = driven(
         r#"
-        nohup "$LINESMAN" run --on near0 > $out 2> /dev/null & run=$!
+        nohup "$LINESMAN" run --on near0 --cycle 20ms > $out 2> /dev/null & run=$!
         up
         kill -HUP $run; sleep 0.5; kill -0 $run && echo "runs on"
         kill -TERM $run; wait $run; echo "status $?"

@@ -1,7 +1,7 @@
 //! Pasted texts: what other tools print, one or several in a file, read as one observation.
 //!
 //! Each format has a file that takes its lines off the front of the text, as far as they go, and says what
-//! they tell as [`Fact`]s. [`gather`] puts the facts of all blocks together to an observation file: SubDevices
+//! they tell as facts ([`fact`]). [`gather`] puts the facts of all blocks together to an observation file: SubDevices
 //! by position, station address or name, times on one scale, wiring as told or as assumed. Nothing is taken
 //! for 0 that is not told.
 
