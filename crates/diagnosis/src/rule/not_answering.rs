@@ -42,6 +42,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// Who did not answer for so long was away.
 const LONG: Span = Span::ms(100);
+/// Who comes back has its station address again after so long at most; what came between belongs to one absence.
+const ADDRESSED_WITHIN: Span = Span::ms(500);
 /// An absence that has been over for so long is history.
 const TOLD_FOR: Span = Span::ms(2_500);
 
@@ -115,13 +117,24 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 /// The absence of a SubDevice that lasts, or was over a moment ago. While addresses are given nobody answers to them
 /// for a while.
 fn absence(view: &View<'_>, device: &Device) -> Option<Absence> {
-    if let Some(since) = device.silent {
-        return Some(Absence { since, ended: None });
+    let mut before = device.absences.iter().rev();
+    let mut latest = match device.silent {
+        Some(since) => Absence { since, ended: None },
+        None => *before.next()?,
+    };
+    // Who comes back answers to its position first, and to its address when it has it again.
+    for earlier in before {
+        match earlier.ended {
+            Some(ended) if latest.since.at.since(ended) <= ADDRESSED_WITHIN => {
+                latest.since = earlier.since;
+            }
+            Some(_) => break,
+            None => {}
+        }
     }
-    let latest = device.absences.back()?;
-    let ended = latest.ended?;
+    let Some(ended) = latest.ended else { return Some(latest) };
     let is_told = ended.since(latest.since.at) >= LONG && view.now.since(ended) <= TOLD_FOR;
-    is_told.then_some(*latest)
+    is_told.then_some(latest)
 }
 
 /// SubDevices that all fell silent behind one link, of which nobody says that it is up.

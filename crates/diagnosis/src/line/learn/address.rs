@@ -30,6 +30,8 @@ const MOST_DEVICES: usize = 4096;
 const STATION: u16 = 0x0010;
 /// First station addresses that MainDevices give: SOEM, ours and KickCAT; TwinCAT; IgH; ethercrab.
 const FIRST_STATIONS: [u16; 4] = [0x1001, 1001, 1, 0x1000];
+/// A station address that lies farther from the first one tells no place, as long as nobody has counted.
+const MOST_BY_NUMBER: usize = 1000;
 /// Asked so often in vain, and over so long, a station address is that of a SubDevice which should be there.
 const ASKED_IN_VAIN: u64 = 3;
 const ASKED_FOR: Span = Span::ms(20);
@@ -196,37 +198,48 @@ impl Addresses {
         if !answers {
             return None;
         }
-        let is_free = |device: &&Device| {
-            device.station.is_none() && !self.stations.values().any(|id| *id == device.id)
-        };
         let by_number = self.by_number(line, station);
-        let by_number = by_number.and_then(|id| line.device(id)).filter(is_free);
-        let free = by_number.or_else(|| line.devices.iter().find(is_free));
-        let id = match free.map(|device| device.id) {
+        let by_number = by_number.filter(|id| line.device(*id).is_some_and(Self::is_free));
+        let free = || line.devices.iter().find(|one| Self::is_free(one)).map(|device| device.id);
+        let id = match by_number.or_else(free) {
             Some(id) => id,
             None if line.devices.len() < MOST_DEVICES => line.add_device(),
             None => return None,
         };
-        self.has_guessed = true;
+        // Counted from a known number it is no mere guess, and what positions tell still corrects it.
+        self.is_by_address |= by_number.is_some();
+        self.has_guessed |= by_number.is_none();
         self.give(line, id, station);
         Some(id)
     }
 
+    /// Whether a controller was counted, and no station address is known to be its own.
+    const fn is_free(device: &Device) -> bool {
+        device.station.is_none()
+    }
+
     /// The controller whose place in the line a station address tells, where MainDevices count from a known number
-    /// on, and how many there are is known.
-    fn by_number(&self, line: &Line, station: StationAddress) -> Option<DeviceId> {
+    /// on: among those that were counted, or, before anybody has counted, as far as it goes.
+    fn by_number(&self, line: &mut Line, station: StationAddress) -> Option<DeviceId> {
         if line.devices.iter().any(|one| one.planned.is_some()) {
             return None;
         }
-        let count = usize::from(self.present?);
+        // While nobody has counted them the number alone tells.
+        let is_counted = self.present.is_some() || !self.order.is_empty();
+        let count = if is_counted { self.order.len() } else { MOST_BY_NUMBER };
         let known = self.stations.keys().chain([&station]);
         let (least, most) =
             known.fold((u16::MAX, 0), |(least, most), one| (least.min(one.0), most.max(one.0)));
-        let fits = |first: &u16| {
-            *first <= least && usize::from(most - *first) < count && self.order.len() == count
-        };
+        let fits = |first: &u16| *first <= least && usize::from(most - *first) < count;
         let first = FIRST_STATIONS.into_iter().find(fits)?;
-        self.order.get(usize::from(station.0 - first)).copied()
+        let place = usize::from(station.0 - first);
+        if is_counted {
+            return self.order.get(place).copied();
+        }
+        while line.devices.len() <= place {
+            line.add_device();
+        }
+        Some(DeviceId(place as u32))
     }
 
     /// Whether single controllers were named, so that their numbers stay.
@@ -271,9 +284,12 @@ impl Addresses {
             if line.devices.len() >= MOST_DEVICES {
                 break;
             }
-            let id = line.add_device();
+            // It may have been counted while it was there, though nobody asked for it by its address then.
+            let counted = self.by_number(line, *station);
+            let counted = counted.filter(|id| line.device(*id).is_some_and(Self::is_free));
+            let id = counted.unwrap_or_else(|| line.add_device());
             self.give(line, id, *station);
-            self.has_guessed = true;
+            self.has_guessed |= counted.is_none();
             if let Some(device) = line.device_mut(id) {
                 device.is_silent(first.at, first.frame);
             }
@@ -318,11 +334,13 @@ impl Addresses {
         self.stations.clear();
         self.order.clear();
         let mut position = 0;
+        // Those that were once counted all together have their positions, whether they answer now or not.
+        let was_whole = self.most_counted(line) >= sorted.len();
         for (index, place) in sorted.into_iter().enumerate() {
             let id = DeviceId(index as u32);
             let mut device = place.or_else(|| others.next()).unwrap_or_else(|| Device::new(id));
             device.id = id;
-            let never_answered = device.answered.is_none() && device.silent.is_some();
+            let never_answered = !was_whole && device.answered.is_none() && device.silent.is_some();
             device.position = (!never_answered).then_some(Position(position));
             if let Some(station) = device.station {
                 self.stations.insert(station, id);
@@ -337,6 +355,12 @@ impl Addresses {
         true
     }
 
+    /// How many controllers a frame has passed at most.
+    fn most_counted(&self, line: &Line) -> usize {
+        let counted = line.traffic.positions_seen.max(line.traffic.broadcast_answers);
+        usize::from(counted.max(self.present.unwrap_or(0))).min(MOST_DEVICES)
+    }
+
     /// The places that station addresses tell: by the number from which the MainDevice counts, else, once all are known,
     /// by their order.
     fn places(&self, line: &Line) -> Option<BTreeMap<StationAddress, usize>> {
@@ -349,6 +373,7 @@ impl Addresses {
         stations.sort_unstable();
         let silent = |one: &&Device| one.answered.is_none() && one.silent.is_some();
         let count = present + line.devices.iter().filter(silent).count();
+        let count = count.max(self.most_counted(line));
         let (least, most) = (stations.first()?.0, stations.last()?.0);
         let fits = |first: &u16| *first <= least && usize::from(most - *first) < count;
         if let Some(first) = FIRST_STATIONS.into_iter().find(fits) {
