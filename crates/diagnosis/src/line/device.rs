@@ -11,6 +11,7 @@ use linesman_proto::register::{
     ControllerType, DlControl, EscInformation, FmmuConfig, WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::sii::Identity;
+use linesman_proto::state::status_code::Class as CodeClass;
 use linesman_proto::time::{DcTime32, Instant, Span};
 use linesman_proto::topology::SeenController;
 
@@ -19,6 +20,9 @@ use super::{
     AlChange, AlError, AlHistory, ClockHistory, CounterHistory, Counting, DlHistory, ErrorSum,
     Power, ReportedTrouble, Seen, SiiImage, push_kept,
 };
+
+/// A state that was lost is read so long after what it was lost by, at most.
+const READ_WITHIN: Span = Span::s(2);
 
 /// A controller.
 #[derive(Clone, Debug)]
@@ -213,6 +217,19 @@ pub struct Absence {
     pub ended: Option<Instant>,
 }
 
+impl Absence {
+    /// Whether what was noticed at `at` may come from it: it is noticed a little late, and for some time after it the
+    /// controller is still brought back.
+    #[must_use]
+    pub fn disturbs(&self, at: Instant) -> bool {
+        let is_over = self.ended.is_some_and(|ended| ended + Self::REPAIR < at);
+        self.since.at.before(Self::NOTICED_WITHIN) <= at && !is_over
+    }
+
+    const NOTICED_WITHIN: Span = Span::ms(200);
+    const REPAIR: Span = Span::ms(1500);
+}
+
 /// What keeps a controller from doing its share.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Trouble {
@@ -323,6 +340,20 @@ impl Device {
     /// Notes an emergency.
     pub fn record_emergency(&mut self, emergency: Seen<Emergency>) {
         push_kept(&mut self.emergencies, emergency);
+    }
+
+    /// Whether it signalled, within a stretch of time or soon after it, that it has lost its step with the SYNC signal
+    /// or the frames: an AL status code of the class timing, or an error whose code nobody has read. Who was away just
+    /// then has lost it by that.
+    #[must_use]
+    pub fn lost_step_within(&self, from: Instant, to: Instant) -> bool {
+        self.al.errors.iter().any(|error| {
+            let is_timing =
+                error.code.is_none_or(|code| code.value.explain().class == CodeClass::Timing);
+            let at = error.status.at;
+            let was_away = self.absences.iter().any(|one| one.disturbs(at));
+            is_timing && !was_away && at >= from && at <= to + READ_WITHIN
+        })
     }
 
     /// When it first was in trouble of its own, or did not answer, within a stretch of time.

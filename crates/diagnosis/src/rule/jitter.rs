@@ -21,7 +21,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Beat, Cyclic, Device, Off};
+use crate::line::{Absence, Beat, Cyclic, Device, Off};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -103,7 +103,10 @@ impl Spell<'_> {
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let has_sync = |device: &&Device| device.sync_on.is_some_and(|on| on.value);
     let in_step: Vec<&Device> = view.line.devices.iter().filter(has_sync).collect();
-    let spells = view.line.cyclic.iter().filter_map(|cyclic| spell(cyclic, !in_step.is_empty()));
+    // A MainDevice that seeks SubDevices and sets them up sends when it has the time.
+    let away: Vec<&Absence> = view.line.devices.iter().flat_map(|one| &one.absences).collect();
+    let cyclic = view.line.cyclic.iter();
+    let spells = cyclic.filter_map(|cyclic| spell(cyclic, !in_step.is_empty(), &away));
     let worst = spells.max_by_key(|spell| spell.worst());
     let Some(spell) = worst else { return };
     let (Some(first), Some(last)) = (spell.off.first(), spell.off.last()) else { return };
@@ -128,12 +131,14 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     } else {
         (FaultName::LateFrames, FaultName::HostJitter)
     };
+    // What was lost before, or by another cause, is none of its doing.
+    let hurt = in_step.iter().filter(|device| device.lost_step_within(first.at, last.at));
     let mut condition = Condition::new(&PAGE, Place::Host, cause, first.at)
         .confidence(if spell.at_sending { 0.7 } else { 0.6 })
         .or(other, 0.25)
         .confirmed(spell.off[OFTEN - 1].at)
         .shown_by(evidence(&spell, last.at, in_step.len()))
-        .explaining(in_step.iter().map(|device| Symptom::StateLost(device.id)))
+        .explaining(hurt.map(|device| Symptom::StateLost(device.id)))
         .explaining([Symptom::FramesLate])
         .advise(
             "Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.",
@@ -151,7 +156,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 /// The latest spell of a datagram: of its sending, else of its return; where nobody keeps step, of less, too.
-fn spell(cyclic: &Cyclic, keeps_step: bool) -> Option<Spell<'_>> {
+fn spell<'a>(
+    cyclic: &'a Cyclic,
+    keeps_step: bool,
+    away: &[&Absence],
+) -> Option<Spell<'a>> {
     let of = |beat: &Beat, at_sending| {
         let cycle = beat.cycle()?;
         let mut off: Vec<Off> = Vec::new();
@@ -160,7 +169,9 @@ fn spell(cyclic: &Cyclic, keeps_step: bool) -> Option<Spell<'_>> {
             if off.last().is_some_and(|later| later.at.since(one.at) > TOGETHER) {
                 break;
             }
-            off.push(*one);
+            if !away.iter().any(|absence| absence.disturbs(one.at)) {
+                off.push(*one);
+            }
         }
         off.reverse();
         (off.len() >= OFTEN).then_some(Spell { cyclic, cycle, at_sending, off })

@@ -19,8 +19,7 @@
 //! and converters out of the way.
 
 use linesman_config::fault::{Class, FaultName};
-use linesman_proto::state::status_code::Class as CodeClass;
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
@@ -44,8 +43,6 @@ const QUIET: Span = Span::s(2);
 const TOGETHER: Span = Span::s(10);
 /// A recording tells of what is late by this part of the cycle: half of what is doubtful to whoever keeps step.
 const RECORDED: u64 = 10;
-/// A state that was lost is read so long after the frame that was late.
-const READ_WITHIN: Span = Span::s(2);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
@@ -95,7 +92,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         .advise("Take switches and media converters out of the way between card and first SubDevice.");
     let in_step = line.devices.iter().filter(|device| device.sync_on.is_some_and(|on| on.value));
     let hurt: Vec<&Device> =
-        in_step.filter(|device| was_hurt(device, first.sent, last.sent + last.by)).collect();
+        in_step.filter(|device| device.lost_step_within(first.sent, last.sent + last.by)).collect();
     if hurt.is_empty() && is_recorded {
         let text = match keeps_step {
             true => "no SubDevice has lost its step meanwhile, as far as the recording shows",
@@ -118,16 +115,6 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         condition = condition.ended(last.sent + last.by);
     }
     conditions.push(condition);
-}
-
-/// Whether it lost its step meanwhile.
-fn was_hurt(device: &Device, from: Instant, to: Instant) -> bool {
-    device.al.errors.iter().any(|error| {
-        let class = error.code.map(|code| code.value.explain().class);
-        class == Some(CodeClass::Timing)
-            && error.status.at >= from
-            && error.status.at <= to + READ_WITHIN
-    })
 }
 
 /// The shortest cycle of process data.
