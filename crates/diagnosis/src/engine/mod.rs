@@ -16,7 +16,7 @@ use crate::coverage::{Coverage, InputKind};
 use crate::finding::{Book, Finding, Severity};
 use crate::line::{Line, Seen, search};
 use crate::observe::{
-    Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome,
+    Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, companion,
 };
 use crate::report::{self, Diagnosis, NetworkReport, Number, Verdict};
 use crate::rule::{RULES, View};
@@ -432,6 +432,10 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
         let seen = Seen::new((), frame.time, Some(frame.number));
         traffic.first_damaged.get_or_insert(seen);
         line.touch();
+        return;
+    }
+    if let Some(processed) = companion::processed(&view) {
+        traffic.record_companion(Seen::new(processed, frame.time, Some(frame.number)));
         return;
     }
     let print = Fingerprint::of(&view);

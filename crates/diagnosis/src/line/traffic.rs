@@ -142,6 +142,12 @@ pub struct Traffic {
     pub datagrams_cut: u64,
     /// Frames that end before their last datagram does, though they were recorded whole.
     pub cut_short: u64,
+    /// Frames that the second card of a ring sent only to see which way they come back; they are not among `sent` and
+    /// `returned`.
+    pub companions: u64,
+    /// The latest of those that controllers have processed, by how many: the ring was open, and so many are reached from
+    /// the second card.
+    pub companion_processed: Option<Seen<u16>>,
     /// Frames that passed and were not shown to the diagnosis, because it did not keep up.
     pub missed: u64,
     /// The largest step by which time stamps ran backwards.
@@ -203,6 +209,15 @@ impl Traffic {
                 self.quiet.pop_front();
             }
             self.quiet.push_back(Pause { from: last, to: at });
+        }
+    }
+
+    /// A frame was seen that the second card of a ring sends only to see which way it comes back, and so many
+    /// controllers had processed it.
+    pub fn record_companion(&mut self, seen: Seen<u16>) {
+        self.companions += 1;
+        if seen.value > 0 {
+            self.companion_processed = Some(seen);
         }
     }
 

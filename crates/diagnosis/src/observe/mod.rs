@@ -1,7 +1,8 @@
 //! What comes in: frames as they were seen, and what the host noticed; and which frames belong
 //! together.
 
-pub mod exchange;
+pub(crate) mod companion;
+mod exchange;
 pub mod fingerprint;
 pub mod pairing;
 pub mod seen;

@@ -156,11 +156,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 /// The latest spell of a datagram: of its sending, else of its return; where nobody keeps step, of less, too.
-fn spell<'a>(
-    cyclic: &'a Cyclic,
-    keeps_step: bool,
-    away: &[&Absence],
-) -> Option<Spell<'a>> {
+fn spell<'a>(cyclic: &'a Cyclic, keeps_step: bool, away: &[&Absence]) -> Option<Spell<'a>> {
     let of = |beat: &Beat, at_sending| {
         let cycle = beat.cycle()?;
         let mut off: Vec<Off> = Vec::new();
