@@ -4,8 +4,9 @@
 //!
 //! **How it is found.** An observation file or a pasted text tells of frames that did not come back, of datagrams
 //! that were not back in time and never came, or of damaged frames that the card dropped, while the error
-//! counters of the SubDevices were not read, or did not move. Other findings that explain lost frames take
-//! precedence.
+//! counters of the SubDevices were not read, or did not move. Beside another MainDevice, and in its recordings, frames
+//! are seen to go out and not to come back, two or more, and nobody reads counters. Other findings that explain lost
+//! frames take precedence.
 //!
 //! **What it means.** A frame that is damaged on the line comes back, and the card counts it: so many damaged
 //! frames at the card are damage somewhere on the way round. Frames that are missing while the card counts no
@@ -18,6 +19,9 @@
 //! observations`. Live, `linesman counters eth0 --clear --for 60` does it.
 
 use linesman_config::fault::{Class, FaultName};
+
+use linesman_proto::address::Path;
+use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
@@ -37,6 +41,12 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// Of so many frames one may get lost on a good line.
 const RARE: u64 = 100_000;
+/// A single one proves no trouble.
+const SEVERAL: u64 = 2;
+/// What explains lost frames was noticed so shortly before or after them.
+const AROUND: Span = Span::ms(500);
+/// What did not come again for this long is over.
+const QUIET: Span = Span::s(2);
 /// Of so many frames one is too much for a line that is to work.
 const OFTEN: u64 = 1_000;
 
@@ -51,11 +61,11 @@ struct Missing {
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
-    if !line.reported.tells_of_frames() && !line.host.is_watched {
+    if line.traffic.frames > 0 {
+        conditions.extend(seen(view, conditions));
         return;
     }
-    // Frames that were seen are judged one by one.
-    if line.traffic.frames > 0 {
+    if !line.reported.tells_of_frames() && !line.host.is_watched {
         return;
     }
     let explains = |symptom: Symptom| {
@@ -78,13 +88,68 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     conditions.push(condition(view, &missing, damaged));
 }
 
+/// Frames that were seen to go out and not to come back, beside another MainDevice or in a recording.
+///
+/// Who drives the line asks for counters, and says no more than these do.
+fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
+    let line = view.line;
+    let traffic = &line.traffic;
+    let lost = traffic.lost;
+    let (Some(first), Some(last)) = (lost.first, lost.last) else { return None };
+    // A recorder that misses requests misses returns, too.
+    let is_recorder = traffic.unrecorded.sum > 0 || traffic.datagrams_cut > 0 || traffic.missed > 0;
+    if lost.sum < SEVERAL || line.sees_all_orders || traffic.is_one_sided() || is_recorder {
+        return None;
+    }
+    let explains = |one: &Condition| {
+        let is_then = one.since.before(AROUND) <= last
+            && one.ended.is_none_or(|ended| ended + AROUND >= first);
+        let all = || one.explains.iter().chain(&one.symptoms);
+        is_then
+            && all().any(|symptom| {
+                matches!(
+                    symptom,
+                    Symptom::FramesLost | Symptom::NobodyAnswers | Symptom::CardErrors
+                )
+            })
+    };
+    if conditions.iter().any(explains) {
+        return None;
+    }
+    let damaged = line.host.is_watched.then_some(line.host.card(Path::A).crc.sum);
+    let condition = causes(view, damaged.unwrap_or(0), damaged.is_some(), first);
+    let count = lost.sum;
+    let text = format!(
+        "{count} of {} frames did not come back, single ones or a few in a row, the last at {last}",
+        traffic.sent
+    );
+    let known = traffic.first_lost.and_then(|seen| seen.frame).unwrap_or(0);
+    let mut condition = condition.confirmed(last).explaining([Symptom::FramesLost]);
+    condition.severity =
+        if count.saturating_mul(RARE) <= traffic.sent { Severity::Info } else { Severity::Warning };
+    condition = condition.shown_by(Evidence::frame(first, known, text));
+    let counters = line.devices.iter().filter(|device| device.counters.is_known()).count();
+    let text = match (counters, damaged) {
+        (0, None) => {
+            "nobody reads error counters, and those of the MainDevice's card are not known"
+        }
+        (0, Some(_)) => "nobody reads error counters",
+        (_, _) => "no error counter that was read names a place",
+    };
+    condition = condition.shown_by(Evidence::host(Some(last), text.to_owned()));
+    if last + QUIET < view.now {
+        condition = condition.ended(last);
+    }
+    Some(advise(condition, line, damaged, damaged.unwrap_or(0)))
+}
+
 fn missing(line: &Line) -> Missing {
     let reported = &line.reported;
     let sum = |tally: Option<Tally>| tally.map_or(0, |tally| tally.sum);
     // What was not back in time and came later was late.
     let came = sum(reported.unmatched).saturating_add(sum(reported.late));
     let vanished = sum(reported.timed_out).saturating_sub(came);
-    let crc = line.host.card(linesman_proto::address::Path::A).crc;
+    let crc = line.host.card(Path::A).crc;
     let tallies = [reported.lost, reported.timed_out, reported.corrupted, Some(crc)];
     let first =
         tallies.into_iter().flatten().filter(|tally| tally.sum > 0).min_by_key(|one| one.first);
@@ -98,16 +163,29 @@ fn missing(line: &Line) -> Missing {
 
 fn condition(view: &View<'_>, missing: &Missing, damaged: u64) -> Condition {
     let line = view.line;
-    let network = Place::Network { network: line.network };
     let since = missing.first.first.unwrap_or(view.now);
-    let condition = if damaged > 0 {
+    let condition = causes(view, damaged, missing.damaged.is_some(), since);
+    let mut condition = condition.confirmed(since).explaining([Symptom::FramesLost]);
+    condition.severity = severity(line, missing.lost.saturating_add(damaged), damaged);
+    for text in texts(line, missing) {
+        condition = condition.shown_by(Evidence::host(Some(since), text));
+    }
+    advise(condition, line, missing.damaged, damaged).advise(
+        "Note the counts, wait some minutes, and read them again: only what rises is of now.",
+    )
+}
+
+/// What loses frames without a trace in the counters of SubDevices; `is_watched` where those of the card are known.
+fn causes(view: &View<'_>, damaged: u64, is_watched: bool, since: Instant) -> Condition {
+    let network = Place::Network { network: view.line.network };
+    if damaged > 0 {
         Condition::new(&PAGE, network, FaultName::CableDegraded, since)
             .confidence(0.35)
             .or(FaultName::EmcNoise, 0.2)
             .or_at(FaultName::NicDamaged, Place::Host, 0.15)
             .or(FaultName::TransmitterDamaged, 0.1)
             .or(FaultName::DeviceInternal, 0.1)
-    } else if missing.damaged.is_some() {
+    } else if is_watched {
         Condition::new(&PAGE, Place::Host, FaultName::HostDrops, since)
             .confidence(0.4)
             .or_at(FaultName::LinkFlapping, network, 0.2)
@@ -115,35 +193,37 @@ fn condition(view: &View<'_>, missing: &Missing, damaged: u64) -> Condition {
             .or_at(FaultName::FalseLink, network, 0.1)
     } else {
         Condition::new(&PAGE, network, FaultName::CableDegraded, since)
-            .confidence(0.25)
-            .or_at(FaultName::HostDrops, Place::Host, 0.2)
-            .or(FaultName::LinkFlapping, 0.15)
+            .confidence(0.2)
+            .or_at(FaultName::HostDrops, Place::Host, 0.19)
             .or(FaultName::EmcNoise, 0.15)
-            .or_at(FaultName::LateFrames, Place::Host, 0.1)
-    };
-    let mut condition = condition.confirmed(since).explaining([Symptom::FramesLost]);
-    condition.severity = severity(line, missing.lost.saturating_add(damaged), damaged);
-    for text in texts(line, missing) {
-        condition = condition.shown_by(Evidence::host(Some(since), text));
+            .or(FaultName::LinkFlapping, 0.1)
+            .or_at(FaultName::NicDamaged, Place::Host, 0.09)
+            .or(FaultName::TransmitterDamaged, 0.07)
+            .or(FaultName::DeviceInternal, 0.07)
+            .or_at(FaultName::LateFrames, Place::Host, 0.06)
     }
+}
+
+/// What to read next.
+fn advise(condition: Condition, line: &Line, card_damaged: Option<u64>, damaged: u64) -> Condition {
+    let mut condition = condition;
     if line.devices.iter().all(|device| !device.counters.is_known()) {
         condition = condition.advise(
             "Read the error counters of all SubDevices (0x0300 to 0x0313), in order: they name the link.",
         );
     }
-    if missing.damaged.is_none() {
-        condition = condition.advise(
+    match card_damaged {
+        None => condition.advise(
             "Read the counters of the network card (`ethtool -S eth0`): damaged frames are counted there, \
              dropped ones, too.",
-        );
-    } else if damaged == 0 {
-        condition = condition
+        ),
+        Some(_) if damaged == 0 => condition
             .advise("Run `linesman host --measure 10`: it tells what makes this computer lose frames.")
-            .advise("Look at the lost-link counters (0x0310 to 0x0313): a contact that opens loses frames, too.");
+            .advise(
+                "Look at the lost-link counters (0x0310 to 0x0313): a contact that opens loses frames, too.",
+            ),
+        Some(_) => condition,
     }
-    condition.advise(
-        "Note the counts, wait some minutes, and read them again: only what rises is of now.",
-    )
 }
 
 /// One lost frame is worth knowing; what is rare, and not going on, too.
