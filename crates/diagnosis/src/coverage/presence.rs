@@ -1,6 +1,6 @@
 //! Presence of the SubDevices as evidence: how many there are, and whether all of them answer.
 
-use super::{Assessment, Basis, Extent, Gap, Reason, Subject};
+use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 use crate::finding::Place;
 use crate::line::{Device, Line};
 
@@ -56,6 +56,14 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         let rest = line.asked_in_vain.len() - stations.len();
         let more = if rest > 0 { format!(", and {rest} more") } else { String::new() };
         let text = format!("nobody answered at station address {}{more}", stations.join(", "));
+        let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
+        all.lacks(Extent::InPart, gap);
+    }
+    // Those of lost frames are told with these. Who brings a line up asks for what is not there.
+    let unanswered = traffic.unanswered_alone;
+    if basis.input != InputKind::Driven && unanswered > 0 && silent.is_empty() {
+        let text =
+            format!("{unanswered} datagrams came back without an answer, and nothing tells why");
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }

@@ -43,6 +43,8 @@ pub struct Device {
     pub reported_wrong: Option<Seen<()>>,
     /// Its station address now.
     pub station: Option<StationAddress>,
+    /// When it was read at its position without the station address that it had been given: it has started anew.
+    pub lost_address: Option<Seen<()>>,
     /// Its alias.
     pub alias: Option<StationAlias>,
     /// Its position now; `None` when it is known to be unreachable, or never was seen.
@@ -55,6 +57,8 @@ pub struct Device {
     pub answered: Option<Seen<()>>,
     /// When it did not answer for the first time since it last answered; `None` while it answers.
     pub silent: Option<Seen<()>>,
+    /// When it last did not answer.
+    pub last_unanswered: Option<Instant>,
     /// When it did not answer, oldest first, at most [`CHANGES_KEPT`](super::CHANGES_KEPT).
     pub absences: VecDeque<Absence>,
     /// Its state.
@@ -226,6 +230,8 @@ impl Absence {
         self.since.at.before(Self::NOTICED_WITHIN) <= at && !is_over
     }
 
+    /// Who comes back has its station address again after so long at most.
+    const ADDRESSED_WITHIN: Span = Span::ms(500);
     const NOTICED_WITHIN: Span = Span::ms(200);
     const REPAIR: Span = Span::ms(1500);
 }
@@ -254,12 +260,14 @@ impl Device {
             chip: None,
             reported_wrong: None,
             station: None,
+            lost_address: None,
             alias: None,
             position: None,
             dl_control: None,
             shared_address: None,
             answered: None,
             silent: None,
+            last_unanswered: None,
             absences: VecDeque::new(),
             al: AlHistory::default(),
             dl: DlHistory::default(),
@@ -308,14 +316,35 @@ impl Device {
         }
     }
 
-    /// Whether it started anew at least once, as far as its states tell.
+    /// Whether it started anew at least once, as far as its states and its station address tell.
     #[must_use]
     pub fn has_restarted(&self) -> bool {
-        self.al.changes.iter().any(super::AlChange::is_own_fall)
+        self.lost_address.is_some() || self.al.changes.iter().any(super::AlChange::is_own_fall)
+    }
+
+    /// When it did not answer, oldest first; those that follow at once upon each other as one. Who comes back answers to
+    /// its position first, and to its address when it has it again.
+    #[must_use]
+    pub fn joined_absences(&self) -> Vec<Absence> {
+        let mut joined: Vec<Absence> = Vec::new();
+        for absence in &self.absences {
+            match joined.last_mut() {
+                Some(last)
+                    if last.ended.is_some_and(|ended| {
+                        absence.since.at.since(ended) <= Absence::ADDRESSED_WITHIN
+                    }) =>
+                {
+                    last.ended = absence.ended;
+                }
+                Some(_) | None => joined.push(*absence),
+            }
+        }
+        joined
     }
 
     /// Notes that it did not answer though it was asked.
     pub fn is_silent(&mut self, at: Instant, frame: Option<u64>) {
+        self.last_unanswered = self.last_unanswered.max(Some(at));
         if self.silent.is_none() {
             let since = Seen::new((), at, frame);
             self.silent = Some(since);

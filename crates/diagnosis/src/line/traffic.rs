@@ -159,6 +159,9 @@ pub struct Traffic {
     /// Datagrams that nobody answered: their frame never came back, or came back with working
     /// counter 0 where an answer was expected.
     pub unanswered: u64,
+    /// Those of them whose frame came back, while process data were exchanged: a MainDevice that starts asks for what is
+    /// not there.
+    pub unanswered_alone: u64,
     /// Datagrams that somebody answered.
     pub answered: u64,
     /// The first unanswered one.

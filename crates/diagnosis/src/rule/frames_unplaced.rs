@@ -98,7 +98,12 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let (Some(first), Some(last)) = (lost.first, lost.last) else { return None };
     // A recorder that misses requests misses returns, too.
     let is_recorder = traffic.unrecorded.sum > 0 || traffic.datagrams_cut > 0 || traffic.missed > 0;
-    if lost.sum < SEVERAL || line.sees_all_orders || traffic.is_one_sided() || is_recorder {
+    // What is lost in a row is another rule's; it is not known yet whether the latest one is the first of many.
+    let in_a_row = traffic.silences.iter().map(|one| one.frames).filter(|frames| *frames > SEVERAL);
+    let single = lost.sum.saturating_sub(in_a_row.sum());
+    let went_on = traffic.latest_returned.is_some_and(|returned| returned.at > last);
+    if single < SEVERAL || !went_on || line.sees_all_orders || traffic.is_one_sided() || is_recorder
+    {
         return None;
     }
     let explains = |one: &Condition| {
@@ -117,7 +122,8 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         return None;
     }
     let damaged = line.host.is_watched.then_some(line.host.card(Path::A).crc.sum);
-    let condition = causes(view, damaged.unwrap_or(0), damaged.is_some(), first);
+    // Many cards count no damaged frame at all: none counted proves nothing.
+    let condition = causes(view, damaged.unwrap_or(0), false, first);
     let count = lost.sum;
     let text = format!(
         "{count} of {} frames did not come back, single ones or a few in a row, the last at {last}",

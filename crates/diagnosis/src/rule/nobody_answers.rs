@@ -280,6 +280,15 @@ fn cut(line: &Line, at: Instant, carrier: Option<bool>) -> Condition {
     // Without a carrier it is the first hop for sure; with one, something forwards nothing.
     let (open, off, dead_link) = match carrier {
         Some(false) => (0.6, 0.3, 0.0),
+        // Nobody looks for the place, and each link of the line may be the one.
+        Some(true) if !line.sees_all_orders => {
+            let network = Place::Network { network: line.network };
+            return Condition::new(&PAGE, network, FaultName::FalseLink, at)
+                .confidence(0.5)
+                .or_at(FaultName::FalseLink, first_link(line), 0.2)
+                .or_at(FaultName::NicDamaged, Place::Host, CARD)
+                .or_at(FaultName::LinkOpen, first_link(line), 0.1);
+        }
         Some(true) => {
             return Condition::new(&PAGE, first_link(line), FaultName::FalseLink, at)
                 .confidence(0.5)

@@ -42,8 +42,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// Who did not answer for so long was away.
 const LONG: Span = Span::ms(100);
-/// Who comes back has its station address again after so long at most; what came between belongs to one absence.
-const ADDRESSED_WITHIN: Span = Span::ms(500);
+/// A link that was lost so often flaps.
+const FLAPS: usize = 3;
 /// An absence that has been over for so long is history.
 const TOLD_FOR: Span = Span::ms(2_500);
 
@@ -62,12 +62,20 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         })
     };
     let branches = silent_branches(view);
+    let (restarted, branches): (Vec<Branch>, Vec<Branch>) =
+        branches.into_iter().partition(|branch| branch.was_without_supply(line));
     for branch in &branches {
         conditions.push(cut_off(line, branch));
     }
+    for branch in &restarted {
+        conditions.push(without_supply(line, branch));
+    }
     for (device, absence) in away() {
-        // The link says it all of one alone.
-        if branches.iter().any(|branch| branch.devices == [device.id]) {
+        // The link says it all of one alone, and the first one without supply all of those behind it.
+        let is_told = |branch: &Branch| branch.devices.contains(&device.id);
+        if branches.iter().any(|branch| branch.devices == [device.id])
+            || restarted.iter().any(is_told)
+        {
             continue;
         }
         let silent = absence.since;
@@ -76,7 +84,22 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         let new = |cause| Condition::new(&PAGE, place, cause, silent.at);
         let is_cut_off = is_cut_off(device.id.index())
             || branches.iter().any(|branch| branch.devices.contains(&device.id));
-        let mut condition = if is_cut_off {
+        let restarted = device.lost_address.filter(|seen| seen.at >= silent.at);
+        let mut condition = if let Some(seen) = restarted.filter(|_| !is_cut_off) {
+            let address = table::STATION_ADDRESS.address;
+            let text = format!(
+                "{label} answers at its position without its station address: it was without supply, or its \
+                 controller was reset; an open link leaves the address as it is"
+            );
+            new(FaultName::DeviceOff)
+                .confidence(0.5)
+                .or(FaultName::BrownOut, 0.3)
+                .or(FaultName::SupplyOff, 0.1)
+                .advise(format!(
+                    "Look at the supply of {label}: its plug, its terminals, its fuse."
+                ))
+                .shown_by(Evidence::register(device.id, address, &seen, text))
+        } else if is_cut_off {
             // Why is for the finding above.
             new(FaultName::LinkOpen).confidence(0.6).or(FaultName::DeviceOff, 0.3)
         } else {
@@ -117,21 +140,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 /// The absence of a SubDevice that lasts, or was over a moment ago. While addresses are given nobody answers to them
 /// for a while.
 fn absence(view: &View<'_>, device: &Device) -> Option<Absence> {
-    let mut before = device.absences.iter().rev();
-    let mut latest = match device.silent {
-        Some(since) => Absence { since, ended: None },
-        None => *before.next()?,
-    };
-    // Who comes back answers to its position first, and to its address when it has it again.
-    for earlier in before {
-        match earlier.ended {
-            Some(ended) if latest.since.at.since(ended) <= ADDRESSED_WITHIN => {
-                latest.since = earlier.since;
-            }
-            Some(_) => break,
-            None => {}
-        }
-    }
+    let latest = *device.joined_absences().last()?;
     let Some(ended) = latest.ended else { return Some(latest) };
     let is_told = ended.since(latest.since.at) >= LONG && view.now.since(ended) <= TOLD_FOR;
     is_told.then_some(latest)
@@ -164,13 +173,56 @@ fn silent_branches(view: &View<'_>) -> Vec<Branch> {
         Some(tree) => in_tree(line, tree, &is_silent, &away),
         None => in_order(line, &is_silent, &away).into_iter().collect(),
     };
-    // Who started anew was without supply, and a link tells nothing of that.
-    let has_restarted = |id: &DeviceId| line.device(*id).is_some_and(Device::has_restarted);
-    let is_open = |branch: &Branch| {
-        !is_up(line, branch)
-            && (branch.ended.is_none() || !branch.devices.iter().any(has_restarted))
+    branches.into_iter().filter(|branch| !is_up(line, branch)).collect()
+}
+
+impl Branch {
+    /// Whether one of them has started anew since: it was without supply, and no link that opens does that.
+    fn was_without_supply(&self, line: &Line) -> bool {
+        let has_restarted = |id: &DeviceId| line.device(*id).is_some_and(Device::has_restarted);
+        self.ended.is_some() && self.devices.iter().any(has_restarted)
+    }
+}
+
+/// The first of some that fell silent together and have started anew.
+fn without_supply(line: &Line, branch: &Branch) -> Condition {
+    let since = branch.since;
+    let first = branch.devices.first().copied().unwrap_or_default();
+    let label = line.label(first);
+    let behind = match branch.devices.len() {
+        0 | 1 => String::new(),
+        count => format!(" and {} behind it", count - 1),
     };
-    branches.into_iter().filter(is_open).collect()
+    let lasted = match branch.ended {
+        Some(ended) => format!(" for {}", ended.since(since.at)),
+        None => String::new(),
+    };
+    let text = format!(
+        "{label}{behind} did not answer{lasted}, and what has answered since has started anew: an open link \
+         leaves states and station addresses as they are"
+    );
+    let all = branch.devices.iter().copied();
+    let condition =
+        Condition::new(&PAGE, Place::device(line.network, first), FaultName::DeviceOff, since.at)
+            .confidence(0.4)
+            .or(FaultName::SupplyOff, 0.3)
+            .or(FaultName::BrownOut, 0.2)
+            .confirmed(since.at)
+            .about([Symptom::Silent(first)])
+            .explaining(all.flat_map(|id| {
+                [
+                    Symptom::Silent(id),
+                    Symptom::WorkingCounter(id),
+                    Symptom::StateLost(id),
+                    Symptom::Mailbox(id),
+                ]
+            }))
+            .shown_by(Evidence::register(first, table::AL_STATUS.address, &since, text))
+            .advise(format!("Look at the supply of {label}: its plug, its terminals, its fuse."));
+    match branch.ended {
+        Some(ended) => condition.ended(ended),
+        None => condition,
+    }
 }
 
 /// Whether broadcasts went on counting all: who still counts is there, and has lost its address.
@@ -180,7 +232,11 @@ fn counts_all(line: &Line, away: &[Option<Absence>]) -> bool {
         return false;
     };
     let since = || away.iter().flatten().map(|absence| absence.since.at);
-    let lasts = away.iter().flatten().any(|absence| absence.ended.is_none());
+    // Who was not asked again since all were counted may have come back with them.
+    let lasts = away.iter().zip(&line.devices).any(|(absence, device)| {
+        absence.is_some_and(|absence| absence.ended.is_none())
+            && device.last_unanswered.is_none_or(|last| last >= now.at)
+    });
     usize::from(now.value) >= line.devices.len()
         && since().max().is_some_and(|latest| read >= latest)
         && (lasts || since().min().is_some_and(|first| now.at < first))
@@ -285,10 +341,24 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
         Some(ended) => format!("{text}; for {}, then again", ended.since(since.at)),
     };
     let all = branch.devices.iter().copied();
-    let condition = Condition::new(&PAGE, place, FaultName::LinkOpen, since.at)
-        .confidence(open)
-        .or_at(FaultName::DeviceOff, device, off)
-        .or_at(FaultName::SupplyOff, device, supply)
+    // A link that comes and goes takes the same shares from process data, again and again.
+    let outages = line.cyclic.iter().map(|cyclic| cyclic.deficits.len()).max().unwrap_or(0);
+    let flaps = outages >= FLAPS;
+    let causes = match flaps {
+        true => Condition::new(&PAGE, place, FaultName::LinkFlapping, since.at)
+            .confidence(0.5)
+            .or(FaultName::LinkOpen, 0.25)
+            .or_at(FaultName::BrownOut, device, 0.1),
+        false => Condition::new(&PAGE, place, FaultName::LinkOpen, since.at)
+            .confidence(open)
+            .or_at(FaultName::DeviceOff, device, off)
+            .or_at(FaultName::SupplyOff, device, supply),
+    };
+    let text = match flaps {
+        true => format!("{text}; process data lacked shares {outages} times"),
+        false => text,
+    };
+    let condition = causes
         .confirmed(since.at)
         .about(all.clone().map(Symptom::Silent))
         .explaining(all.flat_map(|id| {

@@ -86,8 +86,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 /// The pause that let a watchdog expire.
 fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause, Option<Path>)> {
     let watchdog = device.watchdog.span()?;
+    // Where nobody saw whose process data they are, they may be its own.
     let mine = line.cyclic.iter().filter(|cyclic| {
-        line.owners(cyclic).any(|owner| owner.device == device.id && owner.writes)
+        let mut owners = line.owners(cyclic).peekable();
+        owners.peek().is_none() || owners.any(|owner| owner.device == device.id && owner.writes)
     });
     for cyclic in mine {
         let of = |beat: &Beat| {

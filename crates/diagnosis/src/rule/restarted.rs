@@ -157,7 +157,7 @@ fn outage(line: &Line, device: &Device, change: &AlChange) -> Option<(Instant, I
     // request of its own then, but those that it has no address for after its start.
     let silences = line.traffic.silences.iter().rev();
     let silences = silences.map(|one| (one.since.at, one.ended.unwrap_or(change.at)));
-    let absences = device.absences.iter().rev();
+    let absences = device.joined_absences().into_iter().rev();
     let absences = absences.map(|absence| (absence.since.at, absence.ended.unwrap_or(change.at)));
     // A recording has nothing of the time in which the card had no link.
     let quiet = line.quiet().map(|pause| (pause.from, pause.to));
@@ -252,6 +252,9 @@ fn consequences(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
         }
         if tree.upstream(id.index()).is_some_and(|end| end.node().is_none()) {
             follows.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
+            if fall.gone.is_some() {
+                follows.push(Symptom::FramesLost);
+            }
         }
     }
     // Its own fall is what it is about, not what follows.

@@ -190,7 +190,11 @@ fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Conditi
 }
 
 fn page_of(error: &AlError) -> &'static RulePage {
-    if !error.had_arrived {
+    // Who was higher before and was asked for nothing has left; a watchdog watches those that are in OP alone.
+    let fell = error.from.is_some_and(|from| error.status.value.state().state() < Some(from));
+    let is_watchdog = error.code.is_some_and(|code| code.value == WATCHDOG_CODE);
+    let has_left = error.had_arrived || error.requested.is_none() && (fell || is_watchdog);
+    if !has_left {
         return &REFUSED;
     }
     match error.code.map(|code| code.value) {

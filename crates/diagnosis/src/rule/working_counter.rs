@@ -46,6 +46,9 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 /// earlier or later still belongs to the deficit.
 const AROUND: Span = Span::ms(1500);
 
+/// So many deficits of one datagram have one cause that comes and goes.
+const FLAPS: usize = 3;
+
 /// So soon after a deficit states and links have been read anew.
 const ASKED: Span = Span::ms(200);
 
@@ -293,7 +296,12 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     let known = first_suspect
         .and_then(|device| deficits.iter().find_map(|(_, at)| trouble(device, at, view.now)));
     let nobody_known = suspects.devices.is_empty() && lasts;
+    // Again and again for a moment: a contact that opens, and nothing that hangs.
+    let is_flapping = suspects.devices.is_empty() && deficits.len() >= FLAPS;
     let (cause, confidence, others) = match known {
+        None if is_flapping => {
+            (FaultName::LinkFlapping, 0.4, [(FaultName::LinkOpen, 0.2), (FaultName::BrownOut, 0.1)])
+        }
         // All behind a link, or nobody knows whose: a cable, or the supply of a device, takes shares for good.
         _ if !links.is_empty() => {
             (FaultName::LinkOpen, 0.5, [(FaultName::DeviceOff, 0.2), (FaultName::SupplyOff, 0.1)])

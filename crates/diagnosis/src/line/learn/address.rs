@@ -387,6 +387,12 @@ impl Addresses {
     pub(super) fn read(&mut self, line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         let Some(station) = word_at(answer.reply.data(), answer.ado, STATION) else { return };
         let station = StationAddress(station);
+        if station.0 == 0
+            && let Some(device) = line.device_mut(id)
+            && device.station.is_some_and(|had| had.0 != 0)
+        {
+            device.lost_address = Some(Seen::new((), answer.at, Some(answer.frame)));
+        }
         let may_be_wrong = self.has_guessed || self.is_by_address;
         if may_be_wrong && answer.effect.addressing == Addressing::Position {
             self.correct(line, id, station);

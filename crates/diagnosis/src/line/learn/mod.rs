@@ -185,6 +185,7 @@ impl Learner {
             line.traffic.datagrams += 1;
             if is_expected && answer.sum == 0 {
                 line.traffic.unanswered += 1;
+                line.traffic.unanswered_alone += u64::from(!line.cyclic.is_empty());
                 let seen = Seen::new((), answer.at, Some(answer.frame));
                 line.traffic.first_unanswered.get_or_insert(seen);
             } else if answer.sum > 0 {
