@@ -19,8 +19,9 @@ pub(super) const CONFIGURED_ADDRESSES: Range<u32> = 0x0100_0000..0x0A00_0000;
 const SOEM_SOURCE: MacAddress = MacAddress([0x01; 6]);
 /// ethercrab: every byte 0x10, see `lib.rs`.
 const ETHERCRAB_SOURCE: MacAddress = MacAddress([0x10; 6]);
-/// KickCAT: `PRIMARY_IF_MAC` and `SECONDARY_IF_MAC`.
-const KICKCAT_SOURCES: [MacAddress; 2] = [
+/// KickCAT: `PRIMARY_IF_MAC` of its versions, and `SECONDARY_IF_MAC`.
+const KICKCAT_SOURCES: [MacAddress; 3] = [
+    MacAddress([0xCA, 0xDE, 0xCA, 0xDE, 0xDE, 0xFF]),
     MacAddress([0x02, 0xCA, 0xCA, 0x0F, 0xFF, 0xFF]),
     MacAddress([0x02, 0xC0, 0xFF, 0xEE, 0x00, 0xFF]),
 ];

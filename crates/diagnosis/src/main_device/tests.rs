@@ -183,7 +183,7 @@ fn twincat_is_recognised_by_its_cycle_and_the_counters_it_clears() {
 
 #[test]
 fn kickcat_and_ethercrab_are_recognised_by_source_and_stations() {
-    let mut kickcat = Script::new([0x02, 0xCA, 0xCA, 0x0F, 0xFF, 0xFF]);
+    let mut kickcat = Script::new([0xCA, 0xDE, 0xCA, 0xDE, 0xDE, 0xFF]);
     kickcat.send(&[(BWR, 0, 0, 0x0600, &[0; 256])]);
     kickcat.send(&[(APWR, 0, 0, 0x0010, &1001_u16.to_le_bytes())]);
     assert_eq!(kickcat.kind(), (MainDeviceKind::Kickcat, Certainty::Likely));
