@@ -1,7 +1,7 @@
 //! Frames in, findings out: where, why and what to do.
 //!
 //! [`observe`] pairs what went out with what came back, [`mod@line`] is what is known of the network,
-//! each [`rule`] looks at the line for one kind of trouble, [`finding`] gives conditions a life,
+//! [`main_device`] recognises who drives it, each [`rule`] looks at the line for one kind of trouble, [`finding`] gives conditions a life,
 //! [`coverage`] says what could be judged at all, and [`report`] is the answer as people and programs read it. [`Engine`] drives them all.
 
 pub mod coverage;
@@ -9,6 +9,7 @@ pub mod engine;
 pub mod finding;
 pub mod line;
 pub mod locate;
+pub mod main_device;
 pub mod observation_file;
 pub mod observe;
 pub mod pasted;

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::finding::Place;
 use crate::line::Line;
+use crate::main_device::{MainDeviceKind, next_step};
 
 /// A way by which evidence came in: it decides which next steps there are.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
@@ -412,16 +413,18 @@ impl<'a> Basis<'a> {
         }
     }
 
+    /// The kind of the MainDevice that drives the line.
+    fn kind(&self) -> MainDeviceKind {
+        self.line.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind)
+    }
+
     /// The next step that gets error counters read.
     fn read_counters(&self) -> &'static str {
         match self.input {
             InputKind::Driven | InputKind::ReadOut => {
                 "clear and watch them: `linesman counters WHERE --clear --for 60`"
             }
-            InputKind::Listened | InputKind::Recorded => {
-                "read the error counters with the MainDevice's own tool, or with `linesman counters WHERE --for \
-                 60` while the line is idle"
-            }
+            InputKind::Listened | InputKind::Recorded => next_step::error_counters(self.kind()),
             InputKind::Typed => {
                 "clear the error counters, wait, read them again, and give both readings"
             }

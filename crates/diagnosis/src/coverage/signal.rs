@@ -10,6 +10,7 @@ use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 use crate::finding::{LinkDirection, Place};
 use crate::line::{CounterTrack, Device, Line};
 use crate::locate::Survey;
+use crate::main_device::next_step;
 
 /// So many frames that came back, with none lost, show that a link whose counter is full spoils no frames.
 const MANY_FRAMES: u64 = 2_000;
@@ -150,9 +151,7 @@ pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
     let step = match basis.input {
         InputKind::Typed => "give `ports.A = { link = …, lost_link = … }` of each SubDevice",
         InputKind::Driven | InputKind::ReadOut => "read it: `linesman counters WHERE --for 60`",
-        InputKind::Listened | InputKind::Recorded => {
-            "read DL status (0x0110) and 0x0310 to 0x0313 with the MainDevice's own tool"
-        }
+        InputKind::Listened | InputKind::Recorded => next_step::link_status(basis.kind()),
     };
     all.lacks(extent, Gap::new(Reason::LinkStatusNotRead, text).at(places).step(step));
     all

@@ -18,7 +18,7 @@ use crate::line::{Line, Seen, search};
 use crate::observe::{
     Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, companion,
 };
-use crate::report::{self, Diagnosis, NetworkReport, Number, Verdict};
+use crate::report::{self, Diagnosis, MainDeviceReport, NetworkReport, Number, Verdict};
 use crate::rule::{RULES, View};
 
 pub use setup::{Asked, Event, EventKind, Probe, ProbeEffect, Setup};
@@ -194,6 +194,7 @@ impl Engine {
             complete: self.is_complete,
             verdict: self.verdict(&coverage),
             network: self.network_report(),
+            main_device: self.main_device(),
             devices: report::device::reports(self.line(Network(0))),
             coverage: report::coverage::report(&coverage),
             understood: None,
@@ -374,6 +375,12 @@ impl Engine {
         }
     }
 
+    /// The MainDevice, where it is another program.
+    fn main_device(&self) -> Option<MainDeviceReport> {
+        let is_other = matches!(self.setup.input, InputKind::Listened | InputKind::Recorded);
+        self.line(Network(0)).filter(|_| is_other).and_then(report::main_device::report)
+    }
+
     fn network_report(&self) -> NetworkReport {
         let lines = || self.networks.iter().map(|watched| &watched.line);
         let sum = |count: fn(&Line) -> u64| Number(lines().map(count).sum());
@@ -455,6 +462,10 @@ fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     if has_other_senders {
         traffic.senders = pairing.senders().to_vec();
     }
+    if matches!(outcome, Outcome::Request | Outcome::ReturnAlone) {
+        line.habits.take(&view, frame.time, outcome == Outcome::Request);
+    }
+    let traffic = &mut line.traffic;
     match outcome {
         Outcome::Request | Outcome::RequestCopy => traffic.sent += 1,
         Outcome::Return | Outcome::ReturnAlone => {

@@ -30,6 +30,8 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 
+use crate::main_device::Habits;
+
 pub use al_history::{AlChange, AlError, AlHistory, StateRequest};
 pub use beat::{Beat, Off, Pause};
 pub use clock::{ClockHistory, Reference};
@@ -103,6 +105,8 @@ pub struct Line {
     pub sees_all_orders: bool,
     /// Process data that were planned: working counters that are expected from the start.
     pub planned_exchange: PlannedExchange,
+    /// Habits of the MainDevice by which it is recognised.
+    pub habits: Habits,
     /// What the host noticed.
     pub host: HostHistory,
     /// Logical datagrams that are sent again and again.

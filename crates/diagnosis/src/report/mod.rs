@@ -7,6 +7,7 @@ pub mod build;
 mod calibration;
 pub mod coverage;
 pub mod device;
+pub mod main_device;
 pub mod number;
 
 use linesman_config::fault::{Class, FaultName};
@@ -16,6 +17,7 @@ pub use crate::finding::{EvidenceKind, Severity};
 pub use crate::pasted::Understood;
 pub use coverage::CoverageReport;
 pub use device::DeviceReport;
+pub use main_device::MainDeviceReport;
 pub use number::Number;
 
 /// Name and version of the format.
@@ -41,6 +43,10 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The network as a whole.
     pub network: NetworkReport,
+    /// The MainDevice that drives the line, as far as its requests tell; `null` where this program drives it, or where
+    /// there are no frames.
+    #[serde(default)]
+    pub main_device: Option<MainDeviceReport>,
     /// The SubDevices, as far as the input says who they are.
     #[serde(default)]
     pub devices: Vec<DeviceReport>,

@@ -1,0 +1,49 @@
+"""Linesman listens beside SOEM, KickCAT and ethercrab while a fault comes: it says what is so, or that it cannot tell.
+
+What may be said in which case stands in beside_matrix.py, what is said wrong still in its KNOWN_WRONG: a cell that is
+wrong and not there fails, and so does one that is there and not wrong any more. A case that disagrees is played again, as
+it may have been the host.
+"""
+
+from beside_matrix import GOOD, agrees, document_outcomes, known_wrong, settled
+from harness import check
+
+
+def beside(line, name):
+    cells = settled([name])
+    odd = [cell for cell in cells if not agrees(cell)]
+    assert not odd, "; ".join(told(cell) for cell in odd)
+    right = sum(cell.outcome in GOOD for cell in cells)
+    line.notes.append(f"{right} of {len(cells)} cells admissible, the others are known")
+    written = document_outcomes(name)
+    differing = [cell.key() for cell in cells if written.get(cell.key()) != (not known_wrong(cell))]
+    assert not differing, f"docs/guide/beside.md tells otherwise of {differing}: `beside_matrix.py --write` writes it"
+
+
+def told(cell):
+    what = "is right now, and stands in KNOWN_WRONG" if cell.outcome in GOOD else f"is wrong ({cell.outcome})"
+    return f"{cell.client}, {cell.name}, {cell.when} {what}: {cell.said}"
+
+
+@check
+def a_listener_beside_soem_says_nothing_wrong_of_any_fault(line):
+    beside(line, "SOEM")
+
+
+@check
+def a_listener_beside_kickcat_says_nothing_wrong_of_any_fault(line):
+    beside(line, "KickCAT")
+
+
+@check
+def a_listener_beside_ethercrab_says_nothing_wrong_of_any_fault(line):
+    beside(line, "ethercrab")
+
+
+for one in (
+    a_listener_beside_soem_says_nothing_wrong_of_any_fault,
+    a_listener_beside_kickcat_says_nothing_wrong_of_any_fault,
+    a_listener_beside_ethercrab_says_nothing_wrong_of_any_fault,
+):
+    # Namespaces of its own: there is nothing on the cable of the check itself.
+    one.spoils_frames = True
