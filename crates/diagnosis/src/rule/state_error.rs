@@ -109,7 +109,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             }
         }
         for (page, error, times) in pages {
-            if !may_be_left_over(view, error) {
+            if !may_be_left_over(view, error) && !is_echo(error) {
                 conditions.push(condition(view, device, page, error, times));
             }
         }
@@ -125,6 +125,13 @@ fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
         && view.line.traffic.frames > 0
         && was_left_over(view.line, error)
         && error.ended.is_none()
+}
+
+/// Whether an error bit may be the acknowledgement that a MainDevice writes with each request: a SubDevice whose
+/// controller emulates the device copies AL control to AL status, error bit and all, and has no AL status code
+/// (register 0x0140 bit 8). Only one that stood from the first reading on, so that nobody saw it come.
+fn is_echo(error: &AlError) -> bool {
+    error.was_left_over() && error.code.is_some_and(|code| code.value == AlStatusCode(0))
 }
 
 /// Whether an error is of a time before this run: where process data went on while it stood, it belongs to them.

@@ -15,14 +15,16 @@
 //! In a ring that is open each card has positions of its own. Those of card B begin at the gap, so they follow
 //! upon those of card A (S1 chapter 3: who is entered from behind is processed on the way back).
 
+mod unanswered;
+
 use std::collections::BTreeMap;
 
 use linesman_proto::address::{DeviceId, Path, Position, StationAddress};
 use linesman_proto::command::Addressing;
-use linesman_proto::time::{Instant, Span};
 
 use super::{Answer, word_at};
 use crate::line::{Device, Line, Seen, SharedBy};
+use unanswered::Unanswered;
 
 /// Most controllers that are learnt from frames.
 const MOST_DEVICES: usize = 4096;
@@ -32,28 +34,6 @@ const STATION: u16 = 0x0010;
 const FIRST_STATIONS: [u16; 4] = [0x1001, 1001, 1, 0x1000];
 /// A station address that lies farther from the first one tells no place, as long as nobody has counted.
 const MOST_BY_NUMBER: usize = 1000;
-/// Asked so often in vain, and over so long, a station address is that of a SubDevice which should be there.
-const ASKED_IN_VAIN: u64 = 3;
-const ASKED_FOR: Span = Span::ms(20);
-/// Most station addresses without an answer that are followed.
-const MOST_UNANSWERED: usize = 512;
-
-/// A station address that never answered.
-#[derive(Clone, Copy, Debug)]
-struct Unanswered {
-    first: Seen<()>,
-    last: Instant,
-    times: u64,
-    /// Whether others had answered at theirs before.
-    others_answer: bool,
-}
-
-impl Unanswered {
-    /// Whether it was asked often enough, and for long enough, that somebody expects a SubDevice there.
-    fn is_expected(&self) -> bool {
-        self.times >= ASKED_IN_VAIN && self.last.since(self.first.at) >= ASKED_FOR
-    }
-}
 
 /// What positions and station addresses mean at the moment.
 #[derive(Clone, Default, Debug)]
@@ -245,56 +225,6 @@ impl Addresses {
     /// Whether single controllers were named, so that their numbers stay.
     pub(super) const fn name(&mut self) {
         self.is_named = true;
-    }
-
-    /// A station address of no controller was asked, and nobody answered.
-    pub(super) fn asked_in_vain(
-        &mut self,
-        line: &mut Line,
-        station: StationAddress,
-        seen: Seen<()>,
-    ) {
-        let count = self.unanswered.len();
-        match self.unanswered.get_mut(&station) {
-            Some(known) => (known.last, known.times) = (seen.at, known.times + 1),
-            None if count < MOST_UNANSWERED => {
-                let others_answer = !self.stations.is_empty();
-                let unanswered = Unanswered { first: seen, last: seen.at, times: 1, others_answer };
-                self.unanswered.insert(station, unanswered);
-                line.asked_in_vain.push(station);
-            }
-            None => {}
-        }
-    }
-
-    /// Makes controllers of station addresses that were asked often enough in vain, where others answer: somebody
-    /// expects a SubDevice there. Says whether there are new ones.
-    pub(super) fn expect_unanswered(&mut self, line: &mut Line) -> bool {
-        let is_planned = line.devices.iter().any(|one| one.planned.is_some());
-        if self.is_named || is_planned || self.stations.is_empty() {
-            return false;
-        }
-        let wanted: Vec<(StationAddress, Seen<()>)> = self
-            .unanswered
-            .iter()
-            .filter(|(_, one)| one.is_expected())
-            .map(|(station, one)| (*station, one.first))
-            .collect();
-        for (station, first) in &wanted {
-            if line.devices.len() >= MOST_DEVICES {
-                break;
-            }
-            // It may have been counted while it was there, though nobody asked for it by its address then.
-            let counted = self.by_number(line, *station);
-            let counted = counted.filter(|id| line.device(*id).is_some_and(Self::is_free));
-            let id = counted.unwrap_or_else(|| line.add_device());
-            self.give(line, id, *station);
-            self.has_guessed |= counted.is_none();
-            if let Some(device) = line.device_mut(id) {
-                device.is_silent(first.at, first.frame);
-            }
-        }
-        !wanted.is_empty()
     }
 
     /// Whether the order of controllers is known: from their positions, or by [`Self::settle`].
