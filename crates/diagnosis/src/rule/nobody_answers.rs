@@ -122,7 +122,7 @@ fn told(view: &View<'_>) -> Option<Condition> {
     let devices = line.devices.iter().map(|device| device.id);
     let follows = devices
         .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
-    let condition = cut(line, at, carrier)
+    let condition = cut(line, at, carrier, false)
         .confirmed(at)
         .shown_by(Evidence::host(Some(at), text))
         .about([Symptom::NobodyAnswers])
@@ -206,7 +206,11 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         (Some(found), ..) => placed(line, since.at, found),
         (None, true, _) => spoiling(line, since.at),
         (None, false, true) => hole(view, silence),
-        (None, false, false) => cut(line, since.at, carrier.filter(|_| lasted >= CARRIER_LATE)),
+        (None, false, false) => {
+            let carrier = carrier.filter(|_| lasted >= CARRIER_LATE);
+            // A search that closed ports in vain leaves the first link.
+            cut(line, since.at, carrier, search::began(line, silence).is_some())
+        }
     };
     condition = condition.shown_by(Evidence::frame(since.at, frame, text));
     if is_spoiled {
@@ -276,12 +280,12 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
 }
 
 /// Frames do not come back at all: the first hop, or what is behind it.
-fn cut(line: &Line, at: Instant, carrier: Option<bool>) -> Condition {
+fn cut(line: &Line, at: Instant, carrier: Option<bool>, was_searched: bool) -> Condition {
     // Without a carrier it is the first hop for sure; with one, something forwards nothing.
     let (open, off, dead_link) = match carrier {
         Some(false) => (0.6, 0.3, 0.0),
         // Nobody looks for the place, and each link of the line may be the one.
-        Some(true) if !line.sees_all_orders => {
+        Some(true) if !line.sees_all_orders && !was_searched => {
             let network = Place::Network { network: line.network };
             return Condition::new(&PAGE, network, FaultName::FalseLink, at)
                 .confidence(0.5)
