@@ -3,6 +3,8 @@
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
+use crate::habit::Habit;
+
 /// What a lab does with its line from the start.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum Begin {
@@ -18,6 +20,9 @@ pub enum Begin {
 /// Choices for a lab.
 #[derive(Clone, Debug)]
 pub struct LabOptions {
+    /// How the MainDevice drives the line. Beside another habit than ours the diagnosis listens: it is shown what the
+    /// cards have sent and received, and asks for nothing.
+    pub habit: Habit,
     /// State the line is driven to.
     pub target: AlState,
     /// Cycle of the process data.
@@ -46,6 +51,7 @@ pub struct LabOptions {
 impl Default for LabOptions {
     fn default() -> Self {
         Self {
+            habit: Habit::Own,
             target: AlState::Op,
             cycle: Span::ms(2),
             host_counters: true,

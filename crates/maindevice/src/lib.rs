@@ -26,7 +26,7 @@ pub use cyclic::{FrameStatus, Quality};
 pub use event::Event;
 pub use exchange::{Access, DatagramData, ExchangeError, Reply, Request, Target, Transmit};
 pub use main_device::{MainDevice, ProbeRequest};
-pub use options::Options;
+pub use options::{CounterPoll, Options, Polling, Rounds};
 pub use statistics::Statistics;
 pub use supervisor::{BringUpTimes, DeviceTimes, Phase, StartUpError};
 pub use watch::Watch;

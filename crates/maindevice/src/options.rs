@@ -22,7 +22,9 @@ pub struct Options {
     /// datagrams with outputs are sent without them, so that the watchdogs of SubDevices expire;
     /// `None`: it may be as late as it likes. It counts from the first outputs that it gives.
     pub allowed_misses: Option<u32>,
-    /// How often each SubDevice's error counters, DL status and AL status are read while running.
+    /// What is read while running, to watch the SubDevices.
+    pub polling: Polling,
+    /// How often it is read.
     pub watch_interval: Span,
     /// Counter registers stop at 255. When one has reached this, all error counters of the SubDevice are read
     /// and cleared in one frame, and the totals go on; `None`: never, as where somebody else clears them.
@@ -55,6 +57,62 @@ pub struct Options {
     pub retry_after: [Span; 2],
 }
 
+/// Registers that a running MainDevice reads beside process data, to watch its SubDevices.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Polling {
+    /// AL status, DL status and error counters of each SubDevice, at intervals and as soon as process data
+    /// show a change.
+    #[default]
+    EachDevice,
+    /// AL status of all by one broadcast read, at intervals; only when that is not as it should be, AL status of
+    /// each SubDevice.
+    Rounds(Rounds),
+    /// None: what process data show is all that is known.
+    Nothing,
+}
+
+/// Registers that are read with AL status of all.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Rounds {
+    /// DL status of each SubDevice, together with its AL status.
+    pub links: bool,
+    /// Error counters of each SubDevice, in each round.
+    pub counters: CounterPoll,
+}
+
+/// A way to watch error counters.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum CounterPoll {
+    /// They are not read.
+    #[default]
+    None,
+    /// All of them are read, 0x0300 to 0x0313.
+    Read,
+    /// Those of the ports, 0x0300 to 0x0307, are read, then cleared by one broadcast write.
+    ReadAndCleared,
+}
+
+impl Polling {
+    /// Whether error counters are read.
+    #[must_use]
+    pub const fn reads_counters(self) -> bool {
+        match self {
+            Self::EachDevice => true,
+            Self::Rounds(rounds) => !matches!(rounds.counters, CounterPoll::None),
+            Self::Nothing => false,
+        }
+    }
+
+    /// Whether DL status of a SubDevice is read together with its AL status.
+    pub(crate) const fn reads_links(self) -> bool {
+        match self {
+            Self::EachDevice => true,
+            Self::Rounds(rounds) => rounds.links,
+            Self::Nothing => false,
+        }
+    }
+}
+
 impl Options {
     /// The same on a line of so many SubDevices, on which a frame is under way for so long: on one of
     /// thousands that is longer than is usually waited for, and more frames have to be out at once.
@@ -83,6 +141,7 @@ impl Default for Options {
             repeats: 3,
             frames_at_once: 4,
             allowed_misses: None,
+            polling: Polling::default(),
             watch_interval: Span::ms(100),
             clear_counters_at: Some(128),
             mailbox_interval: Span::ms(50),

@@ -14,6 +14,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::Outgoing;
 
 use super::{AT_ONE_INSTANT, Lab, LabError};
+use crate::habit::Habit;
 use crate::options::Begin;
 
 /// How many events are kept; the oldest go first.
@@ -40,7 +41,9 @@ impl Lab {
     pub(super) fn drain(&mut self) -> Result<(), LabError> {
         let mut transmit = std::mem::take(&mut self.transmit);
         let mut count = 0_u32;
-        while let Some(sent) = self.main.poll_transmit(self.now, &mut transmit) {
+        while !self.is_paused()
+            && let Some(sent) = self.main.poll_transmit(self.now, &mut transmit)
+        {
             let at = sent.at.max(self.now);
             let frame = &transmit[..sent.len];
             self.show(Direction::Sent, sent.path, at, frame);
@@ -105,15 +108,22 @@ impl Lab {
             truncated: false,
             bytes,
         };
-        self.engine.handle_frame(&seen);
+        if self.options.habit == Habit::Own {
+            self.engine.handle_frame(&seen);
+        }
         if let Some(tap) = &mut self.tap {
             tap(&seen);
         }
     }
 
-    /// Gives the recorder what was handed to the cards.
+    /// Whether somebody is shown what a capture tool on the computer is shown.
+    fn is_recorded(&self) -> bool {
+        self.recorder.is_some() || self.options.habit != Habit::Own
+    }
+
+    /// Gives the recorder, and a diagnosis that listens, what was handed to the cards.
     pub(super) fn record_outgoing(&mut self) {
-        if self.recorder.is_none() {
+        if !self.is_recorded() {
             return;
         }
         let mut bytes = std::mem::take(&mut self.outgoing);
@@ -123,14 +133,16 @@ impl Lab {
         self.outgoing = bytes;
     }
 
-    /// Gives the recorder a frame.
+    /// Gives the recorder, and a diagnosis that listens, a frame.
     pub(super) fn record(&mut self, direction: Direction, path: Path, time: Instant, bytes: &[u8]) {
-        let Some(recorder) = &mut self.recorder else { return };
+        if !self.is_recorded() {
+            return;
+        }
         if self.recorder_veil.as_mut().is_some_and(|veil| veil.hides(direction, bytes)) {
             return;
         }
         self.recorded += 1;
-        recorder(&FrameSeen {
+        let seen = FrameSeen {
             network: self.network,
             path: Some(path),
             direction,
@@ -139,7 +151,13 @@ impl Lab {
             fcs: None,
             truncated: false,
             bytes,
-        });
+        };
+        if self.options.habit != Habit::Own {
+            self.engine.handle_frame(&seen);
+        }
+        if let Some(recorder) = &mut self.recorder {
+            recorder(&seen);
+        }
     }
 
     fn handle_event(&mut self, event: Event) {
@@ -191,6 +209,7 @@ impl Lab {
             }
         }
         let options = PlanOptions { cycle, clock_datagrams, ..PlanOptions::default() };
+        let options = self.options.habit.plan(options);
         Plan::build(&planned, inventory.tree().clone(), &options).map_err(|error| error.to_string())
     }
 
@@ -210,7 +229,8 @@ impl Lab {
         for (device, node) in devices.iter_mut().zip(order) {
             device.target = self.target_of(DeviceId(*node as u32));
         }
-        Plan::build(&devices, resolved.tree, &resolved.options).map_err(|error| error.to_string())
+        let options = self.options.habit.plan(resolved.options);
+        Plan::build(&devices, resolved.tree, &options).map_err(|error| error.to_string())
     }
 
     /// Turns what the cards counted since the last look into host observations.

@@ -7,6 +7,7 @@
 mod error;
 mod exchange;
 mod object;
+mod pause;
 mod register;
 mod truth;
 mod veil;
@@ -33,7 +34,9 @@ use linesman_sim::truth::TruthLog;
 
 pub use error::LabError;
 
+use self::pause::Socket;
 use self::veil::Veil;
+use crate::habit::Habit;
 use crate::options::{Begin, LabOptions};
 
 /// How often the card's counters are looked at.
@@ -80,6 +83,7 @@ pub struct Lab {
     host_next: Instant,
     host_last: [Option<HostPort>; 2],
     paths: usize,
+    socket: Socket,
     arrival: Vec<u8>,
     outgoing: Vec<u8>,
     transmit: Vec<u8>,
@@ -115,13 +119,14 @@ impl Lab {
         let tree = project.tree()?;
         let network = Network(0);
         let paths = if file.ring.is_some() { 2 } else { 1 };
+        let is_own = options.habit == Habit::Own;
         let setup = Setup {
             exchange: linesman_config::plan::PlannedExchange::default(),
             project: options.project.then(|| project.clone()),
-            input: InputKind::Driven,
+            input: if is_own { InputKind::Driven } else { InputKind::Listened },
             host_counters: options.host_counters,
-            probes: options.probes,
-            active: options.active,
+            probes: options.probes && is_own,
+            active: options.active && is_own,
             source: match options.source.as_str() {
                 "" => format!("lab:{}", file.name),
                 source => source.to_owned(),
@@ -134,7 +139,7 @@ impl Lab {
             settings.drift_frames = DRIFT_FRAMES;
         }
         let settings = settings.on_line(segment.tree().len(), segment.longest_way());
-        let main = MainDevice::new(network, settings);
+        let main = MainDevice::new(network, options.habit.main_device(settings));
         let mut lab = Self {
             now: Instant::ZERO,
             network,
@@ -160,11 +165,13 @@ impl Lab {
             host_next: Instant::ZERO,
             host_last: [None; 2],
             paths,
+            socket: Socket::default(),
             arrival: Vec::with_capacity(FRAME),
             outgoing: Vec::with_capacity(FRAME),
             transmit: vec![0; FRAME],
             options,
         };
+        lab.segment.listen(!is_own);
         if lab.options.begin != Begin::Idle {
             lab.main.scan(lab.now);
         }
@@ -420,10 +427,10 @@ impl Lab {
         format!("{} {} ({state})", id.no(), self.segment.name(id))
     }
 
-    fn next_due(&self) -> (Instant, &'static str) {
+    fn next_due(&mut self) -> (Instant, &'static str) {
         let due = [
             (self.segment.poll_timeout(), "the segment"),
-            (self.main.poll_timeout(), "the MainDevice"),
+            (self.main_due(), "the MainDevice"),
             (self.engine.poll_timeout(), "the diagnosis"),
             (Some(self.host_next), "the card"),
         ];
@@ -436,7 +443,7 @@ impl Lab {
         self.segment.advance(self.now);
         self.record_outgoing();
         self.receive();
-        self.main.handle_timeout(self.now);
+        self.serve_main();
         self.engine.handle_timeout(self.now);
         let has_news = self.segment.takes_card_news();
         if has_news || self.now >= self.host_next {
@@ -452,7 +459,7 @@ impl Lab {
             if came.intact {
                 self.show(Direction::Received, came.path, came.at, &arrival);
                 self.record(Direction::Received, came.path, came.at, &arrival);
-                self.main.handle_frame(came.at.max(self.now), came.path, &arrival);
+                self.give_main(came.at.max(self.now), came.path, &arrival);
             }
         }
         self.arrival = arrival;

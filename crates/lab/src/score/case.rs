@@ -9,6 +9,7 @@ use linesman_sim::segment_file::{PlantOptions, SegmentFile, plant};
 
 use super::perturb::Perturbation;
 use crate::choice::AT_RUN_TIME;
+use crate::habit::Habit;
 
 /// Choices for a score.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -21,6 +22,17 @@ pub struct ScoreOptions {
     pub healthy: bool,
     /// What is other than the diagnosis expects.
     pub perturb: Option<Perturbation>,
+    /// How the MainDevice drives the line. With another habit than ours nobody asks for registers, and listeners are
+    /// judged.
+    pub habit: Habit,
+}
+
+impl ScoreOptions {
+    /// Whether the diagnosis beside the MainDevice is judged, which may ask for registers.
+    #[must_use]
+    pub fn judges_live(&self) -> bool {
+        !self.capture_only && self.habit == Habit::Own
+    }
 }
 
 /// What kind of case it is.

@@ -1,15 +1,10 @@
 //! One diagnosis held against the faults of a case.
 
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, Severity};
-use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::End;
 
 use crate::verdict::judge::{Company, may_be_common};
-use crate::verdict::{Claim, Grade, Match, Scene, Site, Truth, matches};
-
-/// How a diagnosis calls the SubDevices: by the identity of the project, unless it had none.
-pub type Naming<'a> = &'a dyn Fn(DeviceId) -> DeviceId;
+use crate::verdict::{Claim, Grade, Match, Naming, Scene, Truth, matches};
 
 /// What was said of a fault.
 #[derive(Clone, PartialEq, Debug)]
@@ -34,17 +29,7 @@ pub struct Judged {
 /// A finding's claim, with SubDevices by the identity of the project.
 #[must_use]
 pub fn claim(finding: &FindingReport, naming: Naming<'_>) -> Claim {
-    let claim = Claim::of(finding);
-    let end = |end: End<DeviceId>| match end {
-        End::Controller(id, port) => End::Controller(naming(id), port),
-        End::MainDevice(_) => end,
-    };
-    let site = match claim.site {
-        Site::Device(id) => Site::Device(naming(id)),
-        Site::Link { a, b, way } => Site::Link { a: end(a), b: b.map(end), way },
-        Site::Host | Site::Network => claim.site,
-    };
-    Claim { site, ..claim }
+    Claim::of(finding).renamed(naming)
 }
 
 /// Holds the first `among` findings of a diagnosis against one of the faults of its case.

@@ -3,7 +3,8 @@
 //! A seed gives a [`case`]: a plant, its features, and faults of the whole catalogue with wide
 //! parameters ([`draw`]). [`play`] runs it, live and as a recording, [`judge`] holds what was said
 //! against the truth log, [`report`] adds up. [`disturb`] does to a healthy line what is no fault,
-//! [`perturb`] makes a plant other than the diagnosis expects. A case counts when the truth log shows an effect,
+//! [`perturb`] makes a plant other than the diagnosis expects, [`listen`] judges by what is heard beside a MainDevice
+//! with other habits. A case counts when the truth log shows an effect,
 //! whether or not the diagnosis saw it.
 
 pub mod baseline;
@@ -14,11 +15,14 @@ pub mod draw;
 mod effect;
 pub mod excerpt;
 pub mod judge;
+pub mod listen;
 pub mod perturb;
 pub mod play;
 pub mod rate;
 pub mod report;
 pub mod tally;
+mod tape;
+mod trace;
 
 pub use case::{CaseKind, ScoreOptions};
 pub use perturb::Perturbation;

@@ -11,6 +11,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Stream;
+use linesman_sim::segment_file::{FaultEntry, Value};
 use linesman_sim::truth::{FaultId, TruthLog};
 
 use super::baseline;
@@ -19,9 +20,11 @@ use super::case::{Case, CaseKind, ScoreOptions};
 use super::disturb::disturb;
 use super::draw::{Drawn, Ends, Offer, When, draw};
 use super::effect::effects;
-use super::excerpt::{Tape, take_down};
 use super::judge::{Judged, alarms, claim, judge};
+use super::listen::{HealthyListened, Listeners};
+use super::tape::{Tape, take_down, take_down_host};
 use crate::choice::{Ground, are_apart, text};
+use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 use crate::swarm::run::cabled;
@@ -36,6 +39,12 @@ const CALM: Span = Span::ms(1_500);
 const VERDICT: Span = Span::ms(2_500);
 /// How long a line may take to come back.
 const RECOVERY: Span = Span::s(8);
+/// How long it may take where nobody brings anything back.
+const SETTLING: Span = Span::s(1);
+/// How much longer a run is listened to, so that who joins late hears enough.
+const LISTENED: Span = Span::ms(2_500);
+/// From the end of one pause of the MainDevice to the next, in ms.
+const BETWEEN_PAUSES_MS: (f64, f64) = (300.0, 1_500.0);
 /// How often plants are drawn for a fault that needs a place of its own.
 const ATTEMPTS: u32 = 40;
 
@@ -56,6 +65,8 @@ pub struct CaseReport {
     pub host_counters: bool,
     /// What a healthy line was accused of, live and in its recording; `None` where it never was healthy.
     pub healthy: Option<(Vec<String>, Vec<String>)>,
+    /// What listeners said of it, beside a MainDevice with the habits of others.
+    pub healthy_listened: Option<HealthyListened>,
     /// Cycle of the process data.
     pub cycle: Span,
     /// Its faults.
@@ -79,6 +90,10 @@ pub struct FaultOutcome {
     pub capture: Judged,
     /// Whether the first port with a counter above zero is the place.
     pub baseline: bool,
+    /// Whether it is the MainDevice that stops.
+    pub is_pause: bool,
+    /// What listeners said of it, beside a MainDevice with the habits of others.
+    pub listened: Option<Listeners>,
 }
 
 impl CaseReport {
@@ -135,6 +150,7 @@ fn empty(case: &Case, devices: usize) -> CaseReport {
         forwarded: case.forwarded,
         host_counters: case.host_counters,
         healthy: None,
+        healthy_listened: None,
         cycle: case.cycle,
         faults: Vec::new(),
         unplayable: None,
@@ -155,11 +171,15 @@ struct First {
     cause: Option<Span>,
 }
 
-struct Play<'a> {
-    case: &'a Case,
+pub(super) struct Play<'a> {
+    pub(super) case: &'a Case,
     options: &'a ScoreOptions,
     stream: Stream,
-    lab: Lab,
+    pub(super) lab: Lab,
+    /// What listeners hear, beside a MainDevice with the habits of others.
+    pub(super) tape: Option<Tape>,
+    /// Since when the line has been up, or broken from the start.
+    pub(super) up: Instant,
     /// What reads the recording.
     recording: Arc<Mutex<Engine>>,
     /// Faults that are in the line from its making on.
@@ -175,11 +195,12 @@ impl<'a> Play<'a> {
         let mut stream = case.seed.stream("score faults");
         let (file, built_in) = with_built_in(case, &mut stream)?;
         let lab_options = LabOptions {
+            habit: options.habit,
             cycle: case.cycle,
             host_counters: case.host_counters,
             clocks: case.clocks,
-            probes: !options.capture_only,
-            active: !options.capture_only,
+            probes: options.judges_live(),
+            active: options.judges_live(),
             ..LabOptions::default()
         };
         // What cannot be built so is no case.
@@ -195,16 +216,46 @@ impl<'a> Play<'a> {
         }
         let recording = Arc::new(Mutex::new(Engine::new(setup)));
         let reader = Arc::clone(&recording);
+        let tape = (options.habit != Habit::Own).then(Tape::default);
+        if let Some(tape) = tape.clone() {
+            lab.set_host_tap(Box::new(move |seen| take_down_host(&tape, seen)));
+        }
+        let heard = tape.clone();
         lab.set_recorder(Box::new(move |seen| {
+            if let Some(heard) = &heard {
+                take_down(heard, seen);
+            }
             // As most recordings are: neither cards nor directions are told apart.
             let frame = FrameSeen { path: None, direction: Direction::Unknown, ..*seen };
             reader.lock().unwrap_or_else(PoisonError::into_inner).handle_frame(&frame);
         }));
-        Ok(Self { case, options, stream, lab, recording, built_in, has_project, beside: 0 })
+        let up = Instant::ZERO;
+        Ok(Self {
+            case,
+            options,
+            stream,
+            lab,
+            tape,
+            up,
+            recording,
+            built_in,
+            has_project,
+            beside: 0,
+        })
     }
 
     fn play(mut self) -> Result<CaseReport, Stop> {
         self.run_all()
+    }
+
+    /// A line that has been up for a while, and on which all is well.
+    #[cfg(test)]
+    pub(super) fn calm(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, Stop> {
+        let mut play = Self::new(case, options)?;
+        play.lab.wait_up(BRING_UP)?;
+        play.up = play.lab.now();
+        play.run(CALM)?;
+        Ok(play)
     }
 
     fn run_all(&mut self) -> Result<CaseReport, Stop> {
@@ -212,22 +263,24 @@ impl<'a> Play<'a> {
         let mut active: Vec<Active> = Vec::new();
         if self.built_in.is_empty() {
             self.lab.wait_up(BRING_UP)?;
+            self.up = self.lab.now();
             self.run(CALM)?;
-            report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
             if self.case.kind == CaseKind::Healthy {
                 disturb(&mut self.lab, self.case.cycle, &mut self.stream)?;
                 self.run(VERDICT)?;
-                report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
+            }
+            report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
+            report.healthy_listened = self.healthy_listened();
+            if self.case.kind == CaseKind::Healthy {
                 return Ok(report);
             }
             self.break_line(&mut active)?;
         } else {
             for (drawn, id) in std::mem::take(&mut self.built_in).into_iter().zip(0..) {
-                active.push(Active {
-                    id: FaultId(id),
-                    until: self.lab.now() + drawn.choice.lasts,
-                    drawn,
-                });
+                let until = self.lab.now() + drawn.choice.lasts;
+                // Who joins late finds the line brought up, as far as it comes.
+                self.up = self.lab.now() + Span::ns(drawn.choice.lasts.as_nanos() / 2);
+                active.push(Active { id: FaultId(id), until, drawn });
             }
         }
         self.wait(&mut active)?;
@@ -254,7 +307,10 @@ impl<'a> Play<'a> {
         for name in self.case.faults.clone() {
             let pause = Span::us(self.stream.between(0, 200_000));
             self.run(pause)?;
-            let drawn = self.draw(name, active)?;
+            let mut drawn = self.draw(name, active)?;
+            if self.options.habit != Habit::Own {
+                repeat_pauses(&mut drawn.choice.entry, &mut self.case.seed.stream("score pauses"));
+            }
             let mut entry = drawn.choice.entry.clone();
             if let Some(perturb) = self.options.perturb {
                 perturb.fault(&mut entry, &mut self.stream);
@@ -326,9 +382,13 @@ impl<'a> Play<'a> {
         }
         let is_for_ever = |active: &Active| active.drawn.ends == Ends::Never;
         if !active.iter().any(is_for_ever) {
-            self.lab.run_while(RECOVERY, Span::ms(20), Lab::is_up)?;
+            let within = if self.options.habit.brings_back() { RECOVERY } else { SETTLING };
+            self.lab.run_while(within, Span::ms(20), Lab::is_up)?;
         }
         self.run(VERDICT)?;
+        if self.options.habit != Habit::Own {
+            self.run(LISTENED)?;
+        }
         Ok(())
     }
 
@@ -443,7 +503,7 @@ impl<'a> Play<'a> {
         let when = (company, self.case.faults.len().max(1) + self.beside);
         let cycle = self.case.cycle.as_nanos().max(1);
         let cycles = first.place.map(|after| after.as_nanos().div_ceil(cycle));
-        let live = (!self.options.capture_only).then(|| Judged {
+        let live = self.options.judges_live().then(|| Judged {
             cycles,
             named_after: first.cause,
             ..judge(live, &truth, &all, &scene, when, &|id| id)
@@ -452,9 +512,15 @@ impl<'a> Play<'a> {
         let as_planned = |id: DeviceId| id;
         let naming: &dyn Fn(DeviceId) -> DeviceId =
             if self.has_project { &as_planned } else { &by_position };
+        let heard_scene = scene;
         let scene = Scene { host_counters: false, ..scene };
         let capture = judge(recorded, &truth, &all, &scene, when, naming);
         let baseline = baseline::first_counter(&self.lab);
+        let is_pause = truth.name == FaultName::WatchdogStarved
+            && truth.places.iter().any(|place| matches!(place, TruthPlace::Host(_)));
+        let is_single = self.case.faults.len() + self.beside == 1;
+        let listened =
+            is_single.then(|| self.listened(record, &truth, &all, &heard_scene)).flatten();
         Some(FaultOutcome {
             name: truth.name,
             entry: text(&active.drawn.choice.entry),
@@ -462,6 +528,20 @@ impl<'a> Play<'a> {
             live,
             capture,
             baseline: baseline.is_some_and(|site| baseline::is_right(site, &truth, tree)),
+            is_pause,
+            listened,
         })
+    }
+}
+
+/// Lets a MainDevice that stops do so again and again, in half of the cases.
+fn repeat_pauses(entry: &mut FaultEntry, stream: &mut Stream) {
+    let pause = entry.parameters.get("pause_ms").and_then(Value::as_number);
+    if let Some(pause) = pause
+        && stream.chance(0.5)
+    {
+        let (least, most) = BETWEEN_PAUSES_MS;
+        let every = (pause + stream.log_uniform(least, most)).round();
+        *entry = entry.clone().with("every_ms", every);
     }
 }

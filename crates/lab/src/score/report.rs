@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use linesman_config::fault::FaultName;
 use serde::Serialize;
 
+use super::listen::report::ListenedReport;
 use super::rate::Rate;
 
 /// Name and version of the format.
@@ -27,6 +28,8 @@ pub struct ScoreReport {
     pub capture_only: bool,
     /// What was other than the diagnosis expects, if anything.
     pub perturbed: Option<String>,
+    /// How the MainDevice drove the line: `own`, or a habit of others.
+    pub habit: String,
     /// Cases: one for each seed.
     pub cases: u64,
     /// Cases in which a fault had an effect.
@@ -71,6 +74,9 @@ pub struct ScoreReport {
     pub named_in_100_ms: BTreeMap<String, Rate>,
     /// Single faults by name.
     pub per_fault: BTreeMap<String, GroupReport>,
+    /// Listeners beside a MainDevice with the habits of others; with `own` there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub listened: Option<ListenedReport>,
     /// Seeds that could not be played, and why.
     pub unplayable: Vec<String>,
     /// Cases that were judged wrongly, or with findings that nothing explains; at most 2,000.

@@ -7,12 +7,14 @@ use linesman_proto::time::Span;
 
 use super::case::{CaseKind, ScoreOptions};
 use super::judge::Judged;
+use super::listen::tally::ListenTally;
 use super::play::{CaseReport, FaultOutcome};
 use super::rate::{Count, rounded};
 use super::report::{
     Baseline, Bin, Bucket, DoubleReport, GroupReport, HealthyReport, SCHEMA, ScoreReport,
     SideReport, WrongReport,
 };
+use crate::habit::Habit;
 use crate::verdict::Grade;
 
 /// Bins of confidence.
@@ -150,6 +152,7 @@ pub struct Tally {
     per_fault: BTreeMap<FaultName, Group>,
     confidence: [Confidence; BINS],
     fast: BTreeMap<FaultName, Count>,
+    listened: ListenTally,
     wrong: Vec<WrongReport>,
 }
 
@@ -169,13 +172,14 @@ impl Tally {
             self.unplayable.push(format!("seed {}: {why}", case.seed));
         }
         if let Some((live, capture)) = &case.healthy {
-            let shown = if self.options.capture_only { capture } else { live };
+            let shown = if self.options.judges_live() { live } else { capture };
             self.healthy.add(shown.is_empty());
             self.healthy_capture.add(capture.is_empty());
             for alarm in shown {
                 self.alarms.push(format!("seed {}: {alarm}", case.seed));
             }
         }
+        self.listened.add_healthy(case);
         let acted: Vec<&FaultOutcome> = case.faults.iter().filter(|one| one.effects > 0).collect();
         self.effective += u64::from(!acted.is_empty());
         if case.kind == CaseKind::Double && acted.len() == 2 {
@@ -198,6 +202,7 @@ impl Tally {
 
     fn add_single(&mut self, case: &CaseReport, fault: &FaultOutcome) {
         self.single.add(fault);
+        self.listened.add(case, fault);
         if case.kind == CaseKind::Masked {
             self.masked.add(fault);
         }
@@ -267,6 +272,7 @@ impl Tally {
             fault: self.options.fault,
             capture_only: self.options.capture_only,
             perturbed: self.options.perturb.map(|one| one.name().to_owned()),
+            habit: self.options.habit.name().to_owned(),
             cases: self.cases,
             effective_cases: self.effective,
             place_at_1: first.place_at_1.share,
@@ -315,6 +321,7 @@ impl Tally {
                 .iter()
                 .map(|(name, group)| (name.name().to_owned(), group.report()))
                 .collect(),
+            listened: (self.options.habit != Habit::Own).then(|| self.listened.report()),
             unplayable: self.unplayable.clone(),
             wrong: self.wrong.clone(),
         }

@@ -4,6 +4,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
 use super::step::{self, StepAt};
+use crate::habit::Habit;
 
 /// A story.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -37,6 +38,8 @@ pub struct Front {
     pub host_counters: bool,
     /// Whether the diagnosis knows the project, as planned.
     pub project: bool,
+    /// How the MainDevice drives the line.
+    pub habit: Habit,
     /// Segment file to read when there is no TOML block.
     pub segment: Option<String>,
 }
@@ -52,6 +55,7 @@ impl Default for Front {
             target: AlState::Op,
             host_counters: true,
             project: true,
+            habit: Habit::Own,
             segment: None,
         }
     }
@@ -190,11 +194,12 @@ fn entry(front: &mut Front, text: &str) -> Result<(), String> {
         }
         "host-counters" => front.host_counters = yes(value)?,
         "project" => front.project = yes(value)?,
+        "habit" => front.habit = value.parse()?,
         "segment" => front.segment = Some(value.to_owned()),
         other => {
             return Err(format!(
                 "`{other}` is no key of a story: expected title, proves, findings, seed, cycle, \
-                 target, host-counters, project or segment"
+                 target, host-counters, project, habit or segment"
             ));
         }
     }

@@ -123,6 +123,7 @@ fn try_play(
     }
     let first_task = project.tasks.first();
     let options = LabOptions {
+        habit: story.front.habit,
         target: story.front.target,
         cycle: first_task.map_or(story.front.cycle, |task| Span::us(u64::from(task.cycle_us))),
         host_counters: story.front.host_counters,

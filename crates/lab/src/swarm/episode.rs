@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::observe::{Direction, FrameSeen};
-use linesman_diagnosis::report::{FindingState, Severity};
+use linesman_diagnosis::report::{FindingReport, FindingState, Severity};
 use linesman_proto::frame::view::FrameView;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
@@ -16,9 +16,10 @@ use super::counter::{Kind, Returned, expected};
 use super::reach::Reach;
 use super::run::{SwarmOptions, cabled};
 use crate::choice::{AT_RUN_TIME, Choice, Ground, are_apart};
+use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
-use crate::verdict::judge::{Company, best_finding, explains};
-use crate::verdict::{Match, Scene, Site, Truth};
+use crate::verdict::judge::{Company, best_finding, explains, is_left_open};
+use crate::verdict::{Claim, Match, Naming, Scene, Site, Truth};
 
 /// Slices of time between two checks.
 const SLICE: Span = Span::ms(25);
@@ -200,6 +201,9 @@ impl<'a> Episode<'a> {
             if open.is_empty() {
                 return Ok(outcomes);
             }
+            if self.lab.now() >= until && self.listens() {
+                return Ok(outcomes);
+            }
             if self.lab.now() >= until {
                 let said = self.said();
                 let missed: Vec<String> = open.iter().map(|open| open.entry.clone()).collect();
@@ -265,6 +269,10 @@ impl<'a> Episode<'a> {
     fn recover(&mut self, healed: Instant) -> Result<Option<Span>, LabError> {
         let bound = healed + self.options.recovery;
         while !self.lab.is_up() {
+            if !self.options.habit.brings_back() {
+                self.run(QUIET)?;
+                return Ok(None);
+            }
             if self.lab.now() >= bound {
                 let missing: Vec<String> =
                     self.lab.not_up().map(|id| id.no().to_string()).collect();
@@ -289,8 +297,13 @@ impl<'a> Episode<'a> {
         let acted = self.lab.truth().faults().iter().filter(|fault| fault.first_effect.is_some());
         let truths: Vec<Truth> = acted.filter_map(|fault| self.lab.truth_of(fault.id)).collect();
         for finding in diagnosis.findings.iter().filter(|f| f.severity != Severity::Info) {
-            let graded = explains(&truths, self.lab.tree(), self.host_counters, finding);
-            if !graded.place.is_right() {
+            let by_position = |id| self.lab.of_plan(id);
+            let as_planned = |id| id;
+            let naming: Naming<'_> = if self.listens() { &by_position } else { &as_planned };
+            let claim = Claim::of(finding).renamed(naming);
+            let graded = explains(&truths, self.lab.tree(), self.host_counters, claim);
+            let is_open = self.listens() && self.is_left_open(finding, &truths, naming);
+            if !graded.place.is_right() && !is_open {
                 let site = Site::from(&finding.place);
                 let faults: Vec<String> =
                     self.lab.truth().faults().iter().map(|fault| fault.name.to_string()).collect();
@@ -305,6 +318,22 @@ impl<'a> Episode<'a> {
                 ));
             }
         }
+    }
+
+    /// Whether the diagnosis listens beside a MainDevice with the habits of others.
+    fn listens(&self) -> bool {
+        self.options.habit != Habit::Own
+    }
+
+    /// Whether a finding leaves its place open, and holds that of a fault.
+    fn is_left_open(&self, finding: &FindingReport, truths: &[Truth], naming: Naming<'_>) -> bool {
+        truths.iter().any(|truth| {
+            [false, true].into_iter().any(|answered_again| {
+                let host_counters = self.host_counters;
+                let scene = Scene { tree: self.lab.tree(), host_counters, answered_again };
+                is_left_open(finding, truth, &scene, naming)
+            })
+        })
     }
 
     fn audit(&mut self) {

@@ -12,12 +12,16 @@ use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{PlantOptions, SegmentFile, plant};
 
 use super::episode::{Episode, EpisodeReport};
+use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 
 /// Choices for a swarm.
 #[derive(Clone, Debug)]
 pub struct SwarmOptions {
+    /// How the MainDevice drives the line. Beside another habit than ours the diagnosis listens, and need not find
+    /// each fault; it must not name a place where there is none.
+    pub habit: Habit,
     /// Cycle of the process data.
     pub cycle: Span,
     /// At least this many SubDevices.
@@ -35,6 +39,7 @@ pub struct SwarmOptions {
 impl Default for SwarmOptions {
     fn default() -> Self {
         Self {
+            habit: Habit::Own,
             cycle: Span::ms(5),
             min_devices: 5,
             max_devices: 24,
@@ -50,6 +55,8 @@ impl Default for SwarmOptions {
 pub struct SeedReport {
     /// The seed.
     pub seed: u64,
+    /// How the MainDevice drove the line.
+    pub habit: Habit,
     /// SubDevices of its plant.
     pub devices: usize,
     /// What went wrong on purpose, in order.
@@ -80,7 +87,12 @@ impl SeedReport {
     /// The command that plays this seed again.
     #[must_use]
     pub fn replay(&self) -> String {
-        format!("linesman lab swarm --seeds {}..{}", self.seed, self.seed + 1)
+        let habit = if self.habit == Habit::Own {
+            String::new()
+        } else {
+            format!(" --habit {}", self.habit)
+        };
+        format!("linesman lab swarm --seeds {}..{}{habit}", self.seed, self.seed + 1)
     }
 }
 
@@ -148,6 +160,7 @@ pub fn swarm(
 pub fn run_seed(seed: u64, options: &SwarmOptions) -> SeedReport {
     let mut report = SeedReport {
         seed,
+        habit: options.habit,
         devices: 0,
         episodes: Vec::new(),
         violations: Vec::new(),
@@ -166,7 +179,13 @@ fn play(seed: u64, options: &SwarmOptions, report: &mut SeedReport) -> Result<()
     let mut stream = seed.stream("swarm");
     let file = draw_plant(seed, options);
     let host_counters = stream.chance(0.5);
-    let lab_options = LabOptions { cycle: options.cycle, host_counters, ..LabOptions::default() };
+    let lab_options = LabOptions {
+        habit: options.habit,
+        project: options.habit == Habit::Own,
+        cycle: options.cycle,
+        host_counters,
+        ..LabOptions::default()
+    };
     let mut lab = Lab::new(&file, lab_options)?;
     report.devices = lab.segment().tree().len();
     let result = (|| {

@@ -8,6 +8,9 @@ use linesman_proto::topology::End;
 
 use super::site::{Site, Way};
 
+/// How a diagnosis calls the SubDevices: by the identity of the project, unless it had none.
+pub type Naming<'a> = &'a dyn Fn(DeviceId) -> DeviceId;
+
 /// What a diagnosis says: one cause at one place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Claim {
@@ -22,6 +25,21 @@ impl Claim {
     #[must_use]
     pub fn of(finding: &FindingReport) -> Self {
         Self { cause: finding.cause, site: Site::from(&finding.place) }
+    }
+
+    /// The same with SubDevices by the identity of the project.
+    #[must_use]
+    pub fn renamed(self, naming: Naming<'_>) -> Self {
+        let end = |end: End<DeviceId>| match end {
+            End::Controller(id, port) => End::Controller(naming(id), port),
+            End::MainDevice(_) => end,
+        };
+        let site = match self.site {
+            Site::Device(id) => Site::Device(naming(id)),
+            Site::Link { a, b, way } => Site::Link { a: end(a), b: b.map(end), way },
+            Site::Host | Site::Network => self.site,
+        };
+        Self { site, ..self }
     }
 
     /// What a finding says besides, best first.

@@ -6,7 +6,8 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 use linesman_sim::truth::{Effect, Entry, FaultRecord, Place, TruthLog};
 
-use super::{Claim, Match, Scene, Truth, TruthPlace, matches};
+use super::sets::{self, AdmittedSet};
+use super::{Claim, Match, Naming, Scene, Site, Truth, TruthPlace, matches};
 
 /// The fault of a truth log as it is held against a verdict.
 #[must_use]
@@ -100,15 +101,39 @@ pub fn may_be_common(cause: FaultName) -> bool {
     matches!(cause, EmcNoise | BrownOut | SupplyOff | DeviceOff)
 }
 
-/// How well a finding fits any of the faults of the run, now or in the past.
+/// Causes that a finding names: the first, and the others that it may be.
+pub fn may_be(finding: &FindingReport) -> impl Iterator<Item = FaultName> + Clone {
+    let others = finding.alternatives.iter().map(|other| other.cause);
+    std::iter::once(finding.cause).chain(others)
+}
+
+/// Another place leaves the first one open where it is at least half as sure.
+const AS_SURE: f64 = 2.0;
+
+/// Whether a finding leaves its place open, and what it leaves holds the right one: another place about as sure as the
+/// first, or the network as a whole, for a cause that may be taken for the right one.
 #[must_use]
-pub fn explains(
-    truths: &[Truth],
-    tree: &Tree,
-    host_counters: bool,
+pub fn is_left_open(
     finding: &FindingReport,
-) -> Match {
-    let claim = Claim::of(finding);
+    truth: &Truth,
+    scene: &Scene<'_>,
+    naming: Naming<'_>,
+) -> bool {
+    let others = Claim::alternatives(finding).zip(&finding.alternatives);
+    let has_place = others
+        .filter(|(_, other)| other.confidence * AS_SURE >= finding.confidence)
+        .any(|(claim, _)| matches(truth, scene, claim.renamed(naming)).place.is_right());
+    let is_whole = Claim::of(finding).site == Site::Network;
+    let is_kin = |cause: FaultName| {
+        let share = |set: &&AdmittedSet| set.has(cause) && set.has(truth.name);
+        cause == truth.name || sets::ALL.iter().any(share)
+    };
+    has_place || (is_whole && may_be(finding).any(is_kin))
+}
+
+/// How well a claim fits any of the faults of the run, now or in the past.
+#[must_use]
+pub fn explains(truths: &[Truth], tree: &Tree, host_counters: bool, claim: Claim) -> Match {
     let mut best = Match::NONE;
     for truth in truths {
         // A finding may have been made while the line was silent, or since.

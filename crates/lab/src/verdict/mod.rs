@@ -13,7 +13,7 @@ pub mod sets;
 pub mod site;
 
 pub use admit::{Admitted, Hop, Scene, Truth, TruthPlace};
-pub use claim::Claim;
+pub use claim::{Claim, Naming};
 pub use site::{Site, Way};
 
 /// How well a claim fits.

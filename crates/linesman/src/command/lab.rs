@@ -1,6 +1,7 @@
 //! `linesman lab`: stories, swarms, scores and recordings in virtual time.
 
 pub(crate) mod excerpts;
+mod listened;
 pub(crate) mod replay;
 pub(crate) mod score;
 
@@ -12,6 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc;
 use std::thread;
 
+use linesman_lab::habit::Habit;
 use linesman_lab::story::Story;
 use linesman_lab::story::run::play;
 use linesman_lab::swarm::physics::{PhysicsReport, run_physics_seed};
@@ -35,6 +37,9 @@ pub(crate) struct Arguments {
 enum Command {
     /// Play stories: a fault, and what must be said about it
     Run {
+        /// Play all of them with this habit of the MainDevice, whatever they say; see `score --habit`
+        #[arg(long, value_name = "NAME")]
+        habit: Option<Habit>,
         /// Markdown files
         #[arg(required = true, value_name = "STORY.md")]
         stories: Vec<PathBuf>,
@@ -52,8 +57,12 @@ enum Command {
         seeds: Range<u64>,
         /// The segment alone: any fault of the catalogue and frames of chance, without MainDevice or
         /// diagnosis
-        #[arg(long)]
+        #[arg(long, conflicts_with = "habit")]
         physics: bool,
+        /// Let the MainDevice play a habit of others, see `score --habit`: the diagnosis listens, and must not name a
+        /// place where nothing was wrong
+        #[arg(long, value_name = "NAME", default_value_t)]
+        habit: Habit,
         /// Only what did not hold, and the sum
         #[arg(long, short)]
         quiet: bool,
@@ -74,14 +83,16 @@ impl Arguments {
 /// Does it.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     match &arguments.command {
-        Command::Run { stories } => run_stories(stories, output),
+        Command::Run { habit, stories } => run_stories(stories, *habit, output),
         Command::Replay(arguments) => replay::run(arguments, output),
         Command::Score(arguments) => Ok(score::run(arguments, output)),
         Command::Excerpts(arguments) => excerpts::run(arguments, output),
-        Command::Swarm { seeds, physics: true, quiet } => {
+        Command::Swarm { seeds, physics: true, quiet, .. } => {
             Ok(run_physics(seeds.clone(), *quiet, output))
         }
-        Command::Swarm { seeds, quiet, .. } => Ok(run_swarm(seeds.clone(), *quiet, output)),
+        Command::Swarm { seeds, quiet, habit, .. } => {
+            Ok(run_swarm(seeds.clone(), *habit, *quiet, output))
+        }
     }
 }
 
@@ -97,11 +108,16 @@ fn seeds(text: &str) -> Result<Range<u64>, String> {
     Ok(from..to)
 }
 
-fn run_stories(stories: &[PathBuf], output: &mut Output) -> Result<Status, Failure> {
+fn run_stories(
+    stories: &[PathBuf],
+    habit: Option<Habit>,
+    output: &mut Output,
+) -> Result<Status, Failure> {
     let mut held = 0;
     for path in stories {
         let text = files::text(path, "a story")?;
-        let story = Story::parse(&text).map_err(|error| files::in_file(path, &error))?;
+        let mut story = Story::parse(&text).map_err(|error| files::in_file(path, &error))?;
+        story.front.habit = habit.unwrap_or(story.front.habit);
         let report = play(&story, &files::NamedFiles::of(path));
         held += usize::from(report.held());
         output.text(&format!("{report}"));
@@ -117,12 +133,12 @@ fn run_stories(stories: &[PathBuf], output: &mut Output) -> Result<Status, Failu
     Ok(if held == stories.len() { Status::Good } else { Status::Findings })
 }
 
-fn run_swarm(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {
+fn run_swarm(seeds: Range<u64>, habit: Habit, quiet: bool, output: &mut Output) -> Status {
     let total = seeds.end - seeds.start;
     let mut progress = Progress::new();
     let mut done = 0;
     let mut shown = String::new();
-    let report = swarm(seeds, |seed| {
+    let report = swarm(seeds, habit, |seed| {
         done += 1;
         if !quiet || !seed.is_green() {
             progress.clear();
@@ -163,8 +179,8 @@ fn run_physics(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {
 }
 
 /// Runs the seeds and gives their reports in order.
-fn swarm(seeds: Range<u64>, mut show: impl FnMut(&SeedReport)) -> SwarmReport {
-    let options = SwarmOptions::default();
+fn swarm(seeds: Range<u64>, habit: Habit, mut show: impl FnMut(&SeedReport)) -> SwarmReport {
+    let options = SwarmOptions { habit, ..SwarmOptions::default() };
     let mut report = SwarmReport::default();
     on_all_processors(
         seeds,

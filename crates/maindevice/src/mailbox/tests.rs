@@ -177,6 +177,7 @@ fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>
         line: Arc::new(Mutex::new(line)),
         options: Arc::new(Options::default()),
         mailboxes: mailboxes.clone(),
+        bad_rounds: Arc::default(),
     };
     let mut pending = pin!(mailboxes.ask(ID, request));
     wire.spawn(serve_mailbox(context, ID));

@@ -40,7 +40,7 @@ impl MainDevice {
     pub fn look(&mut self, now: Instant) {
         let (wire, network) = (self.aside.clone(), self.network);
         self.aside.spawn(async move {
-            wire.emit(match look::look(wire.clone(), network).await {
+            wire.emit(match look::look(wire.clone(), network, true).await {
                 Ok(look) => Event::Looked(Box::new(look)),
                 Err(error) => Event::LookFailed(error),
             });
@@ -53,8 +53,9 @@ impl MainDevice {
     pub fn scan(&mut self, now: Instant) {
         let (wire, network) = (self.command(), self.network);
         let identified = Arc::clone(&self.identified);
+        let counters = self.options.polling.reads_counters();
         wire.clone().spawn(async move {
-            wire.emit(match scan::scan(wire.clone(), network).await {
+            wire.emit(match scan::scan(wire.clone(), network, counters).await {
                 Ok(inventory) => {
                     *lock(&identified) = Some(Identified::of(&inventory, wire.now()));
                     Event::Scanned(Box::new(inventory))
@@ -86,6 +87,7 @@ impl MainDevice {
             line: Arc::clone(&line),
             options: Arc::clone(&self.options),
             mailboxes: mailboxes.clone(),
+            bad_rounds: Arc::default(),
         };
         wire.spawn(supervisor::supervise(context, identified));
         let allowed = self.options.allowed_misses;

@@ -123,14 +123,15 @@ pub async fn places(wire: &Wire, network: Network) -> Result<(Vec<Target>, OredS
     Ok((places, states))
 }
 
-/// Looks at a line.
+/// Looks at a line, with or without error counters.
 ///
 /// # Errors
 /// [`LookError`] when nobody is there. A single SubDevice that does not answer is no error.
-pub async fn look(wire: Wire, network: Network) -> Result<Look, LookError> {
+pub async fn look(wire: Wire, network: Network, counters: bool) -> Result<Look, LookError> {
     let (places, states) = patient_places(&wire, network).await?;
+    let read = |target, position| look_at(wire.clone(), target, Position(position), counters);
     let reading: Vec<_> = (places.into_iter().zip(0..))
-        .map(|(target, position)| wire.spawn(look_at(wire.clone(), target, Position(position))))
+        .map(|(target, position)| wire.spawn(read(target, position)))
         .collect();
     let mut devices = Vec::with_capacity(reading.len());
     for device in reading {
@@ -156,7 +157,7 @@ async fn patient_places(
     places(wire, network).await
 }
 
-async fn look_at(wire: Wire, target: Target, position: Position) -> LookedDevice {
+async fn look_at(wire: Wire, target: Target, position: Position, counters: bool) -> LookedDevice {
     // All at once, so that they share frames; what was not answered is asked for again.
     let asked = [
         (register::ESC_TYPE.address, EscInformation::LEN as u16),
@@ -165,10 +166,12 @@ async fn look_at(wire: Wire, target: Target, position: Position) -> LookedDevice
         (register::AL_STATUS.address, AL_LEN),
         (ErrorCounters::START, ErrorCounters::LEN as u16),
     ];
-    let first = asked.map(|(address, len)| wire.read(target, address, len));
+    let asked = if counters { &asked[..] } else { &asked[..asked.len() - 1] };
+    let first = asked.iter().map(|(address, len)| wire.read(target, *address, *len));
+    let first: Vec<_> = first.collect();
     let mut replies = Vec::with_capacity(asked.len());
     for (first, (address, len)) in first.into_iter().zip(asked) {
-        replies.push(answered(&wire, target, address, len, first.await).await);
+        replies.push(answered(&wire, target, *address, *len, first.await).await);
     }
     let mut replies = replies.into_iter();
     let mut next = || replies.next().flatten();

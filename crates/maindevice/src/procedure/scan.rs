@@ -82,14 +82,14 @@ impl Identified {
 /// How often a scan begins anew when SubDevices come or go meanwhile.
 const ATTEMPTS: u32 = 3;
 
-/// Scans a line.
+/// Scans a line, with or without error counters.
 ///
 /// # Errors
 /// [`ScanError`].
-pub async fn scan(wire: Wire, network: Network) -> Result<Inventory, ScanError> {
+pub async fn scan(wire: Wire, network: Network, counters: bool) -> Result<Inventory, ScanError> {
     let mut attempt = 1;
     loop {
-        match scan_once(&wire, network).await {
+        match scan_once(&wire, network, counters).await {
             Ok(inventory) => return Ok(inventory),
             Err(error) if attempt >= ATTEMPTS => return Err(error),
             Err(ScanError::Look(error)) => return Err(error.into()),
@@ -98,8 +98,8 @@ pub async fn scan(wire: Wire, network: Network) -> Result<Inventory, ScanError> 
     }
 }
 
-async fn scan_once(wire: &Wire, network: Network) -> Result<Inventory, ScanError> {
-    let look = look::look(wire.clone(), network).await?;
+async fn scan_once(wire: &Wire, network: Network, counters: bool) -> Result<Inventory, ScanError> {
+    let look = look::look(wire.clone(), network, counters).await?;
     let stations = give_addresses(wire, &look).await?;
     let on_b = |device: &LookedDevice| device.target.card() == Some(Path::B);
     let half = look.devices.iter().position(on_b).unwrap_or(look.devices.len());

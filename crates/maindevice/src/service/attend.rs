@@ -34,6 +34,7 @@ impl Attended {
             line: Arc::clone(&attended.line),
             options: Arc::clone(options),
             mailboxes: attended.mailboxes.clone(),
+            bad_rounds: Arc::default(),
         };
         for device in with_mailbox {
             wire.spawn(serve_mailbox(context.clone(), device.id));

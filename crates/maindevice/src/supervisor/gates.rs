@@ -64,6 +64,11 @@ impl Gates {
         }
     }
 
+    /// Whether ports wait to be opened by order.
+    pub(super) const fn are_set(&self) -> bool {
+        self.is_set
+    }
+
     /// Acts upon how the ports stand: opens those that are ready.
     pub(super) async fn tend(&self, context: &Context, device: &DevicePlan, status: DlStatus) {
         if !self.is_set {

@@ -1,5 +1,7 @@
 //! One SubDevice: driven to its target, watched, driven again.
 
+use std::sync::atomic::Ordering;
+
 use linesman_config::plan::DevicePlan;
 use linesman_proto::address::DeviceId;
 use linesman_proto::register::{self, AlStatus, DlStatus, ErrorCounters, EscInformation};
@@ -14,6 +16,7 @@ use super::{CALM, Context, Found, lose};
 use crate::event::Event;
 use crate::exchange::{Reply, Target};
 use crate::executor::lock;
+use crate::options::Polling;
 use crate::procedure::look::{AL_LEN, al_of, counters_of};
 use crate::procedure::state::StepError;
 
@@ -40,6 +43,9 @@ enum Trouble {
 /// A controller whose counters do not let themselves be cleared is left alone after so many attempts.
 const MOST_VAIN_CLEARS: u8 = 3;
 
+/// Nobody looks at a SubDevice by itself for so long, unless there is a reason.
+const UNWATCHED: Span = Span::s(3_600);
+
 /// A SubDevice that stayed well for so long starts with short waits again.
 const FORGIVEN_AFTER: Span = Span::s(10);
 
@@ -52,6 +58,8 @@ pub(super) struct Keeper<'a> {
     backoff: Span,
     /// How often a state had been asked for when it was lost.
     requests_at_loss: u32,
+    /// The last round of all that it has followed up.
+    round: u64,
 }
 
 /// Keeps one SubDevice at its target; never ends.
@@ -66,6 +74,7 @@ pub(crate) async fn keep(context: Context, id: DeviceId) {
         gates: Gates::new(&context, device),
         backoff: Span::ZERO,
         requests_at_loss: 0,
+        round: 0,
     };
     loop {
         let restarted = keeper.until_found().await;
@@ -258,12 +267,35 @@ impl Keeper<'_> {
         state
     }
 
-    /// Reads at intervals, and at once after an alert, until something is wrong.
+    /// Waits until it is to be read: at intervals and after alerts; or, where rounds are made, when one has shown
+    /// that something is wrong.
+    async fn until_look(&mut self, reached: AlState) {
+        if self.context.options.polling == Polling::EachDevice {
+            let seen = self.context.alerts();
+            return self.context.nap(seen, self.context.options.watch_interval).await;
+        }
+        loop {
+            let (seen, round, is_other) = self.reasons(reached);
+            if is_other || round != self.round {
+                self.round = round;
+                return;
+            }
+            self.context.nap(seen, UNWATCHED).await;
+        }
+    }
+
+    /// Alerts and bad rounds so far, and whether it is lost or wanted in another state.
+    fn reasons(&self, reached: AlState) -> (u64, u64, bool) {
+        let (id, line) = (self.device.id, lock(&self.context.line));
+        let is_other = line.found(id) == Found::Lost || line.wanted(id) != reached;
+        (line.alerts(), self.context.bad_rounds.load(Ordering::Relaxed), is_other)
+    }
+
+    /// Reads when it is time, until something is wrong.
     async fn watch(&mut self, reached: AlState) -> Trouble {
         let id = self.device.id;
         loop {
-            let seen = self.context.alerts();
-            self.context.nap(seen, self.context.options.watch_interval).await;
+            self.until_look(reached).await;
             if lock(&self.context.line).found(id) == Found::Lost || !self.read().await {
                 return Trouble::Lost;
             }
@@ -282,8 +314,36 @@ impl Keeper<'_> {
         }
     }
 
-    /// Reads state, ports and counters and tells what has changed. False when it does not answer.
+    /// Reads what is watched and tells what has changed. False when it does not answer.
     async fn read(&mut self) -> bool {
+        match self.context.options.polling {
+            Polling::EachDevice => self.read_all().await,
+            Polling::Rounds(_) | Polling::Nothing => self.read_states().await,
+        }
+    }
+
+    /// Reads state, and ports where these are watched.
+    async fn read_states(&mut self) -> bool {
+        let (wire, target) = (&self.context.wire, self.target());
+        let links = self.context.options.polling.reads_links() || self.gates.are_set();
+        let (address, len) = (register::DL_STATUS.address, register::DL_STATUS.len);
+        let dl = links.then(|| wire.read(target, address, len));
+        let Ok(al) = wire.read_one(target, register::AL_STATUS.address, AL_LEN).await else {
+            return false;
+        };
+        let (status, code) = al_of(&al);
+        if let Some(dl) = dl
+            && let Ok(reply) = dl.await
+            && reply.answered()
+        {
+            self.learn_links(DlStatus(reply.word(0))).await;
+        }
+        self.learn_state(status, code);
+        true
+    }
+
+    /// Reads state, ports and counters.
+    async fn read_all(&mut self) -> bool {
         let (wire, target, id) = (&self.context.wire, self.target(), self.device.id);
         if self.known.information.is_none() {
             let len = EscInformation::LEN as u16;
@@ -314,11 +374,7 @@ impl Keeper<'_> {
             self.learn_state(status, code);
         }
         if let Some(reply) = dl {
-            let status = DlStatus(reply.word(0));
-            if self.known.dl.replace(status) != Some(status) {
-                self.context.wire.emit(Event::Links { id, status });
-            }
-            self.gates.tend(self.context, self.device, status).await;
+            self.learn_links(DlStatus(reply.word(0))).await;
         }
         let cleared = lock(&self.context.line).clears(id) != clears;
         if let Some(reply) = counters.filter(|_| !cleared) {
@@ -345,6 +401,14 @@ impl Keeper<'_> {
             let _ = super::counters::clear(wire, line, self.device.id, self.target()).await;
             self.known.counters = None;
         }
+    }
+
+    async fn learn_links(&mut self, status: DlStatus) {
+        let id = self.device.id;
+        if self.known.dl.replace(status) != Some(status) {
+            self.context.wire.emit(Event::Links { id, status });
+        }
+        self.gates.tend(self.context, self.device, status).await;
     }
 
     pub(super) fn learn_state(&mut self, status: AlStatus, code: AlStatusCode) {

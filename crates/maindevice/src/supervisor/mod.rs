@@ -2,7 +2,8 @@
 //!
 //! [`locate`] finds the SubDevices of the plan on the line and gives them their addresses; one
 //! [`keeper`] per SubDevice drives it to its target, watches it, and drives it again when it fell
-//! out; [`supervise`] starts them and looks for those that are lost. [`mod@line`] is what they know.
+//! out; [`supervise`] starts them and looks for those that are lost. [`mod@line`] is what they know,
+//! [`rounds`] finds out for all of them at once where they do not read by themselves.
 
 mod align;
 mod by_alias;
@@ -14,11 +15,13 @@ pub(crate) mod keeper;
 pub(crate) mod line;
 mod locate;
 mod modules;
+mod rounds;
 mod shortest_cycle;
 mod start_up;
 pub(crate) mod times;
 mod watched_clock;
 
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
 use linesman_config::plan::{AddressingChoice, DevicePlan, Plan};
@@ -29,7 +32,7 @@ use linesman_proto::time::{Instant, Span};
 use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::{Wire, lock};
-use crate::options::Options;
+use crate::options::{Options, Polling};
 use crate::procedure::look::AL_LEN;
 use crate::procedure::scan::Identified;
 
@@ -46,6 +49,8 @@ pub(crate) struct Context {
     pub(crate) line: Arc<Mutex<Line>>,
     pub(crate) options: Arc<Options>,
     pub(crate) mailboxes: crate::mailbox::Queues,
+    /// Rounds in which not all was as wanted: after each all keepers look.
+    pub(crate) bad_rounds: Arc<AtomicU64>,
 }
 
 impl Context {
@@ -62,6 +67,21 @@ impl Context {
     pub(crate) fn alerts(&self) -> u64 {
         lock(&self.line).alerts()
     }
+
+    /// Waits until lost SubDevices are to be looked for.
+    async fn until_search(&self, seen: u64) {
+        match self.options.polling {
+            Polling::EachDevice => self.nap(seen, SEARCH_INTERVAL).await,
+            Polling::Rounds(_) | Polling::Nothing => {
+                self.wire.sleep(self.options.watch_interval).await;
+            }
+        }
+    }
+
+    /// Whether all that is left to do is to exchange process data.
+    fn is_left_alone(&self) -> bool {
+        self.options.polling == Polling::Nothing && lock(&self.line).all_have_been_reached()
+    }
 }
 
 /// How often lost SubDevices are looked for.
@@ -71,8 +91,8 @@ const THOROUGH_INTERVAL: Span = Span::s(2);
 /// Alerts are acted upon no more often than this.
 pub(crate) const CALM: Span = Span::ms(5);
 
-/// Runs a network according to its plan; never ends. Who a scan has just identified need not be asked
-/// again.
+/// Runs a network according to its plan; does not end as long as anybody is to be looked for. Who a scan has just
+/// identified need not be asked again.
 pub(crate) async fn supervise(context: Context, identified: Option<Identified>) {
     lock(&context.line).begin_times(context.wire.now());
     context.wire.forget_places();
@@ -96,11 +116,14 @@ pub(crate) async fn supervise(context: Context, identified: Option<Identified>) 
             context.wire.spawn(crate::mailbox::serve_mailbox(context.clone(), device.id));
         }
     }
+    if let Polling::Rounds(rounds) = context.options.polling {
+        context.wire.spawn(rounds::make(context.clone(), rounds));
+    }
     let mut thorough_at = context.wire.now() + THOROUGH_INTERVAL;
     let (mut located_at, mut placed_at) = (None, None);
-    loop {
+    while !context.is_left_alone() {
         let seen = context.alerts();
-        context.nap(seen, SEARCH_INTERVAL).await;
+        context.until_search(seen).await;
         if context.alerts() == seen && is_calm(&context, placed_at) {
             continue;
         }

@@ -15,6 +15,7 @@ mod many;
 mod reference_clock;
 mod ring;
 mod robust;
+mod rounds;
 mod run;
 mod scan;
 mod soak;

@@ -150,6 +150,12 @@ impl Card {
         silent.map(|(_, _, fault)| *fault)
     }
 
+    /// Until when it sends nothing, of an instant at which it does not.
+    pub(crate) fn silent_until(&self, at: Instant) -> Option<Instant> {
+        let silent = self.silent.iter().filter(|(from, until, _)| (*from..*until).contains(&at));
+        silent.map(|(_, until, _)| *until).max()
+    }
+
     /// Whether the kernel hands frames to the driver at an instant: until it knows that there is no carrier, and
     /// while the card takes any.
     pub(super) fn takes_frames(&self, at: Instant) -> bool {

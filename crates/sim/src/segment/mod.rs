@@ -399,6 +399,12 @@ impl Segment {
         self.world.cards.iter_mut().fold(false, |told, card| card.takes_news(now) | told)
     }
 
+    /// Until when a card sends nothing, if a fault silences it at `now`.
+    pub fn silent_until(&mut self, now: Instant, path: Path) -> Option<Instant> {
+        self.world.look_ahead(now, Span::ZERO);
+        self.world.card(path).silent_until(now)
+    }
+
     /// What became of the frames that the cards sent.
     #[must_use]
     pub const fn frames(&self) -> FrameTally {

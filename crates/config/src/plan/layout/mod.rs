@@ -56,6 +56,8 @@ pub struct PlanOptions {
     pub clock_datagrams: bool,
     /// A cyclic datagram that reads which mailboxes hold something.
     pub mailbox_states: bool,
+    /// A cyclic datagram that reads AL status of all by broadcast, behind the process data.
+    pub presence: bool,
     /// The shift of the outputs: from the frames to SYNC0. `None`: 30 % of the cycle (SYN-11).
     pub outputs_shift: Option<Span>,
     /// How far a clock may be off the reference clock before that is told, where that is chosen.
@@ -74,6 +76,7 @@ impl Default for PlanOptions {
             pack_bits: false,
             clock_datagrams: false,
             mailbox_states: false,
+            presence: true,
             outputs_shift: None,
             sync_window: None,
             ports_open_by_order: false,
@@ -208,7 +211,7 @@ impl Plan {
             for unit in units(devices, &members) {
                 layout.place_unit(unit, devices, &mut plan, &mut datagrams)?;
             }
-            if index == last {
+            if index == last && options.presence {
                 datagrams.push(extra::presence_monitor());
             }
             let frames = layout.frames(datagrams, devices);

@@ -8,7 +8,7 @@ use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Stream;
 
-use super::TapedFrame;
+use super::super::tape::TapedFrame;
 
 /// Lengths that recorders are set to.
 const SNAPS: [usize; 4] = [40, 64, 96, 128];

@@ -3,9 +3,8 @@
 //! whose fault acted inside the excerpt and left a trace there, or whose kind of fault could not be judged.
 
 mod cut;
-mod trace;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::PoisonError;
 
 use linesman_config::fault::FaultName;
 use linesman_config::project::Project;
@@ -18,32 +17,13 @@ use linesman_sim::truth::{Effect, Entry, FaultId, TruthLog};
 
 use super::case::{Case, CaseKind, ScoreOptions};
 use super::judge::alarms;
+use super::listen::leaves_a_state;
 use super::play::play_taped;
+use super::tape::{Tape, TapedFrame};
+use super::trace;
 
+pub use super::trace::Trace;
 pub use cut::Cut;
-pub use trace::Trace;
-
-/// A frame of a recording.
-#[derive(Clone, Debug)]
-pub(super) struct TapedFrame {
-    time: Instant,
-    is_sent: bool,
-    fcs: Option<bool>,
-    bytes: Vec<u8>,
-}
-
-/// A recording in memory, as a tool makes it that tells neither cards nor directions apart.
-pub(super) type Tape = Arc<Mutex<Vec<TapedFrame>>>;
-
-/// Takes one frame down.
-pub(super) fn take_down(tape: &Tape, seen: &FrameSeen<'_>) {
-    tape.lock().unwrap_or_else(PoisonError::into_inner).push(TapedFrame {
-        time: seen.time,
-        is_sent: seen.direction == Direction::Sent,
-        fcs: seen.fcs,
-        bytes: seen.bytes.to_vec(),
-    });
-}
 
 /// Choices for excerpts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -170,7 +150,8 @@ fn taped(seed: u64, options: &ExcerptOptions) -> Option<Taped> {
         }
         let tape = Tape::default();
         let Ok((_, truth, project)) = play_taped(&case, &score, &tape) else { continue };
-        let frames = std::mem::take(&mut *tape.lock().unwrap_or_else(PoisonError::into_inner));
+        let recording = std::mem::take(&mut *tape.lock().unwrap_or_else(PoisonError::into_inner));
+        let frames = recording.frames;
         return Some(Taped { case, frames, truth, project });
     }
     None
@@ -247,45 +228,4 @@ fn lasts(
     effects.into_iter().any(|(at, effect)| {
         leaves_a_state(effect) && at <= to && ended.is_none_or(|ended| ended >= from)
     })
-}
-
-/// Whether an effect is the beginning of something that lasts until the fault ends.
-const fn leaves_a_state(effect: Effect) -> bool {
-    match effect {
-        Effect::SignalLost
-        | Effect::PowerLost
-        | Effect::StateRefused { .. }
-        | Effect::Misbehaves(_)
-        | Effect::ProcessorStopped
-        | Effect::ClockDrifts { .. }
-        | Effect::ClockStopped
-        | Effect::SyncCut
-        | Effect::SyncBounces
-        | Effect::WrongDevice
-        | Effect::MissingDevice
-        | Effect::ExtraDevice
-        | Effect::SwappedDevice
-        | Effect::SharedAddress { .. }
-        | Effect::WrongPort => true,
-        Effect::SymbolError
-        | Effect::FrameSpoiled { .. }
-        | Effect::FrameLost { .. }
-        | Effect::StrangerSent { .. }
-        | Effect::ContentRefused { .. }
-        | Effect::SignalBack
-        | Effect::PowerBack
-        | Effect::ProcessorRuns
-        | Effect::ProcessorRestarted
-        | Effect::CardSilent
-        | Effect::WatchdogSet { .. }
-        | Effect::WatchdogExpired { .. }
-        | Effect::EmergencySent { .. }
-        | Effect::ClockRestarted
-        | Effect::ClockRestored
-        | Effect::SyncBack
-        | Effect::WorkTakes { .. }
-        | Effect::WorkRestored
-        | Effect::FrameHeldBack { .. }
-        | Effect::OldCounters => false,
-    }
 }

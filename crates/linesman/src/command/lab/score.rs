@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use linesman_config::fault::FaultName;
+use linesman_lab::habit::Habit;
 use linesman_lab::score::report::{GroupReport, SideReport};
 use linesman_lab::score::{Perturbation, Rate, ScoreOptions, ScoreReport, Tally, run_case};
 
-use super::{on_all_processors, seeds};
+use super::{listened, on_all_processors, seeds};
 use crate::exit::Status;
 use crate::output::{Output, Progress, Table};
 use crate::text::quantity::count;
@@ -30,6 +31,10 @@ pub(crate) struct Arguments {
     /// cleared-counters
     #[arg(long, value_name = "NAME")]
     perturb: Option<Perturbation>,
+    /// Let the MainDevice play a habit of others: process-data, states, links, counters or clearing. Then nobody asks
+    /// for registers, and who listens beside it is judged: from the start, joined during a fault, joined after it
+    #[arg(long, value_name = "NAME", default_value_t)]
+    habit: Habit,
     /// Also each case that was judged wrongly, with what was said
     #[arg(long)]
     list: bool,
@@ -46,6 +51,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Status {
         capture_only: arguments.capture_only,
         healthy: arguments.healthy,
         perturb: arguments.perturb,
+        habit: arguments.habit,
     };
     let mut tally = Tally::new(options);
     let mut progress = Progress::new();
@@ -73,11 +79,16 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Status {
 fn show(report: &ScoreReport, list: bool, output: &mut Output) {
     let (from, to) = report.seeds;
     output.line(&format!(
-        "Seeds {from}..{to}: {}, in {} a fault had an effect{}.",
+        "Seeds {from}..{to}: {}, in {} a fault had an effect{}{}.",
         count(report.cases, "case"),
         report.effective_cases,
-        report.perturbed.as_ref().map_or_else(String::new, |name| format!("; perturbed: {name}"))
+        report.perturbed.as_ref().map_or_else(String::new, |name| format!("; perturbed: {name}")),
+        report.listened.as_ref().map_or_else(String::new, |_| format!("; habit: {}", report.habit)),
     ));
+    if let Some(report) = &report.listened {
+        output.line("");
+        listened::show(report, list, output);
+    }
     output.line("");
     let mut table = Table::new(
         &["single faults", "place", "cause", "place, set", "cause, set", "95 %"],

@@ -1,0 +1,146 @@
+//! The listeners of one case.
+
+use std::sync::PoisonError;
+
+use linesman_diagnosis::report::{Diagnosis, Verdict};
+use linesman_proto::address::DeviceId;
+use linesman_proto::time::{Instant, Span};
+use linesman_sim::truth::FaultRecord;
+
+use super::super::judge::alarms;
+use super::super::play::Play;
+use super::super::tape::Recording;
+use super::super::trace;
+use super::join::Joins;
+use super::judge::judge_listener;
+use super::play::Listener;
+use super::{HealthyListened, HealthySaid, Listeners, Pair};
+use crate::verdict::judge::Company;
+use crate::verdict::{Naming, Scene, Truth};
+
+/// Who joins a healthy run listens for the last part of it: two of three.
+const LATE_PART: u64 = 3;
+
+impl Play<'_> {
+    fn listener<'a>(&'a self, recording: &'a Recording, with_project: bool) -> Listener<'a> {
+        Listener {
+            recording,
+            project: with_project.then(|| self.lab.project()),
+            host_counters: self.case.host_counters,
+        }
+    }
+
+    /// What listeners say of the run so far, in which nothing was wrong; `None` where nobody listens.
+    pub(in crate::score) fn healthy_listened(&self) -> Option<HealthyListened> {
+        let tape = self.tape.as_ref()?;
+        let recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = self.lab.now();
+        let mut stream = self.case.seed.stream("score late and healthy");
+        let part = now.since(self.up).as_nanos() / LATE_PART;
+        let late = self.up + Span::ns(stream.between(0, part.max(1)));
+        let said = |(from, with_project)| {
+            let said = self.listener(&recording, with_project).says(from, now);
+            HealthySaid {
+                alarms: said.as_ref().map(alarms).unwrap_or_default(),
+                is_healthy: said.is_some_and(|said| said.verdict == Verdict::Healthy),
+            }
+        };
+        let columns = [(None, false), (None, true), (Some(late), false), (Some(late), true)];
+        Some(HealthyListened { columns: columns.map(said) })
+    }
+
+    /// What listeners say of a fault of the run; `None` where nobody listens.
+    pub(in crate::score) fn listened(
+        &self,
+        record: &FaultRecord,
+        truth: &Truth,
+        all: &[Truth],
+        scene: &Scene<'_>,
+    ) -> Option<Listeners> {
+        let tape = self.tape.as_ref()?;
+        let recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut stream = self.case.seed.stream("score listeners");
+        let log = self.lab.truth();
+        let joins = Joins::draw(log, record, (self.up, self.lab.now()), &mut stream);
+        let judging = Judging {
+            play: self,
+            recording: &recording,
+            truth,
+            all,
+            scene,
+            company: Company::of(log, record),
+        };
+        Some(Listeners {
+            start: judging.pair(None),
+            during: joins.during.map(|at| judging.pair(Some(at))),
+            after: joins.after.map(|at| judging.pair(Some(at))),
+        })
+    }
+}
+
+/// The listeners of a case, held against one fault.
+struct Judging<'a, 'p> {
+    play: &'a Play<'p>,
+    recording: &'a Recording,
+    truth: &'a Truth,
+    all: &'a [Truth],
+    scene: &'a Scene<'a>,
+    company: Company,
+}
+
+impl Judging<'_, '_> {
+    /// Those who listen from an instant on, or from before the start.
+    fn pair(&self, from: Option<Instant>) -> Pair {
+        let Play { lab, case, .. } = self.play;
+        let until = lab.now();
+        let frames = &self.recording.frames;
+        let range = self.play.listener(self.recording, false).hears(from, until);
+        // Where the first frame is one that comes back, it is not known to be of this computer.
+        let is_local = frames.get(range.start).is_some_and(|first| first.is_sent);
+        let scene = Scene { host_counters: self.scene.host_counters && is_local, ..*self.scene };
+        let traces = trace::heard(frames, &frames[range], case.cycle, from.is_none());
+        let by_position = |id: DeviceId| lab.of_plan(id);
+        let as_planned = |id: DeviceId| id;
+        let judge = |with_project: bool| {
+            let said: Option<Diagnosis> =
+                self.play.listener(self.recording, with_project).says(from, until);
+            let naming: Naming<'_> = if with_project { &as_planned } else { &by_position };
+            judge_listener(
+                said.as_ref(),
+                self.truth,
+                self.all,
+                &scene,
+                self.company,
+                naming,
+                &traces,
+            )
+        };
+        Pair { alone: judge(false), with_project: judge(true) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::case::{Case, ScoreOptions};
+    use super::*;
+    use crate::habit::Habit;
+
+    #[test]
+    fn frames_of_a_calm_line_show_no_trace_of_trouble() {
+        for habit in Habit::ALL.into_iter().filter(|habit| *habit != Habit::Own) {
+            let options = ScoreOptions { habit, healthy: true, ..ScoreOptions::default() };
+            for seed in 1..13 {
+                let case = Case::draw(seed, 0, &options);
+                let Ok(play) = Play::calm(&case, &options) else { panic!("seed {seed}") };
+                let tape = play.tape.as_ref().map(|tape| tape.lock().unwrap().clone()).unwrap();
+                for from in [None, Some(play.up + Span::ms(100))] {
+                    let range = play.listener(&tape, false).hears(from, play.lab.now());
+                    let heard = &tape.frames[range];
+                    assert!(heard.len() > 100, "{habit}, seed {seed}");
+                    let traces = trace::heard(&tape.frames, heard, case.cycle, from.is_none());
+                    assert_eq!(traces, [], "{habit}, seed {seed}, {from:?}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! Recordings in memory: the frames of a run, and what the computer observed of its cards.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use linesman_diagnosis::observe::{Direction, FrameSeen, HostObservation};
+use linesman_proto::address::Path;
+use linesman_proto::time::Instant;
+
+/// A frame of a recording.
+#[derive(Clone, Debug)]
+pub(super) struct TapedFrame {
+    pub(super) time: Instant,
+    /// The card that it left by or arrived at.
+    pub(super) path: Option<Path>,
+    pub(super) is_sent: bool,
+    pub(super) fcs: Option<bool>,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// All that a listener on the cards of the MainDevice is shown.
+#[derive(Clone, Default, Debug)]
+pub(super) struct Recording {
+    pub(super) frames: Vec<TapedFrame>,
+    /// Observations of the host, each with the number of frames before it.
+    pub(super) host: Vec<(usize, HostObservation)>,
+}
+
+/// A recording that is being made.
+pub(super) type Tape = Arc<Mutex<Recording>>;
+
+/// Takes one frame down.
+pub(super) fn take_down(tape: &Tape, seen: &FrameSeen<'_>) {
+    tape.lock().unwrap_or_else(PoisonError::into_inner).frames.push(TapedFrame {
+        time: seen.time,
+        path: seen.path,
+        is_sent: seen.direction == Direction::Sent,
+        fcs: seen.fcs,
+        bytes: seen.bytes.to_vec(),
+    });
+}
+
+/// Takes an observation of the host down.
+pub(super) fn take_down_host(tape: &Tape, seen: &HostObservation) {
+    let mut recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
+    let before = recording.frames.len();
+    recording.host.push((before, *seen));
+}
