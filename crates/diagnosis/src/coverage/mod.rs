@@ -13,8 +13,10 @@ mod state;
 mod traffic;
 
 use linesman_config::fault::FaultName;
+use linesman_proto::time::Instant;
 use serde::{Deserialize, Serialize};
 
+use crate::ask::AskingReport;
 use crate::finding::Place;
 use crate::line::Line;
 use crate::main_device::{MainDeviceKind, next_step};
@@ -245,6 +247,8 @@ pub enum Reason {
     NoProject,
     /// Nobody asked through a mailbox, or not every SubDevice.
     NoMailboxRequests,
+    /// Questions beside the MainDevice were not sent, or no longer.
+    NotAsked,
     /// No clock's difference to the reference clock was read.
     ClocksNotRead,
     /// A value was not given.
@@ -353,6 +357,22 @@ impl Coverage {
         for (mine, its) in self.assessments.iter_mut().zip(other.assessments) {
             mine.extent = mine.extent.min(its.extent);
             mine.gaps.extend(its.gaps);
+        }
+    }
+
+    /// Says of what questions are to read that they were not asked to the end.
+    pub fn note_asking(&mut self, asking: &AskingReport) {
+        let Some(reason) = &asking.reason else { return };
+        let text = match asking.last_ns {
+            None => format!("no question was asked: {reason}"),
+            Some(last) => {
+                format!("no question was asked after {}: {reason}", Instant::from_nanos(last.0))
+            }
+        };
+        let step = asking.next_step.clone().unwrap_or_default();
+        let subjects = [Subject::SignalQuality, Subject::LinkStatus];
+        for one in self.assessments.iter_mut().filter(|one| subjects.contains(&one.subject)) {
+            one.lacks(Extent::InPart, Gap::new(Reason::NotAsked, text.as_str()).step(step.clone()));
         }
     }
 

@@ -12,11 +12,13 @@ use linesman_proto::address::{DeviceId, Network, RegisterAddress};
 use linesman_proto::frame::{FrameError, FrameView};
 use linesman_proto::time::{Instant, Span};
 
+use crate::ask::AskingReport;
 use crate::coverage::{Coverage, InputKind};
 use crate::finding::{Book, Finding, Severity};
 use crate::line::{Line, Seen, search};
 use crate::observe::{
-    Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, companion,
+    Direction, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, Pairing, companion,
+    question,
 };
 use crate::report::{self, Diagnosis, MainDeviceReport, NetworkReport, Number, Verdict};
 use crate::rule::{RULES, View};
@@ -47,6 +49,7 @@ pub struct Engine {
     next_judgement: Instant,
     has_ended: bool,
     is_complete: bool,
+    asking: Option<AskingReport>,
 }
 
 impl Engine {
@@ -75,6 +78,7 @@ impl Engine {
             next_judgement: Instant::default(),
             has_ended: false,
             is_complete: true,
+            asking: None,
         }
     }
 
@@ -120,8 +124,9 @@ impl Engine {
             return;
         }
         self.now = self.now.max(at);
-        let Watched { line, pairing, .. } = self.watched(network);
+        let Watched { line, pairing, questions, .. } = self.watched(network);
         pairing.forget();
+        questions.forget();
         line.traffic.missed += count;
         // The time to the next one says nothing.
         for cyclic in &mut line.cyclic {
@@ -131,12 +136,27 @@ impl Engine {
         line.touch();
     }
 
+    /// The counters of the host's cards are about this line from now on, so that their silence means zero: the host was
+    /// seen to send on it.
+    pub fn watch_host(&mut self) {
+        self.setup.host_counters = true;
+        for watched in &mut self.networks {
+            watched.line.host.is_watched = true;
+            watched.line.touch();
+        }
+    }
+
+    /// How it stands with questions beside another MainDevice.
+    pub fn note_asking(&mut self, asking: AskingReport) {
+        self.asking = Some(asking);
+    }
+
     /// Time passes. Only for live input: the time of captures comes with their frames.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.now = self.now.max(now);
-        for Watched { line, learner, pairing, .. } in &mut self.networks {
-            line.now = line.now.max(now);
-            pairing.expire(now, &mut |exchange| learner.learn(line, exchange));
+        for watched in &mut self.networks {
+            watched.line.now = watched.line.now.max(now);
+            watched.expire(now, false);
         }
         self.survey();
         self.judge_if_due();
@@ -145,7 +165,8 @@ impl Engine {
     /// When [`Engine::handle_timeout`] has something to do.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let lost = self.networks.iter().filter_map(|watched| watched.pairing.timeout()).min();
+        let pairings = self.networks.iter().flat_map(|one| [&one.pairing, &one.questions]);
+        let lost = pairings.filter_map(Pairing::timeout).min();
         let again = self.networks.iter().filter_map(|watched| watched.again).min();
         let news = self.has_news().then_some(self.next_judgement);
         let judgement = match (news, again) {
@@ -173,9 +194,9 @@ impl Engine {
         self.now = self.now.max(at);
         self.has_ended = true;
         self.is_complete &= complete;
-        for Watched { line, learner, pairing, .. } in &mut self.networks {
-            pairing.finish(&mut |exchange: &Exchange<'_>| learner.learn(line, exchange));
-            line.touch();
+        for watched in &mut self.networks {
+            watched.expire(at, true);
+            watched.line.touch();
         }
         self.judge();
     }
@@ -196,6 +217,7 @@ impl Engine {
             network: self.network_report(),
             main_device: self.main_device(),
             devices: report::device::reports(self.line(Network(0))),
+            asking: self.asking.clone(),
             coverage: report::coverage::report(&coverage),
             understood: None,
             findings: roots
@@ -362,6 +384,9 @@ impl Engine {
         for watched in &self.networks {
             coverage.merge(Coverage::of(&watched.line, self.setup.input));
         }
+        if let Some(asking) = &self.asking {
+            coverage.note_asking(asking);
+        }
         coverage
     }
 
@@ -411,10 +436,20 @@ fn push(probes: &mut VecDeque<Probe>, line: &Line, device: DeviceId, what: Asked
 const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), close::COUNTERS];
 
 fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
+    watched.line.now = now;
+    let parsed = FrameView::parse(frame.bytes);
+    if let Ok(view) = &parsed
+        && question::is_question(view)
+    {
+        // Damaged ones do not reach anybody.
+        if frame.fcs != Some(false) {
+            watched.take_question(frame, view);
+        }
+        return;
+    }
     let Watched { line, learner, pairing, .. } = watched;
-    line.now = now;
     let traffic = &mut line.traffic;
-    let view = match FrameView::parse(frame.bytes) {
+    let view = match parsed {
         Ok(view) => view,
         Err(FrameError::OtherType { .. }) => {
             traffic.frames += 1;

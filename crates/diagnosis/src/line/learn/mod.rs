@@ -118,6 +118,25 @@ impl Learner {
         }
     }
 
+    /// Learns what the answer to a question shows: the registers, but nothing of the MainDevice's own frames.
+    pub fn learn_answer(&mut self, line: &mut Line, exchange: &Exchange<'_>) {
+        let Some(reply) = &exchange.reply else {
+            line.traffic.questions.lost += u64::from(!exchange.is_cut_off);
+            return;
+        };
+        line.traffic.questions.answered += 1;
+        for answer in answers(exchange, exchange.request.as_ref(), reply).flatten() {
+            let is_single =
+                matches!(answer.effect.addressing, Addressing::Position | Addressing::Station);
+            // How many answer a broadcast in UDP says how many process UDP.
+            if is_single && !answer.effect.writes {
+                let (register, len) = (answer.ado, answer.reply.data_len() as u16);
+                line.traffic.questions.note_read(register, len);
+                self.single(line, &answer);
+            }
+        }
+    }
+
     fn answered(
         &mut self,
         line: &mut Line,
@@ -125,43 +144,17 @@ impl Learner {
         request: Option<&FrameCopy<'_>>,
         reply: &FrameCopy<'_>,
     ) {
-        let Ok(view) = FrameView::parse(reply.bytes) else { return };
         if let Some(request) = request.filter(|_| exchange.is_last) {
             let (sent, back, len) = (request.time, reply.time, reply.bytes.len());
             if line.trips.record(sent, back, reply.number, len) {
                 line.touch();
             }
         }
-        let mut requests =
-            request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
-        for (index, datagram) in view.datagrams().enumerate() {
-            let Ok(datagram) = datagram else { break };
-            let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
-            let Some(command) = datagram.command() else {
-                line.traffic.datagrams += u64::from(exchange.is_last);
-                continue;
-            };
-            let sum = exchange.sum(index, datagram.wkc().0);
-            if exchange.is_part && sum == 0 {
-                continue;
+        for answer in answers(exchange, request, reply) {
+            match answer {
+                Some(answer) => self.datagram(line, &answer),
+                None => line.traffic.datagrams += u64::from(exchange.is_last),
             }
-            let answer = Answer {
-                command,
-                effect: command.effect(),
-                request,
-                reply: datagram,
-                ado: datagram.ado(),
-                sum,
-                own: datagram.wkc().0,
-                is_last: exchange.is_last,
-                is_single: exchange.is_last && exchange.earlier.is_empty(),
-                sent_by: exchange.sent_by,
-                knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
-                sent_at: exchange.request.map(|request| request.time),
-                at: reply.time,
-                frame: reply.number,
-            };
-            self.datagram(line, &answer);
         }
     }
 
@@ -352,6 +345,44 @@ impl Learner {
             self.transfers.written(id, answer);
         }
     }
+}
+
+/// The datagrams of a frame that came back, one by one; `None` for one whose command is not known.
+fn answers<'a>(
+    exchange: &'a Exchange<'_>,
+    request: Option<&FrameCopy<'a>>,
+    reply: &FrameCopy<'a>,
+) -> impl Iterator<Item = Option<Answer<'a>>> {
+    let (at, frame) = (reply.time, reply.number);
+    let view = FrameView::parse(reply.bytes).ok();
+    let datagrams = view.into_iter().flat_map(|view| view.datagrams()).map_while(Result::ok);
+    let mut requests =
+        request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
+    let answer = move |(index, datagram): (usize, Datagram<'a>)| {
+        let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
+        let sum = exchange.sum(index, datagram.wkc().0);
+        let Some(command) = datagram.command() else { return Some(None) };
+        if exchange.is_part && sum == 0 {
+            return None;
+        }
+        Some(Some(Answer {
+            command,
+            effect: command.effect(),
+            request,
+            reply: datagram,
+            ado: datagram.ado(),
+            sum,
+            own: datagram.wkc().0,
+            is_last: exchange.is_last,
+            is_single: exchange.is_last && exchange.earlier.is_empty(),
+            sent_by: exchange.sent_by,
+            knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
+            sent_at: exchange.request.map(|request| request.time),
+            at,
+            frame,
+        }))
+    };
+    datagrams.enumerate().filter_map(answer)
 }
 
 /// A request that never came back, or of which only some copies did.
