@@ -436,11 +436,12 @@ impl Asker {
         let Phase::Trial { tries, most } = &mut self.phase else { return };
         (*tries, *most) = (*tries + 1, (*most).max(answered));
         let (tries, most) = (*tries, *most);
+        let kind = line.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind);
         let counted = line.traffic.broadcast_now.map(|count| count.value);
         let present =
             counted.unwrap_or_else(|| u16::try_from(line.device_count()).unwrap_or(u16::MAX));
         if most > 0 && most >= present {
-            self.turns.begin(most);
+            self.turns.begin(most, kind);
             self.phase = Phase::Asking;
             self.news = Some(News::Begun(self.carrier));
             return;
@@ -448,7 +449,6 @@ impl Asker {
         if tries < TRIALS {
             return;
         }
-        let kind = line.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind);
         match carrier::plain(kind, self.highest_index).filter(|_| self.carrier == Carrier::Udp) {
             Some(plain) => {
                 self.carrier = plain;

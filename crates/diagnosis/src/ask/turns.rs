@@ -2,7 +2,8 @@
 //!
 //! Reading DL status or AL status takes back the event that tells the MainDevice of a change, where it has asked for such
 //! events (0x0200, the mask of events that are shown in the IRQ field of datagrams; 0x0210 bits 2 and 3). So the mask of
-//! each SubDevice is read first, and a register whose event is wanted is left alone.
+//! each SubDevice is read first, and a register whose event is wanted is left alone; unless the MainDevice is known to set
+//! the mask and never to look at the field, as SOEM (`ecx_set_slaves_to_default` in `ec_config.c`; `irpt` is used nowhere).
 
 use std::collections::VecDeque;
 
@@ -10,6 +11,7 @@ use linesman_proto::address::{Position, RegisterAddress, StationAddress};
 use linesman_proto::register::ErrorCounters;
 
 use crate::line::Line;
+use crate::main_device::MainDeviceKind;
 
 /// SubDevices that are asked at most.
 const MOST: usize = 4096;
@@ -64,13 +66,16 @@ pub(super) struct Turns {
     position: u16,
     known: Vec<Known>,
     next: usize,
+    /// Whether the MainDevice never looks at events.
+    ignores_events: bool,
     urgent: VecDeque<StationAddress>,
 }
 
 impl Turns {
-    /// Begins anew, with so many SubDevices on the line.
-    pub(super) fn begin(&mut self, count: u16) {
-        *self = Self { positions: count, ..Self::default() };
+    /// Begins anew, with so many SubDevices on the line of this MainDevice.
+    pub(super) fn begin(&mut self, count: u16, kind: MainDeviceKind) {
+        let ignores_events = kind == MainDeviceKind::Soem;
+        *self = Self { positions: count, ignores_events, ..Self::default() };
     }
 
     /// SubDevices that have told who they are.
@@ -119,6 +124,7 @@ impl Turns {
             bytes.try_into().ok().map(u16::from_le_bytes)
         };
         let (Some(station), Some(mask)) = (word(STATION), word(EVENT_MASK)) else { return };
+        let mask = if self.ignores_events { 0 } else { mask };
         let target =
             if station == 0 { question.target } else { Target::Station(StationAddress(station)) };
         // Two with one address would answer together: what they say is mixed.
@@ -156,7 +162,7 @@ mod tests {
     fn all_are_asked_by_turns_once_they_have_told_who_they_are() {
         let line = Line::default();
         let mut turns = Turns::default();
-        turns.begin(2);
+        turns.begin(2, MainDeviceKind::Kickcat);
         for (position, station) in [(0, 0x1001), (1, 0x1002)] {
             let question = turns.next(&line).unwrap();
             assert_eq!(question.target, Target::Position(Position(position)));
@@ -182,18 +188,23 @@ mod tests {
             (0b0011, &[0x0110, 0x0130, 0x0300]),
         ] {
             let mut turns = Turns::default();
-            turns.begin(1);
+            turns.begin(1, MainDeviceKind::Kickcat);
             let question = turns.next(&line).unwrap();
             tell(&mut turns, &question, 0x1001, mask);
             assert_eq!(addresses(&turns.next(&line).unwrap()), expected, "mask {mask:b}");
         }
+        let mut turns = Turns::default();
+        turns.begin(1, MainDeviceKind::Soem);
+        let question = turns.next(&line).unwrap();
+        tell(&mut turns, &question, 0x1001, 0b0100);
+        assert_eq!(addresses(&turns.next(&line).unwrap()), [0x0110, 0x0130, 0x0300], "never looks");
     }
 
     #[test]
     fn without_an_address_of_its_own_a_subdevice_is_asked_by_position() {
         let line = Line::default();
         let mut turns = Turns::default();
-        turns.begin(3);
+        turns.begin(3, MainDeviceKind::Kickcat);
         for station in [0, 0x1001, 0x1001] {
             let question = turns.next(&line).unwrap();
             tell(&mut turns, &question, station, 0);

@@ -16,10 +16,14 @@ use linesman_config::fault::FaultName;
 use linesman_proto::time::Instant;
 use serde::{Deserialize, Serialize};
 
-use crate::ask::AskingReport;
+use crate::ask::{AskingReport, Refusal};
 use crate::finding::Place;
 use crate::line::Line;
 use crate::main_device::{MainDeviceKind, next_step};
+
+/// The step that has what a MainDevice does not read be read by questions.
+const ASK: &str =
+    "on its own computer, have it read beside its cycle: `linesman diagnose WHERE --ask`";
 
 /// A way by which evidence came in: it decides which next steps there are.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
@@ -433,20 +437,23 @@ impl<'a> Basis<'a> {
         }
     }
 
-    /// The kind of the MainDevice that drives the line.
-    fn kind(&self) -> MainDeviceKind {
-        self.line.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind)
-    }
-
     /// The next step that gets error counters read.
-    fn read_counters(&self) -> &'static str {
+    fn read_counters(&self) -> String {
+        let kind = self.line.main_device_kind();
         match self.input {
             InputKind::Driven | InputKind::ReadOut => {
-                "clear and watch them: `linesman counters WHERE --clear --for 60`"
+                "clear and watch them: `linesman counters WHERE --clear --for 60`".to_owned()
             }
-            InputKind::Listened | InputKind::Recorded => next_step::error_counters(self.kind()),
-            InputKind::Typed => {
-                "clear the error counters, wait, read them again, and give both readings"
+            InputKind::Listened
+                if Refusal::of(self.line.habits.recognised().as_ref()).is_none() =>
+            {
+                format!("{ASK}; or {}", next_step::error_counters(kind))
+            }
+            InputKind::Typed if kind == MainDeviceKind::Unknown => {
+                "clear the error counters, wait, read them again, and give both readings".to_owned()
+            }
+            InputKind::Listened | InputKind::Recorded | InputKind::Typed => {
+                next_step::error_counters(kind).to_owned()
             }
         }
     }

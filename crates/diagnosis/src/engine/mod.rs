@@ -20,7 +20,9 @@ use crate::observe::{
     Direction, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, Pairing, companion,
     question,
 };
-use crate::report::{self, Diagnosis, MainDeviceReport, NetworkReport, Number, Verdict};
+use crate::report::{
+    self, Diagnosis, FindingReport, MainDeviceReport, NetworkReport, Number, Verdict,
+};
 use crate::rule::{RULES, View};
 
 pub use setup::{Asked, Event, EventKind, Probe, ProbeEffect, Setup};
@@ -206,6 +208,11 @@ impl Engine {
     pub fn diagnosis(&self) -> Diagnosis {
         let roots = self.book.roots();
         let coverage = self.coverage();
+        let mut findings: Vec<FindingReport> =
+            roots.into_iter().map(|finding| report::build::finding(&self.book, finding)).collect();
+        if let Some(line) = self.line(Network(0)) {
+            report::reading::advise(&mut findings, line, self.setup.input);
+        }
         Diagnosis {
             schema: report::SCHEMA.to_owned(),
             tool: concat!("linesman ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -220,10 +227,7 @@ impl Engine {
             asking: self.asking.clone(),
             coverage: report::coverage::report(&coverage),
             understood: None,
-            findings: roots
-                .into_iter()
-                .map(|finding| report::build::finding(&self.book, finding))
-                .collect(),
+            findings,
         }
     }
 

@@ -9,6 +9,7 @@ pub mod coverage;
 pub mod device;
 pub mod main_device;
 pub mod number;
+pub(crate) mod reading;
 
 use linesman_config::fault::{Class, FaultName};
 use serde::{Deserialize, Serialize};
