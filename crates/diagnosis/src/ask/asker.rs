@@ -91,8 +91,8 @@ impl Over {
         match self {
             Self::Refused(refusal) => refusal.to_string(),
             Self::Stopped(disturbance) => format!("the MainDevice may be disturbed: {disturbance}"),
-            Self::NoCarrier { answered: 0, present, kind } => format!(
-                "none of {present} SubDevices answered to EtherCAT in UDP, and {} may take plain frames for its own",
+            Self::NoCarrier { answered: 0, kind, .. } => format!(
+                "no SubDevice answered to EtherCAT in UDP, and {} may take plain frames for its own",
                 kind.name()
             ),
             Self::NoCarrier { answered, present, kind } => format!(
@@ -158,8 +158,8 @@ pub struct Asker {
     look_at: Option<Instant>,
     highest_index: u8,
     source: Option<MacAddress>,
-    /// Frames that came in while none had been seen to leave.
-    came_in: u64,
+    /// Frames that show that the MainDevice is elsewhere: they came in while none had been seen to leave, or answers leave.
+    elsewhere: u64,
     /// Frames that came back with the address of another card than that which sends here.
     by_other_card: u64,
     /// How many have answered the latest trial that came back.
@@ -188,7 +188,7 @@ impl Asker {
             look_at: None,
             highest_index: 0,
             source: None,
-            came_in: 0,
+            elsewhere: 0,
             by_other_card: 0,
             counted: None,
             questions: 0,
@@ -211,8 +211,11 @@ impl Asker {
             self.by_other_card += 1;
             return;
         }
+        let print = Fingerprint::of(&view);
         match frame.direction {
-            Direction::Unknown => self.came_in += 1,
+            Direction::Unknown => self.elsewhere += 1,
+            // Whoever answers here is the line, not the MainDevice.
+            Direction::Sent if print.is_answered => self.elsewhere += 1,
             Direction::Sent => {
                 self.source = Some(view.source());
                 let indexes = view.datagrams().map_while(Result::ok).map(|one| one.index());
@@ -230,7 +233,7 @@ impl Asker {
             return;
         }
         let Self { pairing, gaps, guard, .. } = self;
-        pairing.take(frame, &view, Fingerprint::of(&view), &mut |exchange| {
+        pairing.take(frame, &view, print, &mut |exchange| {
             if let (Some(request), Some(reply)) = (&exchange.request, &exchange.reply) {
                 gaps.returned(request.time, reply.time);
             }
@@ -396,7 +399,7 @@ impl Asker {
     }
 
     fn learn(&mut self, since: Instant, now: Instant, line: &Line) {
-        if self.source.is_none() && self.came_in >= FEW {
+        if self.source.is_none() && self.elsewhere >= FEW {
             return self.end(Over::Refused(Refusal::Elsewhere));
         }
         if self.by_other_card >= FEW {

@@ -259,6 +259,11 @@ fn main_device_elsewhere_or_of_a_kind_that_minds_is_refused() {
     bench.direction = [Direction::Unknown; 2];
     bench.run(20);
     assert_eq!(bench.news, [News::Over(Over::Refused(Refusal::Elsewhere))]);
+    // The computer that plays the line.
+    let mut bench = Bench::new(SOEM);
+    bench.direction = [Direction::Received, Direction::Sent];
+    bench.run(20);
+    assert_eq!(bench.news, [News::Over(Over::Refused(Refusal::Elsewhere))]);
     let mut bench = Bench::new(MacAddress([0, 1, 2, 3, 4, 5]));
     bench.run(seconds(3));
     assert_eq!(bench.news, [News::Over(Over::Refused(Refusal::Unrecognised))]);
