@@ -91,6 +91,29 @@ fn frames_that_the_card_drops_are_this_computer() {
 }
 
 #[test]
+fn link_that_the_card_lost_is_the_first_one_though_the_wiring_is_not_known() {
+    let mut script = Script::with(Setup { input: InputKind::Listened, ..Setup::default() });
+    script.is_live = true;
+    script.engine.watch_host();
+    cycles(&mut script, 500, 0);
+    host(&mut script, HostEvent::Carrier(true));
+    cycles(&mut script, 500, 0);
+    host(&mut script, HostEvent::Carrier(false));
+    script.now += 500_000_000;
+    host(&mut script, HostEvent::SendFailures(50));
+    script.now += 500_000_000;
+    host(&mut script, HostEvent::Carrier(true));
+    cycles(&mut script, 500, 0);
+    let report = report(&mut script);
+    let (code, place, cause) = first(&report);
+    assert_eq!((code, cause), ("H101", "link-open"), "{}", text(&report));
+    let PlaceReport::Link { a, b: None, .. } = place else { panic!("{}", text(&report)) };
+    assert_eq!(a.no, 0);
+    let below: Vec<_> = report.findings[0].consequences.iter().map(|one| &one.code).collect();
+    assert_eq!(below, ["X512"], "{}", text(&report));
+}
+
+#[test]
 fn silence_of_the_card_is_evidence_only_where_it_is_that_of_the_main_device() {
     for (is_local, known) in [(true, true), (false, false)] {
         let mut script = joined(is_local);
