@@ -1,7 +1,6 @@
 //! Questions on a card that is listened on: the socket that sends them, and the lock of the card.
 
-use linesman_diagnosis::ask::asker::News;
-use linesman_diagnosis::ask::{AskSetup, Asker, AskingReport};
+use linesman_diagnosis::ask::{AskSetup, Asker, AskingReport, News};
 use linesman_diagnosis::{Engine, FrameSeen};
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;

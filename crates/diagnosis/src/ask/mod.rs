@@ -11,12 +11,14 @@ pub mod carrier;
 pub mod disturbance;
 pub mod gap;
 pub mod likelihood;
+pub mod outcome;
 pub mod report;
 pub mod turns;
 
 pub use asker::{AskSetup, Asker};
 pub use carrier::{Carrier, Refusal};
 pub use disturbance::Disturbance;
+pub use outcome::{News, Over};
 pub use report::{AskingReport, AskingState};
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
 use self::frame::{Frame, Made, lrw};
-use super::asker::{News, Over};
 use super::*;
 use crate::coverage::InputKind;
 use crate::observe::{Direction, FrameSeen};
@@ -228,7 +227,7 @@ fn questions_leave_in_gaps_at_the_rate_that_was_wished() {
     assert!(times.windows(2).all(|two| two[1].since(two[0]) >= Span::ms(10)));
     for at in times {
         let phase = at.as_nanos() % CYCLE.as_nanos();
-        assert!(phase >= 100_000 && phase <= 1_900_000, "{phase}");
+        assert!((100_000..=1_900_000).contains(&phase), "{phase}");
     }
 }
 
@@ -374,7 +373,7 @@ fn frames_lost_near_questions_alone_end_them() {
 fn frames_lost_everywhere_are_the_line_and_go_on_being_asked_about() {
     let mut bench = Bench::new(SOEM);
     bench.run(seconds(3));
-    bench.loses = Box::new(|cycle, _| (cycle * 2_654_435_761 >> 7).is_multiple_of(17));
+    bench.loses = Box::new(|cycle, _| ((cycle * 2_654_435_761) >> 7).is_multiple_of(17));
     bench.run(seconds(6));
     let report = bench.asker.report(bench.now);
     assert_eq!(report.state, AskingState::Asking, "{report:?}");

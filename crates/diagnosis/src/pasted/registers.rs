@@ -164,15 +164,12 @@ fn typed(kind: &str, text: &str) -> Option<Vec<u8>> {
 
 /// `slave 3 0x0300: 00 12`, `position 2 reg 0x0110 = 0x30 0x5A`, `0x1001 0x0300: …`.
 fn labelled(text: &str) -> Option<Value> {
-    let (label, bytes) = text.split_once([':', '=']).and_then(|(label, rest)| {
-        // `slave 3: 0x0300: 00 12`
-        match rest.split_once([':', '=']) {
-            Some((more, bytes)) if register(more).is_some() => {
-                Some((format!("{label} {more}"), bytes))
-            }
-            _ => Some((label.to_owned(), rest)),
-        }
-    })?;
+    let (label, rest) = text.split_once([':', '='])?;
+    // `slave 3: 0x0300: 00 12`
+    let (label, bytes) = match rest.split_once([':', '=']) {
+        Some((more, bytes)) if register(more).is_some() => (format!("{label} {more}"), bytes),
+        _ => (label.to_owned(), rest),
+    };
     let start = register(&label)?;
     let words: Vec<&str> =
         label.split([' ', ',', '#', '(', ')', '\t']).filter(|word| !word.is_empty()).collect();

@@ -33,11 +33,11 @@ impl Frame {
         let mut buffer = vec![0; 1514];
         let mut builder = FrameBuilder::new(&mut buffer, source);
         for (command, adp, ado, data, _) in datagrams {
-            let address = match command {
-                Command::Lrw => DatagramAddress::Logical(LogicalAddress(
+            let address = match *command == Command::Lrw {
+                true => DatagramAddress::Logical(LogicalAddress(
                     u32::from(*ado) << 16 | u32::from(*adp),
                 )),
-                _ => DatagramAddress::Physical(*adp, RegisterAddress(*ado)),
+                false => DatagramAddress::Physical(*adp, RegisterAddress(*ado)),
             };
             builder.push(*command, index, address, data.len()).unwrap().copy_from_slice(data);
         }

@@ -7,10 +7,8 @@ use linesman_proto::port::Port;
 
 fn read(block: &Block, position: u16) -> &ReadDevice {
     let is_it = |fact: &&super::super::fact::Fact| matches!(&fact.what, What::Read(Whom::Position(at), _) if *at == position);
-    match &block.facts.iter().find(is_it).unwrap().what {
-        What::Read(_, read) => read,
-        _ => unreachable!(),
-    }
+    let What::Read(_, read) = &block.facts.iter().find(is_it).unwrap().what else { panic!() };
+    read
 }
 
 fn frames(block: &Block, position: u16, port: Port) -> Option<u64> {

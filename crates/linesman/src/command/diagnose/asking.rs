@@ -1,8 +1,7 @@
 //! Questions beside another MainDevice: refused before anything is sent where that may do harm, and told of.
 
 use linesman_diagnosis::Engine;
-use linesman_diagnosis::ask::asker::{News, Over};
-use linesman_diagnosis::ask::{AskSetup, Refusal};
+use linesman_diagnosis::ask::{AskSetup, News, Over, Refusal};
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
 use linesman_runtime::asking::Asking;
