@@ -230,6 +230,25 @@ def tap_is_refused(line):
         assert status == 2 and "does not send from this computer" in reason, (status, reason)
 
 
+@check
+def counters_that_a_program_with_soem_prints_name_the_link(line):
+    with Segment(line, LINESMAN, FILE) as segment:
+        program = line.start(line.near, *SOEM.command("soem_counters.py"), NEAR, CYCLE_US, 4)
+        first = program.stdout.readline()
+        time.sleep(1)
+        segment.ask(do="inject", fault=NOISE, for_ms=None)
+        status, out, err = line.finish(program)
+        assert status == 0, err[-600:]
+    file = line.path("counters.txt")
+    file.write_text(first + out)
+    status, out, err = linesman(line, "diagnose", file, "--json")
+    diagnosis = parse(out, err)
+    worst = wrong(diagnosis)[0]
+    # The text does not tell that the second coupler hangs on port C: the wiring is assumed, and said so.
+    assert status == 1 and worst["place"]["b"] == {"no": 5, "port": "A"}, (names(diagnosis), first, out)
+    assert diagnosis["understood"]["assumed"], diagnosis["understood"]
+
+
 def crab_in_op(main):
     end = time.monotonic() + 30
     while time.monotonic() < end:
@@ -242,5 +261,6 @@ def crab_in_op(main):
 for one in (
     noise_beside_soem_is_placed_with_its_direction, noise_beside_kickcat_is_placed_with_its_direction,
     device_that_spoils_frames_beside_soem_is_named, device_that_spoils_frames_beside_kickcat_is_named,
+    counters_that_a_program_with_soem_prints_name_the_link,
 ):
     one.spoils_frames = True

@@ -210,6 +210,21 @@ mod tests {
     }
 
     #[test]
+    fn without_process_data_a_question_leaves_behind_any_frame() {
+        let mut gaps = Gaps::default();
+        for poll in 0..30 {
+            let sent = at_us(poll * 100_000);
+            let frame = Frame::of(&[fprd(0x1001, 0x0130, 2)]);
+            gaps.sent(sent, &frame.view());
+            assert_ne!(gaps.look(sent + Span::us(50)), Gap::Open, "it is under way");
+            gaps.returned(sent, sent + Span::us(100));
+        }
+        assert_eq!((gaps.cycle(), gaps.has_room()), (None, true));
+        assert_eq!(gaps.look(at_us(2_900_000 + 50_000)), Gap::Open);
+        assert!(!gaps.is_driven(at_us(2_900_000 + 3_000_000)));
+    }
+
+    #[test]
     fn cycle_that_is_filled_has_no_room() {
         let mut gaps = Gaps::default();
         for cycle in 0..50 {
