@@ -231,6 +231,19 @@ def tap_is_refused(line):
 
 
 @check
+def card_of_a_ring_is_refused(line):
+    with Segment(line, LINESMAN, HERE / "ring.toml", on=f"{FAR}+{FAR_B}"):
+        for client in (SOEM, CAT):
+            rounds = line.path("rounds.json")
+            rounds.write_text("[{}]")
+            program = line.start(line.near, *client.command(), f"{NEAR}+{NEAR_B}", 3000, CYCLE_US, rounds)
+            time.sleep(4)
+            reason, _ = refused(line, f"listen:{NEAR}", "--ask")
+            assert "ring" in reason, (client.name, reason)
+            line.finish(program)
+
+
+@check
 def counters_that_a_program_with_soem_prints_name_the_link(line):
     with Segment(line, LINESMAN, FILE) as segment:
         program = line.start(line.near, *SOEM.command("soem_counters.py"), NEAR, CYCLE_US, 4)
