@@ -85,6 +85,8 @@ pub struct Asker {
     out: Option<Out>,
     next: Instant,
     look_at: Option<Instant>,
+    /// When it was last looked what is due.
+    looked: Instant,
     highest_index: u8,
     source: Option<MacAddress>,
     /// Frames that show that the MainDevice is elsewhere: they came in while none had been seen to leave, or answers leave.
@@ -115,6 +117,7 @@ impl Asker {
             out: None,
             next: Instant::ZERO,
             look_at: None,
+            looked: Instant::ZERO,
             highest_index: 0,
             source: None,
             elsewhere: 0,
@@ -215,12 +218,14 @@ impl Asker {
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let out = self.out.as_ref().map(|out| out.gives_up);
-        let learnt = match self.phase {
-            Phase::Learning(since) => Some(since + LEARN),
-            Phase::Trial { .. } | Phase::Asking | Phase::Over(_) => None,
-        };
-        let all = [out, learnt, self.look_at, self.pairing.timeout(), self.guard.timeout()];
-        all.into_iter().flatten().min()
+        let [learnt, steady] = match self.phase {
+            Phase::Learning(since) => [Some(since), self.guard.last_order()],
+            Phase::Trial { .. } | Phase::Asking | Phase::Over(_) => [None, None],
+        }
+        .map(|from| from.map(|from| from + LEARN));
+        let all = [out, learnt, steady, self.look_at, self.pairing.timeout(), self.guard.timeout()];
+        // What is past and left something to be waited for is looked at with the next frame.
+        all.into_iter().flatten().filter(|at| *at > self.looked).min()
     }
 
     /// News since this was last asked.
@@ -287,6 +292,7 @@ impl Asker {
 
     /// Gives up what is lost, and goes on to the next phase.
     fn settle(&mut self, now: Instant, line: &Line) {
+        self.looked = now;
         let Self { pairing, guard, .. } = self;
         pairing.expire(now, &mut |exchange| guard.exchanged(exchange));
         if let Some(out) = self.out.take_if(|out| out.gives_up <= now) {

@@ -116,6 +116,11 @@ impl Bench {
         let mut buffer = [0; 256];
         let line = self.engine.line(Network(0)).unwrap();
         let len = self.asker.poll_transmit(self.now, line, &mut buffer);
+        let next = self.asker.poll_timeout();
+        assert!(
+            next.is_none_or(|next| next > self.now),
+            "it would be looked at without end: {next:?}"
+        );
         self.news.extend(self.asker.poll_news());
         let Some(len) = len else { return };
         let bytes = buffer[..len].to_vec();

@@ -94,7 +94,9 @@ struct Listening {
 impl Listening {
     /// When there is something to do though nothing is heard.
     fn deadline(&self) -> Instant {
-        self.asking.as_ref().map_or(Instant::MAX, Asking::deadline)
+        // Before the first frame there is nothing to be asked.
+        let asking = self.asking.as_ref().filter(|_| self.engine.is_some());
+        asking.map_or(Instant::MAX, Asking::deadline)
     }
 
     fn hear(
