@@ -4,6 +4,7 @@
 //! [`main_device`] recognises who drives it, each [`rule`] looks at the line for one kind of trouble, [`finding`] gives conditions a life,
 //! [`coverage`] says what could be judged at all, and [`report`] is the answer as people and programs read it. [`Engine`] drives them all.
 
+pub mod ask;
 pub mod coverage;
 pub mod engine;
 pub mod finding;

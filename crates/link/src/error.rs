@@ -122,9 +122,12 @@ pub(crate) fn this_program() -> PathBuf {
 }
 
 fn in_use(holder: &Holder) -> &'static str {
-    match holder.is_segment() {
-        true => "a virtual segment answers on this card already",
-        false => "another MainDevice drives this line",
+    if holder.is_segment() {
+        "a virtual segment answers on this card already"
+    } else if holder.asks() {
+        "questions are asked on this card already"
+    } else {
+        "another MainDevice drives this line"
     }
 }
 

@@ -11,8 +11,14 @@ use linesman_link::direction::FrameDirection::{Incoming, Outgoing};
 use linesman_link::error::LinkError;
 use linesman_link::interface::CardLock;
 use linesman_link::socket::{
-    Batch, ListenFilter, Listener, RawSocket, Ready, SocketOptions, StampSource, wait_any,
+    Batch, ListenFilter, Listener, RawSocket, Ready, Reception, SocketOptions, StampSource,
+    wait_any,
 };
+use linesman_proto::address::RegisterAddress;
+use linesman_proto::command::Command;
+use linesman_proto::ethernet::MacAddress;
+use linesman_proto::frame::FrameBuilder;
+use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::time::{Instant, Span};
 use namespace::{await_operation, ip, with_cable};
 
@@ -171,6 +177,39 @@ fn frames_past_the_queue_arrive_but_are_not_heard_at_home() {
         let mut batch = Batch::new(4);
         fetch(&mut far, &mut batch, &clock, 1);
         assert_eq!(listener.recv_batch(&mut batch, &clock).unwrap(), 0);
+    });
+}
+
+/// EtherCAT in UDP.
+fn udp(number: u8) -> Vec<u8> {
+    let mut buffer = [0; 60];
+    let (source, destination) = (MacAddress([0, 1, 2, 3, 4, 5]), MacAddress([0x4E, 0, 0, 0, 0, 9]));
+    let mut builder = FrameBuilder::in_udp(&mut buffer, source, destination);
+    let address = DatagramAddress::Physical(0, RegisterAddress(0));
+    builder.push(Command::Brd, number, address, 1).unwrap();
+    let len = builder.finish();
+    buffer[..len].to_vec()
+}
+
+#[test]
+fn frames_in_udp_reach_only_sockets_that_ask_for_every_form() {
+    with_cable(|| {
+        let clock = HostClock::start();
+        let sender = SocketOptions { reception: Reception::Nothing, ..SocketOptions::default() };
+        let every = SocketOptions { reception: Reception::EveryForm, ..SocketOptions::default() };
+        let mut near = RawSocket::open("va", &sender).unwrap();
+        let (mut far, mut plain) = (RawSocket::open("vb", &every).unwrap(), raw("vb"));
+        let mut batch = Batch::new(8);
+        let frames = [udp(1), ethercat(2), frame([0x08, 0x00], 3, 60), udp(4)];
+        assert_eq!(near.send_batch(borrowed(&frames)).unwrap().frames, 4);
+        fetch(&mut far, &mut batch, &clock, 3);
+        fetch(&mut plain, &mut batch, &clock, 1);
+        assert_eq!(batch.iter().next().unwrap().bytes, frames[1]);
+        assert_eq!(plain.recv_batch(&mut batch, &clock).unwrap(), 0);
+        // What comes back goes to nobody who only sends.
+        assert_eq!(far.send_batch(borrowed(&frames)).unwrap().frames, 4);
+        assert_eq!(near.wait(&clock, clock.now() + Span::ms(50)).unwrap(), Ready::Deadline);
+        assert_eq!(near.recv_batch(&mut batch, &clock).unwrap(), 0);
     });
 }
 

@@ -26,6 +26,13 @@ pub const MAX_LEN: usize = 1514;
 /// It tells a frame that came back from the line from the copy that went out (S1, DL control bit 0).
 pub const SOURCE_MARK: u8 = 0x02;
 
+/// Source address of the read requests that Linesman sends beside another MainDevice: that one, and whoever judges a
+/// recording, tells them by it from the frames of a second MainDevice. [`SOURCE_MARK`] is clear in it.
+pub const ASKING_SOURCE: MacAddress = MacAddress([0x4C, 0x49, 0x4E, 0x45, 0x53, 0x3F]);
+/// Destination address of these requests where they are sent in UDP: of no host, so that the IP layer of the computer
+/// that receives them throws them away.
+pub const ASKING_DESTINATION: MacAddress = MacAddress([0x4E, 0x49, 0x4E, 0x45, 0x53, 0x3F]);
+
 /// A hardware address.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct MacAddress(pub [u8; 6]);

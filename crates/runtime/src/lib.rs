@@ -1,13 +1,14 @@
 //! Threads, selectors and recorders: what joins the cores to a real interface.
 //!
 //! [`selector`] says what a word like `eth0+eth1` means, wherever it is written; [`capture`] reads
-//! files, [`line`](mod@line) is where frames go, [`drive`] runs a MainDevice there, [`listen`] hears what is on a card, [`host_watch`]
-//! asks about a card, [`record`] writes what was seen to a file. [`serve`] puts a segment on real
+//! files, [`line`](mod@line) is where frames go, [`drive`] runs a MainDevice there, [`listen`] hears what is on a card, [`asking`]
+//! asks SubDevices there, [`host_watch`] asks about a card, [`record`] writes what was seen to a file. [`serve`] puts a segment on real
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
 //! outside, [`journal`] writes down what really happened, [`names`] says where. [`plan_file`] reads
 //! the file that a line is planned with, [`named_files`] the files that a file names. [`stop`] is the wish to stop,
 //! [`part`] says that a part of a command has failed.
 
+pub mod asking;
 pub mod capture;
 pub mod control;
 mod desk;

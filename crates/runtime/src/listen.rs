@@ -2,12 +2,14 @@
 
 use std::hash::BuildHasher;
 
-use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
+use linesman_diagnosis::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_link::clock::HostClock;
 use linesman_link::direction::FrameDirection;
 use linesman_link::error::LinkError;
 use linesman_link::interface::CardLock;
-use linesman_link::socket::{Batch, ListenFilter, Listener, Ready, Waitable, wait_any};
+use linesman_link::socket::{
+    Batch, ListenFilter, Listener, Ready, SocketCounters, Waitable, wait_any,
+};
 use linesman_proto::address::{Network, Path};
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::time::{Instant, Span};
@@ -34,6 +36,8 @@ struct Ear {
     listener: Listener,
     path: Path,
     watch: HostWatch,
+    /// Frames that this socket had no room for, as last told.
+    drops: u64,
     /// Whether frames were seen that this host sent: then the MainDevice runs here, and what comes
     /// in has come back. Else the card may be fed by a tap, with requests and answers alike.
     sees_own: bool,
@@ -44,8 +48,19 @@ struct Ear {
 pub enum Heard<'a> {
     /// A frame.
     Frame(FrameSeen<'a>),
-    /// Something about the host.
+    /// Something about the host, which is that of the MainDevice: at a tap the card's counters are about the tap.
     Host(HostObservation),
+    /// So many frames passed up to this time for which the listening socket had no room. They were not lost on the line.
+    Missed(u64, Instant),
+}
+
+/// What the card of a tap has dropped: that tells nothing of the MainDevice's card.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct TapCounts {
+    /// Frames whose check sequence was wrong, and other damaged ones.
+    pub damaged: u64,
+    /// Frames for which the card had no room.
+    pub dropped: u64,
 }
 
 impl Ears {
@@ -59,6 +74,7 @@ impl Ears {
                 listener: Listener::open(name, ListenFilter::EtherCat)?,
                 watch: HostWatch::open(name, path, &clock)?,
                 path,
+                drops: 0,
                 sees_own: false,
             })
         };
@@ -119,12 +135,44 @@ impl Ears {
             if !card.watch.is_due(now)? {
                 continue;
             }
-            let counters = card.listener.counters()?;
-            for observation in card.watch.poll(now, counters)? {
+            let drops = card.listener.counters()?.drops;
+            let missed = drops - std::mem::replace(&mut card.drops, drops);
+            if missed > 0 {
+                sink(Heard::Missed(missed, now));
+            }
+            // Until it is known whether this host drives the line, the watch adds up.
+            if !card.sees_own {
+                continue;
+            }
+            // What this socket has no room for is no loss of the MainDevice's socket.
+            for observation in card.watch.poll(now, SocketCounters::default())? {
                 sink(Heard::Host(observation));
             }
         }
         Ok(())
+    }
+
+    /// What the cards have dropped on which nothing was seen to leave this host.
+    ///
+    /// # Errors
+    /// When an interface vanished or the kernel does not answer.
+    pub fn tap_counts(&mut self) -> Result<TapCounts, LinkError> {
+        let mut counts = TapCounts::default();
+        let now = self.clock.now();
+        for card in self.cards.iter_mut().filter(|card| !card.sees_own) {
+            for observation in card.watch.poll(now, SocketCounters::default())? {
+                match observation.what {
+                    HostEvent::CardErrors { crc, other } => counts.damaged += crc + other,
+                    HostEvent::CardDrops(count) => counts.dropped += count,
+                    HostEvent::Carrier(_)
+                    | HostEvent::SocketDrops(_)
+                    | HostEvent::SendFailures(_)
+                    | HostEvent::Late(_)
+                    | HostEvent::ClockStep(_) => {}
+                }
+            }
+        }
+        Ok(counts)
     }
 }
 

@@ -13,11 +13,17 @@ mod state;
 mod traffic;
 
 use linesman_config::fault::FaultName;
+use linesman_proto::time::Instant;
 use serde::{Deserialize, Serialize};
 
+use crate::ask::{AskingReport, Refusal};
 use crate::finding::Place;
 use crate::line::Line;
 use crate::main_device::{MainDeviceKind, next_step};
+
+/// The step that has what a MainDevice does not read be read by questions.
+const ASK: &str =
+    "on its own computer, have it read beside its cycle: `linesman diagnose WHERE --ask`";
 
 /// A way by which evidence came in: it decides which next steps there are.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
@@ -245,6 +251,8 @@ pub enum Reason {
     NoProject,
     /// Nobody asked through a mailbox, or not every SubDevice.
     NoMailboxRequests,
+    /// Questions beside the MainDevice were not sent, or no longer.
+    NotAsked,
     /// No clock's difference to the reference clock was read.
     ClocksNotRead,
     /// A value was not given.
@@ -356,6 +364,22 @@ impl Coverage {
         }
     }
 
+    /// Says of what questions are to read that they were not asked to the end.
+    pub fn note_asking(&mut self, asking: &AskingReport) {
+        let Some(reason) = &asking.reason else { return };
+        let text = match asking.last_ns {
+            None => format!("no question was asked: {reason}"),
+            Some(last) => {
+                format!("no question was asked after {}: {reason}", Instant::from_nanos(last.0))
+            }
+        };
+        let step = asking.next_step.clone().unwrap_or_default();
+        let subjects = [Subject::SignalQuality, Subject::LinkStatus];
+        for one in self.assessments.iter_mut().filter(|one| subjects.contains(&one.subject)) {
+            one.lacks(Extent::InPart, Gap::new(Reason::NotAsked, text.as_str()).step(step.clone()));
+        }
+    }
+
     /// Whether enough was judged to call a line healthy of which no rule says anything.
     #[must_use]
     pub fn suffices(&self) -> bool {
@@ -413,20 +437,23 @@ impl<'a> Basis<'a> {
         }
     }
 
-    /// The kind of the MainDevice that drives the line.
-    fn kind(&self) -> MainDeviceKind {
-        self.line.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind)
-    }
-
     /// The next step that gets error counters read.
-    fn read_counters(&self) -> &'static str {
+    fn read_counters(&self) -> String {
+        let kind = self.line.main_device_kind();
         match self.input {
             InputKind::Driven | InputKind::ReadOut => {
-                "clear and watch them: `linesman counters WHERE --clear --for 60`"
+                "clear and watch them: `linesman counters WHERE --clear --for 60`".to_owned()
             }
-            InputKind::Listened | InputKind::Recorded => next_step::error_counters(self.kind()),
-            InputKind::Typed => {
-                "clear the error counters, wait, read them again, and give both readings"
+            InputKind::Listened
+                if Refusal::of(self.line.habits.recognised().as_ref()).is_none() =>
+            {
+                format!("{ASK}; or {}", next_step::error_counters(kind))
+            }
+            InputKind::Typed if kind == MainDeviceKind::Unknown => {
+                "clear the error counters, wait, read them again, and give both readings".to_owned()
+            }
+            InputKind::Listened | InputKind::Recorded | InputKind::Typed => {
+                next_step::error_counters(kind).to_owned()
             }
         }
     }

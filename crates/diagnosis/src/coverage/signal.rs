@@ -10,7 +10,7 @@ use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 use crate::finding::{LinkDirection, Place};
 use crate::line::{CounterTrack, Device, Line};
 use crate::locate::Survey;
-use crate::main_device::next_step;
+use crate::main_device::{MainDeviceKind, next_step};
 
 /// So many frames that came back, with none lost, show that a link whose counter is full spoils no frames.
 const MANY_FRAMES: u64 = 2_000;
@@ -148,10 +148,15 @@ pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
     };
     let places = unread.iter().map(|one| Place::device(line.network, one.id));
     let places = if is_none_read { Vec::new() } else { places.collect() };
+    let kind = line.main_device_kind();
     let step = match basis.input {
-        InputKind::Typed => "give `ports.A = { link = …, lost_link = … }` of each SubDevice",
+        InputKind::Typed if kind == MainDeviceKind::Unknown => {
+            "give `ports.A = { link = …, lost_link = … }` of each SubDevice"
+        }
         InputKind::Driven | InputKind::ReadOut => "read it: `linesman counters WHERE --for 60`",
-        InputKind::Listened | InputKind::Recorded => next_step::link_status(basis.kind()),
+        InputKind::Listened | InputKind::Recorded | InputKind::Typed => {
+            next_step::link_status(kind)
+        }
     };
     all.lacks(extent, Gap::new(Reason::LinkStatusNotRead, text).at(places).step(step));
     all

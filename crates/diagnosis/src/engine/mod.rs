@@ -2,6 +2,7 @@
 
 mod bisect;
 mod close;
+mod intake;
 mod setup;
 mod survey;
 mod watched;
@@ -9,16 +10,16 @@ mod watched;
 use std::collections::VecDeque;
 
 use linesman_proto::address::{DeviceId, Network, RegisterAddress};
-use linesman_proto::frame::{FrameError, FrameView};
 use linesman_proto::time::{Instant, Span};
 
+use crate::ask::AskingReport;
 use crate::coverage::{Coverage, InputKind};
 use crate::finding::{Book, Finding, Severity};
-use crate::line::{Line, Seen, search};
-use crate::observe::{
-    Direction, Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Outcome, companion,
+use crate::line::{Line, search};
+use crate::observe::{FrameSeen, HostEvent, HostObservation, Pairing};
+use crate::report::{
+    self, Diagnosis, FindingReport, MainDeviceReport, NetworkReport, Number, Verdict,
 };
-use crate::report::{self, Diagnosis, MainDeviceReport, NetworkReport, Number, Verdict};
 use crate::rule::{RULES, View};
 
 pub use setup::{Asked, Event, EventKind, Probe, ProbeEffect, Setup};
@@ -47,6 +48,7 @@ pub struct Engine {
     next_judgement: Instant,
     has_ended: bool,
     is_complete: bool,
+    asking: Option<AskingReport>,
 }
 
 impl Engine {
@@ -75,6 +77,7 @@ impl Engine {
             next_judgement: Instant::default(),
             has_ended: false,
             is_complete: true,
+            asking: None,
         }
     }
 
@@ -92,7 +95,7 @@ impl Engine {
         self.now = self.now.max(frame.time);
         let now = self.now;
         let watched = self.watched(frame.network);
-        take(watched, frame, now);
+        intake::take(watched, frame, now);
         self.survey();
         self.judge_if_due();
     }
@@ -120,8 +123,9 @@ impl Engine {
             return;
         }
         self.now = self.now.max(at);
-        let Watched { line, pairing, .. } = self.watched(network);
+        let Watched { line, pairing, questions, .. } = self.watched(network);
         pairing.forget();
+        questions.forget();
         line.traffic.missed += count;
         // The time to the next one says nothing.
         for cyclic in &mut line.cyclic {
@@ -131,12 +135,27 @@ impl Engine {
         line.touch();
     }
 
+    /// The counters of the host's cards are about this line from now on, so that their silence means zero: the host was
+    /// seen to send on it.
+    pub fn watch_host(&mut self) {
+        self.setup.host_counters = true;
+        for watched in &mut self.networks {
+            watched.line.host.is_watched = true;
+            watched.line.touch();
+        }
+    }
+
+    /// How it stands with questions beside another MainDevice.
+    pub fn note_asking(&mut self, asking: AskingReport) {
+        self.asking = Some(asking);
+    }
+
     /// Time passes. Only for live input: the time of captures comes with their frames.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.now = self.now.max(now);
-        for Watched { line, learner, pairing, .. } in &mut self.networks {
-            line.now = line.now.max(now);
-            pairing.expire(now, &mut |exchange| learner.learn(line, exchange));
+        for watched in &mut self.networks {
+            watched.line.now = watched.line.now.max(now);
+            watched.expire(now, false);
         }
         self.survey();
         self.judge_if_due();
@@ -145,7 +164,8 @@ impl Engine {
     /// When [`Engine::handle_timeout`] has something to do.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let lost = self.networks.iter().filter_map(|watched| watched.pairing.timeout()).min();
+        let pairings = self.networks.iter().flat_map(|one| [&one.pairing, &one.questions]);
+        let lost = pairings.filter_map(Pairing::timeout).min();
         let again = self.networks.iter().filter_map(|watched| watched.again).min();
         let news = self.has_news().then_some(self.next_judgement);
         let judgement = match (news, again) {
@@ -173,9 +193,9 @@ impl Engine {
         self.now = self.now.max(at);
         self.has_ended = true;
         self.is_complete &= complete;
-        for Watched { line, learner, pairing, .. } in &mut self.networks {
-            pairing.finish(&mut |exchange: &Exchange<'_>| learner.learn(line, exchange));
-            line.touch();
+        for watched in &mut self.networks {
+            watched.expire(at, true);
+            watched.line.touch();
         }
         self.judge();
     }
@@ -185,6 +205,11 @@ impl Engine {
     pub fn diagnosis(&self) -> Diagnosis {
         let roots = self.book.roots();
         let coverage = self.coverage();
+        let mut findings: Vec<FindingReport> =
+            roots.into_iter().map(|finding| report::build::finding(&self.book, finding)).collect();
+        if let Some(line) = self.line(Network(0)) {
+            report::reading::advise(&mut findings, line, self.setup.input);
+        }
         Diagnosis {
             schema: report::SCHEMA.to_owned(),
             tool: concat!("linesman ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -196,12 +221,10 @@ impl Engine {
             network: self.network_report(),
             main_device: self.main_device(),
             devices: report::device::reports(self.line(Network(0))),
+            asking: self.asking.clone(),
             coverage: report::coverage::report(&coverage),
             understood: None,
-            findings: roots
-                .into_iter()
-                .map(|finding| report::build::finding(&self.book, finding))
-                .collect(),
+            findings,
         }
     }
 
@@ -362,6 +385,9 @@ impl Engine {
         for watched in &self.networks {
             coverage.merge(Coverage::of(&watched.line, self.setup.input));
         }
+        if let Some(asking) = &self.asking {
+            coverage.note_asking(asking);
+        }
         coverage
     }
 
@@ -409,72 +435,3 @@ fn push(probes: &mut VecDeque<Probe>, line: &Line, device: DeviceId, what: Asked
 
 /// DL status, AL status with its code, all error counters.
 const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), close::COUNTERS];
-
-fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
-    let Watched { line, learner, pairing, .. } = watched;
-    line.now = now;
-    let traffic = &mut line.traffic;
-    let view = match FrameView::parse(frame.bytes) {
-        Ok(view) => view,
-        Err(FrameError::OtherType { .. }) => {
-            traffic.frames += 1;
-            traffic.without_datagrams += 1;
-            return;
-        }
-        Err(FrameError::NotEtherCat { .. } | FrameError::CutOff { .. }) => {
-            let kind = frame.bytes.get(12..14).map_or(0, |at| u16::from_be_bytes([at[0], at[1]]));
-            let seen = Seen::new(kind, frame.time, Some(frame.number));
-            if traffic.record_foreign(seen, frame.direction == Direction::Received) {
-                line.touch();
-            }
-            return;
-        }
-    };
-    traffic.record_frame(frame.time);
-    traffic.truncated += u64::from(frame.truncated);
-    traffic.direction_known |= frame.direction != Direction::Unknown;
-    if frame.fcs == Some(false) {
-        // Its bytes prove nothing, and the MainDevice's card drops it: the request stays open.
-        traffic.damaged.add(1, frame.time);
-        let seen = Seen::new((), frame.time, Some(frame.number));
-        traffic.first_damaged.get_or_insert(seen);
-        line.touch();
-        return;
-    }
-    if let Some(processed) = companion::processed(&view) {
-        traffic.record_companion(Seen::new(processed, frame.time, Some(frame.number)));
-        return;
-    }
-    let print = Fingerprint::of(&view);
-    traffic.cut_short += u64::from(print.is_cut && !frame.truncated);
-    traffic.datagrams_cut += u64::from(print.is_cut && frame.truncated);
-    let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(line, exchange));
-    let (mistaken, unrecorded) = (pairing.take_mistaken(), pairing.take_unrecorded());
-    let traffic = &mut line.traffic;
-    traffic.note_unrecorded(unrecorded, frame.time);
-    if mistaken > 0 {
-        traffic.sent = traffic.sent.saturating_sub(mistaken);
-        traffic.returned += mistaken;
-        traffic.returned_alone += mistaken;
-        traffic.senders = pairing.senders().to_vec();
-    }
-    let has_other_senders = pairing.senders_changed();
-    if has_other_senders {
-        traffic.senders = pairing.senders().to_vec();
-    }
-    if matches!(outcome, Outcome::Request | Outcome::ReturnAlone) {
-        line.habits.take(&view, frame.time, outcome == Outcome::Request);
-    }
-    let traffic = &mut line.traffic;
-    match outcome {
-        Outcome::Request | Outcome::RequestCopy => traffic.sent += 1,
-        Outcome::Return | Outcome::ReturnAlone => {
-            traffic.returned_alone += u64::from(outcome == Outcome::ReturnAlone);
-            traffic.record_returned(frame.time, frame.number);
-        }
-        Outcome::Duplicate => traffic.duplicates += 1,
-    }
-    if has_other_senders {
-        line.touch();
-    }
-}

@@ -1,5 +1,6 @@
 //! One network of the diagnosis: what is known of it, and when its rules have something to do.
 
+use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
 use super::Probe;
@@ -8,7 +9,7 @@ use super::close::CloseWatch;
 use super::survey::Survey;
 use crate::finding::Condition;
 use crate::line::{Learner, Line, Silence};
-use crate::observe::Pairing;
+use crate::observe::{Fingerprint, FrameSeen, Pairing};
 
 /// For so long after its last rise a counter is watched in this way.
 const WATCHED_AFTER_RISE: Span = Span::s(15);
@@ -28,6 +29,8 @@ pub(super) struct Watched {
     pub(super) line: Line,
     pub(super) learner: Learner,
     pub(super) pairing: Pairing,
+    /// Questions that are under way.
+    pub(super) questions: Pairing,
     pub(super) judged: u64,
     /// What had gone wrong when the rules were last asked.
     pub(super) judged_alarms: (u64, u64),
@@ -51,6 +54,7 @@ impl Watched {
             line,
             learner,
             pairing: Pairing::default(),
+            questions: Pairing::default(),
             judged: 0,
             judged_alarms: (0, 0),
             again: None,
@@ -61,6 +65,25 @@ impl Watched {
             controls_asked: None,
             survey: Survey::default(),
             close: CloseWatch::default(),
+        }
+    }
+
+    /// Takes a question, or what came back of one.
+    pub(super) fn take_question(&mut self, frame: &FrameSeen<'_>, view: &FrameView<'_>) {
+        let Self { line, learner, questions, .. } = self;
+        let print = Fingerprint::of(view);
+        questions.take(frame, view, print, &mut |exchange| learner.learn_answer(line, exchange));
+    }
+
+    /// Gives up what does not come back: by `now`, or all of it, as the input has ended.
+    pub(super) fn expire(&mut self, now: Instant, has_ended: bool) {
+        let Self { line, learner, pairing, questions, .. } = self;
+        if has_ended {
+            pairing.finish(&mut |exchange| learner.learn(line, exchange));
+            questions.finish(&mut |exchange| learner.learn_answer(line, exchange));
+        } else {
+            pairing.expire(now, &mut |exchange| learner.learn(line, exchange));
+            questions.expire(now, &mut |exchange| learner.learn_answer(line, exchange));
         }
     }
 

@@ -30,7 +30,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Link, Reconstruction, Tree};
 
-use crate::main_device::Habits;
+use crate::main_device::{Habits, MainDeviceKind};
 
 pub use al_history::{AlChange, AlError, AlHistory, StateRequest};
 pub use beat::{Beat, Off, Pause};
@@ -288,6 +288,12 @@ impl Line {
     pub fn highest_state(&self) -> Option<AlState> {
         let states = self.devices.iter().map(|device| device.al.highest);
         states.max().flatten().max(self.traffic.al_highest)
+    }
+
+    /// The MainDevice that drives the line: by its habits, or whose tools have told of the line.
+    #[must_use]
+    pub fn main_device_kind(&self) -> MainDeviceKind {
+        self.habits.recognised().map_or(self.reported.kind, |found| found.kind)
     }
 
     /// When no frame at all was seen for several cycles of the process data, latest first.

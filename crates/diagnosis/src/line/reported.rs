@@ -12,10 +12,13 @@ use linesman_proto::register::AlStatus;
 use linesman_proto::time::{Instant, Span};
 
 use super::{Seen, Tally};
+use crate::main_device::MainDeviceKind;
 
 /// What was told of a line.
 #[derive(Clone, Default, Debug)]
 pub struct Reported {
+    /// The MainDevice whose tools say so.
+    pub kind: MainDeviceKind,
     /// Frames that the MainDevice has sent.
     pub sent: Option<u64>,
     /// The cycle of its process data.

@@ -9,7 +9,7 @@ use linesman_proto::time::{Instant, Span};
 use super::Seen;
 use super::beat::Pause;
 use super::host::Tally;
-use crate::observe::Sender;
+use crate::observe::{Questions, Sender};
 
 /// Silences kept.
 pub const SILENCES_KEPT: usize = 16;
@@ -145,6 +145,8 @@ pub struct Traffic {
     /// Frames that the second card of a ring sent only to see which way they come back; they are not among `sent` and
     /// `returned`.
     pub companions: u64,
+    /// Questions of Linesman beside this MainDevice; they are not among `frames`, `sent` and `returned`.
+    pub questions: Questions,
     /// The latest of those that controllers have processed, by how many: the ring was open, and so many are reached from
     /// the second card.
     pub companion_processed: Option<Seen<u16>>,

@@ -9,23 +9,21 @@ pub const fn error_counters(kind: MainDeviceKind) -> &'static str {
     match kind {
         MainDeviceKind::Soem => {
             "in its program call `ecx_FPRD(port, slavelist[n].configadr, 0x0300, 20, bytes, EC_TIMEOUTRET)` for each \
-             SubDevice n, between two of its cycles and again a minute later; write both readings into an \
-             observation file (`ports.A = { rx = \"0x…\" }`) and give it to `linesman diagnose readings.toml`"
+             SubDevice n, between two of its cycles, print `slave n 0x0300: 00 00 …` with all bytes, and again a minute \
+             later; the text goes to `linesman diagnose counters.txt` as it is"
         }
         MainDeviceKind::Igh => {
             "read them beside its cycle with `ethercat reg_read -p N 0x0300 20` for each position N, and again a \
-             minute later; write both readings into an observation file (`ports.A = { rx = \"0x…\" }`) and give it \
-             to `linesman diagnose readings.toml`"
+             minute later; what the terminal shows, commands included, goes to `linesman diagnose counters.txt` as it is"
         }
         MainDeviceKind::Ethercrab => {
-            "in its program call `subdevice.register_read::<[u8; 20]>(0x0300u16)` for each SubDevice, and again a \
-             minute later; write both readings into an observation file (`ports.A = { rx = \"0x…\" }`) and give it \
-             to `linesman diagnose readings.toml`"
+            "in its program call `subdevice.register_read::<[u8; 20]>(0x0300u16)` for each SubDevice n, print `slave {n} \
+             0x0300: {bytes:02x?}`, and again a minute later; the text goes to `linesman diagnose counters.txt` as it is"
         }
         MainDeviceKind::Kickcat => {
-            "in its program call `bus.sendRefreshErrorCounters(on_error)` and `bus.processAwaitingFrames()`, and \
-             print `error_counters` of each of `bus.slaves()`, and again a minute later; write both readings into an \
-             observation file (`ports.A = { rx = \"0x…\" }`) and give it to `linesman diagnose readings.toml`"
+            "in its program call `bus.sendRefreshErrorCounters(on_error)` and `bus.processAwaitingFrames()`, print \
+             `toString(slave.error_counters)` of each of `bus.slaves()` beneath its number, and again a minute later; the \
+             text goes to `linesman diagnose counters.txt` as it is"
         }
         MainDeviceKind::Twincat => {
             "it adds them up itself: I/O, the EtherCAT device, tab Online, copy the list with its column CRC and the \
@@ -48,15 +46,16 @@ pub const fn link_status(kind: MainDeviceKind) -> &'static str {
     match kind {
         MainDeviceKind::Igh => {
             "read it with `ethercat slaves -v`, which tells the link of each port, and `ethercat reg_read -p N \
-             0x0310 4`; `linesman diagnose` takes the text of the former as it is"
+             0x0310 4`; what the terminal shows goes to `linesman diagnose links.txt` as it is"
         }
         MainDeviceKind::Soem => {
             "in its program call `ecx_FPRD(port, slavelist[n].configadr, 0x0110, 2, bytes, EC_TIMEOUTRET)`, and \
-             0x0310 with 4 bytes, for each SubDevice n"
+             0x0310 with 4 bytes, for each SubDevice n, and print `slave n 0x0110: 00 00`, which `linesman diagnose \
+             links.txt` takes"
         }
         MainDeviceKind::Ethercrab => {
             "in its program call `subdevice.register_read::<u16>(0x0110u16)`, and `<[u8; 4]>(0x0310u16)`, for each \
-             SubDevice"
+             SubDevice n, and print `slave {n} 0x0310: {bytes:02x?}`, which `linesman diagnose links.txt` takes"
         }
         MainDeviceKind::Kickcat => {
             "in its program call `bus.sendGetDLStatus(slave, on_error)` for each SubDevice, and \

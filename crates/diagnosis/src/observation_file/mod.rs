@@ -39,6 +39,7 @@ pub use working_counter::{LogicalCommand, ObservedWorkingCounter};
 
 use crate::engine::{Engine, Setup};
 use crate::line::reported::WiringBasis;
+use crate::main_device::MainDeviceKind;
 use crate::report::Diagnosis;
 use place::Lines;
 
@@ -69,6 +70,9 @@ pub struct ObservationFile {
     /// Whether times were made up to keep the order: a file tells them.
     #[serde(skip)]
     pub times_are_assumed: bool,
+    /// The MainDevice whose tools have printed the values; a file does not tell it.
+    #[serde(skip)]
+    pub kind: MainDeviceKind,
     /// How the wiring is known; a file tells it.
     #[serde(skip)]
     pub wiring: WiringBasis,

@@ -135,10 +135,11 @@ impl Pairing {
                 && pending.copy_by.is_none()
                 && pending.source.marked() != source
         };
-        let found = self
-            .pending
-            .iter()
-            .position(|pending| pending.print.lasting == print.lasting && !is_others(pending));
+        // Indexes are used again: of several that fit, one that others overtook is lost.
+        let fits =
+            |pending: &Pending| pending.print.lasting == print.lasting && !is_others(pending);
+        let fitting = self.pending.iter().enumerate().filter(|(_, pending)| fits(pending));
+        let found = fitting.min_by_key(|(_, pending)| pending.overtaken).map(|(index, _)| index);
         if is_unknown && self.is_one_way_for_sure() && !source.is_marked() {
             // The copy of a ring's second card, which no controller has touched.
             return Outcome::Duplicate;
@@ -466,4 +467,50 @@ const fn copy<'a>(frame: &FrameSeen<'a>) -> FrameCopy<'a> {
 /// The time between two instants in either order.
 fn gap(one: Instant, other: Instant) -> Span {
     if one < other { other.since(one) } else { one.since(other) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ask::tests::frame::{Frame, lrw};
+
+    #[test]
+    fn lost_frame_does_not_take_the_return_of_a_later_one_with_its_index() {
+        let mut pairing = Pairing::default();
+        let (mut trips, mut lost) = (Vec::new(), Vec::new());
+        // SOEM has 16 indexes and uses them in turn.
+        for cycle in 0..200_u64 {
+            let at = Instant::ZERO + Span::ms(2 * cycle);
+            let source = MacAddress([1; 6]);
+            let frame = Frame::from(source, (cycle % 16) as u8, &[lrw(0, &[0; 4])]);
+            let back = frame.clone().returned(&[4]);
+            let copies =
+                [(&frame, Direction::Sent, at), (&back, Direction::Received, at + Span::us(50))];
+            for (frame, direction, time) in copies {
+                if cycle == 60 && direction == Direction::Received {
+                    continue;
+                }
+                let seen = FrameSeen {
+                    network: Default::default(),
+                    path: None,
+                    direction,
+                    time,
+                    number: cycle,
+                    fcs: None,
+                    truncated: false,
+                    bytes: &frame.0,
+                };
+                let view = frame.view();
+                pairing.take(&seen, &view, Fingerprint::of(&view), &mut |exchange| {
+                    let sent = exchange.request.unwrap();
+                    match exchange.reply {
+                        Some(reply) => trips.push(reply.time.since(sent.time)),
+                        None => lost.push(sent.number),
+                    }
+                });
+            }
+        }
+        assert_eq!(lost, [60]);
+        assert!(trips.iter().all(|trip| *trip == Span::us(50)), "{trips:?}");
+    }
 }

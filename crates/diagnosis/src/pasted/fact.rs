@@ -3,6 +3,7 @@
 use linesman_proto::port::{Port, PortMap};
 
 use super::stamp::Stamp;
+use crate::main_device::MainDeviceKind;
 use crate::observation_file::{ObservedMainDevice, ObservedWorkingCounter, ReadDevice};
 
 /// A stretch of lines of one format.
@@ -24,6 +25,8 @@ pub(super) struct Block {
     pub(super) to: usize,
     /// The line before it, which may be the command that was typed.
     pub(super) shell: Option<String>,
+    /// The MainDevice whose tool has printed it, where the format is of one alone.
+    pub(super) kind: Option<MainDeviceKind>,
 }
 
 /// A format.
@@ -38,6 +41,8 @@ pub(super) enum Format {
     Online,
     Frames,
     Messages,
+    Registers,
+    KickcatCounters,
 }
 
 impl Format {
@@ -51,7 +56,22 @@ impl Format {
             | Self::SlaveInfo
             | Self::Ethtool
             | Self::Online
-            | Self::Frames => false,
+            | Self::Frames
+            | Self::Registers
+            | Self::KickcatCounters => false,
+        }
+    }
+
+    /// The MainDevice whose tools print this alone.
+    const fn kind(self) -> Option<MainDeviceKind> {
+        match self {
+            Self::IghSlaves | Self::IghMaster | Self::IghDomains | Self::KernelLog => {
+                Some(MainDeviceKind::Igh)
+            }
+            Self::SlaveInfo => Some(MainDeviceKind::Soem),
+            Self::Online | Self::Frames | Self::Messages => Some(MainDeviceKind::Twincat),
+            Self::KickcatCounters => Some(MainDeviceKind::Kickcat),
+            Self::Ethtool | Self::Registers => None,
         }
     }
 }
@@ -67,6 +87,7 @@ impl Block {
             from: 0,
             to: 0,
             shell: None,
+            kind: format.kind(),
         }
     }
 

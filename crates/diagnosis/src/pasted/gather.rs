@@ -41,8 +41,9 @@ pub(super) fn gather(
     let mut assumed = Vec::new();
     let roster = Roster::of(blocks, &mut assumed);
     let timeline = Timeline::of(blocks, &mut assumed);
+    let kind = blocks.iter().find_map(|block| block.kind).unwrap_or_default();
     let mut gatherer = Gatherer {
-        file: ObservationFile::default(),
+        file: ObservationFile { kind, ..ObservationFile::default() },
         reads: vec![ReadDevice::default(); roster.len()],
         roster,
         added: zeros(blocks),

@@ -5,6 +5,7 @@
 //! by position, station address or name, times on one scale, wiring as told or as assumed. Nothing is taken
 //! for 0 that is not told.
 
+mod byte_list;
 mod ethtool;
 mod fact;
 mod gather;
@@ -12,6 +13,9 @@ mod igh_domains;
 mod igh_master;
 mod igh_slaves;
 mod kernel_log;
+mod kickcat_counters;
+mod register_values;
+mod registers;
 mod soem_slaveinfo;
 mod stamp;
 mod state_word;
@@ -96,6 +100,9 @@ pub const FORMATS: &[(&str, &str)] = &[
     ("`ethercat master`", "Master0 / Phase: Operation"),
     ("`ethercat domains`", "Domain0: LogBaseAddr 0x00000000, Size 6, WorkingCounter 0/1"),
     ("kernel log of IgH EtherCAT", "[ 12.5] EtherCAT 0: Domain 0: Working counter changed to 2/3."),
+    ("`ethercat reg_read`", "$ ethercat reg_read -p 0 0x0300 20 / 0x00 0x00 …"),
+    ("registers", "slave 1 0x0300: 00 00 …"),
+    ("KickCAT error counters", "slave 1 / Port 0 / invalid frame: 0"),
     ("SOEM `slaveinfo`", "3 slaves found and configured. / Slave:1"),
     ("`ethtool -S`", "NIC statistics: / rx_crc_errors: 0"),
     ("TwinCAT Online list", "1;1001;Term 1 (EK1100);OP;0, 15"),
@@ -129,6 +136,8 @@ const TAKES: &[Take] = &[
     igh_slaves::take_list,
     igh_master::take,
     igh_domains::take,
+    registers::take,
+    kickcat_counters::take,
     soem_slaveinfo::take,
     ethtool::take,
     kernel_log::take,
@@ -148,7 +157,7 @@ pub fn read(text: &str) -> Result<Pasted, NothingUnderstood> {
     let mut blocks: Vec<Block> = Vec::new();
     let mut at = 0;
     while let Some(line) = lines.get(at) {
-        if line.is_blank() || is_prompt(line) {
+        if line.is_blank() || (is_prompt(line) && !registers::is_command(line)) {
             at += 1;
             continue;
         }

@@ -4,14 +4,13 @@
 //! Reference: `No`, `Addr`, `Name`, `State`, `CRC` (errors of each port, added up since the start, as many as the
 //! device has ports), `Changes` (states left unasked, times it was gone, the latter from 1), `Reg:0300` (words).
 
-use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::Port;
-use linesman_proto::register::{DlStatus, ErrorCounter, ErrorCounters};
 
 use super::fact::{About, Block, Format, What, Whom, extent};
+use super::register_values;
 use super::state_word::{self, StateWord};
 use super::text::{Line, cells, count, leading_number, port, so_many, type_in, value_of};
-use crate::observation_file::{Count, ObservedMainDevice, ReadDevice, ReadPort, Word};
+use crate::observation_file::{Count, ObservedMainDevice, ReadDevice, ReadPort};
 
 /// What a column holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -297,7 +296,9 @@ fn tell(block: &mut Block, row: Row) {
     for (port, told) in row.ports {
         *read.port_mut(port) = told;
     }
-    registers(&mut read, &row.registers);
+    for (address, word) in &row.registers {
+        register_values::fill(&mut read, *address, &word.to_le_bytes());
+    }
     if let Some((states, present)) = row.changes {
         read.state_changes = Some(Count(states));
         // The first time it was there is none at which it was gone.
@@ -305,38 +306,6 @@ fn tell(block: &mut Block, row: Row) {
     }
     block.tell(What::About(whom.clone(), Box::new(about)));
     block.tell(What::Read(whom, Box::new(read)));
-}
-
-/// Words of registers, as columns show them.
-fn registers(read: &mut ReadDevice, words: &[(u16, u16)]) {
-    for (address, word) in words {
-        match address {
-            0x0110 => {
-                let status = DlStatus(*word);
-                for port in Port::ALL {
-                    let state = status.port_state(port);
-                    let into = read.port_mut(port);
-                    (into.link, into.open) = (Some(state.link), Some(!state.closed));
-                    into.communication = Some(state.communication);
-                }
-            }
-            0x0130 => read.state = state_word::of_status((*word).into()).or(read.state.take()),
-            0x0134 => read.al_code = Some(Word(*word)),
-            _ => {}
-        }
-        let counters = ErrorCounters::from_bytes(&word.to_le_bytes(), RegisterAddress(*address));
-        for (counter, value) in counters.iter() {
-            let value = Some(Count(value.into()));
-            match counter {
-                ErrorCounter::InvalidFrame(port) => read.port_mut(port).frame = value,
-                ErrorCounter::PhysicalLayer(port) => read.port_mut(port).physical = value,
-                ErrorCounter::Forwarded(port) => read.port_mut(port).forwarded = value,
-                ErrorCounter::LostLink(port) => read.port_mut(port).lost_link = value,
-                ErrorCounter::ProcessingUnit => read.processing_unit = value,
-                ErrorCounter::Pdi => {}
-            }
-        }
-    }
 }
 
 /// A row of the frames beneath the list.

@@ -66,6 +66,7 @@ pub(crate) fn report(line: &Line) -> Option<MainDeviceReport> {
     let never = line
         .habits
         .never_reads()
+        .filter(|(register, len)| !line.traffic.questions.have_read(*register, *len))
         .map(|(register, len)| RegisterReport { register: register.0, name: name(register, len) });
     Some(MainDeviceReport {
         kind: recognised.kind,

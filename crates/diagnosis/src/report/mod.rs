@@ -9,10 +9,12 @@ pub mod coverage;
 pub mod device;
 pub mod main_device;
 pub mod number;
+pub(crate) mod reading;
 
 use linesman_config::fault::{Class, FaultName};
 use serde::{Deserialize, Serialize};
 
+pub use crate::ask::AskingReport;
 pub use crate::finding::{EvidenceKind, Severity};
 pub use crate::pasted::Understood;
 pub use coverage::CoverageReport;
@@ -50,6 +52,9 @@ pub struct Diagnosis {
     /// The SubDevices, as far as the input says who they are.
     #[serde(default)]
     pub devices: Vec<DeviceReport>,
+    /// Questions that were asked beside the MainDevice; left out where none were wanted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub asking: Option<AskingReport>,
     /// What could be judged, and what not.
     #[serde(default)]
     pub coverage: CoverageReport,

@@ -16,6 +16,8 @@
 //!   such as a media converter, shows a link whatever happens behind it.
 //!   In a ring such an end closes no port, so that all on its side fall silent; it stays in use as long as it
 //!   shows a link.
+//! * The card of the MainDevice has lost its link, and nothing tells how the line is wired: the first cable, or the first
+//!   SubDevice.
 //! * The link comes and goes: a contact is loose, a plug not locked, a cable broken inside.
 //!
 //! What follows (SubDevices that do not answer, working counters, watchdogs) is listed beneath.
@@ -23,6 +25,7 @@
 //! **What to do.** Look at the lamps on both sides. Seat the plug, exchange the cable; on the terminal
 //! bus press the terminals together and look at the contacts. Measure the supply of the device behind.
 
+mod card;
 mod never_seen;
 mod swallowed_half;
 
@@ -68,7 +71,10 @@ const AGAIN: u64 = 2;
 const OFTEN: u64 = 3;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let Some(tree) = &view.line.tree else { return };
+    let Some(tree) = &view.line.tree else {
+        conditions.extend(card::lost(view));
+        return;
+    };
     let all = Drops::all(view.line);
     for drops in &all {
         // Who answers though its entry has no link is plugged in the other way round.

@@ -1,5 +1,6 @@
 //! `linesman diagnose`: what is wrong with a line, where, why, and what to do.
 
+mod asking;
 mod capture;
 mod cards;
 mod file;
@@ -11,6 +12,7 @@ pub(crate) mod several;
 
 use std::path::{Path, PathBuf};
 
+use linesman_diagnosis::ask::AskSetup;
 use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_diagnosis::{Engine, Setup};
 use linesman_link::unix_time::UnixTime;
@@ -21,7 +23,7 @@ use linesman_runtime::record::Recorder;
 use linesman_runtime::selector::Selector;
 
 use self::follow::Follower;
-use crate::amount::lasting;
+use crate::amount::{count, lasting};
 use crate::drawing;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -73,6 +75,19 @@ pub(crate) struct Arguments {
     /// counters are left alone in any case
     #[arg(long)]
     active: bool,
+    /// Beside another MainDevice of this computer (listen:eth0): also send small frames that read DL status, AL status and
+    /// error counters, one SubDevice at a time, between its frames; ends at the first sign that it is disturbed
+    #[arg(long)]
+    ask: bool,
+    /// Most questions in a second
+    #[arg(long, requires = "ask", value_name = "N", default_value_t = asking::PER_S, value_parser = count(1, 200))]
+    ask_per_s: u64,
+    /// After trouble of the MainDevice that no question was near: go on asking once it runs steadily again
+    #[arg(long, requires = "ask")]
+    keep_asking: bool,
+    /// Ask beside a kind of MainDevice that is refused, or not recognised
+    #[arg(long, requires = "ask")]
+    force: bool,
     /// On a virtual segment: the state that its SubDevices are driven to
     #[arg(long, value_enum, value_name = "STATE", ignore_case = true)]
     to: Option<Target>,
@@ -90,6 +105,15 @@ pub(crate) struct Arguments {
     /// JSON, schema linesman.diagnosis/1
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl Arguments {
+    /// The questions that are wanted.
+    fn questions(&self) -> Option<AskSetup> {
+        let per_s = u32::try_from(self.ask_per_s).unwrap_or(u32::MAX);
+        let (is_forced, keeps_on) = (self.force, self.keep_asking);
+        self.ask.then_some(AskSetup { per_s, is_forced, keeps_on })
+    }
 }
 
 /// A state to drive to.
@@ -134,7 +158,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             Ok(session.answer(&judged.engine, &judged.names, judged.at, output))
         }
         Selector::Listen(names) => {
-            listen::run(names, Session::new(arguments, &selector, project), output)
+            let session = Session::new(arguments, &selector, project);
+            listen::run(names, arguments.questions(), session, output)
         }
         Selector::Cards(names) => {
             let session = Session::new(arguments, &selector, project);
@@ -153,13 +178,16 @@ fn refuse_misplaced(arguments: &Arguments, selector: &Selector) -> Result<(), Fa
     let is_file = matches!(selector, Selector::File(_));
     let is_segment = matches!(selector, Selector::Segment(_));
     let is_driven = matches!(selector, Selector::Cards(_));
-    let Arguments { project, seconds, record, active, to, .. } = arguments;
+    let is_listened = matches!(selector, Selector::Listen(_));
+    let Arguments { project, seconds, record, active, to, ask, .. } = arguments;
     let rows = [
         ("--record", record.is_some() && is_file, "there is nothing to record"),
         ("--seconds", seconds.is_some() && is_file, "the file is judged to its end"),
         ("--project", project.is_some() && is_segment, "the file says itself what was planned"),
         ("--active", *active && !is_driven && !is_segment, "nothing there can be written to"),
         ("--to", to.is_some() && !is_segment, "only a virtual segment is driven to a state"),
+        ("--ask", *ask && is_driven, "what is to be known is read there anyway"),
+        ("--ask", *ask && !is_listened, "nobody can be asked there"),
     ];
     match rows.into_iter().find(|(_, is_misplaced, _)| *is_misplaced) {
         None => Ok(()),

@@ -137,6 +137,12 @@ impl Holder {
         self.command.get(1).is_some_and(|word| word == "sim")
     }
 
+    /// Whether it asks beside a MainDevice, and is none.
+    #[must_use]
+    pub fn asks(&self) -> bool {
+        self.command.iter().any(|word| word == "--ask")
+    }
+
     /// What it was given for an option; a path as seen from the folder that it works in.
     #[must_use]
     pub fn path_given(&self, option: &str) -> Option<PathBuf> {
@@ -184,6 +190,7 @@ mod tests {
         assert_eq!(run.path_given("--control"), Some("/srv/c.sock".into()));
         assert_eq!(run.path_given("--image"), None);
         assert!(!run.is_segment() && holder(&["linesman", "sim", "a.toml"]).is_segment());
+        assert!(!run.asks() && holder(&["linesman", "diagnose", "listen:eth0", "--ask"]).asks());
         assert_eq!(holder(&["x", "--control=/a"]).path_given("--control"), Some("/a".into()));
         assert_eq!(Holder::default().to_string(), "another process");
         assert!(holder(&["x", &"y".repeat(200)]).to_string().ends_with("y …`)"));

@@ -5,9 +5,9 @@
 use linesman_proto::time::Instant;
 
 use super::batch::{Batch, Wanted};
+use super::packet;
 use super::receiver::{Receiver, SocketCounters};
 use super::wait::{self, Ready, Waitable};
-use super::{filter, packet};
 use crate::clock::HostClock;
 use crate::error::LinkError;
 use crate::interface::Interface;
@@ -56,13 +56,12 @@ impl Listener {
     /// When the interface is missing, down or no Ethernet one, or the process lacks the right.
     pub fn open(interface: &str, filter: ListenFilter) -> Result<Self, LinkError> {
         let receiver = Receiver::open(interface, Wanted::BothWays)?;
-        receiver.set("asking for VLAN tags", libc::SOL_PACKET, libc::PACKET_AUXDATA)?;
         receiver.set_receive_buffer(RECEIVE_BUFFER)?;
         match filter {
-            ListenFilter::Everything => {}
-            // Set before binding: nothing else slips in.
-            ListenFilter::EtherCat => packet::set_filter(receiver.socket(), &filter::program())
-                .map_err(receiver.failed("setting the filter for EtherCAT frames"))?,
+            ListenFilter::Everything => {
+                receiver.set("asking for VLAN tags", libc::SOL_PACKET, libc::PACKET_AUXDATA)?;
+            }
+            ListenFilter::EtherCat => receiver.accept_every_form()?,
         }
         packet::join_promiscuous(receiver.socket(), receiver.interface().index)
             .map_err(receiver.failed("switching on promiscuous mode"))?;

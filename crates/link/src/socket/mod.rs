@@ -15,7 +15,7 @@ mod wake;
 
 pub use batch::{Batch, ReceivedFrame, StampSource};
 pub use listener::{ListenFilter, Listener};
-pub use raw::{RawSocket, Sent, SocketOptions};
+pub use raw::{RawSocket, Reception, Sent, SocketOptions};
 pub use receiver::SocketCounters;
 pub use wait::{Ready, Waitable, wait_any, wait_for};
 pub use wake::{Bell, Waker};

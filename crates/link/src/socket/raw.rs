@@ -19,6 +19,8 @@ use crate::clock::HostClock;
 use crate::error::LinkError;
 use crate::interface::Interface;
 
+/// A socket that is bound to it receives nothing (packet(7)).
+const NO_ETHERTYPE: u16 = 0;
 /// Frames that are handed to the kernel in one call.
 const SEND_BATCH: usize = 64;
 
@@ -34,12 +36,30 @@ pub struct SocketOptions {
     /// Ask the card itself for frames for so long before waiting; rounded down to microseconds.
     /// Zero leaves it to interrupts. More than the system's setting needs `CAP_NET_ADMIN`.
     pub busy_poll: Span,
+    /// Frames that are received.
+    pub reception: Reception,
+}
+
+/// Frames that a [`RawSocket`] receives.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Reception {
+    /// Frames of EtherType 0x88A4.
+    EtherCat,
+    /// Those behind VLAN tags and in UDP, too, as controllers process them.
+    EveryForm,
+    /// None: it only sends.
+    Nothing,
 }
 
 impl Default for SocketOptions {
-    /// 4 MiB of room, through the queue, by interrupts.
+    /// 4 MiB of room, through the queue, by interrupts; EtherCAT frames.
     fn default() -> Self {
-        Self { receive_buffer: 4 * 1024 * 1024, bypass_queue: false, busy_poll: Span::ZERO }
+        Self {
+            receive_buffer: 4 * 1024 * 1024,
+            bypass_queue: false,
+            busy_poll: Span::ZERO,
+            reception: Reception::EtherCat,
+        }
     }
 }
 
@@ -53,7 +73,7 @@ pub struct Sent {
     pub full: bool,
 }
 
-/// An active socket on a card: sends frames, receives those of EtherType 0x88A4 that come back.
+/// An active socket on a card: sends frames, receives those that come back, as [`Reception`] says.
 pub struct RawSocket {
     receiver: Receiver,
     vectors: Box<[libc::iovec]>,
@@ -92,7 +112,14 @@ impl RawSocket {
             packet::set_int(receiver.socket(), level, option, value)
                 .map_err(receiver.failed("switching on busy polling"))?;
         }
-        receiver.bind(ETHERTYPE_ETHERCAT)?;
+        match options.reception {
+            Reception::EtherCat => receiver.bind(ETHERTYPE_ETHERCAT)?,
+            Reception::EveryForm => {
+                receiver.accept_every_form()?;
+                receiver.bind(libc::ETH_P_ALL as u16)?;
+            }
+            Reception::Nothing => receiver.bind(NO_ETHERTYPE)?,
+        }
         Self::around(receiver)
     }
 

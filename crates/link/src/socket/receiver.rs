@@ -7,7 +7,7 @@ use rustix::io::Errno;
 use rustix::net::{RecvFlags, recv, sockopt};
 
 use super::batch::{Batch, Wanted};
-use super::packet;
+use super::{filter, packet};
 use crate::clock::HostClock;
 use crate::error::{LinkError, this_program};
 use crate::interface::netlink::Netlink;
@@ -83,6 +83,14 @@ impl Receiver {
         option: libc::c_int,
     ) -> Result<(), LinkError> {
         packet::set_int(&self.socket, level, option, 1).map_err(self.failed(doing))
+    }
+
+    /// Has only EtherCAT frames received, those behind VLAN tags and in UDP included. To be set before
+    /// [binding](Self::bind): nothing else slips in.
+    pub(super) fn accept_every_form(&self) -> Result<(), LinkError> {
+        self.set("asking for VLAN tags", libc::SOL_PACKET, libc::PACKET_AUXDATA)?;
+        packet::set_filter(&self.socket, &filter::program())
+            .map_err(self.failed("setting the filter for EtherCAT frames"))
     }
 
     /// Makes room for `bytes` bytes of received frames; more than the system's limit needs

@@ -5,7 +5,14 @@ use super::{
 };
 use crate::address::{LogicalAddress, RegisterAddress};
 use crate::command::Command;
-use crate::ethernet::{ETHERTYPE_ETHERCAT, HEADER_LEN, MAX_LEN, MIN_LEN, MacAddress};
+use crate::ethernet::{
+    ETHERTYPE_ETHERCAT, ETHERTYPE_IPV4, HEADER_LEN, MAX_LEN, MIN_LEN, MacAddress, UDP_PORT,
+};
+
+/// IPv4 header without options.
+const IP_LEN: usize = 20;
+/// UDP header.
+const UDP_LEN: usize = 8;
 
 /// The four address bytes of a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -62,6 +69,8 @@ pub struct FrameFull {
 #[derive(Debug)]
 pub struct FrameBuilder<'a> {
     buffer: &'a mut [u8],
+    /// Where the EtherCAT header lies.
+    header_at: usize,
     len: usize,
     /// Where the last datagram's header lies, to set its "more follows" bit.
     last_at: Option<usize>,
@@ -78,7 +87,32 @@ impl<'a> FrameBuilder<'a> {
         buffer[0..6].copy_from_slice(&MacAddress::BROADCAST.0);
         buffer[6..12].copy_from_slice(&source.0);
         buffer[12..14].copy_from_slice(&ETHERTYPE_ETHERCAT.to_be_bytes());
-        Self { buffer, len: HEADER_LEN + ETHERCAT_HEADER_LEN, last_at: None }
+        Self::behind(buffer, HEADER_LEN)
+    }
+
+    /// Starts a frame from `source` to `destination` that carries its datagrams in UDP, as controllers process it, too
+    /// (S1 chapter 2.1). It goes to the broadcast address of IP and is never routed.
+    ///
+    /// # Panics
+    /// When `buffer` is shorter than the shortest frame (60 bytes): our own mistake.
+    #[must_use]
+    pub fn in_udp(buffer: &'a mut [u8], source: MacAddress, destination: MacAddress) -> Self {
+        assert!(buffer.len() >= MIN_LEN, "a frame buffer has at least {MIN_LEN} bytes");
+        buffer[0..6].copy_from_slice(&destination.0);
+        buffer[6..12].copy_from_slice(&source.0);
+        buffer[12..14].copy_from_slice(&ETHERTYPE_IPV4.to_be_bytes());
+        let [high, low] = UDP_PORT.to_be_bytes();
+        // Version and length, lengths and checksum as `finish` sets them; not to be cut, one hop, UDP.
+        let ip = [0x45, 0, 0, 0, 0, 0, 0x40, 0, 1, 17, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF];
+        let udp = [high, low, high, low, 0, 0, 0, 0];
+        let header_at = HEADER_LEN + IP_LEN + UDP_LEN;
+        buffer[HEADER_LEN..HEADER_LEN + IP_LEN].copy_from_slice(&ip);
+        buffer[HEADER_LEN + IP_LEN..header_at].copy_from_slice(&udp);
+        Self::behind(buffer, header_at)
+    }
+
+    const fn behind(buffer: &'a mut [u8], header_at: usize) -> Self {
+        Self { buffer, header_at, len: header_at + ETHERCAT_HEADER_LEN, last_at: None }
     }
 
     /// Bytes of data that one more datagram could carry.
@@ -129,13 +163,29 @@ impl<'a> FrameBuilder<'a> {
 
     /// Completes header and padding and returns the frame's length without check sequence.
     pub fn finish(self) -> usize {
-        let datagrams = self.len - HEADER_LEN - ETHERCAT_HEADER_LEN;
+        let datagrams = self.len - self.header_at - ETHERCAT_HEADER_LEN;
         let word = (datagrams as u16 & 0x07FF) | 0x1000;
-        self.buffer[HEADER_LEN..HEADER_LEN + 2].copy_from_slice(&word.to_le_bytes());
+        self.buffer[self.header_at..self.header_at + 2].copy_from_slice(&word.to_le_bytes());
+        if self.header_at > HEADER_LEN {
+            let (ip, udp) = (HEADER_LEN, HEADER_LEN + IP_LEN);
+            let (ip_len, udp_len) = ((self.len - ip) as u16, (self.len - udp) as u16);
+            self.buffer[ip + 2..ip + 4].copy_from_slice(&ip_len.to_be_bytes());
+            self.buffer[udp + 4..udp + 6].copy_from_slice(&udp_len.to_be_bytes());
+            let sum = ip_checksum(&self.buffer[ip..udp]);
+            self.buffer[ip + 10..ip + 12].copy_from_slice(&sum.to_be_bytes());
+        }
         let padded = self.len.max(MIN_LEN);
         self.buffer[self.len..padded].fill(0);
         padded
     }
+}
+
+/// Checksum of an IPv4 header whose own field for it is 0. Reference: RFC 791, section 3.1.
+fn ip_checksum(header: &[u8]) -> u16 {
+    let words = header.chunks_exact(2).map(|word| u32::from(word[0]) << 8 | u32::from(word[1]));
+    let sum: u32 = words.sum();
+    let folded = (sum & 0xFFFF) + (sum >> 16);
+    !((folded & 0xFFFF) + (folded >> 16)) as u16
 }
 
 #[cfg(test)]
@@ -170,6 +220,25 @@ mod tests {
         assert_eq!(datagram.data(), [0, 0]);
         assert_eq!(datagram.wkc(), WorkingCounter(0), "a working counter starts at 0");
         assert!(!datagram.more_follow() && !datagram.circulated());
+    }
+
+    #[test]
+    fn frame_in_udp_has_the_lengths_and_the_checksum_of_its_headers() {
+        let mut buffer = [0xEE; 128];
+        let (source, destination) =
+            (MacAddress([0, 1, 2, 3, 4, 5]), MacAddress([2, 0, 0, 0, 0, 1]));
+        let mut builder = FrameBuilder::in_udp(&mut buffer, source, destination);
+        builder.push(Command::Brd, 7, BRD_AL_STATUS, 2).unwrap();
+        let len = builder.finish();
+        assert_eq!(len, 60, "42 of headers, 2, 14, and padding");
+        let view = FrameView::parse(&buffer[..len]).unwrap();
+        assert_eq!((view.source(), view.destination()), (source, destination));
+        assert_eq!(view.announced_len(), 14);
+        let datagram = view.datagrams().next().unwrap().unwrap();
+        assert_eq!((datagram.command(), datagram.index()), (Some(Command::Brd), 7));
+        assert_eq!(buffer[16..18], 44_u16.to_be_bytes(), "length of the IP packet");
+        assert_eq!(buffer[38..40], 24_u16.to_be_bytes(), "length of the UDP packet");
+        assert_eq!(ip_checksum(&buffer[14..34]), 0, "a right checksum makes the sum 0");
     }
 
     // proves: FRM-13 partial

@@ -18,7 +18,7 @@ use linesman_link::error::LinkError;
 use linesman_link::interface::CardLock;
 use linesman_link::real_time::sched_fifo;
 use linesman_link::socket::{
-    Batch, Bell, RawSocket, Ready, SocketOptions, Waitable, Waker, wait_any,
+    Batch, Bell, RawSocket, Ready, Reception, SocketOptions, Waitable, Waker, wait_any,
 };
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
@@ -88,7 +88,8 @@ impl Server {
     /// # Errors
     /// When an interface cannot be used, or is used by another process.
     pub fn open(segment: Segment, wiring: Wiring, names: &[String]) -> Result<Self, LinkError> {
-        let options = SocketOptions::default();
+        // Controllers process EtherCAT in UDP and behind VLAN tags, too.
+        let options = SocketOptions { reception: Reception::EveryForm, ..SocketOptions::default() };
         let locks = names.iter().map(|name| CardLock::take(name)).collect::<Result<_, _>>()?;
         let cards: Result<Vec<_>, _> =
             names.iter().take(2).map(|name| RawSocket::open(name, &options)).collect();

@@ -5,6 +5,7 @@
 //! mean, [`registers`], [`sii`] and [`coe`].
 
 mod address;
+mod answer;
 mod clock;
 mod coe;
 mod process_data;
@@ -12,11 +13,11 @@ mod registers;
 mod sii;
 
 use linesman_proto::address::{DeviceId, Path, Position, RegisterAddress, StationAddress};
-use linesman_proto::command::{Addressing, Command, Effect};
-use linesman_proto::frame::{Datagram, FrameView};
-use linesman_proto::time::Instant;
+use linesman_proto::command::{Addressing, Command};
+use linesman_proto::frame::FrameView;
 
 pub use address::Addresses;
+use answer::{Answer, answers};
 
 use super::{Cyclic, Device, Line, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
@@ -33,53 +34,6 @@ pub struct Learner {
     addresses: Addresses,
     latest_cyclic: usize,
     transfers: sii::Transfers,
-}
-
-/// One datagram on its way back, with all there is to know of it.
-struct Answer<'a> {
-    command: Command,
-    effect: Effect,
-    request: Option<Datagram<'a>>,
-    reply: Datagram<'a>,
-    ado: RegisterAddress,
-    /// Its working counter, all copies so far together.
-    sum: u16,
-    /// The working counter of this copy alone.
-    own: u16,
-    is_last: bool,
-    /// Whether positions can be counted: there is but one copy.
-    is_single: bool,
-    /// The card by which this copy had gone out, where that is known.
-    sent_by: Option<Path>,
-    /// Whether cards are told apart by more than their addresses.
-    knows_cards: bool,
-    /// When the request went out, where it was seen.
-    sent_at: Option<Instant>,
-    at: Instant,
-    frame: u64,
-}
-
-impl Answer<'_> {
-    /// What was written: as it went out if that was seen, since a read may have changed it.
-    fn written(&self) -> &[u8] {
-        match (self.request, self.effect.reads) {
-            (Some(request), _) => request.data(),
-            (None, false) => self.reply.data(),
-            (None, true) => &[],
-        }
-    }
-
-    /// How many controllers it passed.
-    fn passed(&self) -> Option<u16> {
-        if !self.is_single || !self.command.increments_position() {
-            return None;
-        }
-        match self.request {
-            Some(request) => Some(self.reply.adp().wrapping_sub(request.adp())),
-            None if self.effect.addressing == Addressing::Broadcast => Some(self.reply.adp()),
-            None => None,
-        }
-    }
 }
 
 impl Learner {
@@ -118,6 +72,25 @@ impl Learner {
         }
     }
 
+    /// Learns what the answer to a question shows: the registers, but nothing of the MainDevice's own frames.
+    pub fn learn_answer(&mut self, line: &mut Line, exchange: &Exchange<'_>) {
+        let Some(reply) = &exchange.reply else {
+            line.traffic.questions.lost += u64::from(!exchange.is_cut_off);
+            return;
+        };
+        line.traffic.questions.answered += 1;
+        for answer in answers(exchange, exchange.request.as_ref(), reply).flatten() {
+            let is_single =
+                matches!(answer.effect.addressing, Addressing::Position | Addressing::Station);
+            // How many answer a broadcast in UDP says how many process UDP.
+            if is_single && !answer.effect.writes {
+                let (register, len) = (answer.ado, answer.reply.data_len() as u16);
+                line.traffic.questions.note_read(register, len);
+                self.single(line, &answer);
+            }
+        }
+    }
+
     fn answered(
         &mut self,
         line: &mut Line,
@@ -125,43 +98,17 @@ impl Learner {
         request: Option<&FrameCopy<'_>>,
         reply: &FrameCopy<'_>,
     ) {
-        let Ok(view) = FrameView::parse(reply.bytes) else { return };
         if let Some(request) = request.filter(|_| exchange.is_last) {
             let (sent, back, len) = (request.time, reply.time, reply.bytes.len());
             if line.trips.record(sent, back, reply.number, len) {
                 line.touch();
             }
         }
-        let mut requests =
-            request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
-        for (index, datagram) in view.datagrams().enumerate() {
-            let Ok(datagram) = datagram else { break };
-            let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
-            let Some(command) = datagram.command() else {
-                line.traffic.datagrams += u64::from(exchange.is_last);
-                continue;
-            };
-            let sum = exchange.sum(index, datagram.wkc().0);
-            if exchange.is_part && sum == 0 {
-                continue;
+        for answer in answers(exchange, request, reply) {
+            match answer {
+                Some(answer) => self.datagram(line, &answer),
+                None => line.traffic.datagrams += u64::from(exchange.is_last),
             }
-            let answer = Answer {
-                command,
-                effect: command.effect(),
-                request,
-                reply: datagram,
-                ado: datagram.ado(),
-                sum,
-                own: datagram.wkc().0,
-                is_last: exchange.is_last,
-                is_single: exchange.is_last && exchange.earlier.is_empty(),
-                sent_by: exchange.sent_by,
-                knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
-                sent_at: exchange.request.map(|request| request.time),
-                at: reply.time,
-                frame: reply.number,
-            };
-            self.datagram(line, &answer);
         }
     }
 

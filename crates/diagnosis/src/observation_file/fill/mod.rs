@@ -63,6 +63,7 @@ impl ObservationFile {
         main_device::teach(&mut line, &steps);
         process_data::teach(self, &mut line, &steps);
         self.teach_events(&mut line, &clock);
+        line.reported.kind = self.kind;
         line.reported.wiring = if planned.is_some() { WiringBasis::Told } else { self.wiring };
         // Whoever wrote the file saw a place for each of them, also for those that are silent.
         line.traffic.positions_seen = u16::try_from(line.devices.len()).unwrap_or(u16::MAX);

@@ -1,12 +1,16 @@
-//! Beside another MainDevice: listening without sending.
+//! Beside another MainDevice: listening without sending, or with questions between its frames.
 
-use linesman_diagnosis::{Engine, InputKind, Setup};
+use linesman_diagnosis::ask::AskSetup;
+use linesman_diagnosis::{Direction, Engine, InputKind, Setup};
 use linesman_link::clock::HostClock;
+use linesman_link::error::LinkError;
+use linesman_proto::address::Network;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::listen::{Ears, Heard};
+use linesman_runtime::asking::Asking;
+use linesman_runtime::listen::{Ears, Heard, TapCounts};
 use linesman_runtime::record::Recorder;
 
-use super::Session;
+use super::{Session, asking};
 use crate::command::driven;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -15,39 +19,58 @@ use crate::text::quantity::{count, time};
 
 /// How long is listened when nobody says.
 const LASTS: Span = Span::s(10);
+/// How long, when questions are asked: they begin once the MainDevice is known.
+const ASKING_LASTS: Span = Span::s(20);
 /// Longest wait, so that a wish to stop is noticed.
 const NAP: Span = Span::ms(100);
 
-/// Judges what is heard.
+/// Judges what is heard, and what is asked, where that is wanted.
 pub(super) fn run(
     names: &[String],
+    questions: Option<AskSetup>,
     session: Session,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     let stop = driven::stop()?;
     let clock = HostClock::start();
-    let until = session.until(LASTS);
+    let until = session.until(if questions.is_some() { ASKING_LASTS } else { LASTS });
     let mut ears = Ears::open(names, clock)?;
+    let asking = questions.map(|setup| asking::open(names, clock, setup)).transpose()?;
     let recorder = session.recorder(clock.started_at(), names)?;
-    let mut listening = Listening { session, clock, recorder, engine: None, frames: 0 };
+    let mut listening =
+        Listening { session, clock, recorder, engine: None, asking, frames: 0, is_local: false };
     let mut progress = Progress::new();
     let mut lost = None;
     while !stop.is_set() && clock.now() < until && !output.is_closed() {
-        let deadline = until.min(clock.now() + NAP);
-        if let Err(error) = listening.hear(&mut ears, deadline, output) {
-            lost = Some(error);
-            break;
+        let deadline = until.min(clock.now() + NAP).min(listening.deadline());
+        let heard = listening.hear(&mut ears, deadline, output);
+        match heard.and_then(|()| listening.ask(names, output)) {
+            Ok(None) => {}
+            Ok(Some(refused)) => {
+                progress.clear();
+                return Err(refused);
+            }
+            Err(error) => {
+                lost = Some(error);
+                break;
+            }
         }
         let frames = listening.frames;
         progress.show(|| format!("{}, {}", count(frames, "frame"), time(clock.now().as_nanos())));
     }
     progress.clear();
     let heard_for = clock.now();
-    let Listening { mut session, engine, recorder, .. } = listening;
+    let Listening { mut session, engine, recorder, asking, is_local, .. } = listening;
     session.end_recording(recorder, output);
-    let Some(engine) = engine else {
+    let Some(mut engine) = engine else {
         return Err(lost.map_or_else(|| silence(names, heard_for), Failure::from));
     };
+    if let Some(asking) = asking {
+        engine.note_asking(asking.report());
+    }
+    if !is_local && lost.is_none() {
+        tell_of_tap(&mut ears, names, output);
+    }
     let complete = lost.is_none();
     if let Some(error) = lost {
         let failure = Failure::from(error);
@@ -62,17 +85,27 @@ struct Listening {
     clock: HostClock,
     recorder: Option<Recorder>,
     engine: Option<Engine>,
+    asking: Option<Asking>,
     frames: u64,
+    /// Whether this computer drives the line: then the counters of its card are about the line.
+    is_local: bool,
 }
 
 impl Listening {
+    /// When there is something to do though nothing is heard.
+    fn deadline(&self) -> Instant {
+        // Before the first frame there is nothing to be asked.
+        let asking = self.asking.as_ref().filter(|_| self.engine.is_some());
+        asking.map_or(Instant::MAX, Asking::deadline)
+    }
+
     fn hear(
         &mut self,
         ears: &mut Ears,
         deadline: Instant,
         output: &mut Output,
-    ) -> Result<(), linesman_link::error::LinkError> {
-        let Self { session, clock, recorder, engine, frames } = self;
+    ) -> Result<(), LinkError> {
+        let Self { session, clock, recorder, engine, asking, frames, is_local } = self;
         ears.hear(deadline, |heard| {
             match heard {
                 Heard::Frame(frame) => {
@@ -80,14 +113,27 @@ impl Listening {
                     if let Some(recorder) = recorder {
                         recorder.frame(&frame);
                     }
-                    // Only beside a MainDevice of this host are the card's counters about the line.
-                    let is_local = frame.direction == linesman_diagnosis::Direction::Sent;
-                    let engine = engine.get_or_insert_with(|| begin(session, *clock, is_local));
+                    let engine =
+                        engine.get_or_insert_with(|| begin(session, *clock, asking.is_some()));
+                    if frame.direction == Direction::Sent && !std::mem::replace(is_local, true) {
+                        engine.watch_host();
+                    }
                     engine.handle_frame(&frame);
+                    if let Some(asking) = asking {
+                        asking.frame(&frame);
+                    }
                 }
                 Heard::Host(observation) => {
                     if let Some(engine) = engine {
                         engine.handle_host(&observation);
+                    }
+                }
+                Heard::Missed(count, at) => {
+                    if let Some(engine) = engine {
+                        engine.handle_missed(Network::default(), count, at);
+                    }
+                    if let Some(asking) = asking {
+                        asking.missed();
                     }
                 }
             }
@@ -102,18 +148,35 @@ impl Listening {
         }
         Ok(())
     }
+
+    /// Sends the question that is due. Gives why nothing is asked at all beside this MainDevice, if that is so.
+    fn ask(&mut self, names: &[String], output: &Output) -> Result<Option<Failure>, LinkError> {
+        match (&mut self.asking, &mut self.engine) {
+            (Some(asking), Some(engine)) => asking::turn(asking, engine, names, output),
+            (_, None) | (None, _) => Ok(None),
+        }
+    }
 }
 
-fn begin(session: &Session, clock: HostClock, host_counters: bool) -> Engine {
+/// Says of a card that only listens that what it dropped is no matter of the MainDevice's card.
+fn tell_of_tap(ears: &mut Ears, names: &[String], output: &Output) {
+    let Ok(counts) = ears.tap_counts() else { return };
+    if counts == TapCounts::default() {
+        return;
+    }
+    output.warn(&format!(
+        "{} only listens here: {} and {} that it dropped itself are not counted to the MainDevice's card; some of them may \
+         be among the frames that seem lost",
+        names.join("+"),
+        count(counts.damaged, "damaged frame"),
+        count(counts.dropped, "other frame"),
+    ));
+}
+
+fn begin(session: &Session, clock: HostClock, probes: bool) -> Engine {
     let start = clock.started_at().rfc3339();
     let clock = "host, monotonic".to_owned();
-    Engine::new(Setup {
-        input: InputKind::Listened,
-        host_counters,
-        start,
-        clock,
-        ..session.setup.clone()
-    })
+    Engine::new(Setup { input: InputKind::Listened, probes, start, clock, ..session.setup.clone() })
 }
 
 fn silence(names: &[String], heard_for: Instant) -> Failure {

@@ -77,6 +77,7 @@ fn selectors(arguments: &Arguments) -> Result<Vec<Selector>, Failure> {
         ("--follow", arguments.follow),
         ("--active", arguments.active),
         ("--to", arguments.to.is_some()),
+        ("--ask", arguments.ask),
     ];
     if let Some((option, _)) = misplaced.into_iter().find(|(_, is_given)| *is_given) {
         let files = count(arguments.places.len() as u64, "file");
