@@ -81,6 +81,8 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
 
 /// Whether a SubDevice was asked in vain, or is planned and nothing was seen of it.
 fn is_missed(line: &Line, device: &Device) -> bool {
-    let is_unseen = device.answered.is_none() && line.device_count() < line.devices.len();
+    let is_unseen = device.answered.is_none()
+        && device.planned.is_some()
+        && line.device_count() < line.devices.len();
     device.silent.is_some() || is_unseen
 }

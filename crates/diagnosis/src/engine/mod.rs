@@ -122,7 +122,7 @@ impl Engine {
         self.now = self.now.max(at);
         let Watched { line, pairing, .. } = self.watched(network);
         pairing.forget();
-        line.traffic.missed += count;
+        line.traffic.record_missed(count);
         // The time to the next one says nothing.
         for cyclic in &mut line.cyclic {
             cyclic.sent.skip();

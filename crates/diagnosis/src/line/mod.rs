@@ -10,9 +10,11 @@ pub mod counters;
 pub mod cyclic;
 pub mod device;
 pub mod dl_history;
+pub mod event_field;
 pub mod host;
 pub mod learn;
 pub mod mailbox;
+pub mod motion;
 pub mod reported;
 pub mod search;
 pub mod sii_image;
@@ -39,6 +41,7 @@ pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cyclic::{Cyclic, Deficit, Ordered, Owner};
 pub use device::{Absence, Chip, Device, Planned, SeenIdentity, SharedAddress, SharedBy, Trouble};
 pub use dl_history::{DlChange, DlHistory};
+pub use event_field::{EventField, EventTrack};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
 pub use reported::{Counting, ErrorSum, Reported, ReportedTrouble};
@@ -115,6 +118,8 @@ pub struct Line {
     pub references: Vec<Reference>,
     /// How long frames are on their way.
     pub trips: Trips,
+    /// Events that controllers report in frames that pass them.
+    pub events: EventField,
     /// Frames and datagrams.
     pub traffic: Traffic,
     /// Station addresses that were asked without any answer, and that no SubDevice was seen to have: in the order of
@@ -307,6 +312,13 @@ impl Line {
     /// Who has an FMMU on a logical datagram, as far as it was seen being set up.
     pub fn owners(&self, cyclic: &Cyclic) -> impl Iterator<Item = Owner> + '_ {
         owners(&self.devices, cyclic.start, cyclic.len)
+    }
+
+    /// Forgets a tree that was put together from what was seen: controllers have other numbers now.
+    pub fn forget_tree(&mut self) {
+        if !self.tree_is_planned {
+            (self.tree, self.tree_basis) = (None, (0, 0));
+        }
     }
 
     /// Puts the tree together from what was seen, once all ports of all controllers are known; not

@@ -191,6 +191,8 @@ pub struct Traffic {
     /// When no frame at all was seen, neither on its way out nor back, oldest first, at most [`SILENCES_KEPT`]. In
     /// a recording it is so while a card takes no frames, as without a link.
     pub quiet: VecDeque<Pause>,
+    /// Whether frames passed since the latest one that were not shown: the time to the next says nothing.
+    is_gap_unknown: bool,
     /// The first frame.
     pub first: Option<Instant>,
     /// The latest frame.
@@ -206,6 +208,9 @@ impl Traffic {
         // Times of two interfaces may run backwards.
         self.last = Some(last.max(at));
         self.clock_back = self.clock_back.max(last.since(at));
+        if std::mem::take(&mut self.is_gap_unknown) {
+            return;
+        }
         self.longest_gap = self.longest_gap.max(at.since(last));
         if at.since(last) >= QUIET {
             if self.quiet.len() == SILENCES_KEPT {
@@ -213,6 +218,12 @@ impl Traffic {
             }
             self.quiet.push_back(Pause { from: last, to: at });
         }
+    }
+
+    /// So many frames passed and were not shown.
+    pub const fn record_missed(&mut self, count: u64) {
+        self.missed += count;
+        self.is_gap_unknown = true;
     }
 
     /// A frame was seen that the second card of a ring sends only to see which way it comes back, and so many

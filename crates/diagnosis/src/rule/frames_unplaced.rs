@@ -23,7 +23,7 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
-use super::{Rule, RulePage, View};
+use super::{Rule, RulePage, View, nobody_answers};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::line::{Line, Tally};
 
@@ -98,10 +98,14 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let (Some(first), Some(last)) = (lost.first, lost.last) else { return None };
     // A recorder that misses requests misses returns, too.
     let is_recorder = traffic.unrecorded.sum > 0 || traffic.datagrams_cut > 0 || traffic.missed > 0;
-    // What is lost in a row is another rule's; it is not known yet whether the latest one is the first of many.
-    let in_a_row = traffic.silences.iter().map(|one| one.frames).filter(|frames| *frames > SEVERAL);
-    let single = lost.sum.saturating_sub(in_a_row.sum());
-    let went_on = traffic.latest_returned.is_some_and(|returned| returned.at > last);
+    // What is lost in a row is another rule's; of those that are still missing it is not known whether they are the
+    // first of many.
+    let in_a_row = traffic.silences.iter().filter(|one| {
+        let is_open = one.ended.is_none() && !view.has_ended;
+        is_open || one.frames >= nobody_answers::CERTAIN
+    });
+    let single = lost.sum.saturating_sub(in_a_row.map(|one| one.frames).sum());
+    let went_on = traffic.latest_returned.is_some_and(|returned| returned.at > first);
     if single < SEVERAL || !went_on || line.sees_all_orders || traffic.is_one_sided() || is_recorder
     {
         return None;

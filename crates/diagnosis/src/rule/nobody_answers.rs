@@ -53,7 +53,7 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// So many requests in a row without a return are no accident.
-const CERTAIN: u64 = 8;
+pub(super) const CERTAIN: u64 = 8;
 /// More in a row than noise takes from a line that still answers.
 const LONG: u64 = 32;
 /// How likely it is the card.
@@ -62,6 +62,8 @@ const CARD: f64 = 0.1;
 const NEVER_SEEN: f64 = 0.08;
 /// Cards are looked at now and then only: a silence must last so long before their link proves anything.
 const CARRIER_LATE: Span = Span::ms(300);
+/// So long after its link was lost a card takes no frames any more: drivers look for it every second or two.
+const CARRIER_KNOWN: Span = Span::ms(2_200);
 /// Ports that were closed in a silence keep it from being one; what follows so soon belongs to it.
 const SAME_SILENCE: Span = Span::ms(100);
 /// With fewer, the end of the input may have cut off the answer.
@@ -85,7 +87,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
                 && ended.since(silence.since.at) >= LINK_UP
                 && !traffic.was_badly_recorded(silence.since.at, ended)
         }
-        None => silence.frames >= CERTAIN || (silence.frames >= FEW && view.has_ended),
+        // A few at the end, where a few were lost all along, are more of the same.
+        None => {
+            let is_few = silence.frames >= FEW && view.has_ended && !is_among_others(line, silence);
+            silence.frames >= CERTAIN || is_few
+        }
     };
     let swallowed = traffic.swallowed.iter().rev().find(|silence| silence.frames >= CERTAIN);
     let silence = traffic.silences.iter().rev().find(is_long);
@@ -232,10 +238,14 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         let told = line.host.card(Path::A).carrier.map(|carrier| carrier.at);
         let text = match (carrier, told) {
             (true, Some(_)) => "card A has a link",
-            (true, None) => "ports were closed meanwhile to find the place: who does so has a link",
+            (true, None) if search::began(line, silence).is_some() => {
+                "ports were closed meanwhile to find the place: who does so has a link"
+            }
+            (true, None) => "frames went on leaving the card, and none leaves one without a link",
             (false, _) => "card A had no link meanwhile",
         };
-        let at = told.or_else(|| search::began(line, silence).map(|began| began.at));
+        let began = search::began(line, silence).map(|began| began.at);
+        let at = told.or(began).or(Some(silence.last.at));
         condition = condition.shown_by(Evidence::host(at, text));
     }
     if silence.frames >= CERTAIN || view.has_ended {
@@ -374,14 +384,22 @@ fn spoiling(line: &Line, at: Instant) -> Condition {
 }
 
 /// Whether the card had a link during a silence; `None` when neither the host says so nor anybody who searched
-/// for the place, which nobody does without one.
+/// for the place, which nobody does without one, nor frames that went on leaving it.
 fn carrier_during(line: &Line, silence: &Silence) -> Option<bool> {
     let card = line.host.card(Path::A);
     let Some(carrier) = card.carrier else {
-        return search::began(line, silence).map(|_| true);
+        return (search::began(line, silence).is_some() || went_on_leaving(line, silence))
+            .then_some(true);
     };
     let came_back = carrier.value && card.carrier_changes > 0 && carrier.at >= silence.since.at;
     Some(carrier.value && !came_back)
+}
+
+/// Whether frames were seen to leave the card itself for so long that it had a link: the system hands none to a card
+/// without one, once it knows.
+fn went_on_leaving(line: &Line, silence: &Silence) -> bool {
+    let is_host = line.traffic.senders.iter().any(|sender| sender.is_host);
+    is_host && silence.last.at.since(silence.since.at) >= CARRIER_KNOWN
 }
 
 /// Frames come back as they went out.

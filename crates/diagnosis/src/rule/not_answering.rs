@@ -7,7 +7,9 @@
 //! A station address that is asked again and again and has never answered counts, too, where others answer.
 //!
 //! Where all behind one link are silent at once, it is one finding, at that link; unless the near end of it was read
-//! since and says otherwise, or broadcasts still count all of them.
+//! since and says otherwise, or broadcasts still count all of them. Where nobody has seen the wiring, as when the
+//! diagnosis joins a line that runs already, SubDevices that follow upon one another and are silent at once are one
+//! finding at the first of them: frames come to it by a link from one of those before it, which of them was not seen.
 //!
 //! **What it means.** It is without power, cut off, or has lost its station address by starting anew.
 //! When the link to it is lost, that finding stands above this one.
@@ -20,7 +22,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::table;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::{End, Tree};
+use linesman_proto::topology::{End, Link, Tree};
 
 use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
@@ -148,10 +150,8 @@ fn absence(view: &View<'_>, device: &Device) -> Option<Absence> {
 
 /// SubDevices that all fell silent behind one link, of which nobody says that it is up.
 struct Branch {
-    a: End<DeviceId>,
-    b: End<DeviceId>,
-    /// Whether the ports are those of the wiring, and not of a line in the order of positions.
-    is_wired: bool,
+    /// The link; `None` where nobody has seen what the first of them hangs on.
+    link: Option<Link<DeviceId>>,
     is_on_terminal_bus: bool,
     devices: Vec<DeviceId>,
     since: Seen<()>,
@@ -171,7 +171,7 @@ fn silent_branches(view: &View<'_>) -> Vec<Branch> {
     let branches = match line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) {
         Some(tree) if tree.closes_at().is_some() => return Vec::new(),
         Some(tree) => in_tree(line, tree, &is_silent, &away),
-        None => in_order(line, &is_silent, &away).into_iter().collect(),
+        None => in_order(line, &is_silent, &away),
     };
     branches.into_iter().filter(|branch| !is_up(line, branch)).collect()
 }
@@ -258,9 +258,7 @@ fn in_tree(
         let link = tree.links().get(tree.link_above(head)?)?.map(id);
         let devices: Vec<DeviceId> = tree.subtree(head).iter().map(|node| id(*node)).collect();
         Some(Branch {
-            a: link.upstream,
-            b: link.downstream,
-            is_wired: true,
+            link: Some(link),
             is_on_terminal_bus: is_on_terminal_bus(line, head),
             since: since(away, &devices)?,
             ended: ended(away, &devices),
@@ -270,27 +268,30 @@ fn in_tree(
     heads.filter_map(branch).collect()
 }
 
-/// Where nobody has seen the wiring: the last ones in the order of positions, as on a line.
+/// Where nobody has seen the wiring: those that follow upon one another in the order of positions, which is that in which
+/// frames reach them, so that all behind a link do. Somebody before them answers.
 fn in_order(
     line: &Line,
     is_silent: &dyn Fn(&DeviceId) -> bool,
     away: &[Option<Absence>],
-) -> Option<Branch> {
-    let order: Vec<DeviceId> = line.devices.iter().map(|device| device.id).collect();
-    let silent = order.iter().rev().take_while(|id| is_silent(id)).count();
-    let (there, devices) = order.split_at(order.len() - silent);
-    if devices.len() < 2 || there.iter().any(is_silent) {
-        return None;
-    }
-    Some(Branch {
-        a: End::Controller(*there.last()?, Port::B),
-        b: End::Controller(*devices.first()?, Port::A),
-        is_wired: false,
-        is_on_terminal_bus: false,
-        since: since(away, devices)?,
-        ended: ended(away, devices),
-        devices: devices.to_vec(),
-    })
+) -> Vec<Branch> {
+    let is_away = |device: &Device| is_silent(&device.id);
+    // Of whom nothing was heard and who was not asked nobody knows.
+    let is_known = |device: &&Device| is_away(device) || device.answered.is_some();
+    let known: Vec<&Device> = line.devices.iter().filter(is_known).collect();
+    let runs = known.chunk_by(|one, next| is_away(one) == is_away(next));
+    let silent = runs.skip(1).filter(|run| run.first().is_some_and(|first| is_away(first)));
+    let branch = |run: &[&Device]| {
+        let devices: Vec<DeviceId> = run.iter().map(|device| device.id).collect();
+        Some(Branch {
+            link: None,
+            is_on_terminal_bus: false,
+            since: since(away, &devices)?,
+            ended: ended(away, &devices),
+            devices,
+        })
+    };
+    silent.filter(|run| run.len() > 1).filter_map(branch).collect()
 }
 
 fn since(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Seen<()>> {
@@ -308,7 +309,7 @@ fn ended(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Instant> {
 /// Whether the near end says, after all fell silent, that the link is there, or that it is not: then another rule
 /// tells of it.
 fn is_up(line: &Line, branch: &Branch) -> bool {
-    let End::Controller(id, _) = branch.a else { return false };
+    let Some(End::Controller(id, _)) = branch.link.map(|link| link.upstream) else { return false };
     let dl = line.device(id).map(|device| &device.dl).filter(|dl| !dl.is_assumed);
     let read = dl.and_then(|dl| dl.latest_reading);
     read.is_some_and(|read| read >= branch.since.at)
@@ -316,34 +317,27 @@ fn is_up(line: &Line, branch: &Branch) -> bool {
 
 /// One link, and all behind it silent.
 fn cut_off(line: &Line, branch: &Branch) -> Condition {
-    let (a, b, since) = (branch.a, branch.b, branch.since);
-    let direction = Some(LinkDirection::Both);
-    let place = Place::Link { network: line.network, a, b: Some(b), direction };
-    let (open, off, supply) =
-        if branch.is_on_terminal_bus { (0.5, 0.35, 0.05) } else { (0.6, 0.25, 0.1) };
+    let since = branch.since;
     let first = branch.devices.first().copied().unwrap_or_default();
     let device = Place::device(line.network, first);
-    let label = line.label(first);
-    let count = branch.devices.len();
-    let text = match (count, branch.is_wired) {
-        (1, _) => format!("{label} does not answer, and whoever is before it does"),
-        (_, true) => format!(
-            "{label} and {} behind it do not answer, and whoever is before them does",
-            count - 1
-        ),
-        (_, false) => format!(
-            "the last {count} SubDevices in the order of positions do not answer, {label} the first of \
-             them; the wiring was not seen and is taken for a line"
-        ),
-    };
-    let text = match branch.ended {
-        None => text,
-        Some(ended) => format!("{text}; for {}, then again", ended.since(since.at)),
-    };
-    let all = branch.devices.iter().copied();
+    let place = branch
+        .link
+        .map_or(device, |link| Place::link(line.network, link, Some(LinkDirection::Both)));
     // A link that comes and goes takes the same shares from process data, again and again.
     let outages = line.cyclic.iter().map(|cyclic| cyclic.deficits.len()).max().unwrap_or(0);
     let flaps = outages >= FLAPS;
+    let mut text = silence_text(line, branch);
+    if let Some(ended) = branch.ended {
+        text = format!("{text}; for {}, then again", ended.since(since.at));
+    }
+    if flaps {
+        text = format!("{text}; process data lacked shares {outages} times");
+    }
+    let (open, off, supply) = match branch.link {
+        Some(_) if branch.is_on_terminal_bus => (0.5, 0.35, 0.05),
+        Some(_) => (0.6, 0.25, 0.1),
+        None => (0.5, 0.2, 0.1),
+    };
     let causes = match flaps {
         true => Condition::new(&PAGE, place, FaultName::LinkFlapping, since.at)
             .confidence(0.5)
@@ -354,10 +348,19 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
             .or_at(FaultName::DeviceOff, device, off)
             .or_at(FaultName::SupplyOff, device, supply),
     };
-    let text = match flaps {
-        true => format!("{text}; process data lacked shares {outages} times"),
-        false => text,
+    // As on a line without branches.
+    let before = first.index().checked_sub(1).filter(|_| branch.link.is_none());
+    let causes = match before.map(|index| DeviceId(index as u32)) {
+        None => causes,
+        Some(before) => {
+            let (a, b) = (End::Controller(before, Port::B), Some(End::Controller(first, Port::A)));
+            let direction = Some(LinkDirection::Both);
+            let link = Place::Link { network: line.network, a, b, direction };
+            causes.or_at(FaultName::LinkOpen, link, 0.15)
+        }
     };
+    let label = line.label(first);
+    let all = branch.devices.iter().copied();
     let condition = causes
         .confirmed(since.at)
         .about(all.clone().map(Symptom::Silent))
@@ -370,11 +373,36 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
             ]
         }))
         .shown_by(Evidence::register(first, table::AL_STATUS.address, &since, text))
-        .advise(format!("Look at {label}: if no lamp is lit, measure its supply first."))
-        .advise(format!("Look at the plugs and the cable of {place}."));
+        .advise(format!("Look at {label}: if no lamp is lit, measure its supply first."));
+    let condition = match branch.link {
+        Some(_) => condition.advise(format!("Look at the plugs and the cable of {place}.")),
+        None => condition
+            .advise(format!(
+                "Follow the way into {label}: plugs, cable or contact, to where it comes from."
+            ))
+            .advise("Name the project or ENI, `--project FILE`: it has the wiring."),
+    };
     match branch.ended {
         Some(ended) => condition.ended(ended),
         None => condition,
+    }
+}
+
+/// Who does not answer, in words.
+fn silence_text(line: &Line, branch: &Branch) -> String {
+    let label = |id: Option<&DeviceId>| line.label(id.copied().unwrap_or_default());
+    let first = label(branch.devices.first());
+    match (branch.devices.len(), branch.link) {
+        (1, _) => format!("{first} does not answer, and whoever is before it does"),
+        (count, Some(_)) => format!(
+            "{first} and {} behind it do not answer, and whoever is before them does",
+            count - 1
+        ),
+        (count, None) => format!(
+            "{count} SubDevices that follow upon one another do not answer, from {first} to {}, and whoever is \
+             before them does; what {first} hangs on was not seen",
+            label(branch.devices.last())
+        ),
     }
 }
 

@@ -7,6 +7,7 @@
 mod address;
 mod clock;
 mod coe;
+mod count;
 mod process_data;
 mod registers;
 mod sii;
@@ -17,6 +18,7 @@ use linesman_proto::frame::{Datagram, FrameView};
 use linesman_proto::time::Instant;
 
 pub use address::Addresses;
+use count::CountDoubt;
 
 use super::{Cyclic, Device, Line, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
@@ -32,6 +34,7 @@ const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
 pub struct Learner {
     addresses: Addresses,
     latest_cyclic: usize,
+    broadcast_doubt: CountDoubt,
     transfers: sii::Transfers,
 }
 
@@ -134,6 +137,8 @@ impl Learner {
         }
         let mut requests =
             request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
+        let is_single = exchange.is_last && exchange.earlier.is_empty();
+        let mut events = None;
         for (index, datagram) in view.datagrams().enumerate() {
             let Ok(datagram) = datagram else { break };
             let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
@@ -141,9 +146,15 @@ impl Learner {
                 line.traffic.datagrams += u64::from(exchange.is_last);
                 continue;
             };
-            let sum = exchange.sum(index, datagram.wkc().0);
+            // A request may go out with a count in its working counter, and with events: what was added matters.
+            let sent = request.map_or(0, |request| request.wkc().0);
+            let sum = exchange.added(index, sent, datagram.wkc().0);
+            let own = datagram.wkc().0.saturating_sub(sent);
             if exchange.is_part && sum == 0 {
                 continue;
+            }
+            if let Some(request) = request.filter(|_| is_single && own > 0) {
+                *events.get_or_insert(0) |= datagram.irq() & !request.irq();
             }
             let answer = Answer {
                 command,
@@ -152,9 +163,9 @@ impl Learner {
                 reply: datagram,
                 ado: datagram.ado(),
                 sum,
-                own: datagram.wkc().0,
+                own,
                 is_last: exchange.is_last,
-                is_single: exchange.is_last && exchange.earlier.is_empty(),
+                is_single,
                 sent_by: exchange.sent_by,
                 knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
                 sent_at: exchange.request.map(|request| request.time),
@@ -162,6 +173,11 @@ impl Learner {
                 frame: reply.number,
             };
             self.datagram(line, &answer);
+        }
+        if let Some(added) = events
+            && line.events.record(added, reply.time, reply.number)
+        {
+            line.touch();
         }
     }
 
@@ -196,15 +212,18 @@ impl Learner {
 
     fn broadcast(&mut self, line: &mut Line, answer: &Answer<'_>) {
         let passed = answer.passed();
+        // A broadcast to an optional register is answered by some only.
+        let counts = answer.command == Command::Brd && answer.ado < FIRST_OPTIONAL;
+        let is_counted_twice = counts && passed == Some(answer.own);
         if let Some(passed) = passed {
-            self.addresses.passed(line, answer.sent_by, passed);
+            self.addresses.passed(line, answer.sent_by, passed, is_counted_twice);
         }
         if !answer.is_last {
             return;
         }
-        // A broadcast to an optional register is answered by some only.
-        let counts = answer.command == Command::Brd && answer.ado < FIRST_OPTIONAL;
-        if counts {
+        let most = line.traffic.broadcast_answers;
+        let is_confirmed = is_counted_twice || passed.is_none();
+        if counts && self.broadcast_doubt.is_believed(answer.sum, most, is_confirmed) {
             line.traffic.broadcast_answers = line.traffic.broadcast_answers.max(answer.sum);
             line.traffic.broadcast_read = line.traffic.broadcast_read.max(Some(answer.at));
             let split = (answer.sum - answer.own, answer.own);
@@ -252,7 +271,7 @@ impl Learner {
     /// A datagram to one controller.
     fn single(&mut self, line: &mut Line, answer: &Answer<'_>) {
         if let Some(passed) = answer.passed() {
-            self.addresses.passed(line, answer.sent_by, passed);
+            self.addresses.passed(line, answer.sent_by, passed, false);
         }
         let is_position = answer.effect.addressing == Addressing::Position;
         let device = if is_position {
@@ -314,7 +333,7 @@ impl Learner {
             }
             return;
         }
-        if answer.reply.wkc().0 == 0 {
+        if answer.own == 0 {
             // The other copy was answered, and taught what there was to learn.
             return;
         }
@@ -381,7 +400,8 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
         let Ok(datagram) = datagram else { break };
         let traffic = &mut line.traffic;
         traffic.datagrams += 1;
-        if exchange.sum(index, 0) == 0 && datagram.command() != Some(Command::Nop) {
+        let sent = datagram.wkc().0;
+        if exchange.added(index, sent, sent) == 0 && datagram.command() != Some(Command::Nop) {
             traffic.unanswered += 1;
             let seen = Seen::new((), request.time, Some(request.number));
             traffic.first_unanswered.get_or_insert(seen);

@@ -9,6 +9,8 @@ use crate::line::{Line, Seen};
 /// Asked so often in vain, and over so long, a station address is that of a SubDevice which should be there.
 const ASKED_IN_VAIN: u64 = 3;
 const ASKED_FOR: Span = Span::ms(20);
+/// Who is asked in vain so many numbers beyond all that are known is expected by nobody: somebody looks who is there.
+const MOST_BEYOND: usize = 64;
 /// Most station addresses without an answer that are followed.
 const MOST_UNANSWERED: usize = 512;
 
@@ -68,7 +70,7 @@ impl Addresses {
                 break;
             }
             // It may have been counted while it was there, though nobody asked for it by its address then.
-            let counted = self.by_number(line, *station);
+            let counted = self.by_number(line, *station, MOST_BEYOND);
             let counted = counted.filter(|id| line.device(*id).is_some_and(Self::is_free));
             let id = counted.unwrap_or_else(|| line.add_device());
             self.give(line, id, *station);
