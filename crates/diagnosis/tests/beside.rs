@@ -12,7 +12,7 @@ use linesman_diagnosis::{Direction, Setup};
 use linesman_proto::address::{LogicalAddress, RegisterAddress};
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::register::FmmuConfig;
-use support::script::{Datagram, Script, brd, fprd, fpwr, frame_of, lrw};
+use support::script::{Datagram, Script, apwr, brd, fprd, fpwr, frame_of, lrw};
 use support::text;
 
 const SOEM: MacAddress = MacAddress([0x01; 6]);
@@ -111,7 +111,7 @@ fn subdevices_that_come_back_have_the_numbers_that_they_had() {
         let polls = polls(0x1001, 4, away);
         move |cycle: u64| {
             let mut all = polls(cycle);
-            all.extend((cycle % 25 == 0).then(|| brd(0x0130, &[8, 0], present)));
+            all.extend(cycle.is_multiple_of(25).then(|| brd(0x0130, &[8, 0], present)));
             all
         }
     };
@@ -136,6 +136,45 @@ fn subdevices_that_vanish_in_the_middle_of_the_order_hang_on_somebody_before_the
     assert_eq!(no(cut), Some(2), "{}", text(&report));
     assert_eq!(cut.consequences.len(), 3, "{}", text(&report));
     assert!(cut.evidence[0].text.contains("what SubDevice 2 hangs on was not seen"));
+}
+
+/// A coupler and its terminals have started anew; whoever hangs behind them answers on.
+// fires: H102
+#[test]
+fn subdevices_through_which_frames_go_have_started_anew() {
+    let mut script = listening(ETHERCRAB);
+    cycles(&mut script, 300, polls(0x1000, 6, &[]));
+    cycles(&mut script, 600, polls(0x1000, 6, &[0x1000, 0x1001, 0x1002, 0x1003]));
+    let report = report(&mut script);
+    let anew = &report.findings[0];
+    assert_eq!(codes(&report), ["H102"], "{}", text(&report));
+    assert_eq!((anew.cause, no(anew)), (FaultName::BrownOut, Some(1)), "{}", text(&report));
+    assert!(anew.evidence[0].text.contains("and 3 that follow upon it"), "{}", text(&report));
+}
+
+// fires: H100
+#[test]
+fn addresses_that_are_given_anew_after_a_silence_are_a_restart_of_the_first() {
+    let mut script = listening(SOEM);
+    for _ in 0..400 {
+        script.now += 4_000_000;
+        script.vanish(&[lrw(PROCESS, 8, 6)]);
+    }
+    let states = |away: u16| {
+        let answer = |station| fprd(station, 0x0130, &OP).wkc(u16::from(station > away));
+        (0x1001..=0x1004).map(answer).collect::<Vec<_>>()
+    };
+    script.exchange(&states(0x1002));
+    for position in 0..2 {
+        let station = (0x1001_u16 + position).to_le_bytes();
+        script.exchange(&[apwr(position, 0x0010, &station, 4)]);
+    }
+    cycles(&mut script, 300, |_| states(0));
+    let report = report(&mut script);
+    let anew = &report.findings[0];
+    assert_eq!(codes(&report), ["H100"], "{}", text(&report));
+    assert_eq!((anew.cause, no(anew)), (FaultName::BrownOut, Some(1)), "{}", text(&report));
+    assert!(text(&report).contains("2 SubDevices, SubDevice 1 the first of them"));
 }
 
 // fires: H105
@@ -355,6 +394,38 @@ fn toggle_bits_that_stop_are_an_application_that_has_stopped_and_values_that_sto
     // The second one has a value alone, which stops, too.
     let running = with_inputs(u64::MAX);
     assert!(codes(&running).is_empty(), "{}", text(&running));
+}
+
+/// An SDO to the second SubDevice, and its abort.
+fn aborted(script: &mut Script, command: u8, index: u16) {
+    let message = |service: u8, body: [u8; 8]| {
+        let head = [10, 0, 0, 0, 0, 0x13, 0, service << 4];
+        [head.as_slice(), &body].concat()
+    };
+    let [low, high] = index.to_le_bytes();
+    let request = message(2, [command, low, high, 1, 0, 0, 0, 0]);
+    let abort = message(2, [0x80, low, high, 1, 0x02, 0x00, 0x01, 0x06]);
+    script.exchange(&[fpwr(0x1002, 0x1000, &request)]);
+    script.exchange(&[fprd(0x1002, 0x1080, &abort)]);
+}
+
+// fires: S250
+// silent: S250
+#[test]
+fn refused_read_of_the_identity_is_no_finding_and_a_refused_write_is_a_note() {
+    const UPLOAD: u8 = 0x40;
+    const DOWNLOAD: u8 = 0x23;
+    for (command, index, found) in
+        [(UPLOAD, 0x1018, 0), (DOWNLOAD, 0x1C12, 1), (UPLOAD, 0x6000, 1), (DOWNLOAD, 0x8000, 1)]
+    {
+        let mut script = listening(SOEM);
+        cycles(&mut script, 100, polls(0x1001, 3, &[]));
+        aborted(&mut script, command, index);
+        cycles(&mut script, 100, polls(0x1001, 3, &[]));
+        let report = report(&mut script);
+        let count = codes(&report).iter().filter(|code| **code == "S250").count();
+        assert_eq!(count, found, "0x{index:04X}: {}", text(&report));
+    }
 }
 
 #[test]

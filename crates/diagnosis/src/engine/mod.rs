@@ -259,9 +259,8 @@ impl Engine {
             }
             if self.book.names_devices() {
                 watched.learner.name();
-            } else {
-                watched.learner.settle(&mut watched.line);
             }
+            watched.learner.settle(&mut watched.line);
             if watched.learner.is_settled() {
                 watched.line.derive_tree();
             }

@@ -295,6 +295,14 @@ impl Line {
         states.max().flatten().max(self.traffic.al_highest)
     }
 
+    /// When DL status of a SubDevice changed for the last time while process data were exchanged, as the event field of
+    /// frames tells: before that links come as the line is brought up.
+    #[must_use]
+    pub fn changed_link(&self) -> Option<Seen<()>> {
+        let is_running = |at: Instant| self.cyclic.iter().any(|cyclic| cyclic.first.at < at);
+        self.events.dl_status.came.filter(|came| is_running(came.at))
+    }
+
     /// When no frame at all was seen for several cycles of the process data, latest first.
     pub fn quiet(&self) -> impl Iterator<Item = Pause> + '_ {
         let cycle = self.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min();

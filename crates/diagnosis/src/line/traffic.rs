@@ -132,6 +132,8 @@ pub struct Traffic {
     /// Datagrams to station or logical addresses in frames that never came back: a MainDevice gets
     /// that far only when SubDevices answer.
     pub lost_addressed: u64,
+    /// Of those the process data.
+    pub lost_logical: u64,
     /// Frames that came back with a wrong check sequence.
     pub damaged: Tally,
     /// The first of those.

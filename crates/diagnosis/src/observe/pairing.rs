@@ -135,10 +135,14 @@ impl Pairing {
                 && pending.copy_by.is_none()
                 && pending.source.marked() != source
         };
-        let found = self
-            .pending
-            .iter()
-            .position(|pending| pending.print.lasting == print.lasting && !is_others(pending));
+        let is_it =
+            |pending: &Pending| pending.print.lasting == print.lasting && !is_others(pending);
+        let found = self.pending.iter().position(is_it).map(|first| {
+            // Who asks the same again long after has given the first one up.
+            let is_old = gap(self.pending[first].time, frame.time) > IN_FLIGHT;
+            let newest = || self.pending.iter().rposition(is_it);
+            if is_old { newest().unwrap_or(first) } else { first }
+        });
         if is_unknown && self.is_one_way_for_sure() && !source.is_marked() {
             // The copy of a ring's second card, which no controller has touched.
             return Outcome::Duplicate;
@@ -332,13 +336,18 @@ impl Pairing {
         if frame.direction == Direction::Unknown && !is_repeated {
             self.unrecorded += self.senders.number(source, &print);
         }
-        let has_more = |pending: &Pending| {
+        let is_by_other_card = |pending: &Pending| {
             pending.print.skeleton == print.skeleton
-                && pending.print.commands > print.commands
                 && (pending.source, pending.path) != (source, frame.path)
                 && gap(pending.time, frame.time) <= OTHER_CARD
         };
-        let is_part = self.pending.iter().rev().take(8).any(has_more);
+        // What the second card alone asks goes round a whole ring untouched: it is only to see which way it comes back.
+        let is_second_card = frame.path == Some(Path::B) || self.other_card == Some(source);
+        let is_less = |pending: &Pending| {
+            let (its, own) = (pending.print.commands, print.commands);
+            is_by_other_card(pending) && (its > own || (is_second_card && its < own))
+        };
+        let is_part = self.pending.iter().rev().take(8).any(is_less);
         if self.pending.len() >= MOST_PENDING {
             self.lose(0, false, settle);
         }

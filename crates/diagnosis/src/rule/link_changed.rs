@@ -21,7 +21,6 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::Line;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -45,9 +44,9 @@ const FLAPS: u64 = 3;
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
     let track = &line.events.dl_status;
-    let (Some(first), Some(last)) = (track.first_came, track.came) else { return };
+    let (Some(first), Some(last)) = (track.first_came, line.changed_link()) else { return };
     let is_settled = view.has_ended || view.now.since(last.at) >= SETTLED;
-    if !is_settled || !is_running(line, last.at) || is_told(conditions, last.at) {
+    if !is_settled || is_told(conditions, last.at) {
         return;
     }
     let network = Place::Network { network: line.network };
@@ -76,11 +75,6 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         )
         .advise("Look at the lamps of the ports, and move the cables one after the other.");
     conditions.push(condition);
-}
-
-/// Whether process data were exchanged by then: while a line is brought up, links come.
-fn is_running(line: &Line, at: Instant) -> bool {
-    line.cyclic.iter().any(|cyclic| cyclic.first.at < at)
 }
 
 /// Whether another finding is about a link, a SubDevice that was away or a processor that stopped at that time.

@@ -11,7 +11,7 @@
 //! errors in it leave the state machine alone (S0 L2399), and a SubDevice with a stuck mailbox may run on in
 //! OP. An abort says that a request does not suit an object: another index than the device has, a
 //! value out of range, a write in the wrong state. That an object is not there is asked for by many
-//! tools on purpose and is no finding.
+//! tools on purpose and is no finding; nor is a refused read of an object of the communication profile (before 0x2000).
 //!
 //! **What to do.** Look the code up with `linesman explain`. Of a slow or stuck mailbox: ask less often, and
 //! one at a time; look for a second tool that uses the same mailbox; read the diagnosis history; then new
@@ -19,6 +19,7 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
+use linesman_proto::mailbox::coe::ObjectIndex;
 use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
@@ -66,6 +67,9 @@ const SHOWN: usize = 3;
 /// supported.
 const ASKING: [u32; 3] = [0x0602_0000, 0x0609_0011, 0x0601_0004];
 
+/// Objects before it are of the communication profile (ETG.1000.6): identity, mappings, assignments.
+const FIRST_OF_MAKER: ObjectIndex = ObjectIndex(0x2000);
+
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for device in &view.line.devices {
         conditions.extend(refused(view.line, device));
@@ -75,7 +79,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 fn refused(line: &Line, device: &Device) -> Option<Condition> {
-    let counts = |seen: &&Seen<Refusal>| !matches!(seen.value, Refusal::Abort { code, .. } if ASKING.contains(&code));
+    // Whoever brings a SubDevice up reads what it says of itself, at once or entry by entry, and takes a refusal for an
+    // answer.
+    let counts = |seen: &&Seen<Refusal>| {
+        !matches!(seen.value, Refusal::Abort { code, object, is_read }
+            if ASKING.contains(&code) || (is_read && object.index < FIRST_OF_MAKER))
+    };
     let all: Vec<_> = device.mailbox.refusals.iter().filter(counts).collect();
     let (first, last) = (all.first()?, all.last()?);
     let mut condition = begin(line, device, &REFUSED, FaultName::MailboxError, first.at, last.at)
@@ -88,7 +97,7 @@ fn refused(line: &Line, device: &Device) -> Option<Condition> {
     let label = line.label(device.id);
     for seen in all.iter().rev().take(SHOWN) {
         let text = match seen.value {
-            Refusal::Abort { object, code } => {
+            Refusal::Abort { object, code, .. } => {
                 format!("{label} aborts {object}: {}", SdoAbortCode(code))
             }
             Refusal::Error(code) => {
@@ -198,7 +207,7 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
 fn processor_stopped_about(line: &Line, since: Instant) -> Option<Seen<()>> {
     let is_then =
         |came: &Seen<()>| came.at.since(since).max(since.since(came.at)) <= STOPPED_WITHIN;
-    line.events.dl_status.came.filter(is_then)
+    line.changed_link().filter(is_then)
 }
 
 fn begin(

@@ -51,6 +51,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const SEVERAL: u64 = 3;
 /// … for so long are no accident.
 const STALLED: Span = Span::ms(20);
+/// Where nobody reads counters, a pause is worth a word that is as long as watchdogs hold after a reset.
+const NOTABLE: Span = Span::ms(100);
 /// States are polled after the pause: an expiry is read so long after it at most.
 const READ_WITHIN: Span = Span::ms(1500);
 
@@ -272,6 +274,9 @@ fn stood_still(line: &Line) -> Option<Condition> {
             matches!(counter, ErrorCounter::LostLink(_)) && track.last.at > pause.to
         })
     });
+    if !were_read && pause.span() < NOTABLE {
+        return None;
+    }
     let known = match were_read {
         true => "no link was lost and no counter of any SubDevice moved",
         false => "nothing was lost and nobody has started anew; nobody has read links or counters",

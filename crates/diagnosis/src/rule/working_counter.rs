@@ -295,7 +295,7 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     };
     let known = first_suspect
         .and_then(|device| deficits.iter().find_map(|(_, at)| trouble(device, at, view.now)));
-    let link_changed = line.events.dl_status.came.filter(|event| {
+    let link_changed = line.changed_link().filter(|event| {
         deficits.iter().any(|(_, deficit)| {
             let (from, to) = around(deficit, view.now);
             from <= event.at && event.at <= to

@@ -22,6 +22,7 @@ use std::collections::BTreeMap;
 
 use linesman_proto::address::{DeviceId, Path, Position, StationAddress};
 use linesman_proto::command::Addressing;
+use linesman_proto::time::Span;
 
 use super::count::CountDoubt;
 use super::{Answer, word_at};
@@ -29,6 +30,10 @@ use crate::line::{Device, Line, Seen, SharedBy};
 use number::MOST_BY_NUMBER;
 use unanswered::Unanswered;
 
+/// Who did not answer at its station address so long ago at most, and is given one, had lost it.
+const AWAY_WITHIN: Span = Span::s(5);
+/// The station address by which SOEM takes a SubDevice aside that it sets up anew.
+const SET_ASIDE: StationAddress = StationAddress(0xFFFF);
 /// Most controllers that are learnt from frames.
 const MOST_DEVICES: usize = 4096;
 /// Configured station address.
@@ -233,8 +238,11 @@ impl Addresses {
         let by_number = self.by_number(line, station, MOST_BY_NUMBER);
         let by_number = by_number.filter(|id| line.device(*id).is_some_and(Self::is_free));
         let free = || line.devices.iter().find(|one| Self::is_free(one)).map(|device| device.id);
+        // Where all were counted and have their addresses, one of them has got another one, unseen.
+        let is_whole = self.present.is_some_and(|one| usize::from(one) == line.devices.len());
         let id = match by_number.or_else(free) {
             Some(id) => id,
+            None if is_whole => return None,
             None if line.devices.len() < MOST_DEVICES => line.add_device(),
             None => return None,
         };
@@ -329,8 +337,18 @@ impl Addresses {
 
     /// A controller's registers were written.
     pub(super) fn written(&mut self, line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
-        if let Some(station) = word_at(answer.written(), answer.ado, STATION) {
-            self.give(line, id, StationAddress(station));
+        let Some(station) = word_at(answer.written(), answer.ado, STATION) else { return };
+        let station = StationAddress(station);
+        let since = answer.at.before(AWAY_WITHIN);
+        let asked_in_vain = self.unanswered.contains_key(&station);
+        self.give(line, id, station);
+        let is_running = !line.cyclic.is_empty() || line.traffic.lost_logical > 0;
+        if let Some(device) = line.device_mut(id).filter(|_| is_running && station != SET_ASIDE) {
+            // While a line runs addresses are given to those that have lost theirs.
+            let was_away = device.last_unanswered.is_some_and(|last| last >= since);
+            if asked_in_vain || was_away {
+                device.lost_address = Some(Seen::new((), answer.at, Some(answer.frame)));
+            }
         }
     }
 

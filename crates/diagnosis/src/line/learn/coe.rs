@@ -54,7 +54,8 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
             }
             Ok(Message::Abort(abort)) => {
                 device.mailbox.answered(at, frame);
-                let refusal = Refusal::Abort { object: abort.object, code: abort.code };
+                let is_read = device.mailbox.is_read;
+                let refusal = Refusal::Abort { object: abort.object, code: abort.code, is_read };
                 device.mailbox.refused(refusal, at, frame);
                 true
             }
@@ -80,18 +81,16 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
 /// A mailbox was written to, or another part of the process RAM; or was not, if `taken` is false.
 pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>, taken: bool) {
     let Some((MailboxType::Coe, body)) = message(answer.written()) else { return };
-    let object = match Message::parse(body) {
-        Ok(Message::SdoRequest(
-            Request::Upload { object, .. } | Request::Download { object, .. },
-        )) => Some(object),
-        Ok(Message::SdoRequest(Request::UploadSegment { .. } | Request::DownloadSegment(_))) => {
-            None
-        }
+    let (object, is_read) = match Message::parse(body) {
+        Ok(Message::SdoRequest(Request::Upload { object, .. })) => (Some(object), true),
+        Ok(Message::SdoRequest(Request::Download { object, .. })) => (Some(object), false),
+        Ok(Message::SdoRequest(Request::UploadSegment { .. })) => (None, true),
+        Ok(Message::SdoRequest(Request::DownloadSegment(_))) => (None, false),
         Ok(_) | Err(_) => return,
     };
     let Some(device) = line.devices.get_mut(id.index()) else { return };
     if taken {
-        device.mailbox.asked(object, answer.at, answer.frame);
+        device.mailbox.asked(object, is_read, answer.at, answer.frame);
     } else {
         device.mailbox.not_taken(answer.at, answer.frame);
     }

@@ -23,9 +23,28 @@ use count::CountDoubt;
 use super::{Cyclic, Device, Line, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
 
-/// Registers from here on are optional: without so many FMMUs and SyncManagers, without distributed
-/// clocks, or without a mailbox message to fetch, nobody answers there, and nothing is wrong.
-const FIRST_OPTIONAL: RegisterAddress = RegisterAddress(0x0600);
+/// Registers that every controller has, without what is reserved between them. Elsewhere, without so many FMMUs and
+/// SyncManagers, without distributed clocks, or without a mailbox message to fetch, nobody answers, and nothing is wrong.
+/// Reference: S2 chapter 2.
+const EVERYWHERE: [std::ops::Range<u16>; 17] = [
+    0x0000..0x000A,
+    0x0010..0x0014,
+    0x0100..0x0104,
+    0x0110..0x0112,
+    0x0120..0x0122,
+    0x0130..0x0132,
+    0x0134..0x0136,
+    0x0200..0x0202,
+    0x0204..0x0208,
+    0x0210..0x0212,
+    0x0220..0x0224,
+    0x0300..0x0314,
+    0x0400..0x0402,
+    0x0410..0x0412,
+    0x0420..0x0422,
+    0x0440..0x0444,
+    0x0500..0x0510,
+];
 /// Process RAM begins here: mailboxes and process data.
 const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
 
@@ -70,6 +89,11 @@ impl Answer<'_> {
             (None, false) => self.reply.data(),
             (None, true) => &[],
         }
+    }
+
+    /// Whether it begins at a register that every controller has.
+    fn is_everywhere(&self) -> bool {
+        EVERYWHERE.iter().any(|range| range.contains(&self.ado.0))
     }
 
     /// How many controllers it passed.
@@ -187,11 +211,11 @@ impl Learner {
             Addressing::Logical => process_data::returned(line, &mut self.latest_cyclic, answer),
             Addressing::Broadcast => {
                 self.broadcast(line, answer);
-                answer.ado < FIRST_OPTIONAL
+                answer.is_everywhere()
             }
             Addressing::Position | Addressing::Station => {
                 self.single(line, answer);
-                answer.ado < FIRST_OPTIONAL
+                answer.is_everywhere()
             }
         };
         if answer.own > 0 {
@@ -213,7 +237,7 @@ impl Learner {
     fn broadcast(&mut self, line: &mut Line, answer: &Answer<'_>) {
         let passed = answer.passed();
         // A broadcast to an optional register is answered by some only.
-        let counts = answer.command == Command::Brd && answer.ado < FIRST_OPTIONAL;
+        let counts = answer.command == Command::Brd && answer.is_everywhere();
         let is_counted_twice = counts && passed == Some(answer.own);
         if let Some(passed) = passed {
             self.addresses.passed(line, answer.sent_by, passed, is_counted_twice);
@@ -287,7 +311,7 @@ impl Learner {
             self.addresses.at_station(line, station, answer.sum > 0)
         };
         let Some(id) = device else {
-            if !is_position && answer.is_last && answer.sum == 0 && answer.ado < FIRST_OPTIONAL {
+            if !is_position && answer.is_last && answer.sum == 0 && answer.is_everywhere() {
                 let seen = Seen::new((), answer.at, Some(answer.frame));
                 let station = StationAddress(answer.reply.adp());
                 self.addresses.asked_in_vain(line, station, seen);
@@ -324,7 +348,7 @@ impl Learner {
                 // Whether it is there, others tell: who does not fetch requests takes no new one.
                 return;
             }
-            if answer.is_last && answer.ado < FIRST_OPTIONAL && device.answered.is_some() {
+            if answer.is_last && answer.is_everywhere() && device.answered.is_some() {
                 let is_news = device.silent.is_none();
                 device.is_silent(answer.at, Some(answer.frame));
                 if is_news {
@@ -442,6 +466,7 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
         let traffic = &mut line.traffic;
         if matches!(addressing, Some(Addressing::Station | Addressing::Logical)) {
             traffic.lost_addressed += 1;
+            traffic.lost_logical += u64::from(addressing == Some(Addressing::Logical));
         }
     }
 }

@@ -73,7 +73,9 @@ pub(super) fn returned(line: &mut Line, latest: &mut usize, answer: &Answer<'_>)
             news |= cyclic.note_below_plan();
         }
     }
+    // In a ring each copy has the inputs of those alone that it came by.
     if answer.effect.reads
+        && answer.is_single
         && let Some(request) = answer.request
     {
         let (sent, back) = (request.data(), answer.reply.data());
