@@ -412,12 +412,13 @@ fn aborted(script: &mut Script, command: u8, index: u16) {
 // fires: S250
 // silent: S250
 #[test]
-fn refused_read_of_the_identity_is_no_finding_and_a_refused_write_is_a_note() {
+fn identity_that_is_not_given_at_once_is_no_finding_and_what_else_is_refused_is_a_note() {
     const UPLOAD: u8 = 0x40;
+    const COMPLETE: u8 = 0x50;
     const DOWNLOAD: u8 = 0x23;
-    for (command, index, found) in
-        [(UPLOAD, 0x1018, 0), (DOWNLOAD, 0x1C12, 1), (UPLOAD, 0x6000, 1), (DOWNLOAD, 0x8000, 1)]
-    {
+    let rows =
+        [(COMPLETE, 0x1018, 0), (UPLOAD, 0x1018, 1), (COMPLETE, 0x6000, 1), (DOWNLOAD, 0x1C12, 1)];
+    for (command, index, found) in rows {
         let mut script = listening(SOEM);
         cycles(&mut script, 100, polls(0x1001, 3, &[]));
         aborted(&mut script, command, index);
@@ -473,4 +474,108 @@ fn odd_frames_do_not_make_a_line_of_thousands() {
     assert_eq!(report.network.devices.0, 3, "{}", text(&report));
     let named = |finding: &&FindingReport| finding.code != "C330";
     assert_eq!(report.findings.iter().filter(named).count(), 0, "{}", text(&report));
+}
+
+/// Frames that come back a second time.
+#[test]
+fn frames_that_come_back_twice_keep_the_line_from_being_healthy() {
+    let mut script = listening(SOEM);
+    cycles(&mut script, 300, polls(0x1001, 3, &[]));
+    for _ in 0..4 {
+        let data = [lrw(PROCESS, 8, 6)];
+        let back = frame_of(SOEM, &data, script.index, true);
+        script.exchange(&data);
+        script.feed(&back, Direction::Received, 200_000);
+    }
+    cycles(&mut script, 300, polls(0x1001, 3, &[]));
+    let report = report(&mut script);
+    assert_eq!(report.verdict, Verdict::Inconclusive, "{}", text(&report));
+    assert!(text(&report).contains("4 frames came back a second time"), "{}", text(&report));
+    assert!(codes(&report).is_empty(), "{}", text(&report));
+}
+
+// fires: H114
+#[test]
+fn frames_lost_at_equal_intervals_are_told_with_their_rhythm() {
+    for (every, words) in [(50, "about every 98"), (0, "in bursts")] {
+        let mut script = listening(SOEM);
+        for round in 0..24_u64 {
+            let calm = match every {
+                0 if round % 8 == 0 => 400,
+                0 => 2,
+                every => every,
+            };
+            cycles(&mut script, calm, polls(0x1001, 3, &[]));
+            script.vanish(&[lrw(PROCESS, 8, 6)]);
+        }
+        cycles(&mut script, 100, polls(0x1001, 3, &[]));
+        let report = report(&mut script);
+        assert_eq!(codes(&report), ["H114"], "{}", text(&report));
+        assert!(text(&report).contains(words), "{words}: {}", text(&report));
+    }
+}
+
+#[test]
+fn more_that_answer_than_at_first_were_away_before() {
+    let counted = |count: u16| {
+        move |cycle: u64| match cycle % 25 {
+            0 => vec![brd(0x0130, &[8, 0], count)],
+            _ => Vec::new(),
+        }
+    };
+    let mut script = listening(SOEM);
+    cycles(&mut script, 300, counted(4));
+    cycles(&mut script, 300, counted(6));
+    let report = report(&mut script);
+    assert_eq!(report.verdict, Verdict::Inconclusive, "{}", text(&report));
+    assert!(text(&report).contains("4 SubDevices answered a broadcast at first"));
+}
+
+/// A coupler with three terminals on port B and two boxes on port C; a frame is away behind port B for so many ns.
+fn branched(script: &mut Script) {
+    script.exchange(&[brd(0x0000, &[0x11, 0], 6)]);
+    for position in 0..6 {
+        let station = (0x1001_u16 + position).to_le_bytes();
+        script.exchange(&[apwr(position, 0x0010, &station, 6)]);
+    }
+    // Links and communication of ports A, B and C, of A and B, and of A alone, as DL status has them.
+    let statuses: [u16; 6] = [0x6A73, 0x5A33, 0x5A33, 0x5613, 0x5A33, 0x5613];
+    for (station, status) in (0x1001..).zip(statuses) {
+        script.exchange(&[fprd(station, 0x0110, &status.to_le_bytes())]);
+        script.exchange(&[fprd(station, 0x0130, &OP)]);
+    }
+    let times: Vec<u8> =
+        [1_000_u32, 4_000, 6_200, 0].into_iter().flat_map(u32::to_le_bytes).collect();
+    script.exchange(&[fprd(0x1001, 0x0900, &times)]);
+}
+
+/// Nobody asks anybody: a broadcast counts fewer, and which branch is gone the time of the frames tells.
+// fires: H104
+#[test]
+fn step_in_the_time_of_frames_tells_which_of_two_branches_is_gone() {
+    for (shorter, expected) in [(3_000, (1, 2)), (2_200, (1, 5))] {
+        let gone = if expected.1 == 2 { 3 } else { 2 };
+        let mut script = listening(SOEM);
+        branched(&mut script);
+        let mut play = |count: u64, present: u16, took: u64| {
+            for _ in 0..count {
+                let data = [brd(0x0130, &[8, 0], present), lrw(PROCESS, 8, 6)];
+                script.send(&data);
+                script.now -= 20_000;
+                script.now += took;
+                script.give_back(&data);
+                script.index = script.index.wrapping_add(2);
+                script.now += 1_900_000;
+            }
+        };
+        play(400, 6, 50_000);
+        play(400, 6 - gone, 50_000 - shorter);
+        let report = report(&mut script);
+        let cut = &report.findings[0];
+        assert_eq!(codes(&report), ["H104"], "{}", text(&report));
+        let PlaceReport::Link { a, b, .. } = cut.place else { panic!("{}", text(&report)) };
+        assert_eq!((a.no, b.unwrap().no), expected, "{}", text(&report));
+        let sooner = format!("come back {} sooner", linesman_proto::time::Span::ns(shorter));
+        assert!(text(&report).contains(&sooner), "{sooner}: {}", text(&report));
+    }
 }

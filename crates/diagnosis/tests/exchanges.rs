@@ -456,7 +456,12 @@ fn look_by_the_second_card_alone_is_not_unanswered() {
     }
     script.finish();
     let report = script.engine.diagnosis();
-    assert_eq!((report.network.devices.0, report.network.unanswered.0), (4, 0), "{}", text(&report));
+    assert_eq!(
+        (report.network.devices.0, report.network.unanswered.0),
+        (4, 0),
+        "{}",
+        text(&report)
+    );
     assert!(!text(&report).contains("answered the last broadcast"), "{}", text(&report));
 }
 

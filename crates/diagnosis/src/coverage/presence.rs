@@ -76,6 +76,15 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
+    if let Some(rose) = traffic.broadcast_rose.filter(|_| !line.sees_all_orders) {
+        let text = format!(
+            "{} SubDevices answered a broadcast at first, and {} from {} on, while process data were exchanged: where the \
+             others had been was not seen",
+            rose.value, traffic.broadcast_answers, rose.at
+        );
+        let gap = Gap::new(Reason::NumberUnknown, text).essential().step(basis.look_longer());
+        all.lacks(Extent::InPart, gap);
+    }
     all
 }
 

@@ -19,8 +19,8 @@ pub const SLOW: Span = Span::ms(300);
 pub struct MailboxHistory {
     /// The request that was taken and is not answered yet, by its object, where it names one.
     pub waiting: Option<Seen<Option<ObjectAddress>>>,
-    /// Whether the latest request that was taken reads an object.
-    pub is_read: bool,
+    /// Whether the latest request that was taken reads all entries of an object at once (complete access).
+    pub reads_whole: bool,
     /// When somebody last looked for an answer.
     pub polled: Option<Instant>,
     /// Since when, and until when, requests are not taken; `None` when the latest one was.
@@ -47,8 +47,8 @@ pub enum Refusal {
         object: ObjectAddress,
         /// With this code.
         code: u32,
-        /// Whether it was to be read, as far as the request was seen.
-        is_read: bool,
+        /// Whether all its entries were to be read at once, as far as the request was seen.
+        reads_whole: bool,
     },
     /// The mailbox itself answered with an error.
     Error(ErrorReplyCode),
@@ -79,9 +79,15 @@ pub struct HistoryMessage {
 }
 
 impl MailboxHistory {
-    /// A request was taken; one that reads an object, or another one.
-    pub fn asked(&mut self, object: Option<ObjectAddress>, is_read: bool, at: Instant, frame: u64) {
-        self.is_read = is_read;
+    /// A request was taken; one that reads all entries of an object at once, or another one.
+    pub fn asked(
+        &mut self,
+        object: Option<ObjectAddress>,
+        reads_whole: bool,
+        at: Instant,
+        frame: u64,
+    ) {
+        self.reads_whole = reads_whole;
         if let Some((since, until)) = self.full.take() {
             self.note_stuck(since.at, until.max(at));
         }

@@ -20,6 +20,7 @@ pub mod search;
 pub mod sii_image;
 pub mod traffic;
 pub mod trip;
+pub mod way;
 
 use std::collections::VecDeque;
 
@@ -49,6 +50,7 @@ pub use search::LoopWrite;
 pub use sii_image::{Power, SiiImage};
 pub use traffic::{Silence, Traffic};
 pub use trip::Trips;
+pub use way::{WayStep, Ways};
 
 /// How many changes of one kind are kept of a controller; older ones are forgotten.
 pub const CHANGES_KEPT: usize = 64;

@@ -11,6 +11,8 @@ use super::beat::Pause;
 use super::host::Tally;
 use crate::observe::Sender;
 
+/// Times of lost frames kept.
+pub const LOST_KEPT: usize = 64;
 /// Silences kept.
 pub const SILENCES_KEPT: usize = 16;
 
@@ -98,6 +100,9 @@ pub struct Traffic {
     /// In a ring that was whole before, frames of which one copy alone came back, with none after them of which both
     /// did: some of them at least.
     pub copies_gone: Tally,
+    /// When the first of each row of them was sent between two returns, in the order in which that was known, at most
+    /// [`LOST_KEPT`].
+    pub lost_at: VecDeque<Instant>,
     /// The first lost frame.
     pub first_lost: Option<Seen<()>>,
     /// The latest lost frame.
@@ -125,6 +130,8 @@ pub struct Traffic {
     pub returned_alone: u64,
     /// Frames recorded twice.
     pub duplicates: u64,
+    /// Frames that came back a second time, as a live socket tells.
+    pub doubled: u64,
     /// EtherCAT frames without datagrams: network variables, mailbox.
     pub without_datagrams: u64,
     /// Whether any frame's direction was known for sure.
@@ -172,6 +179,9 @@ pub struct Traffic {
     pub broadcast_answers: u16,
     /// The working counter of the latest broadcast read, with when it last changed.
     pub broadcast_now: Option<Seen<u16>>,
+    /// When more controllers answered a broadcast read than ever before though process data were exchanged already, and
+    /// how many it had been.
+    pub broadcast_rose: Option<Seen<u16>>,
     /// When a broadcast read that all controllers answer last came back.
     pub broadcast_read: Option<Instant>,
     /// In a ring, the latest broadcast read ever whose copies were both processed by somebody: by how many
@@ -281,6 +291,14 @@ impl Traffic {
             self.lost_by_order += 1;
         } else {
             self.lost.add(1, at);
+            let in_a_row =
+                self.silences.back().map(|row| row.returns_before) == Some(returns_before);
+            if !in_a_row {
+                if self.lost_at.len() == LOST_KEPT {
+                    self.lost_at.pop_front();
+                }
+                self.lost_at.push_back(at);
+            }
             self.first_lost.get_or_insert(seen);
             self.latest_lost = Some(seen);
         }

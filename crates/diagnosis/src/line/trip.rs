@@ -8,6 +8,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use linesman_proto::time::{Instant, Span};
 
+use super::Ways;
+
 /// Lengths of frames that are followed.
 const LENGTHS: usize = 128;
 /// Frames of a length after which its usual time is known.
@@ -110,6 +112,8 @@ pub struct Trips {
     steps: [Option<Step>; STEPS],
     /// Frames that are counted so.
     stepped: u64,
+    /// The fastest of them, from time to time.
+    pub ways: Ways,
 }
 
 /// Frames of one length.
@@ -152,6 +156,7 @@ impl Trips {
         let leaves = sent.max(self.busy_until.min(back));
         self.busy_until = leaves + duration;
         let took = back.since(leaves).as_nanos();
+        self.ways.record(len, took, sent);
         if self.usual.len() >= LENGTHS && !self.usual.contains_key(&len) {
             return false;
         }

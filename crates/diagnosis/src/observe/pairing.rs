@@ -79,6 +79,8 @@ pub struct Pairing {
     mistaken: u64,
     /// Requests that were sent and not recorded, as their numbers tell, since this was asked.
     unrecorded: u64,
+    /// Frames that came back a second time, since this was asked.
+    doubled: u64,
     /// Returns without a request since the recording began to look as if it had no requests.
     alone: u32,
 }
@@ -158,7 +160,13 @@ impl Pairing {
             return self.request(frame, source, is_repeated, print, settle);
         }
         let Some(found) = found else {
-            if self.was_returned(print, frame.time) {
+            if self.was_returned(print, frame.time, RECORDED_TWICE) {
+                return Outcome::Duplicate;
+            }
+            if frame.direction == Direction::Received
+                && self.was_returned(print, frame.time, TIMEOUT)
+            {
+                self.doubled += 1;
                 return Outcome::Duplicate;
             }
             if frame.direction == Direction::Unknown {
@@ -242,6 +250,11 @@ impl Pairing {
     /// How many requests turned out to be returns whose request was not seen, since this was asked.
     pub fn take_mistaken(&mut self) -> u64 {
         std::mem::take(&mut self.mistaken)
+    }
+
+    /// How many frames came back a second time, since this was asked.
+    pub fn take_doubled(&mut self) -> u64 {
+        std::mem::take(&mut self.doubled)
     }
 
     /// How many requests were sent and not recorded, as their numbers tell, since this was asked.
@@ -462,9 +475,10 @@ impl Pairing {
         self.returned_next = (self.returned_next + 1) % REMEMBERED;
     }
 
-    fn was_returned(&self, print: Fingerprint, time: Instant) -> bool {
+    /// Whether the same came back within some time.
+    fn was_returned(&self, print: Fingerprint, time: Instant, within: Span) -> bool {
         let known = self.returned.iter().flatten();
-        known.into_iter().any(|(other, at)| *other == print && gap(*at, time) <= RECORDED_TWICE)
+        known.into_iter().any(|(other, at)| *other == print && gap(*at, time) <= within)
     }
 }
 

@@ -25,7 +25,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View, nobody_answers};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Line, Tally};
+use crate::line::{Line, Tally, Traffic};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -49,6 +49,9 @@ const AROUND: Span = Span::ms(500);
 const QUIET: Span = Span::s(2);
 /// Of so many frames one is too much for a line that is to work.
 const OFTEN: u64 = 1_000;
+
+/// So many intervals make a rhythm.
+const RHYTHM: usize = 6;
 
 /// What is missing or damaged.
 struct Missing {
@@ -138,6 +141,8 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     condition.severity =
         if count.saturating_mul(RARE) <= traffic.sent { Severity::Info } else { Severity::Warning };
     condition = condition.shown_by(Evidence::frame(first, known, text));
+    let rhythm = rhythm(traffic);
+    condition.evidence.extend(rhythm.map(|text| Evidence::host(Some(last), text)));
     let counters = line.devices.iter().filter(|device| device.counters.is_known()).count();
     let text = match (counters, damaged) {
         (0, None) => {
@@ -151,6 +156,33 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         condition = condition.ended(last);
     }
     Some(advise(condition, line, damaged, damaged.unwrap_or(0)))
+}
+
+/// The rhythm in which frames got lost, in words: at equal intervals, or in bursts.
+fn rhythm(traffic: &Traffic) -> Option<String> {
+    let mut times: Vec<Instant> = traffic.lost_at.iter().copied().collect();
+    times.sort_unstable();
+    let mut gaps: Vec<u64> =
+        times.windows(2).map(|pair| pair[1].since(pair[0]).as_nanos()).collect();
+    if gaps.len() < RHYTHM {
+        return None;
+    }
+    gaps.sort_unstable();
+    let middle = gaps[gaps.len() / 2];
+    let sum = gaps.iter().fold(0_u64, |sum, gap| sum.saturating_add(*gap));
+    let mean = sum / gaps.len() as u64;
+    if middle <= mean / 10 {
+        return Some(
+            "they were lost in bursts, with long times without any between them".to_owned(),
+        );
+    }
+    let near = gaps.iter().filter(|gap| gap.abs_diff(middle) <= middle / 10).count();
+    (near * 10 >= gaps.len() * 8).then(|| {
+        format!(
+            "they were lost about every {}: look what works, or is switched, in this rhythm",
+            Span::ns(middle)
+        )
+    })
 }
 
 fn missing(line: &Line) -> Missing {

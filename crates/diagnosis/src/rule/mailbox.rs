@@ -11,7 +11,8 @@
 //! errors in it leave the state machine alone (S0 L2399), and a SubDevice with a stuck mailbox may run on in
 //! OP. An abort says that a request does not suit an object: another index than the device has, a
 //! value out of range, a write in the wrong state. That an object is not there is asked for by many
-//! tools on purpose and is no finding; nor is a refused read of an object of the communication profile (before 0x2000).
+//! tools on purpose and is no finding; nor is one of the communication profile (before
+//! 0x2000) that is not given at once, by complete access.
 //!
 //! **What to do.** Look the code up with `linesman explain`. Of a slow or stuck mailbox: ask less often, and
 //! one at a time; look for a second tool that uses the same mailbox; read the diagnosis history; then new
@@ -79,11 +80,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 fn refused(line: &Line, device: &Device) -> Option<Condition> {
-    // Whoever brings a SubDevice up reads what it says of itself, at once or entry by entry, and takes a refusal for an
-    // answer.
+    // Whoever brings a SubDevice up tries to read objects at once, and does so entry by entry where that is refused.
     let counts = |seen: &&Seen<Refusal>| {
-        !matches!(seen.value, Refusal::Abort { code, object, is_read }
-            if ASKING.contains(&code) || (is_read && object.index < FIRST_OF_MAKER))
+        !matches!(seen.value, Refusal::Abort { code, object, reads_whole }
+            if ASKING.contains(&code) || (reads_whole && object.index < FIRST_OF_MAKER))
     };
     let all: Vec<_> = device.mailbox.refusals.iter().filter(counts).collect();
     let (first, last) = (all.first()?, all.last()?);

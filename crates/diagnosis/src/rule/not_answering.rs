@@ -30,7 +30,7 @@ use linesman_proto::topology::End;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::line::{Absence, Device, Line};
-use crate::locate::Drops;
+use crate::locate::{Drops, way};
 use branch::{Branch, absence, passed, silent_branches};
 
 /// The page.
@@ -283,7 +283,11 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
     };
     match branch.ended {
         Some(ended) => condition.ended(ended),
-        None => condition,
+        None => {
+            let mut condition = condition;
+            condition.evidence.extend(way::evidence(line, since.at));
+            condition
+        }
     }
 }
 

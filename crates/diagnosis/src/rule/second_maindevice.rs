@@ -55,7 +55,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     // The cards of this host are one MainDevice; two that send by one card are two programs.
     let mut apart: Vec<&Sender> = Vec::new();
     for sender in own {
-        let is_same = |known: &&&Sender| known.is_host && sender.is_host && known.card != sender.card;
+        let is_same =
+            |known: &&&Sender| known.is_host && sender.is_host && known.card != sender.card;
         if apart.iter().find(is_same).is_none() {
             apart.push(sender);
         }

@@ -28,7 +28,7 @@ use linesman_proto::time::{Instant, Span};
 use super::{Rule, RulePage, View, processor_stopped};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::line::{Cyclic, Deficit, Device, Line, Owner, Trouble};
-use crate::locate::Drops;
+use crate::locate::{Drops, way};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -363,6 +363,9 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
         let text = "the frames tell that DL status of a SubDevice has changed then (event field, bit 2): a link came or \
                     went";
         condition = condition.shown_by(Evidence::frame(event.at, event.frame.unwrap_or(0), text));
+    }
+    if lasts && !links.is_empty() {
+        condition.evidence.extend(way::evidence(line, since));
     }
     // Where one or some of them are it, or the set-up was not seen and they are all that are in trouble, what
     // explains it of each of them explains this, whoever it is.

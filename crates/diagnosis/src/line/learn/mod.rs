@@ -248,7 +248,10 @@ impl Learner {
         let most = line.traffic.broadcast_answers;
         let is_confirmed = is_counted_twice || passed.is_none();
         if counts && self.broadcast_doubt.is_believed(answer.sum, most, is_confirmed) {
-            line.traffic.broadcast_answers = line.traffic.broadcast_answers.max(answer.sum);
+            if answer.is_single && most > 0 && answer.sum > most && !line.cyclic.is_empty() {
+                line.traffic.broadcast_rose = Some(Seen::new(most, answer.at, Some(answer.frame)));
+            }
+            line.traffic.broadcast_answers = most.max(answer.sum);
             line.traffic.broadcast_read = line.traffic.broadcast_read.max(Some(answer.at));
             let split = (answer.sum - answer.own, answer.own);
             let is_split = split.0 > 0 && split.1 > 0;
