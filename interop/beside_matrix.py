@@ -201,7 +201,8 @@ def play(one, name):
             in_op(driver, client)
             time.sleep(0.7)
             strike(one, segment, driver.process)
-            listeners["late"] = listen(line, records["late"], 0.3 if one.for_ms else 0.1)
+            # Late, but not too late to see any of it.
+            listeners["late"] = listen(line, records["late"], 0.3 if (one.for_ms or 0) > 1000 else 0.1)
             if one.stopped_ms:
                 stop_and_go(driver.process, one)
             else:

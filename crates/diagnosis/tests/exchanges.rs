@@ -431,6 +431,40 @@ fn a_single_copy_that_is_lost_in_a_whole_ring_is_counted_at_its_card() {
     assert_eq!(lost, [1, 0]);
 }
 
+/// In a whole ring nobody processes what the second card sends: it asks by it alone to see which way frames come back.
+#[test]
+fn look_by_the_second_card_alone_is_not_unanswered() {
+    let mut script = Script::new();
+    script.is_live = true;
+    let asked = brd(0x0130, &[8, 0], 4);
+    let untouched = |datagram: &Datagram| Datagram { passed: 0, ..datagram.clone().wkc(0) };
+    for _ in 0..200 {
+        for (first, second) in [(asked.clone(), void(&asked)), (void(&asked), asked.clone())] {
+            for (path, datagram) in [(Path::A, &first), (Path::B, &second)] {
+                script.path = Some(path);
+                script.send(std::slice::from_ref(datagram));
+                script.now -= 79_999;
+            }
+            // What card A has sent comes to card B, processed, and the other way round.
+            script.path = Some(Path::A);
+            script.give_back(&[untouched(&second)]);
+            script.path = Some(Path::B);
+            let is_void = first.command == Command::Nop;
+            script.give_back(&[if is_void { untouched(&first) } else { first.clone() }]);
+            script.index = script.index.wrapping_add(1);
+        }
+    }
+    script.finish();
+    let report = script.engine.diagnosis();
+    assert_eq!(
+        (report.network.devices.0, report.network.unanswered.0),
+        (4, 0),
+        "{}",
+        text(&report)
+    );
+    assert!(!text(&report).contains("answered the last broadcast"), "{}", text(&report));
+}
+
 #[test]
 fn a_write_that_nobody_takes_is_unanswered_but_an_empty_mailbox_is_not() {
     let mut script = Script::scanned(1);

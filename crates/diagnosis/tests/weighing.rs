@@ -30,8 +30,12 @@ fn only(report: &Diagnosis) -> &FindingReport {
 }
 
 fn link(finding: &FindingReport) -> Option<(u32, u32)> {
-    match finding.place {
-        PlaceReport::Link { a, b, .. } => Some((a.no, b?.no)),
+    link_of(&finding.place)
+}
+
+fn link_of(place: &PlaceReport) -> Option<(u32, u32)> {
+    match place {
+        PlaceReport::Link { a, b, .. } => Some((a.no, b.as_ref()?.no)),
         PlaceReport::Device { .. } | PlaceReport::Network { .. } | PlaceReport::Host => None,
     }
 }
@@ -233,7 +237,7 @@ fn nobody_of_a_list_answers_is_the_first_link() {
 }
 
 #[test]
-fn trailing_subdevices_that_a_foreign_maindevice_stops_reaching_are_one_link() {
+fn trailing_subdevices_that_a_foreign_maindevice_stops_reaching_are_one_finding_at_the_first() {
     // A recording that joins late and shows states alone: no links, no wiring.
     let mut script = Script::new();
     let poll = |script: &mut Script, gone: bool| {
@@ -250,7 +254,12 @@ fn trailing_subdevices_that_a_foreign_maindevice_stops_reaching_are_one_link() {
         let report = report(script);
         let cut = only(&report);
         assert_eq!((cut.code.as_str(), cut.cause), ("H102", FaultName::LinkOpen));
-        assert_eq!((link(cut), cut.state), (Some((2, 3)), state), "{}", text(&report));
+        // What it hangs on was not seen: on a line without branches it is the link before it.
+        assert_eq!((no(cut), cut.state), (Some(3), state), "{}", text(&report));
+        assert!(cut.evidence[0].text.contains("was not seen"), "{}", text(&report));
+        let places = cut.alternatives.iter().filter(|other| other.cause == FaultName::LinkOpen);
+        let links: Vec<_> = places.filter_map(|other| link_of(other.place.as_ref()?)).collect();
+        assert_eq!(links, [(2, 3)], "{}", text(&report));
     };
     judged(&mut script, FindingState::Confirmed);
     // The same when they are back, all of them as they were.

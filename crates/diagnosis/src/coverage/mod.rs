@@ -211,6 +211,8 @@ pub enum Reason {
     FramesCut,
     /// Frames did not come back, and nothing tells why.
     FramesLost,
+    /// Frames came back a second time.
+    FramesDoubled,
     /// Frames passed, and the diagnosis was too slow to look at them.
     FramesMissed,
     /// Time stamps run backwards.

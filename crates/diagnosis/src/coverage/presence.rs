@@ -76,11 +76,22 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
+    if let Some(rose) = traffic.broadcast_rose.filter(|_| !line.sees_all_orders) {
+        let text = format!(
+            "{} SubDevices answered a broadcast at first, and {} from {} on, while process data were exchanged: where the \
+             others had been was not seen",
+            rose.value, traffic.broadcast_answers, rose.at
+        );
+        let gap = Gap::new(Reason::NumberUnknown, text).essential().step(basis.look_longer());
+        all.lacks(Extent::InPart, gap);
+    }
     all
 }
 
 /// Whether a SubDevice was asked in vain, or is planned and nothing was seen of it.
 fn is_missed(line: &Line, device: &Device) -> bool {
-    let is_unseen = device.answered.is_none() && line.device_count() < line.devices.len();
+    let is_unseen = device.answered.is_none()
+        && device.planned.is_some()
+        && line.device_count() < line.devices.len();
     device.silent.is_some() || is_unseen
 }

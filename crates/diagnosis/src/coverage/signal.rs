@@ -3,6 +3,7 @@
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::Span;
 use linesman_proto::topology::route::Direction;
 use linesman_proto::topology::{End, Hop};
 
@@ -14,6 +15,9 @@ use crate::main_device::{MainDeviceKind, next_step};
 
 /// So many frames that came back, with none lost, show that a link whose counter is full spoils no frames.
 const MANY_FRAMES: u64 = 2_000;
+
+/// What stands so soon after the first frame stood before it.
+const FROM_THE_FIRST: Span = Span::ms(100);
 
 /// How well one port of a controller told of errors.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -132,6 +136,7 @@ pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
     let line = basis.line;
     let mut all = Assessment::judged(Subject::LinkStatus);
     came_up(basis, &mut all);
+    unread_change(basis, &mut all);
     let unread: Vec<&Device> = line.devices.iter().filter(|one| !tells_links(one)).collect();
     if unread.is_empty() && !line.devices.is_empty() {
         return all;
@@ -182,6 +187,30 @@ fn came_up(basis: &Basis<'_>, all: &mut Assessment) {
             all.lacks(Extent::InPart, gap);
         }
     }
+}
+
+/// A change of DL status that frames tell of and that nobody has read.
+fn unread_change(basis: &Basis<'_>, all: &mut Assessment) {
+    let Some(since) = basis.line.events.dl_status.since else { return };
+    let when = match basis.line.traffic.first {
+        Some(first) if since.at.since(first) < FROM_THE_FIRST => {
+            "before the first frame that was seen".to_owned()
+        }
+        Some(_) | None => format!("at {}", since.at),
+    };
+    let text = format!(
+        "DL status of a SubDevice changed {when}, and nobody has read since whose (event field of the frames): a link came \
+         or went"
+    );
+    let step = match basis.input {
+        InputKind::Typed | InputKind::Driven | InputKind::ReadOut => {
+            "read DL status (0x0110) of all SubDevices"
+        }
+        InputKind::Listened | InputKind::Recorded => {
+            next_step::link_status(basis.line.main_device_kind())
+        }
+    };
+    all.lacks(Extent::InPart, Gap::new(Reason::LinkStatusNotRead, text).essential().step(step));
 }
 
 /// The next step that gets the counters of the card.

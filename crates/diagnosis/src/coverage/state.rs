@@ -5,7 +5,8 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 use crate::finding::Place;
-use crate::line::{Device, Line, StateRequest};
+use crate::line::{Device, Line, Seen, StateRequest};
+use crate::main_device::MainDeviceKind;
 
 /// A reading that is older says nothing of the end.
 const OLD: Span = Span::s(10);
@@ -21,7 +22,7 @@ pub(super) fn all_read(line: &Line) -> bool {
     let count = line.devices.len();
     count > 0
         && count >= line.device_count()
-        && line.devices.iter().all(|one| one.al.state().is_some() && !one.al.has_error())
+        && line.devices.iter().all(|one| one.al.state().is_some() && !one.al.has_own_error())
 }
 
 /// Assesses what is known of the states.
@@ -63,7 +64,35 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         all.lacks(Extent::InPart, gap);
     }
     unsettled(basis, &mut all);
+    echoed(basis, &mut all);
     all
+}
+
+/// Error bits that are taken for the acknowledgement that the MainDevice writes with each request.
+fn echoed(basis: &Basis<'_>, all: &mut Assessment) {
+    let line = basis.line;
+    let is_echo = |one: &&Device| {
+        one.al
+            .errors
+            .back()
+            .is_some_and(|error| error.ended.is_none() && error.may_be_echo() && !error.has_no_code)
+    };
+    let echoing: Vec<&Device> = line.devices.iter().filter(is_echo).collect();
+    if echoing.is_empty() {
+        return;
+    }
+    let labels: Vec<String> = echoing.iter().map(|one| line.label(one.id)).collect();
+    let text = format!(
+        "AL status of {} has the error bit in OP, and nobody has read a code: taken for the acknowledgement that the \
+         MainDevice writes with each request",
+        labels.join(", ")
+    );
+    let places = echoing.iter().map(|one| Place::device(line.network, one.id)).collect();
+    let gap = Gap::new(Reason::StatesNotRead, text)
+        .essential_if(basis.line.main_device_kind() != MainDeviceKind::Kickcat)
+        .at(places)
+        .step("read AL status code (0x0134) of these SubDevices with the MainDevice's own tool");
+    all.lacks(Extent::InPart, gap);
 }
 
 /// Requests without an end, and what a MainDevice did about an error that nobody saw.
@@ -80,8 +109,10 @@ fn unsettled(basis: &Basis<'_>, all: &mut Assessment) {
                 "{label} was asked for {} {waited} before the end, and was still in {}",
                 open.to, open.from
             )
-        } else if is_sent_back_alone(line, device) {
+        } else if is_alone(line, device, |one| one.al.sent_back) {
             format!("the MainDevice sent {label} alone back to INIT: why was not seen")
+        } else if is_alone(line, device, |one| one.al.acknowledged) {
+            format!("the MainDevice acknowledged an error of {label} that was not read here")
         } else {
             continue;
         };
@@ -99,11 +130,11 @@ fn is_unsettled(line: &Line, device: &Device, open: &StateRequest) -> bool {
     asked == Some(open.to) && line.now.since(open.asked.at) >= SETTLES
 }
 
-/// Whether it was sent back to INIT and others were not, as they are when a MainDevice starts anew.
-fn is_sent_back_alone(line: &Line, device: &Device) -> bool {
-    let Some(sent) = device.al.sent_back else { return false };
-    let is_near = |other: Instant| other.since(sent.at).max(sent.at.since(other)) <= TOGETHER;
+/// Whether a SubDevice was given an order and others were not, as they are when a MainDevice starts anew.
+fn is_alone(line: &Line, device: &Device, order: impl Fn(&Device) -> Option<Seen<()>>) -> bool {
+    let Some(given) = order(device) else { return false };
+    let is_near = |other: Instant| other.since(given.at).max(given.at.since(other)) <= TOGETHER;
     let others = line.devices.iter().filter(|other| other.id != device.id);
-    let mut stayed = others.filter(|other| !other.al.sent_back.is_some_and(|one| is_near(one.at)));
+    let mut stayed = others.filter(|other| !order(other).is_some_and(|one| is_near(one.at)));
     stayed.any(|other| other.al.state().is_some_and(AlState::has_mailbox))
 }

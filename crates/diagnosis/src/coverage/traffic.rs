@@ -8,6 +8,8 @@ use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 const FEW_FRAMES: u64 = 50;
 /// From this share of returned frames on, in percent, frames that were cut off leave the rest unjudged.
 const CUT_PERCENT: u64 = 1;
+/// A recorder may show a single frame twice.
+const FEW_DOUBLED: u64 = 2;
 /// Of so many frames that came back one may get lost on a good line.
 const RARE: u64 = 100_000;
 /// Two interfaces' clocks differ by less.
@@ -71,6 +73,13 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
         let is_much = lost.saturating_mul(RARE) > traffic.returned;
         let gap = Gap::new(Reason::FramesLost, text).essential_if(is_much).step(
             "read the counters of the MainDevice's card (`ethtool -S`) and the error counters of the SubDevices",
+        );
+        all.lacks(Extent::InPart, gap);
+    }
+    if traffic.doubled >= FEW_DOUBLED {
+        let text = format!("{} frames came back a second time", traffic.doubled);
+        let gap = Gap::new(Reason::FramesDoubled, text).essential().step(
+            "look for what sends frames on a second time: a bridge or a mirror port on this computer, a switch, a loop",
         );
         all.lacks(Extent::InPart, gap);
     }

@@ -59,6 +59,7 @@ pub(super) fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(line, exchange));
     let (mistaken, unrecorded) = (pairing.take_mistaken(), pairing.take_unrecorded());
     let traffic = &mut line.traffic;
+    traffic.doubled += pairing.take_doubled();
     traffic.note_unrecorded(unrecorded, frame.time);
     if mistaken > 0 {
         traffic.sent = traffic.sent.saturating_sub(mistaken);

@@ -126,7 +126,7 @@ impl Engine {
         let Watched { line, pairing, questions, .. } = self.watched(network);
         pairing.forget();
         questions.forget();
-        line.traffic.missed += count;
+        line.traffic.record_missed(count);
         // The time to the next one says nothing.
         for cyclic in &mut line.cyclic {
             cyclic.sent.skip();
@@ -282,9 +282,8 @@ impl Engine {
             }
             if self.book.names_devices() {
                 watched.learner.name();
-            } else {
-                watched.learner.settle(&mut watched.line);
             }
+            watched.learner.settle(&mut watched.line);
             if watched.learner.is_settled() {
                 watched.line.derive_tree();
             }

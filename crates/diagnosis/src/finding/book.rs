@@ -232,6 +232,7 @@ impl Book {
             let cause = &self.findings[other];
             other != index
                 && !was_over(cause, effect, AFTER)
+                && !began_after(cause, effect)
                 && cause.condition.accounts_for(symptom)
                 && !self.follows(other, effect.id)
         };
@@ -285,8 +286,17 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
         |symptom: &Symptom| matches!(symptom, Symptom::StateLost(_) | Symptom::Emergency(_));
     let is_harmless = cause.condition.severity == Severity::Info;
     let hides_harm = is_harmless && symptoms.iter().any(is_hurt);
-    !(symptoms.is_empty() || hides_harm || was_over(cause, effect, after))
+    !(symptoms.is_empty()
+        || hides_harm
+        || was_over(cause, effect, after)
+        || began_after(cause, effect))
         && symptoms.iter().all(|symptom| cause.condition.accounts_for(symptom))
+}
+
+/// Whether a finding began so long after another one was over that this does not follow from it: what brings something
+/// about may be noticed a little later than that, not when it is history.
+fn began_after(cause: &Finding, effect: &Finding) -> bool {
+    effect.closed.is_some_and(|closed| closed + AFTER < cause.opened)
 }
 
 /// Whether a finding was over so long before another one that this does not follow from it.

@@ -92,6 +92,8 @@ pub enum Symptom {
     Emergency(DeviceId),
     /// A controller's mailbox answers late, or not at all.
     Mailbox(DeviceId),
+    /// Inputs of a controller are not renewed any more.
+    InputsStill(DeviceId),
     /// Frames do not come back.
     FramesLost,
     /// Frames come back late.
@@ -256,8 +258,8 @@ impl Condition {
     /// Whether a symptom is among what this condition explains.
     #[must_use]
     pub fn accounts_for(&self, symptom: &Symptom) -> bool {
-        // Who does not answer at all does not answer by its mailbox either.
-        let is_silent = matches!(symptom, Symptom::Mailbox(id)
+        // Who does not answer at all does not answer by its mailbox either, and renews no inputs.
+        let is_silent = matches!(symptom, Symptom::Mailbox(id) | Symptom::InputsStill(id)
             if self.explains.contains(&Symptom::Silent(*id)));
         self.explains.contains(symptom) || is_silent
     }

@@ -36,6 +36,8 @@ pub struct AlHistory {
     pub requests: VecDeque<StateRequest>,
     /// The latest order back to INIT in a higher state and without an error that was read.
     pub sent_back: Option<Seen<()>>,
+    /// The latest order that acknowledges an error though none was read, for a state in which it was or that is lower.
+    pub acknowledged: Option<Seen<()>>,
     /// The latest request that the controller did not take (working counter 0): its processor had not fetched the one
     /// before.
     pub untaken: Option<Seen<StateValue>>,
@@ -94,6 +96,8 @@ pub struct AlError {
     pub status: Seen<AlStatus>,
     /// The code, as far as it was read while the error stood.
     pub code: Option<Seen<AlStatusCode>>,
+    /// Whether the code was read while the error stood, and was 0.
+    pub has_no_code: bool,
     /// The state before; `None` when none was read.
     pub from: Option<AlState>,
     /// The state asked for at that time.
@@ -109,6 +113,26 @@ impl AlError {
     #[must_use]
     pub const fn was_left_over(&self) -> bool {
         self.from.is_none() && self.requested.is_none()
+    }
+
+    /// Whether the bit may be the acknowledgement that a MainDevice writes with each request: a SubDevice whose
+    /// controller emulates the device copies AL control to AL status, error bit and all, and has no AL status code
+    /// (register 0x0140 bit 8). Only one that stood from the first reading on, so that nobody saw it come; and where
+    /// nobody has read the code, only in OP, which an error of its own would have taken it out of.
+    #[must_use]
+    pub fn may_be_echo(&self) -> bool {
+        let is_op = self.status.value.state().state() == Some(AlState::Op);
+        self.was_left_over() && self.code.is_none() && (self.has_no_code || is_op)
+    }
+
+    /// Whether the watchdog of its outputs may have expired: its code says so (0x001B), or nobody has read the code and it
+    /// is in SAFEOP, where an expired watchdog takes it to.
+    #[must_use]
+    pub fn may_be_watchdog(&self) -> bool {
+        match self.code {
+            Some(code) => code.value == AlStatusCode::SYNC_MANAGER_WATCHDOG,
+            None => !self.has_no_code && self.status.value.state().state() == Some(AlState::SafeOp),
+        }
     }
 }
 
@@ -190,7 +214,14 @@ impl AlHistory {
     /// A state is asked for in which it is not. What it is told while it signals an error is for that.
     fn note_request(&mut self, requested: Seen<StateValue>, was_taken: bool) {
         let (Some(from), Some(to)) = (self.state(), requested.value.state()) else { return };
-        if to == from || self.has_error() {
+        if to == from {
+            // Who was to go lower, and is where it is to be again, is waited for no longer.
+            if let Some(open) = self.requests.back_mut().filter(|open| open.to < open.from) {
+                open.ended.get_or_insert(requested.at);
+            }
+            return;
+        }
+        if self.has_error() {
             return;
         }
         let untaken = u32::from(!was_taken);
@@ -251,6 +282,7 @@ impl AlHistory {
             AlError {
                 status,
                 code: None,
+                has_no_code: false,
                 from,
                 requested: self.requested,
                 had_arrived: self.has_arrived,
@@ -285,6 +317,10 @@ impl AlHistory {
             && self.state().is_some_and(|state| state.has_mailbox())
         {
             self.sent_back = Some(Seen::new((), requested.at, requested.frame));
+        }
+        let is_no_step_up = asked.is_some() && asked <= self.highest;
+        if control.acknowledges_error() && self.errors.is_empty() && is_no_step_up {
+            self.acknowledged = Some(Seen::new((), requested.at, requested.frame));
         }
         self.lowest_asked = match (self.lowest_asked, asked) {
             (Some(one), Some(other)) => Some(one.min(other)),
@@ -326,8 +362,17 @@ impl AlHistory {
         self.errors.back().is_some_and(|error| error.ended.is_none())
     }
 
+    /// Whether it signals an error now, other than an acknowledgement that it may have copied.
+    #[must_use]
+    pub fn has_own_error(&self) -> bool {
+        self.errors.back().is_some_and(|error| error.ended.is_none() && !error.may_be_echo())
+    }
+
     /// Takes a reading of AL status code. Says whether it is news.
     pub fn record_code(&mut self, code: AlStatusCode, at: Instant, frame: Option<u64>) -> bool {
+        if let Some(error) = self.errors.back_mut().filter(|error| error.ended.is_none()) {
+            error.has_no_code |= code.0 == 0;
+        }
         if self.code.is_some_and(|known| known.value == code) {
             return false;
         }

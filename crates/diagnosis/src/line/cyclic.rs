@@ -6,6 +6,7 @@ use linesman_proto::address::{DeviceId, LogicalAddress};
 use linesman_proto::command::Command;
 use linesman_proto::time::Instant;
 
+use super::motion::InputMotion;
 use super::{Beat, Seen};
 
 /// Deficits kept of one datagram.
@@ -39,6 +40,8 @@ pub struct Cyclic {
     pub sent: Beat,
     /// When it came back.
     pub returned: Beat,
+    /// Which of its inputs move.
+    pub motion: InputMotion,
     /// When the working counter last fell, where it may have been ordered without anybody having seen it.
     pub may_be_ordered: Option<Seen<u16>>,
     /// Whether the process data were laid out anew since it last came back: the next working counter is the
@@ -100,6 +103,7 @@ impl Cyclic {
             deficits: VecDeque::new(),
             sent: Beat::default(),
             returned: Beat::default(),
+            motion: InputMotion::default(),
             may_be_ordered: None,
             is_laid_out_anew: false,
         }
@@ -132,6 +136,7 @@ impl Cyclic {
 
     /// Notes that FMMUs of this datagram were set again: while SubDevices are brought up frames come unevenly.
     pub fn set_up_again(&mut self) {
+        self.motion.forget();
         (self.sent, self.returned) = (Beat::default(), Beat::default());
     }
 

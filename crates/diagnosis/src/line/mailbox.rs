@@ -19,10 +19,15 @@ pub const SLOW: Span = Span::ms(300);
 pub struct MailboxHistory {
     /// The request that was taken and is not answered yet, by its object, where it names one.
     pub waiting: Option<Seen<Option<ObjectAddress>>>,
+    /// Whether the latest request that was taken reads all entries of an object at once (complete access).
+    pub reads_whole: bool,
     /// When somebody last looked for an answer.
     pub polled: Option<Instant>,
     /// Since when, and until when, requests are not taken; `None` when the latest one was.
     pub full: Option<(Seen<()>, Instant)>,
+    /// Since when, and until when, the mailbox for requests was read full (SyncManager 0, 0x0805): nobody fetches what is
+    /// in it. `None` when it was last read empty, or took a request since.
+    pub unfetched: Option<(Seen<()>, Instant)>,
     /// Stretches of time without an answer, or without a request being taken, that are over: from, to.
     pub stuck: VecDeque<(Instant, Instant)>,
     /// Requests that were refused, oldest first.
@@ -42,6 +47,8 @@ pub enum Refusal {
         object: ObjectAddress,
         /// With this code.
         code: u32,
+        /// Whether all its entries were to be read at once, as far as the request was seen.
+        reads_whole: bool,
     },
     /// The mailbox itself answered with an error.
     Error(ErrorReplyCode),
@@ -72,11 +79,19 @@ pub struct HistoryMessage {
 }
 
 impl MailboxHistory {
-    /// A request was taken.
-    pub fn asked(&mut self, object: Option<ObjectAddress>, at: Instant, frame: u64) {
+    /// A request was taken; one that reads all entries of an object at once, or another one.
+    pub fn asked(
+        &mut self,
+        object: Option<ObjectAddress>,
+        reads_whole: bool,
+        at: Instant,
+        frame: u64,
+    ) {
+        self.reads_whole = reads_whole;
         if let Some((since, until)) = self.full.take() {
             self.note_stuck(since.at, until.max(at));
         }
+        self.fetched();
         if let Some(waiting) = self.waiting.replace(Seen::new(object, at, Some(frame))) {
             self.note_stuck(waiting.at, at);
         }
@@ -87,6 +102,23 @@ impl MailboxHistory {
         match &mut self.full {
             Some((_, until)) => *until = at,
             None => self.full = Some((Seen::new((), at, Some(frame)), at)),
+        }
+    }
+
+    /// The mailbox for requests was read, full or not. Says whether time alone may show that it is stuck.
+    pub fn read_status(&mut self, is_full: bool, at: Instant, frame: u64) -> bool {
+        if !is_full {
+            self.fetched();
+            return false;
+        }
+        let since = self.unfetched.map_or(Seen::new((), at, Some(frame)), |(since, _)| since);
+        self.unfetched = Some((since, at));
+        at.since(since.at) >= STUCK
+    }
+
+    fn fetched(&mut self) {
+        if let Some((since, until)) = self.unfetched.take() {
+            self.note_stuck(since.at, until);
         }
     }
 
@@ -104,7 +136,7 @@ impl MailboxHistory {
     /// Whether time alone may show that it is stuck.
     #[must_use]
     pub const fn is_open(&self) -> bool {
-        self.waiting.is_some() || self.full.is_some()
+        self.waiting.is_some() || self.full.is_some() || self.unfetched.is_some()
     }
 
     /// A request was refused.

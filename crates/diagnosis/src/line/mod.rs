@@ -10,14 +10,17 @@ pub mod counters;
 pub mod cyclic;
 pub mod device;
 pub mod dl_history;
+pub mod event_field;
 pub mod host;
 pub mod learn;
 pub mod mailbox;
+pub mod motion;
 pub mod reported;
 pub mod search;
 pub mod sii_image;
 pub mod traffic;
 pub mod trip;
+pub mod way;
 
 use std::collections::VecDeque;
 
@@ -39,6 +42,7 @@ pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cyclic::{Cyclic, Deficit, Ordered, Owner};
 pub use device::{Absence, Chip, Device, Planned, SeenIdentity, SharedAddress, SharedBy, Trouble};
 pub use dl_history::{DlChange, DlHistory};
+pub use event_field::{EventField, EventTrack};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
 pub use reported::{Counting, ErrorSum, Reported, ReportedTrouble};
@@ -46,6 +50,7 @@ pub use search::LoopWrite;
 pub use sii_image::{Power, SiiImage};
 pub use traffic::{Silence, Traffic};
 pub use trip::Trips;
+pub use way::{WayStep, Ways};
 
 /// How many changes of one kind are kept of a controller; older ones are forgotten.
 pub const CHANGES_KEPT: usize = 64;
@@ -115,6 +120,8 @@ pub struct Line {
     pub references: Vec<Reference>,
     /// How long frames are on their way.
     pub trips: Trips,
+    /// Events that controllers report in frames that pass them.
+    pub events: EventField,
     /// Frames and datagrams.
     pub traffic: Traffic,
     /// Station addresses that were asked without any answer, and that no SubDevice was seen to have: in the order of
@@ -296,6 +303,14 @@ impl Line {
         self.habits.recognised().map_or(self.reported.kind, |found| found.kind)
     }
 
+    /// When DL status of a SubDevice changed for the last time while process data were exchanged, as the event field of
+    /// frames tells: before that links come as the line is brought up.
+    #[must_use]
+    pub fn changed_link(&self) -> Option<Seen<()>> {
+        let is_running = |at: Instant| self.cyclic.iter().any(|cyclic| cyclic.first.at < at);
+        self.events.dl_status.came.filter(|came| is_running(came.at))
+    }
+
     /// When no frame at all was seen for several cycles of the process data, latest first.
     pub fn quiet(&self) -> impl Iterator<Item = Pause> + '_ {
         let cycle = self.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min();
@@ -313,6 +328,13 @@ impl Line {
     /// Who has an FMMU on a logical datagram, as far as it was seen being set up.
     pub fn owners(&self, cyclic: &Cyclic) -> impl Iterator<Item = Owner> + '_ {
         owners(&self.devices, cyclic.start, cyclic.len)
+    }
+
+    /// Forgets a tree that was put together from what was seen: controllers have other numbers now.
+    pub fn forget_tree(&mut self) {
+        if !self.tree_is_planned {
+            (self.tree, self.tree_basis) = (None, (0, 0));
+        }
     }
 
     /// Puts the tree together from what was seen, once all ports of all controllers are known; not

@@ -11,6 +11,8 @@ use super::beat::Pause;
 use super::host::Tally;
 use crate::observe::{Questions, Sender};
 
+/// Times of lost frames kept.
+pub const LOST_KEPT: usize = 64;
 /// Silences kept.
 pub const SILENCES_KEPT: usize = 16;
 
@@ -98,6 +100,9 @@ pub struct Traffic {
     /// In a ring that was whole before, frames of which one copy alone came back, with none after them of which both
     /// did: some of them at least.
     pub copies_gone: Tally,
+    /// When the first of each row of them was sent between two returns, in the order in which that was known, at most
+    /// [`LOST_KEPT`].
+    pub lost_at: VecDeque<Instant>,
     /// The first lost frame.
     pub first_lost: Option<Seen<()>>,
     /// The latest lost frame.
@@ -125,6 +130,8 @@ pub struct Traffic {
     pub returned_alone: u64,
     /// Frames recorded twice.
     pub duplicates: u64,
+    /// Frames that came back a second time, as a live socket tells.
+    pub doubled: u64,
     /// EtherCAT frames without datagrams: network variables, mailbox.
     pub without_datagrams: u64,
     /// Whether any frame's direction was known for sure.
@@ -132,6 +139,8 @@ pub struct Traffic {
     /// Datagrams to station or logical addresses in frames that never came back: a MainDevice gets
     /// that far only when SubDevices answer.
     pub lost_addressed: u64,
+    /// Of those the process data.
+    pub lost_logical: u64,
     /// Frames that came back with a wrong check sequence.
     pub damaged: Tally,
     /// The first of those.
@@ -172,6 +181,9 @@ pub struct Traffic {
     pub broadcast_answers: u16,
     /// The working counter of the latest broadcast read, with when it last changed.
     pub broadcast_now: Option<Seen<u16>>,
+    /// When more controllers answered a broadcast read than ever before though process data were exchanged already, and
+    /// how many it had been.
+    pub broadcast_rose: Option<Seen<u16>>,
     /// When a broadcast read that all controllers answer last came back.
     pub broadcast_read: Option<Instant>,
     /// In a ring, the latest broadcast read ever whose copies were both processed by somebody: by how many
@@ -193,6 +205,8 @@ pub struct Traffic {
     /// When no frame at all was seen, neither on its way out nor back, oldest first, at most [`SILENCES_KEPT`]. In
     /// a recording it is so while a card takes no frames, as without a link.
     pub quiet: VecDeque<Pause>,
+    /// Whether frames passed since the latest one that were not shown: the time to the next says nothing.
+    is_gap_unknown: bool,
     /// The first frame.
     pub first: Option<Instant>,
     /// The latest frame.
@@ -208,6 +222,9 @@ impl Traffic {
         // Times of two interfaces may run backwards.
         self.last = Some(last.max(at));
         self.clock_back = self.clock_back.max(last.since(at));
+        if std::mem::take(&mut self.is_gap_unknown) {
+            return;
+        }
         self.longest_gap = self.longest_gap.max(at.since(last));
         if at.since(last) >= QUIET {
             if self.quiet.len() == SILENCES_KEPT {
@@ -215,6 +232,12 @@ impl Traffic {
             }
             self.quiet.push_back(Pause { from: last, to: at });
         }
+    }
+
+    /// So many frames passed and were not shown.
+    pub const fn record_missed(&mut self, count: u64) {
+        self.missed += count;
+        self.is_gap_unknown = true;
     }
 
     /// A frame was seen that the second card of a ring sends only to see which way it comes back, and so many
@@ -270,6 +293,14 @@ impl Traffic {
             self.lost_by_order += 1;
         } else {
             self.lost.add(1, at);
+            let in_a_row =
+                self.silences.back().map(|row| row.returns_before) == Some(returns_before);
+            if !in_a_row {
+                if self.lost_at.len() == LOST_KEPT {
+                    self.lost_at.pop_front();
+                }
+                self.lost_at.push_back(at);
+            }
             self.first_lost.get_or_insert(seen);
             self.latest_lost = Some(seen);
         }

@@ -8,6 +8,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use linesman_proto::time::{Instant, Span};
 
+use super::Ways;
+
 /// Lengths of frames that are followed.
 const LENGTHS: usize = 128;
 /// Frames of a length after which its usual time is known.
@@ -44,6 +46,8 @@ const BYTE: u64 = 80;
 const AROUND: u64 = 8 + 4 + 12;
 /// The shortest frame, without its check sequence, in bytes.
 const SHORTEST: u64 = 60;
+/// Steps by which it is counted how much later than the fastest frames come back: each twice the one before, in ns.
+const STEPS: usize = 32;
 
 /// A frame that came back late.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -54,6 +58,31 @@ pub struct LateFrame {
     pub frame: u64,
     /// How much later than usual it came back.
     pub by: Span,
+}
+
+/// Frames that came back later than the fastest of their length by some time or more.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct HeldBack {
+    /// How many.
+    pub count: u64,
+    /// Of how many that were compared.
+    pub compared: u64,
+    /// By how much at least.
+    pub by: Span,
+    /// The first of them.
+    pub first: LateFrame,
+    /// The latest of them.
+    pub last: LateFrame,
+    /// The latest one of those that were latest by most, within a factor of two.
+    pub worst: LateFrame,
+}
+
+/// Frames that were later than the fastest of their length by one step or more, and by less than the next.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    count: u64,
+    first: LateFrame,
+    last: LateFrame,
 }
 
 /// How long frames are on their way.
@@ -79,6 +108,12 @@ pub struct Trips {
     pub compared: u64,
     /// Frames that were compared since the first late one.
     since_first: u64,
+    /// Frames by how much later than the fastest of their length they came back: from 2^n ns on.
+    steps: [Option<Step>; STEPS],
+    /// Frames that are counted so.
+    stepped: u64,
+    /// The fastest of them, from time to time.
+    pub ways: Ways,
 }
 
 /// Frames of one length.
@@ -92,8 +127,8 @@ struct Usual {
 }
 
 impl Usual {
-    /// A frame took so long: by how much it is late, if it is.
-    fn take(&mut self, took: u64, least: u64, is_calm: bool) -> Option<u64> {
+    /// A frame took so long: how much longer than the fastest ones, once that is known, and whether it is late.
+    fn take(&mut self, took: u64, least: u64, is_calm: bool) -> Option<(u64, bool)> {
         self.count += 1;
         if self.count == 1 {
             (self.shortest, self.next_shortest) = (took, took);
@@ -105,11 +140,12 @@ impl Usual {
         }
         let longer = took - self.shortest.min(took);
         let limit = (self.wanders * WORSE).max(least);
-        let is_late = self.count > KNOWN && longer > limit;
+        let is_known = self.count > KNOWN;
+        let is_late = is_known && longer > limit;
         if !is_late && is_calm {
             self.wanders = (self.wanders * (SLOWLY - 1) + longer) / SLOWLY;
         }
-        is_late.then_some(longer)
+        is_known.then_some((longer, is_late))
     }
 }
 
@@ -120,12 +156,17 @@ impl Trips {
         let leaves = sent.max(self.busy_until.min(back));
         self.busy_until = leaves + duration;
         let took = back.since(leaves).as_nanos();
+        self.ways.record(len, took, sent);
         if self.usual.len() >= LENGTHS && !self.usual.contains_key(&len) {
             return false;
         }
         let least = LEAST.max(self.worst_learnt * WORST);
         let is_calm = self.late_count == 0 || self.in_time >= CALM;
-        let late = self.usual.entry(len).or_default().take(took, least, is_calm);
+        let compared = self.usual.entry(len).or_default().take(took, least, is_calm);
+        if let Some((longer, _)) = compared {
+            self.count_step(LateFrame { sent, frame, by: Span::ns(longer) });
+        }
+        let late = compared.filter(|(_, is_late)| *is_late).map(|(longer, _)| longer);
         self.frames += 1;
         self.in_time = if late.is_some() { 0 } else { self.in_time + 1 };
         if self.frames <= LEARNT_FROM {
@@ -150,6 +191,31 @@ impl Trips {
             self.usual.clear();
         }
         true
+    }
+
+    fn count_step(&mut self, late: LateFrame) {
+        self.stepped += 1;
+        let Some(step) = late.by.as_nanos().checked_ilog2() else { return };
+        let Some(step) = self.steps.get_mut(step as usize) else { return };
+        let step = step.get_or_insert(Step { count: 0, first: late, last: late });
+        step.count += 1;
+        step.last = late;
+    }
+
+    /// Frames that came back later than the fastest of their length by `least` or more, rounded up to the next power of
+    /// two in ns: whatever this computer does anyway. `None` where there are none.
+    #[must_use]
+    pub fn held_back(&self, least: Span) -> Option<HeldBack> {
+        let from = least.as_nanos().max(1).next_power_of_two().ilog2() as usize;
+        let steps: Vec<&Step> = self.steps.get(from..)?.iter().flatten().collect();
+        Some(HeldBack {
+            count: steps.iter().map(|step| step.count).sum(),
+            compared: self.stepped,
+            by: Span::ns(1 << from),
+            first: steps.iter().map(|step| step.first).min_by_key(|late| late.sent)?,
+            last: steps.iter().map(|step| step.last).max_by_key(|late| late.sent)?,
+            worst: steps.last()?.last,
+        })
     }
 
     /// How many of a hundred frames were late while any were.
@@ -223,5 +289,18 @@ mod tests {
             }
         }
         assert_eq!(trips.late_count, 0);
+    }
+
+    #[test]
+    fn frames_held_back_from_the_first_one_on_are_counted() {
+        let mut trips = Trips::default();
+        let one_in_thirty: Vec<u64> =
+            (0..900).map(|nth| if nth % 30 == 7 { 3_020 } else { 20 }).collect();
+        play(&mut trips, 0, &one_in_thirty);
+        assert_eq!(trips.late_count, 0, "this host does so all the time");
+        let held = trips.held_back(Span::us(800)).unwrap();
+        assert_eq!((held.by, held.worst.by), (Span::ns(1 << 20), Span::us(3_000)));
+        assert!(held.count * 100 >= held.compared * 3, "{held:?}");
+        assert_eq!(trips.held_back(Span::ms(5)), None);
     }
 }

@@ -13,6 +13,7 @@ pub mod drops;
 mod rhythm;
 pub mod spells;
 pub mod survey;
+pub mod way;
 
 pub use cause::{Suspect, Suspicion};
 pub use damage::{Damage, LastHop, Located};

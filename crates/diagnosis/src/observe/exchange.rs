@@ -47,10 +47,12 @@ pub struct Exchange<'a> {
 }
 
 impl Exchange<'_> {
-    /// The working counter of datagram `index`, all copies together, when the one that just came
-    /// back has `wkc`.
+    /// What controllers have added to the working counter of datagram `index`, all copies together, when it went out
+    /// with `sent` and the one that just came back has `wkc`.
     #[must_use]
-    pub fn sum(&self, index: usize, wkc: u16) -> u16 {
-        self.earlier.get(index).map_or(wkc, |earlier| earlier.saturating_add(wkc))
+    pub fn added(&self, index: usize, sent: u16, wkc: u16) -> u16 {
+        let own = wkc.saturating_sub(sent);
+        let earlier = self.earlier.get(index).map(|earlier| earlier.saturating_sub(sent));
+        earlier.map_or(own, |earlier| earlier.saturating_add(own))
     }
 }

@@ -79,6 +79,8 @@ pub struct Pairing {
     mistaken: u64,
     /// Requests that were sent and not recorded, as their numbers tell, since this was asked.
     unrecorded: u64,
+    /// Frames that came back a second time, since this was asked.
+    doubled: u64,
     /// Returns without a request since the recording began to look as if it had no requests.
     alone: u32,
 }
@@ -139,7 +141,12 @@ impl Pairing {
         let fits =
             |pending: &Pending| pending.print.lasting == print.lasting && !is_others(pending);
         let fitting = self.pending.iter().enumerate().filter(|(_, pending)| fits(pending));
-        let found = fitting.min_by_key(|(_, pending)| pending.overtaken).map(|(index, _)| index);
+        let found = fitting.min_by_key(|(_, pending)| pending.overtaken).map(|(index, pending)| {
+            // Who asks the same again long after has given the first one up.
+            let is_old = gap(pending.time, frame.time) > IN_FLIGHT;
+            let newest = || self.pending.iter().rposition(fits);
+            if is_old { newest().unwrap_or(index) } else { index }
+        });
         if is_unknown && self.is_one_way_for_sure() && !source.is_marked() {
             // The copy of a ring's second card, which no controller has touched.
             return Outcome::Duplicate;
@@ -155,7 +162,13 @@ impl Pairing {
             return self.request(frame, source, is_repeated, print, settle);
         }
         let Some(found) = found else {
-            if self.was_returned(print, frame.time) {
+            if self.was_returned(print, frame.time, RECORDED_TWICE) {
+                return Outcome::Duplicate;
+            }
+            if frame.direction == Direction::Received
+                && self.was_returned(print, frame.time, TIMEOUT)
+            {
+                self.doubled += 1;
                 return Outcome::Duplicate;
             }
             if frame.direction == Direction::Unknown {
@@ -239,6 +252,11 @@ impl Pairing {
     /// How many requests turned out to be returns whose request was not seen, since this was asked.
     pub fn take_mistaken(&mut self) -> u64 {
         std::mem::take(&mut self.mistaken)
+    }
+
+    /// How many frames came back a second time, since this was asked.
+    pub fn take_doubled(&mut self) -> u64 {
+        std::mem::take(&mut self.doubled)
     }
 
     /// How many requests were sent and not recorded, as their numbers tell, since this was asked.
@@ -333,13 +351,18 @@ impl Pairing {
         if frame.direction == Direction::Unknown && !is_repeated {
             self.unrecorded += self.senders.number(source, &print);
         }
-        let has_more = |pending: &Pending| {
+        let is_by_other_card = |pending: &Pending| {
             pending.print.skeleton == print.skeleton
-                && pending.print.commands > print.commands
                 && (pending.source, pending.path) != (source, frame.path)
                 && gap(pending.time, frame.time) <= OTHER_CARD
         };
-        let is_part = self.pending.iter().rev().take(8).any(has_more);
+        // What the second card alone asks goes round a whole ring untouched: it is only to see which way it comes back.
+        let is_second_card = frame.path == Some(Path::B) || self.other_card == Some(source);
+        let is_less = |pending: &Pending| {
+            let (its, own) = (pending.print.commands, print.commands);
+            is_by_other_card(pending) && (its > own || (is_second_card && its < own))
+        };
+        let is_part = self.pending.iter().rev().take(8).any(is_less);
         if self.pending.len() >= MOST_PENDING {
             self.lose(0, false, settle);
         }
@@ -454,9 +477,10 @@ impl Pairing {
         self.returned_next = (self.returned_next + 1) % REMEMBERED;
     }
 
-    fn was_returned(&self, print: Fingerprint, time: Instant) -> bool {
+    /// Whether the same came back within some time.
+    fn was_returned(&self, print: Fingerprint, time: Instant, within: Span) -> bool {
         let known = self.returned.iter().flatten();
-        known.into_iter().any(|(other, at)| *other == print && gap(*at, time) <= RECORDED_TWICE)
+        known.into_iter().any(|(other, at)| *other == print && gap(*at, time) <= within)
     }
 }
 

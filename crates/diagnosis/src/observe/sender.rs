@@ -1,5 +1,6 @@
 //! Who sends requests: one MainDevice, its second card, or somebody else.
 
+use linesman_proto::address::Path;
 use linesman_proto::command::Addressing;
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::Datagram;
@@ -25,8 +26,10 @@ pub struct Sender {
     pub first: Seen<()>,
     /// Requests of its own: the second card of a ring only repeats those of the first.
     pub own: u64,
-    /// Whether it is a card of this host, so that several of them are one MainDevice.
+    /// Whether it sends by a card of this host; by several cards, each its own, it is one MainDevice.
     pub is_host: bool,
+    /// The card by which its first request was seen, where that is told.
+    pub card: Option<Path>,
     /// Whether only returns of its frames were seen, among requests of others: it sends from another
     /// place of the line.
     pub is_elsewhere: bool,
@@ -132,6 +135,7 @@ impl Senders {
                     first,
                     own,
                     is_host,
+                    card: frame.path,
                     is_elsewhere: false,
                     writes: 0,
                     orders: 0,

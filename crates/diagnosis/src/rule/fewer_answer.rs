@@ -7,7 +7,8 @@
 //! from a project, or from an earlier count. On a line without branches those answer that are nearest, so the
 //! break lies behind the last of them. The same is told of broadcasts that were seen, where their working counter
 //! falls and stays low, and nothing else says who is gone: then links are named behind which there are just as many
-//! SubDevices as are missing.
+//! SubDevices as are missing. Where receive times were latched (0x0900), the time that frames take tells which of
+//! them: a cut shortens their way by all that lies behind.
 //!
 //! **What it means.** A link is open, or a device is without power; all behind it is gone with it. On a line with
 //! branches the number alone does not say which.
@@ -24,6 +25,7 @@ use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::line::{Line, Seen};
+use crate::locate::way;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -184,6 +186,7 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         false => condition
             .advise(format!("Look at {at}: the lamps on both sides, the plugs, the supply behind.")),
     };
+    condition.evidence.extend(way::evidence(line, now.at));
     let gone = line.devices.iter().map(|device| device.id);
     let follows = gone
         .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
@@ -205,6 +208,7 @@ fn candidates(line: &Line, missing: usize, since: Instant) -> Vec<Place> {
     };
     let mut heads: Vec<usize> = tree.order().iter().copied().filter(fits).collect();
     heads.sort_by_key(|node| is_on_terminal_bus(line, *node));
+    way::keep_fitting(line, tree, &mut heads, since);
     let link = |node: usize| tree.links().get(tree.link_above(node)?).copied();
     let links = heads.into_iter().filter_map(link).take(MOST_LINKS);
     let named = links.map(|link| link.map(|node| DeviceId(node as u32)));

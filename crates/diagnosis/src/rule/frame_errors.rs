@@ -73,9 +73,6 @@ pub const LAST_HOP: RulePage = RulePage {
     source: include_str!("frame_errors.rs"),
 };
 
-/// The watchdog of a SyncManager expired. Reference: ETG.1000.6, AL status codes.
-const OUTPUT_WATCHDOG: AlStatusCode = AlStatusCode(0x001B);
-
 /// Errors that did not come again for this long are over.
 const QUIET: Span = Span::s(2);
 
@@ -198,7 +195,7 @@ fn starved(view: &View<'_>) -> impl Iterator<Item = Symptom> {
     let is_of_time = |error: &AlError| {
         let code = error.code.map(|code| code.value);
         code.is_some_and(|code| {
-            code == OUTPUT_WATCHDOG || code.explain().class == CodeClass::Timing
+            code == AlStatusCode::SYNC_MANAGER_WATCHDOG || code.explain().class == CodeClass::Timing
         })
     };
     let starved = view.line.devices.iter().filter(move |device| {

@@ -23,9 +23,9 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
-use super::{Rule, RulePage, View};
+use super::{Rule, RulePage, View, nobody_answers};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Line, Tally};
+use crate::line::{Line, Tally, Traffic};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -49,6 +49,9 @@ const AROUND: Span = Span::ms(500);
 const QUIET: Span = Span::s(2);
 /// Of so many frames one is too much for a line that is to work.
 const OFTEN: u64 = 1_000;
+
+/// So many intervals make a rhythm.
+const RHYTHM: usize = 6;
 
 /// What is missing or damaged.
 struct Missing {
@@ -98,10 +101,14 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let (Some(first), Some(last)) = (lost.first, lost.last) else { return None };
     // A recorder that misses requests misses returns, too.
     let is_recorder = traffic.unrecorded.sum > 0 || traffic.datagrams_cut > 0 || traffic.missed > 0;
-    // What is lost in a row is another rule's; it is not known yet whether the latest one is the first of many.
-    let in_a_row = traffic.silences.iter().map(|one| one.frames).filter(|frames| *frames > SEVERAL);
-    let single = lost.sum.saturating_sub(in_a_row.sum());
-    let went_on = traffic.latest_returned.is_some_and(|returned| returned.at > last);
+    // What is lost in a row is another rule's; of those that are still missing it is not known whether they are the
+    // first of many.
+    let in_a_row = traffic.silences.iter().filter(|one| {
+        let is_open = one.ended.is_none() && !view.has_ended;
+        is_open || one.frames >= nobody_answers::CERTAIN
+    });
+    let single = lost.sum.saturating_sub(in_a_row.map(|one| one.frames).sum());
+    let went_on = traffic.latest_returned.is_some_and(|returned| returned.at > first);
     if single < SEVERAL || !went_on || line.sees_all_orders || traffic.is_one_sided() || is_recorder
     {
         return None;
@@ -134,6 +141,8 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     condition.severity =
         if count.saturating_mul(RARE) <= traffic.sent { Severity::Info } else { Severity::Warning };
     condition = condition.shown_by(Evidence::frame(first, known, text));
+    let rhythm = rhythm(traffic);
+    condition.evidence.extend(rhythm.map(|text| Evidence::host(Some(last), text)));
     let counters = line.devices.iter().filter(|device| device.counters.is_known()).count();
     let text = match (counters, damaged) {
         (0, None) => {
@@ -147,6 +156,33 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         condition = condition.ended(last);
     }
     Some(advise(condition, line, damaged, damaged.unwrap_or(0)))
+}
+
+/// The rhythm in which frames got lost, in words: at equal intervals, or in bursts.
+fn rhythm(traffic: &Traffic) -> Option<String> {
+    let mut times: Vec<Instant> = traffic.lost_at.iter().copied().collect();
+    times.sort_unstable();
+    let mut gaps: Vec<u64> =
+        times.windows(2).map(|pair| pair[1].since(pair[0]).as_nanos()).collect();
+    if gaps.len() < RHYTHM {
+        return None;
+    }
+    gaps.sort_unstable();
+    let middle = gaps[gaps.len() / 2];
+    let sum = gaps.iter().fold(0_u64, |sum, gap| sum.saturating_add(*gap));
+    let mean = sum / gaps.len() as u64;
+    if middle <= mean / 10 {
+        return Some(
+            "they were lost in bursts, with long times without any between them".to_owned(),
+        );
+    }
+    let near = gaps.iter().filter(|gap| gap.abs_diff(middle) <= middle / 10).count();
+    (near * 10 >= gaps.len() * 8).then(|| {
+        format!(
+            "they were lost about every {}: look what works, or is switched, in this rhythm",
+            Span::ns(middle)
+        )
+    })
 }
 
 fn missing(line: &Line) -> Missing {

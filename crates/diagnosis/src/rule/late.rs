@@ -6,8 +6,9 @@
 //! for on its card is the frame before it. One that takes 60 µs more than the shortest of its length, and far
 //! more than this computer usually wanders, was kept back. Many in a row that take the same longer time took
 //! another way: no finding; nor is it one as long as no process data are exchanged in a cycle. A recording tells
-//! it too, since it has the times at which frames went out and came back; but where nobody keeps step with SYNC
-//! signals, only of frames that are late by a tenth of the cycle or more: the times of a recording wander, too.
+//! it too, since it has the times at which frames went out and came back. Where nobody keeps step with SYNC
+//! signals, it is told of frames that are late by a tenth of the cycle or more. A computer that keeps frames back from
+//! the first one on shows by the fastest frames: two in a hundred that are later by a fifth of the cycle are told.
 //!
 //! **What it means.** The line is well: no controller counts anything. The computer, its card, a switch or a
 //! converter in between kept the frame back. Single frames now and then are the computer's: interrupts, another
@@ -23,6 +24,7 @@ use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::line::trip::LateFrame;
 use crate::line::{Device, Line};
 
 /// The page.
@@ -41,35 +43,54 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const QUIET: Span = Span::s(2);
 /// What lies closer together belongs together.
 const TOGETHER: Span = Span::s(10);
-/// A recording tells of what is late by this part of the cycle: half of what is doubtful to whoever keeps step.
-const RECORDED: u64 = 10;
+/// Where nobody keeps step, what is late by this part of the cycle is told: half of what is doubtful to whoever does.
+const NOTABLE: u64 = 10;
+/// What is late by this part of the cycle all the time is told, whatever is usual here …
+const HELD_BACK: u64 = 5;
+/// … if it is so many frames …
+const SEVERAL: u64 = 16;
+/// … and such a share, in percent.
+const OFTEN_PERCENT: u64 = 2;
+/// With this share the frames wait in a queue, in percent.
+const QUEUE_PERCENT: u64 = 50;
+
+/// Frames that came back late.
+struct Late {
+    /// The first one of the latest spell.
+    first: LateFrame,
+    /// The latest one.
+    last: LateFrame,
+    /// By how much at most.
+    worst: Span,
+    /// Whether most frames are late, as in a queue.
+    is_queue: bool,
+    text: String,
+}
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
-    let trips = &line.trips;
-    let Some(last) = trips.late.back() else { return };
     // Nobody waits for a frame that is sent when its sender likes.
     let keeps_step = line.devices.iter().any(|device| device.sync_on.is_some_and(|on| on.value));
     let Some(cycle) = shortest_cycle(line) else { return };
+    let matters = |late: &Late| keeps_step || late.worst * NOTABLE >= cycle;
+    let unusual = unusual(line, cycle).filter(matters);
+    let Some(late) = unusual.or_else(|| held_back(line, cycle)) else { return };
+    conditions.push(condition(view, &late, cycle, keeps_step));
+}
+
+/// Frames that were later than is usual here.
+fn unusual(line: &Line, cycle: Span) -> Option<Late> {
+    let trips = &line.trips;
+    let last = *trips.late.back()?;
     let mut first = last;
     for late in trips.late.iter().rev() {
         if first.sent.since(late.sent) > TOGETHER {
             break;
         }
-        first = late;
+        first = *late;
     }
     let of_spell = || trips.late.iter().filter(|late| late.sent >= first.sent);
     let worst = of_spell().map(|late| late.by).max().unwrap_or(Span::ZERO);
-    // What a recorder notes a little late was perhaps noted late, and did no harm where nobody keeps step.
-    let is_recorded = !line.traffic.direction_known;
-    if is_recorded && !keeps_step && worst * RECORDED < cycle {
-        return;
-    }
-    let (cause, other) = if trips.is_queue() {
-        (FaultName::LateFrames, FaultName::HostJitter)
-    } else {
-        (FaultName::HostJitter, FaultName::LateFrames)
-    };
     let text = format!(
         "{} later than the line takes: by {:.3} ms at most, {} % of the cycle",
         match trips.late_count {
@@ -80,14 +101,50 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             ),
         },
         worst.as_secs_f64() * 1e3,
-        worst.as_nanos() * 100 / cycle.as_nanos().max(1)
+        percent(worst, cycle)
     );
+    Some(Late { first, last, worst, is_queue: trips.is_queue(), text })
+}
+
+/// Frames that were late by a part of the cycle that matters, all the time: who listens since then knows no better.
+fn held_back(line: &Line, cycle: Span) -> Option<Late> {
+    let held = line.trips.held_back(Span::ns(cycle.as_nanos() / HELD_BACK))?;
+    if held.count < SEVERAL || held.count * 100 < held.compared * OFTEN_PERCENT {
+        return None;
+    }
+    let worst = held.worst.by;
+    let text = format!(
+        "{} of {} frames came back {:.3} ms or more later than the fastest of their length, the worst by \
+         {:.3} ms, {} % of the cycle",
+        held.count,
+        held.compared,
+        held.by.as_secs_f64() * 1e3,
+        worst.as_secs_f64() * 1e3,
+        percent(worst, cycle)
+    );
+    let is_queue = held.count * 100 >= held.compared * QUEUE_PERCENT;
+    Some(Late { first: held.first, last: held.last, worst, is_queue, text })
+}
+
+fn percent(part: Span, whole: Span) -> u64 {
+    part.as_nanos() * 100 / whole.as_nanos().max(1)
+}
+
+fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Condition {
+    let line = view.line;
+    let Late { first, last, worst, .. } = late;
+    let (cause, other) = if late.is_queue {
+        (FaultName::LateFrames, FaultName::HostJitter)
+    } else {
+        (FaultName::HostJitter, FaultName::LateFrames)
+    };
+    let is_recorded = !line.traffic.direction_known;
     let mut condition = Condition::new(&PAGE, Place::Host, cause, first.sent)
         .confidence(0.6)
         .or(other, 0.3)
         .confirmed(first.sent + first.by)
         .about([Symptom::FramesLate])
-        .shown_by(Evidence::frame(last.sent + last.by, last.frame, text))
+        .shown_by(Evidence::frame(last.sent + last.by, last.frame, late.text.clone()))
         .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
         .advise("Take switches and media converters out of the way between card and first SubDevice.");
     let in_step = line.devices.iter().filter(|device| device.sync_on.is_some_and(|on| on.value));
@@ -107,14 +164,14 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         condition = condition.explaining(hurt.iter().map(|device| Symptom::StateLost(device.id)));
         condition =
             condition.explaining(hurt.iter().map(|device| Symptom::WorkingCounter(device.id)));
-    } else if keeps_step && worst >= cycle {
+    } else if keeps_step && *worst >= cycle {
         // Where nobody keeps step, a late frame costs a cycle; every computer has some.
         condition.severity = Severity::Warning;
     }
     if last.sent + QUIET < view.now {
         condition = condition.ended(last.sent + last.by);
     }
-    conditions.push(condition);
+    condition
 }
 
 /// The shortest cycle of process data.

@@ -5,13 +5,14 @@
 //! **How it is found.** Requests and answers are seen in the mailbox areas behind 0x1000. `S250`: an SDO is
 //! aborted, or the mailbox answers with an error of its own. `S251`: an answer came 300 ms or longer after
 //! its request; from 100 ms on it is told and is no warning yet. `S252`: for nearly a second a request is not taken (working counter 0: the one before is
-//! still in the mailbox), or it is taken and the MainDevice looks for the answer in vain, while the controller answers as always.
+//! still in the mailbox, or status 0x0805 reads full all the time), or it is taken and the MainDevice looks for the answer in vain, while the controller answers as always.
 //!
 //! **What it means.** The mailbox is served by another part of the firmware than process data and states:
 //! errors in it leave the state machine alone (S0 L2399), and a SubDevice with a stuck mailbox may run on in
 //! OP. An abort says that a request does not suit an object: another index than the device has, a
 //! value out of range, a write in the wrong state. That an object is not there is asked for by many
-//! tools on purpose and is no finding.
+//! tools on purpose and is no finding; nor is one of the communication profile (before
+//! 0x2000) that is not given at once, by complete access.
 //!
 //! **What to do.** Look the code up with `linesman explain`. Of a slow or stuck mailbox: ask less often, and
 //! one at a time; look for a second tool that uses the same mailbox; read the diagnosis history; then new
@@ -19,6 +20,7 @@
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
+use linesman_proto::mailbox::coe::ObjectIndex;
 use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
@@ -58,11 +60,16 @@ pub const RULE: Rule = Rule { pages: &[REFUSED, SLOW, STUCK_PAGE], judge };
 
 /// What did not come again for this long is over.
 const QUIET: Span = Span::s(2);
+/// A mailbox is asked, and its processor is missed by its watchdog, so long after it has stopped at most.
+const STOPPED_WITHIN: Span = Span::s(2);
 /// Shown of many.
 const SHOWN: usize = 3;
 /// Aborts by which a tool finds out what a SubDevice has: no such object, no such entry, complete access not
 /// supported.
 const ASKING: [u32; 3] = [0x0602_0000, 0x0609_0011, 0x0601_0004];
+
+/// Objects before it are of the communication profile (ETG.1000.6): identity, mappings, assignments.
+const FIRST_OF_MAKER: ObjectIndex = ObjectIndex(0x2000);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for device in &view.line.devices {
@@ -73,7 +80,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 fn refused(line: &Line, device: &Device) -> Option<Condition> {
-    let counts = |seen: &&Seen<Refusal>| !matches!(seen.value, Refusal::Abort { code, .. } if ASKING.contains(&code));
+    // Whoever brings a SubDevice up tries to read objects at once, and does so entry by entry where that is refused.
+    let counts = |seen: &&Seen<Refusal>| {
+        !matches!(seen.value, Refusal::Abort { code, object, reads_whole }
+            if ASKING.contains(&code) || (reads_whole && object.index < FIRST_OF_MAKER))
+    };
     let all: Vec<_> = device.mailbox.refusals.iter().filter(counts).collect();
     let (first, last) = (all.first()?, all.last()?);
     let mut condition = begin(line, device, &REFUSED, FaultName::MailboxError, first.at, last.at)
@@ -86,7 +97,7 @@ fn refused(line: &Line, device: &Device) -> Option<Condition> {
     let label = line.label(device.id);
     for seen in all.iter().rev().take(SHOWN) {
         let text = match seen.value {
-            Refusal::Abort { object, code } => {
+            Refusal::Abort { object, code, .. } => {
                 format!("{label} aborts {object}: {}", SdoAbortCode(code))
             }
             Refusal::Error(code) => {
@@ -144,8 +155,12 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
         .full
         .map(|(since, until)| (since.at, until, since.frame))
         .filter(|(from, to, _)| to.since(*from) >= STUCK);
+    let unfetched = mailbox
+        .unfetched
+        .map(|(since, until)| (since.at, until, since.frame))
+        .filter(|(from, to, _)| to.since(*from) >= STUCK);
     let over = mailbox.stuck.back().map(|(from, to)| (*from, *to, None));
-    let (since, until, frame) = full.or(waiting).or(over)?;
+    let (since, until, frame) = full.or(waiting).or(unfetched).or(over)?;
     if view.line.traffic.may_lack(since, until) {
         // The answer may have been fetched by a frame that is not in the recording.
         return None;
@@ -154,23 +169,45 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
     let ms = until.since(since).as_nanos() / 1_000_000;
     let text = if full.is_some() {
         format!("{label} takes no request out of its mailbox for {ms} ms")
+    } else if waiting.is_none() && unfetched.is_some() {
+        format!(
+            "{label} has not fetched a request for {ms} ms: its mailbox was read full all the time"
+        )
     } else {
         format!("{label} has not answered a request for {ms} ms; its controller answers")
     };
     let place = Place::device(view.line.network, device.id);
-    let mut condition = Condition::new(&STUCK_PAGE, place, FaultName::MailboxStuck, since)
+    let stopped = processor_stopped_about(view.line, since);
+    let (cause, other) = match stopped {
+        None => (FaultName::MailboxStuck, FaultName::FirmwareFault),
+        Some(_) => (FaultName::FirmwareFault, FaultName::MailboxStuck),
+    };
+    let mut condition = Condition::new(&STUCK_PAGE, place, cause, since)
         .confidence(0.7)
-        .or(FaultName::FirmwareFault, 0.2)
+        .or(other, 0.2)
         .confirmed(since + STUCK)
         .about([Symptom::Mailbox(device.id)])
+        .explaining([Symptom::InputsStill(device.id)])
         .shown_by(Evidence::frame(since, frame.unwrap_or(0), text))
         .advise("Look for another tool that uses the mailbox of this SubDevice.")
         .advise("Power it off and on; its process data ran on meanwhile.")
         .advise("Ask its maker for newer firmware.");
-    if full.or(waiting).is_none() {
+    if let Some(event) = stopped {
+        let text = "the frames tell that DL status of a SubDevice has changed then (event field, bit 2): a processor that \
+                    stops shows there";
+        condition = condition.shown_by(Evidence::frame(event.at, event.frame.unwrap_or(0), text));
+    }
+    if full.or(waiting).or(unfetched).is_none() {
         condition = condition.ended(until);
     }
     Some(condition)
+}
+
+/// The event by which a SubDevice told, about when its mailbox got stuck, that its DL status has changed.
+fn processor_stopped_about(line: &Line, since: Instant) -> Option<Seen<()>> {
+    let is_then =
+        |came: &Seen<()>| came.at.since(since).max(since.since(came.at)) <= STOPPED_WITHIN;
+    line.changed_link().filter(is_then)
 }
 
 fn begin(

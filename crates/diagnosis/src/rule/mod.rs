@@ -18,8 +18,10 @@ pub mod frame_errors;
 pub mod frames_unplaced;
 pub mod host_trouble;
 pub mod identity;
+pub mod inputs_still;
 pub mod jitter;
 pub mod late;
+pub mod link_changed;
 pub mod link_lost;
 pub mod long_delay;
 pub mod mailbox;
@@ -131,6 +133,7 @@ pub const RULES: &[Rule] = &[
     late::RULE,
     paused::RULE,
     mailbox::RULE,
+    inputs_still::RULE,
     device_message::RULE,
     counters::RULE,
     second_maindevice::RULE,
@@ -143,6 +146,7 @@ pub const RULES: &[Rule] = &[
     long_delay::RULE,
     errors_at_device::RULE,
     frames_unplaced::RULE,
+    link_changed::RULE,
     exchanged::RULE,
     assumed_wiring::RULE,
 ];

@@ -30,14 +30,14 @@ mod parted;
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::register::ErrorCounter;
+use linesman_proto::register::{ErrorCounter, table};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, LinkEnd, Place, Severity, Symptom};
-use crate::line::{Line, Seen, Silence, search};
+use crate::line::{Device, Line, Seen, Silence, search};
 use crate::locate::Survey;
 
 /// The page.
@@ -53,7 +53,7 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// So many requests in a row without a return are no accident.
-const CERTAIN: u64 = 8;
+pub(super) const CERTAIN: u64 = 8;
 /// More in a row than noise takes from a line that still answers.
 const LONG: u64 = 32;
 /// How likely it is the card.
@@ -62,6 +62,8 @@ const CARD: f64 = 0.1;
 const NEVER_SEEN: f64 = 0.08;
 /// Cards are looked at now and then only: a silence must last so long before their link proves anything.
 const CARRIER_LATE: Span = Span::ms(300);
+/// So long after its link was lost a card takes no frames any more: drivers look for it every second or two.
+const CARRIER_KNOWN: Span = Span::ms(2_200);
 /// Ports that were closed in a silence keep it from being one; what follows so soon belongs to it.
 const SAME_SILENCE: Span = Span::ms(100);
 /// With fewer, the end of the input may have cut off the answer.
@@ -85,7 +87,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
                 && ended.since(silence.since.at) >= LINK_UP
                 && !traffic.was_badly_recorded(silence.since.at, ended)
         }
-        None => silence.frames >= CERTAIN || (silence.frames >= FEW && view.has_ended),
+        // A few at the end, where a few were lost all along, are more of the same.
+        None => {
+            let is_few = silence.frames >= FEW && view.has_ended && !is_among_others(line, silence);
+            silence.frames >= CERTAIN || is_few
+        }
     };
     let swallowed = traffic.swallowed.iter().rev().find(|silence| silence.frames >= CERTAIN);
     let silence = traffic.silences.iter().rev().find(is_long);
@@ -202,7 +208,9 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
     let frame = since.frame.unwrap_or(0);
     let lasted = silence.last.at.since(silence.since.at);
     let found = found_hole(line, silence);
+    let restarted = restarted_with(line, silence);
     let mut condition = match (found, is_spoiled, is_hole) {
+        _ if let Some((count, seen)) = restarted => without_supply(line, silence, count, seen),
         (Some(found), ..) => placed(line, since.at, found),
         (None, true, _) => spoiling(line, since.at),
         (None, false, true) => hole(view, silence),
@@ -232,10 +240,14 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         let told = line.host.card(Path::A).carrier.map(|carrier| carrier.at);
         let text = match (carrier, told) {
             (true, Some(_)) => "card A has a link",
-            (true, None) => "ports were closed meanwhile to find the place: who does so has a link",
+            (true, None) if search::began(line, silence).is_some() => {
+                "ports were closed meanwhile to find the place: who does so has a link"
+            }
+            (true, None) => "frames went on leaving the card, and none leaves one without a link",
             (false, _) => "card A had no link meanwhile",
         };
-        let at = told.or_else(|| search::began(line, silence).map(|began| began.at));
+        let began = search::began(line, silence).map(|began| began.at);
+        let at = told.or(began).or(Some(silence.last.at));
         condition = condition.shown_by(Evidence::host(at, text));
     }
     if silence.frames >= CERTAIN || view.has_ended {
@@ -277,6 +289,33 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         );
     }
     advise(condition, carrier)
+}
+
+/// How many SubDevices, the first of the line among them, were given their station addresses anew after a silence: they
+/// had lost them, and their supply.
+fn restarted_with(line: &Line, silence: &Silence) -> Option<(usize, Seen<()>)> {
+    let ended = silence.ended?;
+    let lost = |device: &Device| device.lost_address.filter(|seen| seen.at >= ended);
+    let first = first_device(line).unwrap_or_default();
+    let seen = line.device(first).and_then(lost)?;
+    Some((line.devices.iter().filter_map(lost).count(), seen))
+}
+
+/// Nothing came back while the first SubDevice had no supply.
+fn without_supply(line: &Line, silence: &Silence, count: usize, seen: Seen<()>) -> Condition {
+    let first = first_device(line).unwrap_or_default();
+    let place = Place::device(line.network, first);
+    let text = format!(
+        "{count} SubDevices, {} the first of them, were given their station addresses anew after it: they had started \
+         anew",
+        line.label(first)
+    );
+    Condition::new(&PAGE, place, FaultName::BrownOut, silence.since.at)
+        .confidence(0.5)
+        .or(FaultName::DeviceOff, 0.2)
+        .or(FaultName::SupplyOff, 0.2)
+        .shown_by(Evidence::register(first, table::STATION_ADDRESS.address, &seen, text))
+        .advise(format!("Measure the supply of {} under load.", line.label(first)))
 }
 
 /// Frames do not come back at all: the first hop, or what is behind it.
@@ -374,14 +413,22 @@ fn spoiling(line: &Line, at: Instant) -> Condition {
 }
 
 /// Whether the card had a link during a silence; `None` when neither the host says so nor anybody who searched
-/// for the place, which nobody does without one.
+/// for the place, which nobody does without one, nor frames that went on leaving it.
 fn carrier_during(line: &Line, silence: &Silence) -> Option<bool> {
     let card = line.host.card(Path::A);
     let Some(carrier) = card.carrier else {
-        return search::began(line, silence).map(|_| true);
+        return (search::began(line, silence).is_some() || went_on_leaving(line, silence))
+            .then_some(true);
     };
     let came_back = carrier.value && card.carrier_changes > 0 && carrier.at >= silence.since.at;
     Some(carrier.value && !came_back)
+}
+
+/// Whether frames were seen to leave the card itself for so long that it had a link: the system hands none to a card
+/// without one, once it knows.
+fn went_on_leaving(line: &Line, silence: &Silence) -> bool {
+    let is_host = line.traffic.senders.iter().any(|sender| sender.is_host);
+    is_host && silence.last.at.since(silence.since.at) >= CARRIER_KNOWN
 }
 
 /// Frames come back as they went out.

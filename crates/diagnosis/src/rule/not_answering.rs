@@ -7,7 +7,11 @@
 //! A station address that is asked again and again and has never answered counts, too, where others answer.
 //!
 //! Where all behind one link are silent at once, it is one finding, at that link; unless the near end of it was read
-//! since and says otherwise, or broadcasts still count all of them.
+//! since and says otherwise, or broadcasts still count all of them. Where nobody has seen the wiring, as when the
+//! diagnosis joins a line that runs already, SubDevices that follow upon one another and are silent at once are one
+//! finding at the first of them: frames come to it by a link from one of those before it, which of them was not seen.
+//! Where frames go through a silent SubDevice to others that still answer, it has its supply and has lost its station
+//! address by starting anew; those that fell silent with it are listed with it.
 //!
 //! **What it means.** It is without power, cut off, or has lost its station address by starting anew.
 //! When the link to it is lost, that finding stands above this one.
@@ -15,18 +19,19 @@
 //! **What to do.** Look at the nearest SubDevice before it that answers: the trouble is between the two,
 //! or in this one.
 
+mod branch;
+
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::table;
-use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::{End, Tree};
+use linesman_proto::topology::End;
 
-use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Absence, Device, Line, Seen};
-use crate::locate::Drops;
+use crate::line::{Absence, Device, Line};
+use crate::locate::{Drops, way};
+use branch::{Branch, absence, passed, silent_branches};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -40,12 +45,8 @@ pub const PAGE: RulePage = RulePage {
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
-/// Who did not answer for so long was away.
-const LONG: Span = Span::ms(100);
 /// A link that was lost so often flaps.
 const FLAPS: usize = 3;
-/// An absence that has been over for so long is history.
-const TOLD_FOR: Span = Span::ms(2_500);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
@@ -61,127 +62,129 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             way.any(|node| tree.link_above(node).is_some_and(|link| down.contains(&link)))
         })
     };
-    let branches = silent_branches(view);
-    let (restarted, branches): (Vec<Branch>, Vec<Branch>) =
-        branches.into_iter().partition(|branch| branch.was_without_supply(line));
-    for branch in &branches {
-        conditions.push(cut_off(line, branch));
-    }
-    for branch in &restarted {
-        conditions.push(without_supply(line, branch));
-    }
+    let passed = passed(view);
+    let is_passed = |id: &DeviceId| passed.iter().any(|branch| branch.devices.contains(id));
+    let (restarted, branches): (Vec<Branch>, Vec<Branch>) = silent_branches(view)
+        .into_iter()
+        .filter(|branch| !branch.devices.iter().all(is_passed))
+        .partition(|branch| branch.was_without_supply(line));
+    conditions.extend(passed.iter().map(|branch| lost_addresses(line, branch)));
+    conditions.extend(branches.iter().map(|branch| cut_off(line, branch)));
+    conditions.extend(restarted.iter().map(|branch| without_supply(line, branch)));
     for (device, absence) in away() {
         // The link says it all of one alone, and the first one without supply all of those behind it.
         let is_told = |branch: &Branch| branch.devices.contains(&device.id);
         if branches.iter().any(|branch| branch.devices == [device.id])
-            || restarted.iter().any(is_told)
+            || restarted.iter().chain(&passed).any(is_told)
         {
             continue;
         }
-        let silent = absence.since;
-        let place = Place::device(line.network, device.id);
-        let label = line.label(device.id);
-        let new = |cause| Condition::new(&PAGE, place, cause, silent.at);
-        let is_cut_off = is_cut_off(device.id.index())
-            || branches.iter().any(|branch| branch.devices.contains(&device.id));
-        let restarted = device.lost_address.filter(|seen| seen.at >= silent.at);
-        let mut condition = if let Some(seen) = restarted.filter(|_| !is_cut_off) {
-            let address = table::STATION_ADDRESS.address;
-            let text = format!(
-                "{label} answers at its position without its station address: it was without supply, or its \
-                 controller was reset; an open link leaves the address as it is"
-            );
-            new(FaultName::DeviceOff)
-                .confidence(0.5)
-                .or(FaultName::BrownOut, 0.3)
-                .or(FaultName::SupplyOff, 0.1)
-                .advise(format!(
-                    "Look at the supply of {label}: its plug, its terminals, its fuse."
-                ))
-                .shown_by(Evidence::register(device.id, address, &seen, text))
-        } else if is_cut_off {
-            // Why is for the finding above.
-            new(FaultName::LinkOpen).confidence(0.6).or(FaultName::DeviceOff, 0.3)
-        } else {
-            new(FaultName::DeviceOff)
-                .confidence(0.5)
-                .or(FaultName::LinkOpen, 0.25)
-                .or(FaultName::BrownOut, 0.1)
-                .advise(format!("Look at {label} and at the way to it: lamps, supply, plugs."))
-        };
-        let text = match absence.ended {
-            None => format!("{label} does not answer"),
-            Some(ended) => {
-                let lasted = ended.since(silent.at);
-                format!("{label} did not answer for {lasted}, then again")
-            }
-        };
-        let address = table::AL_STATUS.address;
-        condition = condition
-            .confirmed(silent.at)
-            .about([Symptom::Silent(device.id)])
-            .explaining([
-                Symptom::WorkingCounter(device.id),
-                Symptom::StateLost(device.id),
-                Symptom::Mailbox(device.id),
-            ])
-            .shown_by(Evidence::register(device.id, address, &silent, text));
-        if let Some(ended) = absence.ended {
-            condition = condition.ended(ended);
-        }
-        // Another tool's list says at once who is gone: those behind went with it.
-        if line.traffic.frames == 0 && !is_cut_off {
-            condition = condition.explaining(behind(line, device.id));
-        }
-        conditions.push(condition);
+        let is_cut_off = is_cut_off(device.id.index()) || branches.iter().any(is_told);
+        conditions.push(alone(line, device, &absence, is_cut_off));
     }
 }
 
-/// The absence of a SubDevice that lasts, or was over a moment ago. While addresses are given nobody answers to them
-/// for a while.
-fn absence(view: &View<'_>, device: &Device) -> Option<Absence> {
-    let latest = *device.joined_absences().last()?;
-    let Some(ended) = latest.ended else { return Some(latest) };
-    let is_told = ended.since(latest.since.at) >= LONG && view.now.since(ended) <= TOLD_FOR;
-    is_told.then_some(latest)
-}
-
-/// SubDevices that all fell silent behind one link, of which nobody says that it is up.
-struct Branch {
-    a: End<DeviceId>,
-    b: End<DeviceId>,
-    /// Whether the ports are those of the wiring, and not of a line in the order of positions.
-    is_wired: bool,
-    is_on_terminal_bus: bool,
-    devices: Vec<DeviceId>,
-    since: Seen<()>,
-    ended: Option<Instant>,
-}
-
-/// All branches that are silent as a whole, or were a moment ago, while whoever is before them answers.
-fn silent_branches(view: &View<'_>) -> Vec<Branch> {
-    let line = view.line;
-    let away: Vec<Option<Absence>> =
-        line.devices.iter().map(|device| absence(view, device)).collect();
-    let is_silent = |id: &DeviceId| away.get(id.index()).is_some_and(Option::is_some);
-    // How many answer says the same, and where.
-    if counts_all(line, &away) || line.reported.answering.is_some() {
-        return Vec::new();
-    }
-    let branches = match line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) {
-        Some(tree) if tree.closes_at().is_some() => return Vec::new(),
-        Some(tree) => in_tree(line, tree, &is_silent, &away),
-        None => in_order(line, &is_silent, &away).into_iter().collect(),
+/// One that does not answer.
+fn alone(line: &Line, device: &Device, absence: &Absence, is_cut_off: bool) -> Condition {
+    let silent = absence.since;
+    let label = line.label(device.id);
+    let text = match absence.ended {
+        None => format!("{label} does not answer"),
+        Some(ended) => {
+            format!("{label} did not answer for {}, then again", ended.since(silent.at))
+        }
     };
-    branches.into_iter().filter(|branch| !is_up(line, branch)).collect()
+    let mut condition = alone_causes(line, device, absence, is_cut_off)
+        .confirmed(silent.at)
+        .about([Symptom::Silent(device.id)])
+        .explaining([
+            Symptom::WorkingCounter(device.id),
+            Symptom::StateLost(device.id),
+            Symptom::Mailbox(device.id),
+        ])
+        .shown_by(Evidence::register(device.id, table::AL_STATUS.address, &silent, text));
+    if let Some(ended) = absence.ended {
+        condition = condition.ended(ended);
+    }
+    // Another tool's list says at once who is gone: those behind went with it.
+    if line.traffic.frames == 0 && !is_cut_off {
+        condition = condition.explaining(behind(line, device.id));
+    }
+    condition
 }
 
-impl Branch {
-    /// Whether one of them has started anew since: it was without supply, and no link that opens does that.
-    fn was_without_supply(&self, line: &Line) -> bool {
-        let has_restarted = |id: &DeviceId| line.device(*id).is_some_and(Device::has_restarted);
-        self.ended.is_some() && self.devices.iter().any(has_restarted)
+fn alone_causes(line: &Line, device: &Device, absence: &Absence, is_cut_off: bool) -> Condition {
+    let (silent, label) = (absence.since, line.label(device.id));
+    let place = Place::device(line.network, device.id);
+    let new = |cause| Condition::new(&PAGE, place, cause, silent.at);
+    if is_cut_off {
+        // Why is for the finding above.
+        return new(FaultName::LinkOpen).confidence(0.6).or(FaultName::DeviceOff, 0.3);
     }
+    let Some(seen) = device.lost_address.filter(|seen| seen.at >= silent.at) else {
+        return new(FaultName::DeviceOff)
+            .confidence(0.5)
+            .or(FaultName::LinkOpen, 0.25)
+            .or(FaultName::BrownOut, 0.1)
+            .advise(format!("Look at {label} and at the way to it: lamps, supply, plugs."));
+    };
+    let text = format!(
+        "{label} answers at its position without its station address: it was without supply, or its \
+         controller was reset; an open link leaves the address as it is"
+    );
+    new(FaultName::DeviceOff)
+        .confidence(0.5)
+        .or(FaultName::BrownOut, 0.3)
+        .or(FaultName::SupplyOff, 0.1)
+        .advise(look_at_supply(&label))
+        .shown_by(Evidence::register(device.id, table::STATION_ADDRESS.address, &seen, text))
+}
+
+fn look_at_supply(label: &str) -> String {
+    format!("Look at the supply of {label}: its plug, its terminals, its fuse.")
+}
+
+/// Some that do not answer to their addresses though frames go through the first of them.
+fn lost_addresses(line: &Line, branch: &Branch) -> Condition {
+    let since = branch.since;
+    let first = branch.devices.first().copied().unwrap_or_default();
+    let label = line.label(first);
+    let others = match branch.devices.len() {
+        0 | 1 => String::new(),
+        count => format!(" and {} that follow upon it", count - 1),
+    };
+    let to = branch.passed_to.map_or_else(String::new, |(id, seen)| {
+        format!(" to {}, which has answered since (at {})", line.label(id), seen.at)
+    });
+    let text = format!(
+        "{label}{others} do not answer to their station addresses, and frames go through {label}{to}: it has supply, \
+         and has lost its address by starting anew"
+    );
+    let all = branch.devices.iter().copied();
+    let mut condition =
+        Condition::new(&PAGE, Place::device(line.network, first), FaultName::BrownOut, since.at)
+            .confidence(0.6)
+            .or(FaultName::DeviceOff, 0.15)
+            .or(FaultName::SupplyOff, 0.1)
+            .confirmed(since.at)
+            .about([Symptom::Silent(first)])
+            .explaining(all.flat_map(follows_from_silence))
+            .shown_by(Evidence::register(first, table::STATION_ADDRESS.address, &since, text))
+            .advise(look_at_supply(&label))
+            .advise(
+                "Let the MainDevice set it up again, or start the MainDevice anew: without address it takes no part.",
+            );
+    if first.index() == 0 {
+        // Without it nothing at all came back.
+        condition =
+            condition.explaining([Symptom::NobodyAnswers, Symptom::FramesLost, Symptom::NoCarrier]);
+    }
+    condition
+}
+
+/// What follows when a SubDevice does not answer.
+fn follows_from_silence(id: DeviceId) -> [Symptom; 4] {
+    [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id), Symptom::Mailbox(id)]
 }
 
 /// The first of some that fell silent together and have started anew.
@@ -209,141 +212,38 @@ fn without_supply(line: &Line, branch: &Branch) -> Condition {
             .or(FaultName::BrownOut, 0.2)
             .confirmed(since.at)
             .about([Symptom::Silent(first)])
-            .explaining(all.flat_map(|id| {
-                [
-                    Symptom::Silent(id),
-                    Symptom::WorkingCounter(id),
-                    Symptom::StateLost(id),
-                    Symptom::Mailbox(id),
-                ]
-            }))
+            .explaining(all.flat_map(follows_from_silence))
             .shown_by(Evidence::register(first, table::AL_STATUS.address, &since, text))
-            .advise(format!("Look at the supply of {label}: its plug, its terminals, its fuse."));
+            .advise(look_at_supply(&label));
     match branch.ended {
         Some(ended) => condition.ended(ended),
         None => condition,
     }
 }
 
-/// Whether broadcasts went on counting all: who still counts is there, and has lost its address.
-fn counts_all(line: &Line, away: &[Option<Absence>]) -> bool {
-    let traffic = &line.traffic;
-    let (Some(now), Some(read)) = (traffic.broadcast_now, traffic.broadcast_read) else {
-        return false;
-    };
-    let since = || away.iter().flatten().map(|absence| absence.since.at);
-    // Who was not asked again since all were counted may have come back with them.
-    let lasts = away.iter().zip(&line.devices).any(|(absence, device)| {
-        absence.is_some_and(|absence| absence.ended.is_none())
-            && device.last_unanswered.is_none_or(|last| last >= now.at)
-    });
-    usize::from(now.value) >= line.devices.len()
-        && since().max().is_some_and(|latest| read >= latest)
-        && (lasts || since().min().is_some_and(|first| now.at < first))
-}
-
-fn in_tree(
-    line: &Line,
-    tree: &Tree,
-    is_silent: &dyn Fn(&DeviceId) -> bool,
-    away: &[Option<Absence>],
-) -> Vec<Branch> {
-    let id = |node: usize| DeviceId(node as u32);
-    let heads = tree.order().iter().copied().filter(|node| {
-        let above = tree.upstream(*node).and_then(|end| end.node());
-        above.is_some_and(|above| !is_silent(&id(above)))
-            && tree.subtree(*node).iter().all(|node| is_silent(&id(*node)))
-    });
-    let branch = |head: usize| {
-        let link = tree.links().get(tree.link_above(head)?)?.map(id);
-        let devices: Vec<DeviceId> = tree.subtree(head).iter().map(|node| id(*node)).collect();
-        Some(Branch {
-            a: link.upstream,
-            b: link.downstream,
-            is_wired: true,
-            is_on_terminal_bus: is_on_terminal_bus(line, head),
-            since: since(away, &devices)?,
-            ended: ended(away, &devices),
-            devices,
-        })
-    };
-    heads.filter_map(branch).collect()
-}
-
-/// Where nobody has seen the wiring: the last ones in the order of positions, as on a line.
-fn in_order(
-    line: &Line,
-    is_silent: &dyn Fn(&DeviceId) -> bool,
-    away: &[Option<Absence>],
-) -> Option<Branch> {
-    let order: Vec<DeviceId> = line.devices.iter().map(|device| device.id).collect();
-    let silent = order.iter().rev().take_while(|id| is_silent(id)).count();
-    let (there, devices) = order.split_at(order.len() - silent);
-    if devices.len() < 2 || there.iter().any(is_silent) {
-        return None;
-    }
-    Some(Branch {
-        a: End::Controller(*there.last()?, Port::B),
-        b: End::Controller(*devices.first()?, Port::A),
-        is_wired: false,
-        is_on_terminal_bus: false,
-        since: since(away, devices)?,
-        ended: ended(away, devices),
-        devices: devices.to_vec(),
-    })
-}
-
-fn since(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Seen<()>> {
-    let absences = devices.iter().filter_map(|id| away.get(id.index()).copied().flatten());
-    absences.map(|absence| absence.since).min_by_key(|seen| seen.at)
-}
-
-/// When all of them answered again.
-fn ended(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Instant> {
-    let absences = devices.iter().map(|id| away.get(id.index()).copied().flatten());
-    let ended: Option<Vec<Instant>> = absences.map(|absence| absence?.ended).collect();
-    ended?.into_iter().max()
-}
-
-/// Whether the near end says, after all fell silent, that the link is there, or that it is not: then another rule
-/// tells of it.
-fn is_up(line: &Line, branch: &Branch) -> bool {
-    let End::Controller(id, _) = branch.a else { return false };
-    let dl = line.device(id).map(|device| &device.dl).filter(|dl| !dl.is_assumed);
-    let read = dl.and_then(|dl| dl.latest_reading);
-    read.is_some_and(|read| read >= branch.since.at)
-}
-
 /// One link, and all behind it silent.
 fn cut_off(line: &Line, branch: &Branch) -> Condition {
-    let (a, b, since) = (branch.a, branch.b, branch.since);
-    let direction = Some(LinkDirection::Both);
-    let place = Place::Link { network: line.network, a, b: Some(b), direction };
-    let (open, off, supply) =
-        if branch.is_on_terminal_bus { (0.5, 0.35, 0.05) } else { (0.6, 0.25, 0.1) };
+    let since = branch.since;
     let first = branch.devices.first().copied().unwrap_or_default();
     let device = Place::device(line.network, first);
-    let label = line.label(first);
-    let count = branch.devices.len();
-    let text = match (count, branch.is_wired) {
-        (1, _) => format!("{label} does not answer, and whoever is before it does"),
-        (_, true) => format!(
-            "{label} and {} behind it do not answer, and whoever is before them does",
-            count - 1
-        ),
-        (_, false) => format!(
-            "the last {count} SubDevices in the order of positions do not answer, {label} the first of \
-             them; the wiring was not seen and is taken for a line"
-        ),
-    };
-    let text = match branch.ended {
-        None => text,
-        Some(ended) => format!("{text}; for {}, then again", ended.since(since.at)),
-    };
-    let all = branch.devices.iter().copied();
+    let place = branch
+        .link
+        .map_or(device, |link| Place::link(line.network, link, Some(LinkDirection::Both)));
     // A link that comes and goes takes the same shares from process data, again and again.
     let outages = line.cyclic.iter().map(|cyclic| cyclic.deficits.len()).max().unwrap_or(0);
     let flaps = outages >= FLAPS;
+    let mut text = silence_text(line, branch);
+    if let Some(ended) = branch.ended {
+        text = format!("{text}; for {}, then again", ended.since(since.at));
+    }
+    if flaps {
+        text = format!("{text}; process data lacked shares {outages} times");
+    }
+    let (open, off, supply) = match branch.link {
+        Some(_) if branch.is_on_terminal_bus => (0.5, 0.35, 0.05),
+        Some(_) => (0.6, 0.25, 0.1),
+        None => (0.5, 0.2, 0.1),
+    };
     let causes = match flaps {
         true => Condition::new(&PAGE, place, FaultName::LinkFlapping, since.at)
             .confidence(0.5)
@@ -354,27 +254,58 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
             .or_at(FaultName::DeviceOff, device, off)
             .or_at(FaultName::SupplyOff, device, supply),
     };
-    let text = match flaps {
-        true => format!("{text}; process data lacked shares {outages} times"),
-        false => text,
+    // As on a line without branches.
+    let before = first.index().checked_sub(1).filter(|_| branch.link.is_none());
+    let causes = match before.map(|index| DeviceId(index as u32)) {
+        None => causes,
+        Some(before) => {
+            let (a, b) = (End::Controller(before, Port::B), Some(End::Controller(first, Port::A)));
+            let direction = Some(LinkDirection::Both);
+            let link = Place::Link { network: line.network, a, b, direction };
+            causes.or_at(FaultName::LinkOpen, link, 0.15)
+        }
     };
+    let label = line.label(first);
+    let all = branch.devices.iter().copied();
     let condition = causes
         .confirmed(since.at)
         .about(all.clone().map(Symptom::Silent))
-        .explaining(all.flat_map(|id| {
-            [
-                Symptom::Silent(id),
-                Symptom::WorkingCounter(id),
-                Symptom::StateLost(id),
-                Symptom::Mailbox(id),
-            ]
-        }))
+        .explaining(all.flat_map(follows_from_silence))
         .shown_by(Evidence::register(first, table::AL_STATUS.address, &since, text))
-        .advise(format!("Look at {label}: if no lamp is lit, measure its supply first."))
-        .advise(format!("Look at the plugs and the cable of {place}."));
+        .advise(format!("Look at {label}: if no lamp is lit, measure its supply first."));
+    let condition = match branch.link {
+        Some(_) => condition.advise(format!("Look at the plugs and the cable of {place}.")),
+        None => condition
+            .advise(format!(
+                "Follow the way into {label}: plugs, cable or contact, to where it comes from."
+            ))
+            .advise("Name the project or ENI, `--project FILE`: it has the wiring."),
+    };
     match branch.ended {
         Some(ended) => condition.ended(ended),
-        None => condition,
+        None => {
+            let mut condition = condition;
+            condition.evidence.extend(way::evidence(line, since.at));
+            condition
+        }
+    }
+}
+
+/// Who does not answer, in words.
+fn silence_text(line: &Line, branch: &Branch) -> String {
+    let label = |id: Option<&DeviceId>| line.label(id.copied().unwrap_or_default());
+    let first = label(branch.devices.first());
+    match (branch.devices.len(), branch.link) {
+        (1, _) => format!("{first} does not answer, and whoever is before it does"),
+        (count, Some(_)) => format!(
+            "{first} and {} behind it do not answer, and whoever is before them does",
+            count - 1
+        ),
+        (count, None) => format!(
+            "{count} SubDevices that follow upon one another do not answer, from {first} to {}, and whoever is \
+             before them does; what {first} hangs on was not seen",
+            label(branch.devices.last())
+        ),
     }
 }
 

@@ -2,7 +2,8 @@
 //!
 //! The MainDevice's side stopped sending process data, and watchdogs expired.
 //!
-//! **How it is found.** A SubDevice left OP with AL status code 0x001B. Right before, the datagrams with its
+//! **How it is found.** A SubDevice left OP with AL status code 0x001B, or is in SAFEOP with an error whose code nobody
+//! has read. Right before, the datagrams with its
 //! outputs paused for as long as its watchdog (0x0400, 0x0420; 100 ms after a reset) or longer. Either none
 //! was sent in that time, or the card did not take them though it had a link. If they were sent and did not
 //! come back, or nobody was there any more to send them to, the line is to blame: then this rule says nothing,
@@ -11,8 +12,9 @@
 //! Without any watchdog that expired: all frames stayed away for 20 ms or more and then came again, while no
 //! link was lost, no SubDevice restarted, and no counter of any of them moved, and the card refused frames
 //! meanwhile. Frames that it took and that nobody brought back vanished on the line (`H100`). A recording has those that
-//! the card took alone: where it refused them, nothing is recorded as sent. If nothing at all was sent for 20 ms or
-//! more and all went on then, with no link lost and no counter moved, that is a note.
+//! the card took alone: where it refused them, nothing is recorded as sent. If another program drives the line and nothing
+//! at all was sent for 20 ms or more and all went on then, with no link lost and no counter moved as far as that was
+//! read, that is a note.
 //!
 //! **What it means.** The application, or the program that sends, stood still: a long call within the cycle
 //! (an SDO, a file, a print), a garbage collector, a debugger, a process without real-time priority, a
@@ -25,8 +27,9 @@
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::register::ErrorCounter;
-use linesman_proto::state::{AlState, AlStatusCode};
+use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
@@ -44,12 +47,12 @@ pub const PAGE: RulePage = RulePage {
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
-/// SyncManager watchdog.
-const WATCHDOG: AlStatusCode = AlStatusCode(0x001B);
 /// So many frames in a row that do not come back …
 const SEVERAL: u64 = 3;
 /// … for so long are no accident.
 const STALLED: Span = Span::ms(20);
+/// Where nobody reads counters, a pause is worth a word that is as long as watchdogs hold after a reset.
+const NOTABLE: Span = Span::ms(100);
 /// States are polled after the pause: an expiry is read so long after it at most.
 const READ_WITHIN: Span = Span::ms(1500);
 
@@ -65,8 +68,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
     let mut all: Vec<Found<'_>> = Vec::new();
     for device in &line.devices {
-        let expired = |error: &&AlError| error.code.is_some_and(|code| code.value == WATCHDOG);
-        let Some(error) = device.al.errors.iter().rfind(expired) else { continue };
+        let mut errors = device.al.errors.iter();
+        let Some(error) = errors.rfind(|error| error.may_be_watchdog()) else { continue };
         let Some((pause, at_card)) = pause_before(line, device, error) else { continue };
         match all.iter_mut().find(|found| found.pause.to == pause.to) {
             Some(found) => found.devices.push(device),
@@ -93,10 +96,11 @@ fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause,
     });
     for cyclic in mine {
         let of = |beat: &Beat| {
+            // Who had starved before anybody listened is starved by pauses that go on.
             let fits = |pause: &&Pause| {
-                pause.span() >= watchdog
-                    && pause.from < error.status.at
-                    && error.status.at.since(pause.to.min(error.status.at)) <= READ_WITHIN
+                let is_before = pause.from < error.status.at
+                    && error.status.at.since(pause.to.min(error.status.at)) <= READ_WITHIN;
+                pause.span() >= watchdog && (is_before || error.was_left_over())
             };
             beat.pauses.iter().rev().find(fits).copied()
         };
@@ -246,31 +250,47 @@ fn stalled(line: &Line) -> Option<Condition> {
     )
 }
 
-/// In a recording: nothing was sent for a while, to anybody, and then all went on as before. The card had its
-/// link, and no watchdog expired: nobody was hurt.
+/// Somebody else drives the line, and nothing was sent for a while, to anybody; then all went on as before. No watchdog
+/// expired: nobody was hurt. Frames that were not sent are not lost, and no link is open for that.
 fn stood_still(line: &Line) -> Option<Condition> {
-    if line.traffic.direction_known {
+    let is_hurt = |device: &Device| device.al.errors.iter().any(AlError::may_be_watchdog);
+    if line.sees_all_orders || line.devices.iter().any(is_hurt) {
         return None;
     }
     let went_on = |pause: &Pause| {
-        line.cyclic.iter().any(|cyclic| cyclic.sent.last().is_some_and(|last| last > pause.to))
-    };
-    let pause = line.quiet().find(|pause| went_on(pause) && !was_silent(line, *pause))?;
-    let were_read = |at: Instant| {
-        line.devices.iter().any(|device| {
-            let mut tracks = device.counters.tracks();
-            tracks.any(|(counter, track)| {
-                matches!(counter, ErrorCounter::LostLink(_)) && track.last.at > at
-            })
+        line.cyclic.iter().any(|cyclic| {
+            let has_begun = cyclic.first.at <= pause.from;
+            has_begun && cyclic.sent.last().is_some_and(|last| last > pause.to)
         })
     };
-    if !(were_read(pause.to) && kept_links(line, pause)) {
+    let pause = line.quiet().find(|pause| went_on(pause) && !was_silent(line, *pause))?;
+    let kept_carrier = Path::ALL.into_iter().all(|card| !lost_its_link(line, card, pause));
+    if !(kept_carrier && kept_links(line, pause)) {
         return None;
     }
+    let were_read = line.devices.iter().any(|device| {
+        let mut tracks = device.counters.tracks();
+        tracks.any(|(counter, track)| {
+            matches!(counter, ErrorCounter::LostLink(_)) && track.last.at > pause.to
+        })
+    });
+    if !were_read && pause.span() < NOTABLE {
+        return None;
+    }
+    let known = match were_read {
+        true => "no link was lost and no counter of any SubDevice moved",
+        false => "nothing was lost and nobody has started anew; nobody has read links or counters",
+    };
     let text = format!(
-        "nothing was sent for {:.1} ms, then all went on; no link was lost and no counter of any SubDevice moved",
+        "nothing was sent for {:.1} ms, then all went on; {known}",
         pause.span().as_secs_f64() * 1e3
     );
+    let first_link = Place::Link {
+        network: line.network,
+        a: End::MainDevice(Path::A),
+        b: None,
+        direction: None,
+    };
     let mut condition = Condition::new(&PAGE, Place::Host, FaultName::WatchdogStarved, pause.from)
         .confidence(0.5)
         .or(FaultName::HostJitter, 0.3)
@@ -281,6 +301,10 @@ fn stood_still(line: &Line) -> Option<Condition> {
             "Ask whether the program that sends was to pause: a change of its state, a debugger.",
         )
         .advise("Run `linesman host`: it tells what lets this computer stop a program.");
+    if !were_read && line.host.card(Path::A).carrier.is_none() {
+        // A card without a link takes no frames either.
+        condition = condition.or_at(FaultName::LinkFlapping, first_link, 0.1);
+    }
     condition.severity = Severity::Info;
     Some(condition)
 }

@@ -92,6 +92,7 @@ fn condition(line: &Line, device: &Device, change: &DlChange, back: Option<Insta
                 Symptom::StateLost(id),
                 Symptom::WorkingCounter(id),
                 Symptom::Emergency(id),
+                Symptom::InputsStill(id),
             ])
             .advise(format!("Take no input of {label} for fresh."))
             .advise(

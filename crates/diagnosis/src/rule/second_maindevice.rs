@@ -3,8 +3,8 @@
 //! Requests come from more than one source address.
 //!
 //! **How it is found.** Frames on their way out carry the address of the card that sent them. Two
-//! addresses that each send requests of their own are two senders on one line; the second card of a ring
-//! only repeats what the first one sends. A MainDevice that is plugged in behind the point of observation
+//! addresses that each send requests of their own are two senders on one line, on one computer, too; the second card of a
+//! ring only repeats what the first one sends. A MainDevice that is plugged in behind the point of observation
 //! shows by its returns alone: frames come back, processed, that nobody here has sent.
 //!
 //! **What it means.** Two MainDevices fight for the line: each changes states, clears counters and writes
@@ -52,10 +52,15 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             || !sender.is_elsewhere && senders.iter().any(|other| other.is_elsewhere)
     };
     let own: Vec<_> = senders.iter().filter(is_one).collect();
-    // The cards of this host are one MainDevice.
-    let ours = own.iter().position(|sender| sender.is_host);
-    let others = own.iter().enumerate().filter(|(at, sender)| !sender.is_host || ours == Some(*at));
-    let apart: Vec<_> = others.map(|(_, sender)| *sender).collect();
+    // The cards of this host are one MainDevice; two that send by one card are two programs.
+    let mut apart: Vec<&Sender> = Vec::new();
+    for sender in own {
+        let is_same =
+            |known: &&&Sender| known.is_host && sender.is_host && known.card != sender.card;
+        if apart.iter().find(is_same).is_none() {
+            apart.push(sender);
+        }
+    }
     let [_, shown, ..] = &apart[..] else { return };
     let names: Vec<_> = apart.iter().map(|sender| sender.mac.to_string()).collect();
     let text =

@@ -7,6 +7,9 @@
 //! (`S200`); if it had been there, it *left* that state by itself (`S201`, watchdog `S202`,
 //! synchronisation `T400`).
 //!
+//! Where nobody reads the code, an error in SAFEOP while process data are exchanged is most likely an expired watchdog: it
+//! is the one that takes a SubDevice there whenever outputs stay away.
+//!
 //! An error that stood already when the SubDevice was first read, and that the MainDevice acknowledged, is left
 //! over from an earlier run: a note. Watchdogs of several SubDevices that expire at about the same time are one
 //! finding, of the network.
@@ -91,15 +94,13 @@ const AT_ONCE: Span = Span::ms(1_500);
 const SEVERAL: usize = 2;
 /// So many SubDevices are named.
 const NAMED: usize = 6;
-/// SyncManager watchdog.
-const WATCHDOG_CODE: AlStatusCode = AlStatusCode(0x001B);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for device in &view.line.devices {
         // One finding for each kind of trouble, however often it came back: the latest is shown.
         let mut pages: Vec<(&'static RulePage, &AlError, u32)> = Vec::new();
         for error in &device.al.errors {
-            let page = page_of(error);
+            let page = page_of(view.line, error);
             match pages.iter_mut().find(|(known, ..)| known.code == page.code) {
                 Some((_, latest, times)) => {
                     *latest = error;
@@ -109,7 +110,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             }
         }
         for (page, error, times) in pages {
-            if !may_be_left_over(view, error) && !is_echo(error) {
+            if !may_be_left_over(view, error) && !error.may_be_echo() {
                 conditions.push(condition(view, device, page, error, times));
             }
         }
@@ -127,13 +128,6 @@ fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
         && error.ended.is_none()
 }
 
-/// Whether an error bit may be the acknowledgement that a MainDevice writes with each request: a SubDevice whose
-/// controller emulates the device copies AL control to AL status, error bit and all, and has no AL status code
-/// (register 0x0140 bit 8). Only one that stood from the first reading on, so that nobody saw it come.
-fn is_echo(error: &AlError) -> bool {
-    error.was_left_over() && error.code.is_some_and(|code| code.value == AlStatusCode(0))
-}
-
 /// Whether an error is of a time before this run: where process data went on while it stood, it belongs to them.
 fn was_left_over(line: &Line, error: &AlError) -> bool {
     let ended = error.ended.unwrap_or(error.status.at);
@@ -149,7 +143,10 @@ fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Conditi
         |id: DeviceId| conditions.iter().any(|one| one.explains.contains(&Symptom::StateLost(id)));
     let starved = line.devices.iter().filter_map(|device| {
         let mut errors = device.al.errors.iter().rev();
-        let error = errors.find(|error| page_of(error).code == WATCHDOG.code)?;
+        let error = errors.find(|error| {
+            let page = page_of(line, error);
+            page.code == WATCHDOG.code || (page.code == LEFT.code && error.may_be_watchdog())
+        })?;
         Some((device, error)).filter(|_| !is_explained(device.id))
     });
     let starved: Vec<(&Device, &AlError)> = starved.collect();
@@ -166,11 +163,15 @@ fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Conditi
         0 => String::new(),
         more => format!(" and {more} others"),
     };
-    let text = format!(
-        "the watchdogs of {} SubDevices expired at about the same time: {}{more}",
-        together.len(),
-        names.join(", ")
-    );
+    let are_read = together.iter().all(|(_, error)| error.code.is_some());
+    let what = match are_read {
+        true => format!("the watchdogs of {} SubDevices expired", together.len()),
+        false => format!(
+            "{} SubDevices went to SAFEOP with an error whose code was not read of all",
+            together.len()
+        ),
+    };
+    let text = format!("{what} at about the same time: {}{more}", names.join(", "));
     let place = Place::Network { network: line.network };
     let mut condition = Condition::new(&WATCHDOG, place, FaultName::WatchdogStarved, since)
         .confidence(0.8)
@@ -196,16 +197,19 @@ fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Conditi
     Some(condition)
 }
 
-fn page_of(error: &AlError) -> &'static RulePage {
+fn page_of(line: &Line, error: &AlError) -> &'static RulePage {
     // Who was higher before and was asked for nothing has left; a watchdog watches those that are in OP alone.
     let fell = error.from.is_some_and(|from| error.status.value.state().state() < Some(from));
-    let is_watchdog = error.code.is_some_and(|code| code.value == WATCHDOG_CODE);
-    let has_left = error.had_arrived || error.requested.is_none() && (fell || is_watchdog);
-    if !has_left {
+    let watchdog = AlStatusCode::SYNC_MANAGER_WATCHDOG;
+    let is_watchdog = error.code.is_some_and(|code| code.value == watchdog);
+    // A MainDevice that is refused a state while it starts does not go on to exchange process data.
+    let is_unread = error.code.is_none() && error.from.is_none() && !line.cyclic.is_empty();
+    let asked_for_nothing = error.requested.is_none() && (fell || is_watchdog || is_unread);
+    if !error.had_arrived && !asked_for_nothing {
         return &REFUSED;
     }
     match error.code.map(|code| code.value) {
-        Some(WATCHDOG_CODE) => &WATCHDOG,
+        Some(code) if code == watchdog => &WATCHDOG,
         // Its SYNC signals do not come as they should, whatever class the code is of.
         Some(AlStatusCode::DC_SYNC_IO_ERROR) => &SYNC,
         Some(code) if code.explain().class == CodeClass::Timing => &SYNC,
@@ -232,13 +236,18 @@ fn condition(
         "S200" => FaultName::InitRefused,
         "S202" => FaultName::WatchdogStarved,
         "T400" => out_of_step(device, error),
+        _ if error.code.is_none() && error.may_be_watchdog() => FaultName::WatchdogStarved,
         _ => FaultName::FirmwareFault,
     };
     let mut condition = Condition::new(page, place, cause, error.status.at)
         .confidence(if meaning.is_some() { 0.8 } else { 0.6 })
         .confirmed(error.status.at)
         .about([Symptom::StateLost(device.id)])
-        .explaining([Symptom::WorkingCounter(device.id), Symptom::Emergency(device.id)]);
+        .explaining([
+            Symptom::WorkingCounter(device.id),
+            Symptom::Emergency(device.id),
+            Symptom::InputsStill(device.id),
+        ]);
     condition = match (cause, meaning.map(|meaning| meaning.class)) {
         (FaultName::ConfigMismatch, _) => condition.or(FaultName::InitRefused, 0.15),
         (FaultName::FirmwareFault, _) if page.code == "S200" => {
@@ -248,6 +257,12 @@ fn condition(
             condition.or(FaultName::SyncLost, 0.15)
         }
         (FaultName::InitRefused, _) => condition.or(FaultName::FirmwareFault, 0.1),
+        (FaultName::WatchdogStarved, None) => condition
+            .confidence(0.4)
+            .or(FaultName::SyncLost, 0.15)
+            .or(FaultName::FirmwareFault, 0.15)
+            .or(FaultName::InitRefused, 0.1)
+            .or_at(FaultName::HostJitter, Place::Host, 0.05),
         (FaultName::WatchdogStarved, _) => {
             condition.or_at(FaultName::HostJitter, Place::Host, 0.1).or(FaultName::LateFrames, 0.05)
         }
@@ -291,7 +306,9 @@ fn condition(
             }
         }
         None => {
+            let text = "nobody has read its AL status code (0x0134), which says why";
             condition = condition
+                .shown_by(Evidence::host(Some(error.status.at), text))
                 .advise("Read AL status code (0x0134) of this SubDevice: it says why.")
                 .advise("Request the states one by one and note at which step the error comes.");
         }

@@ -28,7 +28,7 @@ use linesman_proto::time::{Instant, Span};
 use super::{Rule, RulePage, View, processor_stopped};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::line::{Cyclic, Deficit, Device, Line, Owner, Trouble};
-use crate::locate::Drops;
+use crate::locate::{Drops, way};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -295,7 +295,13 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     };
     let known = first_suspect
         .and_then(|device| deficits.iter().find_map(|(_, at)| trouble(device, at, view.now)));
-    let nobody_known = suspects.devices.is_empty() && lasts;
+    let link_changed = line.changed_link().filter(|event| {
+        deficits.iter().any(|(_, deficit)| {
+            let (from, to) = around(deficit, view.now);
+            from <= event.at && event.at <= to
+        })
+    });
+    let nobody_known = suspects.devices.is_empty() && (lasts || link_changed.is_some());
     // Again and again for a moment: a contact that opens, and nothing that hangs.
     let is_flapping = suspects.devices.is_empty() && deficits.len() >= FLAPS;
     let (cause, confidence, others) = match known {
@@ -305,6 +311,9 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
         // All behind a link, or nobody knows whose: a cable, or the supply of a device, takes shares for good.
         _ if !links.is_empty() => {
             (FaultName::LinkOpen, 0.5, [(FaultName::DeviceOff, 0.2), (FaultName::SupplyOff, 0.1)])
+        }
+        None if nobody_known && link_changed.is_some() => {
+            (FaultName::LinkOpen, 0.4, [(FaultName::DeviceOff, 0.25), (FaultName::BrownOut, 0.15)])
         }
         None if nobody_known => (
             FaultName::LinkOpen,
@@ -349,6 +358,14 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     }
     for (cyclic, deficit) in deficits.iter().rev().take(3) {
         condition = condition.shown_by(evidence(line, cyclic, deficit));
+    }
+    if let Some(event) = link_changed {
+        let text = "the frames tell that DL status of a SubDevice has changed then (event field, bit 2): a link came or \
+                    went";
+        condition = condition.shown_by(Evidence::frame(event.at, event.frame.unwrap_or(0), text));
+    }
+    if lasts && !links.is_empty() {
+        condition.evidence.extend(way::evidence(line, since));
     }
     // Where one or some of them are it, or the set-up was not seen and they are all that are in trouble, what
     // explains it of each of them explains this, whoever it is.

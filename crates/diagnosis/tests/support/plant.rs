@@ -18,6 +18,7 @@ pub fn frmw(time: u64) -> Datagram {
         back: time.to_le_bytes().to_vec(),
         wkc: 3,
         passed: 0,
+        events: 0,
     }
 }
 

@@ -20,6 +20,8 @@ pub struct Datagram {
     pub wkc: u16,
     /// What the controllers added to ADP.
     pub passed: u16,
+    /// The event field, as controllers have left it.
+    pub events: u16,
 }
 
 /// A broadcast read that `count` controllers answer.
@@ -32,6 +34,7 @@ pub fn brd(register: u16, back: &[u8], count: u16) -> Datagram {
         back: back.to_vec(),
         wkc: count,
         passed: count,
+        events: 0,
     }
 }
 
@@ -45,6 +48,7 @@ pub fn fprd(station: u16, register: u16, back: &[u8]) -> Datagram {
         back: back.to_vec(),
         wkc: 1,
         passed: 0,
+        events: 0,
     }
 }
 
@@ -58,6 +62,7 @@ pub fn fpwr(station: u16, register: u16, data: &[u8]) -> Datagram {
         back: data.to_vec(),
         wkc: 1,
         passed: 0,
+        events: 0,
     }
 }
 
@@ -72,6 +77,7 @@ pub fn apwr(position: u16, register: u16, data: &[u8], count: u16) -> Datagram {
         back: data.to_vec(),
         wkc: 1,
         passed: count,
+        events: 0,
     }
 }
 
@@ -84,6 +90,7 @@ pub fn lrw(start: u32, len: usize, wkc: u16) -> Datagram {
         back: vec![0; len],
         wkc,
         passed: 0,
+        events: 0,
     }
 }
 
@@ -96,11 +103,28 @@ impl Datagram {
         }
         self
     }
+
+    /// The same, with events of controllers.
+    pub fn events(mut self, events: u16) -> Self {
+        self.events = events;
+        self
+    }
+
+    /// The same, with other data on its way back.
+    pub fn back(mut self, data: &[u8]) -> Self {
+        self.back = data.to_vec();
+        self
+    }
 }
 
 /// A frame with these datagrams, on its way out or back.
 pub fn frame(datagrams: &[Datagram], index: u8, is_back: bool) -> Vec<u8> {
-    let source = if is_back { SENDER.marked() } else { SENDER };
+    frame_of(SENDER, datagrams, index, is_back)
+}
+
+/// The same of another sender.
+pub fn frame_of(sender: MacAddress, datagrams: &[Datagram], index: u8, is_back: bool) -> Vec<u8> {
+    let source = if is_back { sender.marked() } else { sender };
     let mut buffer = vec![0; 1514];
     let mut builder = FrameBuilder::new(&mut buffer, source);
     let mut at = 16;
@@ -116,13 +140,15 @@ pub fn frame(datagrams: &[Datagram], index: u8, is_back: bool) -> Vec<u8> {
         let index = index.wrapping_add(offset as u8);
         builder.push(datagram.command, index, address, data.len()).unwrap().copy_from_slice(data);
         at += 10 + data.len();
-        counters.push((at, datagram.wkc));
+        counters.push((at, datagram));
         at += 2;
     }
     let len = builder.finish();
     if is_back {
-        for (at, wkc) in counters {
-            buffer[at..at + 2].copy_from_slice(&wkc.to_le_bytes());
+        for (at, datagram) in counters {
+            buffer[at..at + 2].copy_from_slice(&datagram.wkc.to_le_bytes());
+            let events = at - datagram.sent.len() - 2;
+            buffer[events..events + 2].copy_from_slice(&datagram.events.to_le_bytes());
         }
     }
     buffer.truncate(len);
@@ -138,6 +164,8 @@ pub struct Script {
     /// Whether the directions are told, as a live socket does.
     pub is_live: bool,
     pub path: Option<Path>,
+    /// The source address of the MainDevice.
+    pub sender: MacAddress,
 }
 
 impl Script {
@@ -147,7 +175,15 @@ impl Script {
 
     pub fn with(setup: Setup) -> Self {
         let engine = Engine::new(setup);
-        Self { engine, now: 1_000_000, number: 0, index: 0, is_live: false, path: None }
+        Self {
+            engine,
+            now: 1_000_000,
+            number: 0,
+            index: 0,
+            is_live: false,
+            path: None,
+            sender: SENDER,
+        }
     }
 
     /// A line of `count` devices, scanned: station addresses 0x1001 and up, all in PREOP.
@@ -189,12 +225,12 @@ impl Script {
 
     pub fn send(&mut self, datagrams: &[Datagram]) {
         let direction = if self.is_live { Direction::Sent } else { Direction::Unknown };
-        self.feed(&frame(datagrams, self.index, false), direction, 80_000);
+        self.feed(&frame_of(self.sender, datagrams, self.index, false), direction, 80_000);
     }
 
     pub fn give_back(&mut self, datagrams: &[Datagram]) {
         let direction = if self.is_live { Direction::Received } else { Direction::Unknown };
-        self.feed(&frame(datagrams, self.index, true), direction, 20_000);
+        self.feed(&frame_of(self.sender, datagrams, self.index, true), direction, 20_000);
     }
 
     pub fn feed(&mut self, bytes: &[u8], direction: Direction, after: u64) {

@@ -15,26 +15,29 @@
 //! In a ring that is open each card has positions of its own. Those of card B begin at the gap, so they follow
 //! upon those of card A (S1 chapter 3: who is entered from behind is processed on the way back).
 
+mod number;
 mod unanswered;
 
 use std::collections::BTreeMap;
 
 use linesman_proto::address::{DeviceId, Path, Position, StationAddress};
 use linesman_proto::command::Addressing;
+use linesman_proto::time::Span;
 
+use super::count::CountDoubt;
 use super::{Answer, word_at};
 use crate::line::{Device, Line, Seen, SharedBy};
+use number::MOST_BY_NUMBER;
 use unanswered::Unanswered;
 
+/// Who did not answer at its station address so long ago at most, and is given one, had lost it.
+const AWAY_WITHIN: Span = Span::s(5);
+/// The station address by which SOEM takes a SubDevice aside that it sets up anew.
+const SET_ASIDE: StationAddress = StationAddress(0xFFFF);
 /// Most controllers that are learnt from frames.
 const MOST_DEVICES: usize = 4096;
 /// Configured station address.
 const STATION: u16 = 0x0010;
-/// First station addresses that MainDevices give: SOEM, ours and KickCAT; TwinCAT; IgH; ethercrab.
-const FIRST_STATIONS: [u16; 4] = [0x1001, 1001, 1, 0x1000];
-/// A station address that lies farther from the first one tells no place, as long as nobody has counted.
-const MOST_BY_NUMBER: usize = 1000;
-
 /// What positions and station addresses mean at the moment.
 #[derive(Clone, Default, Debug)]
 pub struct Addresses {
@@ -43,12 +46,16 @@ pub struct Addresses {
     order: Vec<DeviceId>,
     /// How many controllers a frame passes now, both cards of a ring together.
     present: Option<u16>,
+    /// A count that is too large to be believed at once.
+    doubt: CountDoubt,
     /// How many of them by each card, as far as that was seen.
     halves: [Option<u16>; 2],
     /// Whether a station was taken for a controller's without any sign of its position.
     has_guessed: bool,
     /// Whether controllers were put into order by their station addresses, without any sign of their positions.
     is_by_address: bool,
+    /// By how many station addresses, by which count and from which first address they were last put into order.
+    settled_by: Option<(usize, Option<u16>, Option<u16>)>,
     /// Whether something was said of single controllers, so that they keep their numbers.
     is_named: bool,
     /// Station addresses that were asked and never answered.
@@ -75,8 +82,18 @@ impl Addresses {
         self.present
     }
 
-    /// A frame that `card` has sent, where that is known, passed `passed` controllers.
-    pub(super) fn passed(&mut self, line: &mut Line, card: Option<Path>, passed: u16) {
+    /// A frame that `card` has sent, where that is known, passed `passed` controllers; confirmed, if as many have
+    /// answered.
+    pub(super) fn passed(
+        &mut self,
+        line: &mut Line,
+        card: Option<Path>,
+        passed: u16,
+        is_confirmed: bool,
+    ) {
+        if !self.doubt.is_believed(passed, line.traffic.positions_seen, is_confirmed) {
+            return;
+        }
         let Some(card) = card else { return self.count(line, passed) };
         self.halves[card.index()] = Some(passed);
         let other = &mut self.halves[card.other().index()];
@@ -115,17 +132,32 @@ impl Addresses {
         line.traffic.positions_seen = line.traffic.positions_seen.max(passed);
         let passed = usize::from(passed).min(MOST_DEVICES);
         while self.order.len() < passed {
-            // Those that answered to a station before any position was known come first.
-            let free = line.devices.get(self.order.len()).map(|device| device.id);
+            // Those that answered to a station before any position was known come first, and those that come back have
+            // their places.
+            let mut known = line.devices.iter().map(|device| device.id);
+            let free = known.find(|id| !self.order.contains(id));
             let id = free.unwrap_or_else(|| line.add_device());
-            self.order.push(id);
+            let place = self.order.partition_point(|one| *one < id);
+            self.order.insert(place, id);
         }
         let is_line = line
             .tree
             .as_ref()
-            .is_none_or(|tree| (0..tree.len()).all(|node| tree.children(node).count() <= 1));
-        let is_certain =
-            |position: usize| position < passed && (passed == self.order.len() || is_line);
+            .is_some_and(|tree| (0..tree.len()).all(|node| tree.children(node).count() <= 1));
+        let is_whole = passed == self.order.len();
+        // Where the wiring is not known, those before whom nobody is missing.
+        let is_away = |id: &DeviceId| {
+            line.device(*id).is_none_or(|one| {
+                one.silent.is_some() || (one.answered.is_none() && self.is_by_address)
+            })
+        };
+        let before_any_away = match line.tree {
+            Some(_) => 0,
+            None => self.order.iter().position(is_away).unwrap_or(self.order.len()),
+        };
+        let is_certain = |position: usize| {
+            position < passed && (is_whole || is_line || position < before_any_away)
+        };
         for (position, id) in self.order.iter().enumerate() {
             let known = is_certain(position).then_some(Position(position as u16));
             if let Some(device) = line.device_mut(*id) {
@@ -149,19 +181,44 @@ impl Addresses {
             self.count(line, position.0.checked_add(1)?);
             self.present = None;
         }
-        let known = match self.present {
-            Some(present) if usize::from(present) < self.order.len() => line.by_position(position),
-            Some(_) | None => self.order.get(index).copied(),
+        // Whoever is known beyond those that were counted may be anywhere among them.
+        let is_partial = self.present.is_some_and(|one| {
+            let present = usize::from(one);
+            present < self.order.len() || (line.tree.is_none() && present < line.devices.len())
+        });
+        let known = match (is_partial, &line.tree) {
+            (true, None) => self.named_here(answer).or_else(|| self.among_present(line, index)),
+            (true, Some(_)) => line.by_position(position),
+            (false, _) => self.order.get(index).copied(),
         };
         if known.is_some() {
             return known;
         }
-        // Its station address, read or written right here, tells who it is.
-        let data = if answer.effect.reads { answer.reply.data() } else { answer.written() };
-        let station = word_at(data, answer.ado, STATION).filter(|_| answer.sum > 0)?;
-        let id = *self.stations.get(&StationAddress(station))?;
+        let id = self.named_here(answer)?;
         line.device_mut(id)?.position = Some(position);
         Some(id)
+    }
+
+    /// The controller whose station address is read or written by a datagram.
+    fn named_here(&self, answer: &Answer<'_>) -> Option<DeviceId> {
+        let data = if answer.effect.reads { answer.reply.data() } else { answer.written() };
+        let station = word_at(data, answer.ado, STATION).filter(|_| answer.sum > 0)?;
+        self.stations.get(&StationAddress(station)).copied()
+    }
+
+    /// The controller at a place among those that are there, where some are not: those that are left keep their order.
+    /// As long as it is not known who is missing, only those before whom nobody is.
+    fn among_present(&self, line: &Line, index: usize) -> Option<DeviceId> {
+        // While a line is scanned nobody has answered yet; who was met by its number alone must have.
+        let is_there =
+            |one: &&Device| one.silent.is_none() && (one.answered.is_some() || !self.is_by_address);
+        let mut there = line.devices.iter().filter(is_there);
+        let count = there.clone().count();
+        let found = match self.present.map(usize::from) == Some(count) {
+            true => there.nth(index),
+            false => line.devices.iter().take_while(is_there).nth(index),
+        };
+        found.map(|device| device.id)
     }
 
     /// The controller with a station address. One that answers and is not known yet is taken to be
@@ -178,11 +235,14 @@ impl Addresses {
         if !answers {
             return None;
         }
-        let by_number = self.by_number(line, station);
+        let by_number = self.by_number(line, station, MOST_BY_NUMBER);
         let by_number = by_number.filter(|id| line.device(*id).is_some_and(Self::is_free));
         let free = || line.devices.iter().find(|one| Self::is_free(one)).map(|device| device.id);
+        // Where all were counted and have their addresses, one of them has got another one, unseen.
+        let is_whole = self.present.is_some_and(|one| usize::from(one) == line.devices.len());
         let id = match by_number.or_else(free) {
             Some(id) => id,
+            None if is_whole => return None,
             None if line.devices.len() < MOST_DEVICES => line.add_device(),
             None => return None,
         };
@@ -198,30 +258,6 @@ impl Addresses {
         device.station.is_none()
     }
 
-    /// The controller whose place in the line a station address tells, where MainDevices count from a known number
-    /// on: among those that were counted, or, before anybody has counted, as far as it goes.
-    fn by_number(&self, line: &mut Line, station: StationAddress) -> Option<DeviceId> {
-        if line.devices.iter().any(|one| one.planned.is_some()) {
-            return None;
-        }
-        // While nobody has counted them the number alone tells.
-        let is_counted = self.present.is_some() || !self.order.is_empty();
-        let count = if is_counted { self.order.len() } else { MOST_BY_NUMBER };
-        let known = self.stations.keys().chain([&station]);
-        let (least, most) =
-            known.fold((u16::MAX, 0), |(least, most), one| (least.min(one.0), most.max(one.0)));
-        let fits = |first: &u16| *first <= least && usize::from(most - *first) < count;
-        let first = FIRST_STATIONS.into_iter().find(fits)?;
-        let place = usize::from(station.0 - first);
-        if is_counted {
-            return self.order.get(place).copied();
-        }
-        while line.devices.len() <= place {
-            line.add_device();
-        }
-        Some(DeviceId(place as u32))
-    }
-
     /// Whether single controllers were named, so that their numbers stay.
     pub(super) const fn name(&mut self) {
         self.is_named = true;
@@ -230,87 +266,6 @@ impl Addresses {
     /// Whether the order of controllers is known: from their positions, or by [`Self::settle`].
     pub(super) const fn is_settled(&self) -> bool {
         !self.has_guessed
-    }
-
-    /// Puts controllers that were met by their station addresses in the middle of a run into order: every known
-    /// MainDevice gives these addresses in the order of positions. Identities change, so this is only for a line of
-    /// which nothing was said yet. Says whether any changed.
-    pub(super) fn settle(&mut self, line: &mut Line) -> bool {
-        let is_planned = line.devices.iter().any(|one| one.planned.is_some());
-        if self.is_named || !self.has_guessed || is_planned {
-            return false;
-        }
-        let Some(places) = self.places(line) else { return false };
-        self.has_guessed = false;
-        self.is_by_address = true;
-        let is_in_order = line
-            .devices
-            .iter()
-            .all(|one| one.station.is_none_or(|at| places.get(&at) == Some(&one.id.index())));
-        if is_in_order {
-            return false;
-        }
-        let count = places.values().max().map_or(0, |last| last + 1).max(line.devices.len());
-        let mut sorted: Vec<Option<Device>> = vec![None; count];
-        let (addressed, others): (Vec<Device>, Vec<Device>) =
-            line.devices.drain(..).partition(|device| device.station.is_some());
-        for device in addressed {
-            if let Some(place) = device.station.and_then(|station| places.get(&station)) {
-                sorted[*place] = Some(device);
-            }
-        }
-        // Of those without an address nothing is known but that they are there.
-        let mut others = others.into_iter();
-        self.stations.clear();
-        self.order.clear();
-        let mut position = 0;
-        // Those that were once counted all together have their positions, whether they answer now or not.
-        let was_whole = self.most_counted(line) >= sorted.len();
-        for (index, place) in sorted.into_iter().enumerate() {
-            let id = DeviceId(index as u32);
-            let mut device = place.or_else(|| others.next()).unwrap_or_else(|| Device::new(id));
-            device.id = id;
-            let never_answered = !was_whole && device.answered.is_none() && device.silent.is_some();
-            device.position = (!never_answered).then_some(Position(position));
-            if let Some(station) = device.station {
-                self.stations.insert(station, id);
-            }
-            if !never_answered {
-                self.order.push(id);
-                position += 1;
-            }
-            line.devices.push(device);
-        }
-        line.touch();
-        true
-    }
-
-    /// How many controllers a frame has passed at most.
-    fn most_counted(&self, line: &Line) -> usize {
-        let counted = line.traffic.positions_seen.max(line.traffic.broadcast_answers);
-        usize::from(counted.max(self.present.unwrap_or(0))).min(MOST_DEVICES)
-    }
-
-    /// The places that station addresses tell: by the number from which the MainDevice counts, else, once all are known,
-    /// by their order.
-    fn places(&self, line: &Line) -> Option<BTreeMap<StationAddress, usize>> {
-        let present = usize::from(self.present?);
-        if present > MOST_DEVICES {
-            return None;
-        }
-        let mut stations: Vec<StationAddress> =
-            line.devices.iter().filter_map(|device| device.station).collect();
-        stations.sort_unstable();
-        let silent = |one: &&Device| one.answered.is_none() && one.silent.is_some();
-        let count = present + line.devices.iter().filter(silent).count();
-        let count = count.max(self.most_counted(line));
-        let (least, most) = (stations.first()?.0, stations.last()?.0);
-        let fits = |first: &u16| *first <= least && usize::from(most - *first) < count;
-        if let Some(first) = FIRST_STATIONS.into_iter().find(fits) {
-            let place = |station: StationAddress| (station, usize::from(station.0 - first));
-            return Some(stations.into_iter().map(place).collect());
-        }
-        (stations.len() == count).then(|| stations.into_iter().zip(0..).collect())
     }
 
     /// A controller's registers were read.
@@ -359,6 +314,7 @@ impl Addresses {
         let position = line.devices[one].position;
         line.devices[one].position = line.devices[other].position;
         line.devices[other].position = position;
+        line.forget_tree();
         line.touch();
     }
 
@@ -381,8 +337,18 @@ impl Addresses {
 
     /// A controller's registers were written.
     pub(super) fn written(&mut self, line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
-        if let Some(station) = word_at(answer.written(), answer.ado, STATION) {
-            self.give(line, id, StationAddress(station));
+        let Some(station) = word_at(answer.written(), answer.ado, STATION) else { return };
+        let station = StationAddress(station);
+        let since = answer.at.before(AWAY_WITHIN);
+        let asked_in_vain = self.unanswered.contains_key(&station);
+        self.give(line, id, station);
+        let is_running = !line.cyclic.is_empty() || line.traffic.lost_logical > 0;
+        if let Some(device) = line.device_mut(id).filter(|_| is_running && station != SET_ASIDE) {
+            // While a line runs addresses are given to those that have lost theirs.
+            let was_away = device.last_unanswered.is_some_and(|last| last >= since);
+            if asked_in_vain || was_away {
+                device.lost_address = Some(Seen::new((), answer.at, Some(answer.frame)));
+            }
         }
     }
 

@@ -7,6 +7,29 @@ use linesman_proto::time::Instant;
 
 use crate::observe::{Exchange, FrameCopy};
 
+/// Registers that every controller has, without what is reserved between them. Elsewhere, without so many FMMUs and
+/// SyncManagers, without distributed clocks, or without a mailbox message to fetch, nobody answers, and nothing is wrong.
+/// Reference: S2 chapter 2.
+const EVERYWHERE: [std::ops::Range<u16>; 17] = [
+    0x0000..0x000A,
+    0x0010..0x0014,
+    0x0100..0x0104,
+    0x0110..0x0112,
+    0x0120..0x0122,
+    0x0130..0x0132,
+    0x0134..0x0136,
+    0x0200..0x0202,
+    0x0204..0x0208,
+    0x0210..0x0212,
+    0x0220..0x0224,
+    0x0300..0x0314,
+    0x0400..0x0402,
+    0x0410..0x0412,
+    0x0420..0x0422,
+    0x0440..0x0444,
+    0x0500..0x0510,
+];
+
 /// One datagram on its way back, with all there is to know of it.
 pub(super) struct Answer<'a> {
     pub(super) command: Command,
@@ -41,6 +64,17 @@ impl Answer<'_> {
         }
     }
 
+    /// Whether it begins at a register that every controller has.
+    pub(super) fn is_everywhere(&self) -> bool {
+        EVERYWHERE.iter().any(|range| range.contains(&self.ado.0))
+    }
+
+    /// The event bits that controllers set in it, where its request was seen; it may go out with some.
+    pub(super) fn added_events(&self) -> Option<u16> {
+        let request = self.request.filter(|_| self.is_single && self.own > 0)?;
+        Some(self.reply.irq() & !request.irq())
+    }
+
     /// How many controllers it passed.
     pub(super) fn passed(&self) -> Option<u16> {
         if !self.is_single || !self.command.increments_position() {
@@ -67,7 +101,10 @@ pub(super) fn answers<'a>(
         request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
     let answer = move |(index, datagram): (usize, Datagram<'a>)| {
         let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
-        let sum = exchange.sum(index, datagram.wkc().0);
+        // A request may go out with a count in its working counter: what was added matters.
+        let sent = request.map_or(0, |request| request.wkc().0);
+        let sum = exchange.added(index, sent, datagram.wkc().0);
+        let own = datagram.wkc().0.saturating_sub(sent);
         let Some(command) = datagram.command() else { return Some(None) };
         if exchange.is_part && sum == 0 {
             return None;
@@ -79,7 +116,7 @@ pub(super) fn answers<'a>(
             reply: datagram,
             ado: datagram.ado(),
             sum,
-            own: datagram.wkc().0,
+            own,
             is_last: exchange.is_last,
             is_single: exchange.is_last && exchange.earlier.is_empty(),
             sent_by: exchange.sent_by,

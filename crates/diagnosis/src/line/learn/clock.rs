@@ -14,7 +14,7 @@ const MOST: usize = 4;
 pub(super) fn handed_round(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
     let (Some(request), Some(sent)) = (answer.request, answer.sent_at) else { return };
     let data = answer.reply.data();
-    let is_read = answer.ado.0 == SYSTEM_TIME && answer.reply.wkc().0 > 0;
+    let is_read = answer.ado.0 == SYSTEM_TIME && answer.own > 0;
     // Where the reference is not on this way round, the others were given what was sent.
     if !is_read || data == request.data() {
         return;

@@ -54,7 +54,9 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
             }
             Ok(Message::Abort(abort)) => {
                 device.mailbox.answered(at, frame);
-                let refusal = Refusal::Abort { object: abort.object, code: abort.code };
+                let reads_whole = device.mailbox.reads_whole;
+                let (object, code) = (abort.object, abort.code);
+                let refusal = Refusal::Abort { object, code, reads_whole };
                 device.mailbox.refused(refusal, at, frame);
                 true
             }
@@ -80,18 +82,17 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
 /// A mailbox was written to, or another part of the process RAM; or was not, if `taken` is false.
 pub(super) fn written(line: &mut Line, id: DeviceId, answer: &Answer<'_>, taken: bool) {
     let Some((MailboxType::Coe, body)) = message(answer.written()) else { return };
-    let object = match Message::parse(body) {
-        Ok(Message::SdoRequest(
-            Request::Upload { object, .. } | Request::Download { object, .. },
-        )) => Some(object),
+    let (object, reads_whole) = match Message::parse(body) {
+        Ok(Message::SdoRequest(Request::Upload { object, complete })) => (Some(object), complete),
+        Ok(Message::SdoRequest(Request::Download { object, .. })) => (Some(object), false),
         Ok(Message::SdoRequest(Request::UploadSegment { .. } | Request::DownloadSegment(_))) => {
-            None
+            (None, false)
         }
         Ok(_) | Err(_) => return,
     };
     let Some(device) = line.devices.get_mut(id.index()) else { return };
     if taken {
-        device.mailbox.asked(object, answer.at, answer.frame);
+        device.mailbox.asked(object, reads_whole, answer.at, answer.frame);
     } else {
         device.mailbox.not_taken(answer.at, answer.frame);
     }

@@ -8,6 +8,7 @@ mod address;
 mod answer;
 mod clock;
 mod coe;
+mod count;
 mod process_data;
 mod registers;
 mod sii;
@@ -18,13 +19,11 @@ use linesman_proto::frame::FrameView;
 
 pub use address::Addresses;
 use answer::{Answer, answers};
+use count::CountDoubt;
 
 use super::{Cyclic, Device, Line, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
 
-/// Registers from here on are optional: without so many FMMUs and SyncManagers, without distributed
-/// clocks, or without a mailbox message to fetch, nobody answers there, and nothing is wrong.
-const FIRST_OPTIONAL: RegisterAddress = RegisterAddress(0x0600);
 /// Process RAM begins here: mailboxes and process data.
 const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
 
@@ -33,6 +32,7 @@ const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
 pub struct Learner {
     addresses: Addresses,
     latest_cyclic: usize,
+    broadcast_doubt: CountDoubt,
     transfers: sii::Transfers,
 }
 
@@ -104,11 +104,21 @@ impl Learner {
                 line.touch();
             }
         }
+        let mut events = None;
         for answer in answers(exchange, request, reply) {
-            match answer {
-                Some(answer) => self.datagram(line, &answer),
-                None => line.traffic.datagrams += u64::from(exchange.is_last),
+            let Some(answer) = answer else {
+                line.traffic.datagrams += u64::from(exchange.is_last);
+                continue;
+            };
+            if let Some(added) = answer.added_events() {
+                *events.get_or_insert(0) |= added;
             }
+            self.datagram(line, &answer);
+        }
+        if let Some(added) = events
+            && line.events.record(added, reply.time, reply.number)
+        {
+            line.touch();
         }
     }
 
@@ -118,11 +128,11 @@ impl Learner {
             Addressing::Logical => process_data::returned(line, &mut self.latest_cyclic, answer),
             Addressing::Broadcast => {
                 self.broadcast(line, answer);
-                answer.ado < FIRST_OPTIONAL
+                answer.is_everywhere()
             }
             Addressing::Position | Addressing::Station => {
                 self.single(line, answer);
-                answer.ado < FIRST_OPTIONAL
+                answer.is_everywhere()
             }
         };
         if answer.own > 0 {
@@ -143,16 +153,22 @@ impl Learner {
 
     fn broadcast(&mut self, line: &mut Line, answer: &Answer<'_>) {
         let passed = answer.passed();
+        // A broadcast to an optional register is answered by some only.
+        let counts = answer.command == Command::Brd && answer.is_everywhere();
+        let is_counted_twice = counts && passed == Some(answer.own);
         if let Some(passed) = passed {
-            self.addresses.passed(line, answer.sent_by, passed);
+            self.addresses.passed(line, answer.sent_by, passed, is_counted_twice);
         }
         if !answer.is_last {
             return;
         }
-        // A broadcast to an optional register is answered by some only.
-        let counts = answer.command == Command::Brd && answer.ado < FIRST_OPTIONAL;
-        if counts {
-            line.traffic.broadcast_answers = line.traffic.broadcast_answers.max(answer.sum);
+        let most = line.traffic.broadcast_answers;
+        let is_confirmed = is_counted_twice || passed.is_none();
+        if counts && self.broadcast_doubt.is_believed(answer.sum, most, is_confirmed) {
+            if answer.is_single && most > 0 && answer.sum > most && !line.cyclic.is_empty() {
+                line.traffic.broadcast_rose = Some(Seen::new(most, answer.at, Some(answer.frame)));
+            }
+            line.traffic.broadcast_answers = most.max(answer.sum);
             line.traffic.broadcast_read = line.traffic.broadcast_read.max(Some(answer.at));
             let split = (answer.sum - answer.own, answer.own);
             let is_split = split.0 > 0 && split.1 > 0;
@@ -199,7 +215,7 @@ impl Learner {
     /// A datagram to one controller.
     fn single(&mut self, line: &mut Line, answer: &Answer<'_>) {
         if let Some(passed) = answer.passed() {
-            self.addresses.passed(line, answer.sent_by, passed);
+            self.addresses.passed(line, answer.sent_by, passed, false);
         }
         let is_position = answer.effect.addressing == Addressing::Position;
         let device = if is_position {
@@ -215,7 +231,7 @@ impl Learner {
             self.addresses.at_station(line, station, answer.sum > 0)
         };
         let Some(id) = device else {
-            if !is_position && answer.is_last && answer.sum == 0 && answer.ado < FIRST_OPTIONAL {
+            if !is_position && answer.is_last && answer.sum == 0 && answer.is_everywhere() {
                 let seen = Seen::new((), answer.at, Some(answer.frame));
                 let station = StationAddress(answer.reply.adp());
                 self.addresses.asked_in_vain(line, station, seen);
@@ -252,7 +268,7 @@ impl Learner {
                 // Whether it is there, others tell: who does not fetch requests takes no new one.
                 return;
             }
-            if answer.is_last && answer.ado < FIRST_OPTIONAL && device.answered.is_some() {
+            if answer.is_last && answer.is_everywhere() && device.answered.is_some() {
                 let is_news = device.silent.is_none();
                 device.is_silent(answer.at, Some(answer.frame));
                 if is_news {
@@ -261,7 +277,7 @@ impl Learner {
             }
             return;
         }
-        if answer.reply.wkc().0 == 0 {
+        if answer.own == 0 {
             // The other copy was answered, and taught what there was to learn.
             return;
         }
@@ -328,7 +344,8 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
         let Ok(datagram) = datagram else { break };
         let traffic = &mut line.traffic;
         traffic.datagrams += 1;
-        if exchange.sum(index, 0) == 0 && datagram.command() != Some(Command::Nop) {
+        let sent = datagram.wkc().0;
+        if exchange.added(index, sent, sent) == 0 && datagram.command() != Some(Command::Nop) {
             traffic.unanswered += 1;
             let seen = Seen::new((), request.time, Some(request.number));
             traffic.first_unanswered.get_or_insert(seen);
@@ -369,6 +386,7 @@ fn lost(line: &mut Line, exchange: &Exchange<'_>, request: &FrameCopy<'_>) {
         let traffic = &mut line.traffic;
         if matches!(addressing, Some(Addressing::Station | Addressing::Logical)) {
             traffic.lost_addressed += 1;
+            traffic.lost_logical += u64::from(addressing == Some(Addressing::Logical));
         }
     }
 }

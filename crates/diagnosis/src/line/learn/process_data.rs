@@ -73,6 +73,14 @@ pub(super) fn returned(line: &mut Line, latest: &mut usize, answer: &Answer<'_>)
             news |= cyclic.note_below_plan();
         }
     }
+    // In a ring each copy has the inputs of those alone that it came by.
+    if answer.effect.reads
+        && answer.is_single
+        && let Some(request) = answer.request
+    {
+        let (sent, back) = (request.data(), answer.reply.data());
+        news |= cyclic.motion.record(sent, back, answer.at, answer.frame);
+    }
     let is_expected = cyclic.highest.value > 0;
     let sent_off = answer.sent_at.is_some_and(|at| cyclic.sent.tick(at));
     if news | sent_off | cyclic.returned.tick(answer.at) {

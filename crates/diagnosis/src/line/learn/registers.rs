@@ -4,7 +4,7 @@ use linesman_proto::address::{DeviceId, RegisterAddress, StationAlias};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{
     AlControl, AlStatus, ClearGroup, ControllerType, DlControl, DlStatus, ErrorCounters,
-    FmmuConfig, PortState, SystemTimeDifference, WatchdogDivider, WatchdogTime,
+    FmmuConfig, PortState, SmStatus, SystemTimeDifference, WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{DcTime32, Instant};
@@ -28,7 +28,8 @@ const CLOCK_DIFFERENCE: u16 = 0x092C;
 const CLOCK_SETTING: std::ops::Range<u16> = 0x0920..0x0936;
 /// Activation of cyclic operation and SYNC signals; bit 0 switches them on, bits 1 and 2 choose them.
 const SYNC_ACTIVATION: u16 = 0x0981;
-/// Status of SyncManager 1, which holds the answers of the mailbox.
+/// Status of SyncManager 0, which holds requests to the mailbox, and of SyncManager 1, which holds its answers.
+const MAILBOX_OUT_STATUS: u16 = 0x0805;
 const MAILBOX_IN_STATUS: u16 = 0x080D;
 const WATCHDOG_DIVIDER: u16 = 0x0400;
 const WATCHDOG_TIME: u16 = 0x0420;
@@ -74,8 +75,14 @@ pub(super) fn read(line: &mut Line, id: DeviceId, answer: &Answer<'_>) {
         news |= device.counters.record(start, data, at, frame);
     } else if start.0 <= WATCHDOG_TIME {
         news |= watchdog(device, data, start, Seen::new((), at, frame));
-    } else if part(data, start, MAILBOX_IN_STATUS, 1).is_some() {
-        device.mailbox.polled = Some(at);
+    } else if start.0 <= MAILBOX_IN_STATUS {
+        if let Some(status) = part(data, start, MAILBOX_OUT_STATUS, 1) {
+            let is_full = SmStatus(status[0]).mailbox_full();
+            news |= device.mailbox.read_status(is_full, at, answer.frame);
+        }
+        if part(data, start, MAILBOX_IN_STATUS, 1).is_some() {
+            device.mailbox.polled = Some(at);
+        }
     } else if start.0 == RECEIVE_TIMES
         && let Some(times) = part(data, start, RECEIVE_TIMES, 16)
     {

@@ -110,7 +110,7 @@ impl ObservationFile {
         for one in &self.aborts {
             let (Some(index), Some(code)) = (one.index, one.code) else { continue };
             let object = ObjectAddress { index: ObjectIndex(index.0), subindex: one.subindex };
-            let refusal = Refusal::Abort { object, code: code.0 };
+            let refusal = Refusal::Abort { object, code: code.0, reads_whole: false };
             let at = clock.at(one.at, one.at_s);
             let device = self.find(&one.device).and_then(|index| line.devices.get_mut(index));
             if let Some(device) = device {

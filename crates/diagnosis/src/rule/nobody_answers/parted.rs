@@ -1,7 +1,6 @@
 //! Where frames vanished, when they come back again: by whose outputs were missed, and by a search that was cut off.
 
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::Span;
 use linesman_proto::topology::Route;
 use linesman_proto::topology::route::Direction;
@@ -11,8 +10,6 @@ use crate::finding::{LinkDirection, Place};
 use crate::line::{Device, Line, Silence};
 use crate::rule::View;
 
-/// The watchdog of a SyncManager expired. Reference: ETG.1000.6, AL status codes.
-const OUTPUT_WATCHDOG: AlStatusCode = AlStatusCode(0x001B);
 /// States are read in turn: so long after a silence they tell of it.
 const STARVED_WITHIN: Span = Span::s(1);
 /// Without a sign of whose outputs were missed, a search must have left so few cables.
@@ -60,8 +57,7 @@ fn fed_until(view: &View<'_>, silence: &Silence, route: &Route) -> Option<(usize
     let lasted = silence.last.at.since(from);
     let is_starved = |device: &Device| {
         device.al.errors.iter().any(|error| {
-            let is_watchdog = error.code.is_some_and(|code| code.value == OUTPUT_WATCHDOG);
-            is_watchdog && from <= error.status.at && error.status.at <= to
+            error.may_be_watchdog() && from <= error.status.at && error.status.at <= to
         })
     };
     let takes_outputs = |device: &&Device| {

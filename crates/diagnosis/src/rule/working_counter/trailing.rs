@@ -7,6 +7,7 @@ use linesman_proto::topology::{End, Tree};
 
 use super::{Suspects, shares};
 use crate::line::{Cyclic, Deficit, Line};
+use crate::locate::way;
 use crate::rule::link_lost::is_on_terminal_bus;
 
 /// Datagrams of one cycle, and of slower ones, lose their shares so soon after each other.
@@ -48,6 +49,7 @@ pub(super) fn suspects(line: &Line, deficit: &Deficit) -> Option<Suspects> {
             is_on_terminal_bus(line, *node),
         )
     });
+    way::keep_fitting(line, tree, &mut heads, since);
     let links: Vec<usize> = heads.iter().filter_map(|node| tree.link_above(*node)).collect();
     let behind = tree.subtree(*heads.first()?);
     let devices = behind.iter().map(|node| DeviceId(*node as u32));

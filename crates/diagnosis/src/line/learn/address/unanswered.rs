@@ -9,6 +9,8 @@ use crate::line::{Line, Seen};
 /// Asked so often in vain, and over so long, a station address is that of a SubDevice which should be there.
 const ASKED_IN_VAIN: u64 = 3;
 const ASKED_FOR: Span = Span::ms(20);
+/// Who is asked in vain so many numbers beyond all that are known is expected by nobody: somebody looks who is there.
+const MOST_BEYOND: usize = 64;
 /// Most station addresses without an answer that are followed.
 const MOST_UNANSWERED: usize = 512;
 
@@ -37,6 +39,10 @@ impl Addresses {
         station: StationAddress,
         seen: Seen<()>,
     ) {
+        // Address 0 is that of those that were given none.
+        if station.0 == 0 {
+            return;
+        }
         let count = self.unanswered.len();
         match self.unanswered.get_mut(&station) {
             Some(known) => (known.last, known.times) = (seen.at, known.times + 1),
@@ -54,29 +60,42 @@ impl Addresses {
     /// expects a SubDevice there. Says whether there are new ones.
     pub(in crate::line::learn) fn expect_unanswered(&mut self, line: &mut Line) -> bool {
         let is_planned = line.devices.iter().any(|one| one.planned.is_some());
-        if self.is_named || is_planned || self.stations.is_empty() {
+        if is_planned || self.stations.is_empty() {
             return false;
         }
+        // Who looks for SubDevices asks at other numbers, too.
+        let (least, most) = (self.stations.keys().next(), self.stations.keys().next_back());
+        let is_near = |station: StationAddress| {
+            let beyond = MOST_BEYOND as u16;
+            let (least, most) = (least.map_or(0, |one| one.0), most.map_or(u16::MAX, |one| one.0));
+            station.0.saturating_add(beyond) >= least && station.0 <= most.saturating_add(beyond)
+        };
         let wanted: Vec<(StationAddress, Seen<()>)> = self
             .unanswered
             .iter()
-            .filter(|(_, one)| one.is_expected())
+            .filter(|(station, one)| one.is_expected() && is_near(**station))
             .map(|(station, one)| (*station, one.first))
             .collect();
+        let mut has_new = false;
         for (station, first) in &wanted {
             if line.devices.len() >= MOST_DEVICES {
                 break;
             }
             // It may have been counted while it was there, though nobody asked for it by its address then.
-            let counted = self.by_number(line, *station);
+            let counted = self.by_number(line, *station, MOST_BEYOND);
             let counted = counted.filter(|id| line.device(*id).is_some_and(Self::is_free));
+            // Once SubDevices are named nobody gets another number: only who has one of its own is added.
+            if self.is_named && counted.is_none() {
+                continue;
+            }
             let id = counted.unwrap_or_else(|| line.add_device());
+            has_new = true;
             self.give(line, id, *station);
             self.has_guessed |= counted.is_none();
             if let Some(device) = line.device_mut(id) {
                 device.is_silent(first.at, first.frame);
             }
         }
-        !wanted.is_empty()
+        has_new
     }
 }
