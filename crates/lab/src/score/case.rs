@@ -25,6 +25,8 @@ pub struct ScoreOptions {
     /// How the MainDevice drives the line. With another habit than ours nobody asks for registers, and listeners are
     /// judged.
     pub habit: Habit,
+    /// Whether what listeners heard is kept.
+    pub keeps_heard: bool,
 }
 
 impl ScoreOptions {

@@ -30,3 +30,4 @@ pub use play::{CaseReport, FaultOutcome, run_case};
 pub use rate::Rate;
 pub use report::ScoreReport;
 pub use tally::Tally;
+pub use tape::TapedFrame;

@@ -21,7 +21,7 @@ use super::disturb::disturb;
 use super::draw::{Drawn, Ends, Offer, When, draw};
 use super::effect::effects;
 use super::judge::{Judged, alarms, claim, judge};
-use super::listen::{HealthyListened, Listeners};
+use super::listen::{HealthyListened, Heard, Listeners};
 use super::tape::{Tape, take_down, take_down_host};
 use crate::choice::{Ground, are_apart, text};
 use crate::habit::Habit;
@@ -67,6 +67,8 @@ pub struct CaseReport {
     pub healthy: Option<(Vec<String>, Vec<String>)>,
     /// What listeners said of it, beside a MainDevice with the habits of others.
     pub healthy_listened: Option<HealthyListened>,
+    /// What listeners heard, where that is kept.
+    pub heard: Vec<Heard>,
     /// Cycle of the process data.
     pub cycle: Span,
     /// Its faults.
@@ -151,6 +153,7 @@ fn empty(case: &Case, devices: usize) -> CaseReport {
         host_counters: case.host_counters,
         healthy: None,
         healthy_listened: None,
+        heard: Vec::new(),
         cycle: case.cycle,
         faults: Vec::new(),
         unplayable: None,
@@ -272,6 +275,9 @@ impl<'a> Play<'a> {
             report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
             report.healthy_listened = self.healthy_listened();
             if self.case.kind == CaseKind::Healthy {
+                if self.options.keeps_heard {
+                    report.heard = self.heard(None);
+                }
                 return Ok(report);
             }
             self.break_line(&mut active)?;
@@ -289,6 +295,9 @@ impl<'a> Play<'a> {
         let firsts = self.firsts(&active);
         for (active, first) in active.iter().zip(firsts) {
             report.faults.extend(self.outcome(active, &diagnosis, &recorded, first));
+        }
+        if let (true, Some(first)) = (self.options.keeps_heard, active.first()) {
+            report.heard = self.heard(self.lab.truth().fault(first.id));
         }
         Ok(report)
     }

@@ -8,13 +8,17 @@ use linesman_proto::time::Instant;
 
 /// A frame of a recording.
 #[derive(Clone, Debug)]
-pub(super) struct TapedFrame {
-    pub(super) time: Instant,
+pub struct TapedFrame {
+    /// When it passed the card.
+    pub time: Instant,
     /// The card that it left by or arrived at.
-    pub(super) path: Option<Path>,
-    pub(super) is_sent: bool,
-    pub(super) fcs: Option<bool>,
-    pub(super) bytes: Vec<u8>,
+    pub path: Option<Path>,
+    /// Whether it left by it.
+    pub is_sent: bool,
+    /// Whether its frame check sequence is right, where that is known.
+    pub fcs: Option<bool>,
+    /// From the destination address on, without frame check sequence.
+    pub bytes: Vec<u8>,
 }
 
 /// All that a listener on the cards of the MainDevice is shown.

@@ -1,6 +1,7 @@
 //! `linesman lab`: stories, swarms, scores and recordings in virtual time.
 
 pub(crate) mod excerpts;
+mod heard;
 mod listened;
 pub(crate) mod replay;
 pub(crate) mod score;
@@ -85,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     match &arguments.command {
         Command::Run { habit, stories } => run_stories(stories, *habit, output),
         Command::Replay(arguments) => replay::run(arguments, output),
-        Command::Score(arguments) => Ok(score::run(arguments, output)),
+        Command::Score(arguments) => score::run(arguments, output),
         Command::Excerpts(arguments) => excerpts::run(arguments, output),
         Command::Swarm { seeds, physics: true, quiet, .. } => {
             Ok(run_physics(seeds.clone(), *quiet, output))

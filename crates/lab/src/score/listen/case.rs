@@ -14,7 +14,7 @@ use super::super::trace;
 use super::join::Joins;
 use super::judge::judge_listener;
 use super::play::Listener;
-use super::{HealthyListened, HealthySaid, Listeners, Pair};
+use super::{HealthyListened, HealthySaid, Heard, Listeners, Pair};
 use crate::verdict::judge::Company;
 use crate::verdict::{Naming, Scene, Truth};
 
@@ -35,9 +35,7 @@ impl Play<'_> {
         let tape = self.tape.as_ref()?;
         let recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
         let now = self.lab.now();
-        let mut stream = self.case.seed.stream("score late and healthy");
-        let part = now.since(self.up).as_nanos() / LATE_PART;
-        let late = self.up + Span::ns(stream.between(0, part.max(1)));
+        let late = self.late();
         let said = |(from, with_project)| {
             let said = self.listener(&recording, with_project).says(from, now);
             HealthySaid {
@@ -47,6 +45,40 @@ impl Play<'_> {
         };
         let columns = [(None, false), (None, true), (Some(late), false), (Some(late), true)];
         Some(HealthyListened { columns: columns.map(said) })
+    }
+
+    /// When a listener joins a healthy run late.
+    fn late(&self) -> Instant {
+        let mut stream = self.case.seed.stream("score late and healthy");
+        let part = self.lab.now().since(self.up).as_nanos() / LATE_PART;
+        self.up + Span::ns(stream.between(0, part.max(1)))
+    }
+
+    /// When listeners join beside a fault.
+    fn joins(&self, record: &FaultRecord) -> Joins {
+        let mut stream = self.case.seed.stream("score listeners");
+        Joins::draw(self.lab.truth(), record, (self.up, self.lab.now()), &mut stream)
+    }
+
+    /// What listeners hear of the run so far, beside a fault or on a healthy line.
+    pub(in crate::score) fn heard(&self, record: Option<&FaultRecord>) -> Vec<Heard> {
+        let Some(tape) = &self.tape else { return Vec::new() };
+        let recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let joins = record.map(|record| self.joins(record));
+        let joined = match joins {
+            None => [None, None, Some(("late", Some(self.late())))],
+            Some(joins) => [
+                Some(("start", None)),
+                joins.during.map(|at| ("during", Some(at))),
+                joins.after.map(|at| ("after", Some(at))),
+            ],
+        };
+        let listener = self.listener(&recording, false);
+        let hears = |(joined, from): (&'static str, Option<Instant>)| {
+            let range = listener.hears(from, self.lab.now());
+            Heard { joined, frames: recording.frames[range].to_vec() }
+        };
+        joined.into_iter().flatten().map(hears).collect()
     }
 
     /// What listeners say of a fault of the run; `None` where nobody listens.
@@ -59,16 +91,14 @@ impl Play<'_> {
     ) -> Option<Listeners> {
         let tape = self.tape.as_ref()?;
         let recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut stream = self.case.seed.stream("score listeners");
-        let log = self.lab.truth();
-        let joins = Joins::draw(log, record, (self.up, self.lab.now()), &mut stream);
+        let joins = self.joins(record);
         let judging = Judging {
             play: self,
             recording: &recording,
             truth,
             all,
             scene,
-            company: Company::of(log, record),
+            company: Company::of(self.lab.truth(), record),
         };
         Some(Listeners {
             start: judging.pair(None),

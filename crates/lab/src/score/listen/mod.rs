@@ -14,6 +14,7 @@ pub(super) mod tally;
 use linesman_diagnosis::report::Verdict;
 
 use super::judge::Judged;
+use super::tape::TapedFrame;
 
 pub(super) use join::leaves_a_state;
 
@@ -63,6 +64,15 @@ pub struct Listeners {
     pub during: Option<Pair>,
     /// Joined after it is over; `None` where it never ends.
     pub after: Option<Pair>,
+}
+
+/// The frames that a listener heard.
+#[derive(Clone, Debug)]
+pub struct Heard {
+    /// When it joined: `start`, `during`, `after`, or `late` on a healthy line.
+    pub joined: &'static str,
+    /// What passed the cards of the MainDevice from then on.
+    pub frames: Vec<TapedFrame>,
 }
 
 /// What listeners said of a healthy line: alarms, and whether it was called healthy.

@@ -1,14 +1,16 @@
 //! `linesman lab score`: how often the diagnosis is right.
 
 use std::ops::Range;
+use std::path::PathBuf;
 
 use linesman_config::fault::FaultName;
 use linesman_lab::habit::Habit;
 use linesman_lab::score::report::{GroupReport, SideReport};
 use linesman_lab::score::{Perturbation, Rate, ScoreOptions, ScoreReport, Tally, run_case};
 
-use super::{listened, on_all_processors, seeds};
+use super::{heard, listened, on_all_processors, seeds};
 use crate::exit::Status;
+use crate::failure::Failure;
 use crate::output::{Output, Progress, Table};
 use crate::text::quantity::count;
 
@@ -35,6 +37,10 @@ pub(crate) struct Arguments {
     /// for registers, and who listens beside it is judged: from the start, joined during a fault, joined after it
     #[arg(long, value_name = "NAME", default_value_t)]
     habit: Habit,
+    /// With --habit: write what each listener heard to this new directory, as SEED-start.pcapng, SEED-during.pcapng and
+    /// SEED-after.pcapng, or SEED-late.pcapng of healthy lines
+    #[arg(long, value_name = "DIRECTORY")]
+    record: Option<PathBuf>,
     /// Also each case that was judged wrongly, with what was said
     #[arg(long)]
     list: bool,
@@ -45,13 +51,18 @@ pub(crate) struct Arguments {
 
 /// Plays the cases on all processors and adds up in the order of seeds: the sum is the same for any
 /// number of them.
-pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Status {
+pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    if let Some(directory) = &arguments.record {
+        heard::create(directory, arguments.habit)?;
+    }
+    let mut written = Ok(());
     let options = ScoreOptions {
         fault: arguments.fault,
         capture_only: arguments.capture_only,
         healthy: arguments.healthy,
         perturb: arguments.perturb,
         habit: arguments.habit,
+        keeps_heard: arguments.record.is_some(),
     };
     let mut tally = Tally::new(options);
     let mut progress = Progress::new();
@@ -62,18 +73,23 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Status {
         |seed| run_case(seed, &options),
         |case| {
             tally.add(&case);
+            if let (Some(directory), Ok(())) = (&arguments.record, &written) {
+                written = heard::write(directory, &case);
+            }
             done += 1;
             progress.show(|| format!("{done} of {}", count(total, "seed")));
         },
     );
     progress.clear();
+    written?;
     let report = tally.report();
     if arguments.json {
         output.json(&report);
     } else {
         show(&report, arguments.list, output);
     }
-    if report.effective_cases + report.healthy_runs > 0 { Status::Good } else { Status::NotJudged }
+    let is_judged = report.effective_cases + report.healthy_runs > 0;
+    Ok(if is_judged { Status::Good } else { Status::NotJudged })
 }
 
 fn show(report: &ScoreReport, list: bool, output: &mut Output) {
