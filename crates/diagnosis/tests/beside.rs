@@ -76,6 +76,8 @@ fn codes(report: &Diagnosis) -> Vec<&str> {
 fn no(finding: &FindingReport) -> Option<u32> {
     match finding.place {
         PlaceReport::Device { no, .. } => Some(no),
+        // The way into one, from somewhere.
+        PlaceReport::Link { a, b: None, .. } => Some(a.no),
         PlaceReport::Link { .. } | PlaceReport::Network { .. } | PlaceReport::Host => None,
     }
 }

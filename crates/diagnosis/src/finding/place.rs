@@ -13,9 +13,10 @@ pub enum Place {
     Link {
         /// The network.
         network: Network,
-        /// The end nearer the MainDevice (in a ring: nearer card A while it is intact).
+        /// The end nearer the MainDevice (in a ring: nearer card A while it is intact); the far end where that alone is
+        /// known, by which frames come in.
         a: LinkEnd,
-        /// The far end; `None` when it was never seen.
+        /// The far end; `None` when the other end was never seen.
         b: Option<LinkEnd>,
         /// The direction in trouble; `None` when it is not known.
         direction: Option<LinkDirection>,

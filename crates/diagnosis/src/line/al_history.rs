@@ -318,7 +318,9 @@ impl AlHistory {
         {
             self.sent_back = Some(Seen::new((), requested.at, requested.frame));
         }
-        let is_no_step_up = asked.is_some() && asked <= self.highest;
+        // In INIT each start of a MainDevice acknowledges what may stand from before.
+        let was_up = self.highest.is_some_and(AlState::has_mailbox);
+        let is_no_step_up = was_up && asked.is_some() && asked <= self.highest;
         if control.acknowledges_error() && self.errors.is_empty() && is_no_step_up {
             self.acknowledged = Some(Seen::new((), requested.at, requested.frame));
         }

@@ -25,6 +25,7 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::table;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View};
@@ -47,6 +48,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// A link that was lost so often flaps.
 const FLAPS: usize = 3;
+/// SubDevices are asked in turn: who falls silent within this time did so at once.
+const AT_ONCE: Span = Span::ms(200);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let line = view.line;
@@ -69,7 +72,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         .filter(|branch| !branch.devices.iter().all(is_passed))
         .partition(|branch| branch.was_without_supply(line));
     conditions.extend(passed.iter().map(|branch| lost_addresses(line, branch)));
-    conditions.extend(branches.iter().map(|branch| cut_off(line, branch)));
+    let (together, apart): (Vec<&Branch>, Vec<&Branch>) =
+        branches.iter().partition(|branch| fell_with_others(branch, &branches));
+    conditions.extend(several(line, &together));
+    conditions.extend(apart.iter().map(|branch| cut_off(line, branch)));
     conditions.extend(restarted.iter().map(|branch| without_supply(line, branch)));
     for (device, absence) in away() {
         // The link says it all of one alone, and the first one without supply all of those behind it.
@@ -221,14 +227,69 @@ fn without_supply(line: &Line, branch: &Branch) -> Condition {
     }
 }
 
+/// Whether a branch is silent since the same time as another one.
+fn fell_with_others(branch: &Branch, all: &[Branch]) -> bool {
+    let lasts = |one: &Branch| one.ended.is_none();
+    let near = |one: Instant, other: Instant| one.since(other).max(other.since(one)) <= AT_ONCE;
+    let others = all.iter().filter(|other| other.devices != branch.devices && lasts(other));
+    lasts(branch) && others.map(|other| other.since.at).any(|at| near(at, branch.since.at))
+}
+
+/// Several branches that fell silent at once, with others between them that answer: what they have in common is a supply.
+fn several(line: &Line, branches: &[&Branch]) -> Option<Condition> {
+    let first = branches.first()?;
+    let since = branches.iter().map(|branch| branch.since).min_by_key(|seen| seen.at)?;
+    let heads = || branches.iter().filter_map(|branch| branch.devices.first().copied());
+    let head = heads().next()?;
+    let names: Vec<String> = heads().map(|id| line.label(id)).collect();
+    let text = format!(
+        "SubDevices do not answer in {} places at once, from {} on, with others between them that do: one link cannot do \
+         that",
+        branches.len(),
+        names.join(", ")
+    );
+    let all = || branches.iter().flat_map(|branch| branch.devices.iter().copied());
+    let place = Place::device(line.network, head);
+    let mut condition = Condition::new(&PAGE, place, FaultName::SupplyOff, since.at)
+        .confidence(0.5)
+        .or(FaultName::DeviceOff, 0.15)
+        .or_at(FaultName::LinkOpen, entry_of(line, head), 0.1)
+        .confirmed(since.at)
+        .about(all().map(Symptom::Silent))
+        .explaining(all().flat_map(follows_from_silence))
+        .shown_by(Evidence::register(head, table::AL_STATUS.address, &since, text));
+    for other in heads().skip(1) {
+        condition = condition.or_at(FaultName::SupplyOff, Place::device(line.network, other), 0.1);
+    }
+    let last = first.devices.last().copied().unwrap_or(head);
+    Some(
+        condition
+            .advise(format!("Measure the supply that {} have in common.", names.join(", ")))
+            .advise(format!(
+                "If all of them have it, follow the way into {} to {}: plugs, cable or contact.",
+                line.label(head),
+                line.label(last)
+            ))
+            .advise("Name the project or ENI, `--project FILE`: it has the wiring."),
+    )
+}
+
+/// The link by which frames come into a SubDevice, where what it hangs on was not seen.
+fn entry_of(line: &Line, id: DeviceId) -> Place {
+    let (a, direction) = (End::Controller(id, Port::A), Some(LinkDirection::Both));
+    Place::Link { network: line.network, a, b: None, direction }
+}
+
 /// One link, and all behind it silent.
 fn cut_off(line: &Line, branch: &Branch) -> Condition {
     let since = branch.since;
     let first = branch.devices.first().copied().unwrap_or_default();
     let device = Place::device(line.network, first);
-    let place = branch
-        .link
-        .map_or(device, |link| Place::link(line.network, link, Some(LinkDirection::Both)));
+    let direction = Some(LinkDirection::Both);
+    let place = match branch.link {
+        Some(link) => Place::link(line.network, link, direction),
+        None => entry_of(line, first),
+    };
     // A link that comes and goes takes the same shares from process data, again and again.
     let outages = line.cyclic.iter().map(|cyclic| cyclic.deficits.len()).max().unwrap_or(0);
     let flaps = outages >= FLAPS;
@@ -259,8 +320,8 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
     let causes = match before.map(|index| DeviceId(index as u32)) {
         None => causes,
         Some(before) => {
-            let (a, b) = (End::Controller(before, Port::B), Some(End::Controller(first, Port::A)));
-            let direction = Some(LinkDirection::Both);
+            let a = End::Controller(before, Port::B);
+            let b = Some(End::Controller(first, Port::A));
             let link = Place::Link { network: line.network, a, b, direction };
             causes.or_at(FaultName::LinkOpen, link, 0.15)
         }
@@ -296,7 +357,10 @@ fn silence_text(line: &Line, branch: &Branch) -> String {
     let label = |id: Option<&DeviceId>| line.label(id.copied().unwrap_or_default());
     let first = label(branch.devices.first());
     match (branch.devices.len(), branch.link) {
-        (1, _) => format!("{first} does not answer, and whoever is before it does"),
+        (1, Some(_)) => format!("{first} does not answer, and whoever is before it does"),
+        (1, None) => format!(
+            "{first} does not answer, and whoever is before it does; what it hangs on was not seen"
+        ),
         (count, Some(_)) => format!(
             "{first} and {} behind it do not answer, and whoever is before them does",
             count - 1

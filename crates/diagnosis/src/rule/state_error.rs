@@ -28,6 +28,8 @@
 //!
 //! **What to do.** The code says more than the state: its own page has the checks, most promising first.
 
+mod unseen;
+
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::state::status_code::Class as CodeClass;
@@ -96,6 +98,8 @@ const SEVERAL: usize = 2;
 const NAMED: usize = 6;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
+    let unseen = unseen::errors(view.line);
+    conditions.extend(unseen::condition(view, &unseen));
     for device in &view.line.devices {
         // One finding for each kind of trouble, however often it came back: the latest is shown.
         let mut pages: Vec<(&'static RulePage, &AlError, u32)> = Vec::new();
@@ -110,12 +114,15 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             }
         }
         for (page, error, times) in pages {
-            if !may_be_left_over(view, error) && !error.may_be_echo() {
+            let is_told = unseen.iter().any(|(other, _)| other.id == device.id);
+            if !is_told && !may_be_left_over(view, error) && !error.may_be_echo() {
                 conditions.push(condition(view, device, page, error, times));
             }
         }
     }
-    conditions.extend(starved_together(view, conditions));
+    if unseen.is_empty() {
+        conditions.extend(starved_together(view, conditions));
+    }
 }
 
 /// Whether an error stood already when its SubDevice was first read, a moment ago: a MainDevice that starts

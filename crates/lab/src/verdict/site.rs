@@ -64,14 +64,17 @@ impl Site {
 
     /// Whether a claim of `claimed` is a claim of this place.
     ///
-    /// A link whose far end was never seen is the link at its near end. A claimed direction must be
+    /// A link of which one end was never seen is the link at the end that was: in a claim, the first. A claimed direction must be
     /// the one of this place; a claim without direction is as wide as the link. Where this place is
     /// a whole link, either direction of it is on it.
     #[must_use]
     pub fn covers(self, claimed: Self) -> bool {
         match (self, claimed) {
             (Self::Link { a, b, way }, Self::Link { a: a2, b: b2, way: way2 }) => {
-                let ends = a == a2 && (b2.is_none() || b == b2);
+                let ends = match b2 {
+                    Some(_) => a == a2 && b == b2,
+                    None => a == a2 || b == Some(a2),
+                };
                 let ways = match (way, way2) {
                     (Some(way), Some(claimed)) => way == claimed,
                     (None, _) | (Some(_), None) => true,

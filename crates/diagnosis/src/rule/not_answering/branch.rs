@@ -52,7 +52,6 @@ pub(super) fn silent_branches(view: &View<'_>) -> Vec<Branch> {
         return Vec::new();
     }
     let branches = match line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) {
-        Some(tree) if tree.closes_at().is_some() => return Vec::new(),
         Some(tree) => in_tree(line, tree, &is_silent, &away),
         None => in_order(line, &is_silent, &away),
     };
@@ -93,7 +92,10 @@ fn in_tree(
     let id = |node: usize| DeviceId(node as u32);
     let heads = tree.order().iter().copied().filter(|node| {
         let above = tree.upstream(*node).and_then(|end| end.node());
-        above.is_some_and(|above| !is_silent(&id(above)))
+        // Behind a link of the ring nobody falls silent: frames come from the other side.
+        let is_on_ring = tree.link_above(*node).is_some_and(|link| tree.is_on_ring(link));
+        !is_on_ring
+            && above.is_some_and(|above| !is_silent(&id(above)))
             && tree.subtree(*node).iter().all(|node| is_silent(&id(*node)))
     });
     let branch = |head: usize| {
@@ -135,7 +137,7 @@ fn in_order(
             devices,
         })
     };
-    silent.filter(|run| run.len() > 1).filter_map(branch).collect()
+    silent.filter_map(branch).collect()
 }
 
 /// Those that stay silent though frames go through the first of them, to others that have answered since: they have their

@@ -47,6 +47,10 @@ impl Listener<'_> {
             engine: None,
             // Who is there from before the first frame has been told of the link before, in vain.
             carriers: [None; 2],
+            listens: Path::ALL.map(|path| {
+                let mut frames = self.recording.frames.iter();
+                frames.any(|frame| frame.path.unwrap_or(Path::A) == path)
+            }),
             is_late: from.is_some(),
             sees_own: false,
             now: Instant::ZERO,
@@ -85,6 +89,8 @@ struct Hearing {
     engine: Option<Engine>,
     /// Whether each card has a link, as far as that was observed.
     carriers: [Option<bool>; 2],
+    /// On which cards it listens: those by which frames pass at any time.
+    listens: [bool; 2],
     is_late: bool,
     /// Frames were seen that this computer has sent.
     sees_own: bool,
@@ -129,6 +135,9 @@ impl Hearing {
     }
 
     fn observe(&mut self, seen: HostObservation, host_counters: bool) {
+        if !self.listens[seen.path.index()] {
+            return;
+        }
         if let HostEvent::Carrier(carrier) = seen.what {
             self.carriers[seen.path.index()] = Some(carrier);
         }
