@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use linesman_proto::address::{DeviceId, StationAddress};
+use linesman_proto::address::StationAddress;
 use linesman_proto::mailbox::soe::Idn;
 use linesman_proto::port::Port;
 use linesman_proto::sii::Identity;
@@ -177,10 +177,11 @@ impl ProjectDevice {
         Wanted { identity: self.identity(), rule: self.rule(), alias: self.alias }
     }
 
-    /// The station address it is to have.
+    /// The station address it is to have: its own, or the one that its position in the order of frames gives it, from
+    /// 0x1001 on.
     #[must_use]
-    pub fn station(&self, id: DeviceId) -> StationAddress {
-        StationAddress(self.station.unwrap_or(0x1000_u16.wrapping_add(id.no() as u16)))
+    pub fn station_at(&self, position: usize) -> StationAddress {
+        StationAddress(self.station.unwrap_or(0x1001_u16.wrapping_add(position as u16)))
     }
 
     pub(super) fn entry_port(&self) -> Result<Port, ProjectError> {

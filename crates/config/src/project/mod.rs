@@ -25,7 +25,7 @@ mod resolve;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::address::{Path, StationAddress};
 use linesman_proto::topology::{End, Tree, Wired, WiringError};
 use serde::{Deserialize, Serialize};
 
@@ -224,14 +224,14 @@ impl Project {
             return value("network".to_owned(), "base_time_us is 0, expected a time in µs");
         }
         let mut stations = BTreeMap::new();
-        for (device, id) in self.devices.iter().zip(0..) {
+        for (device, station) in self.devices.iter().zip(self.stations()) {
             if let Some(task) = &device.task
                 && !self.tasks.iter().any(|known| known.name == *task)
             {
                 let (device, task) = (device.name.clone(), task.clone());
                 return Err(ProjectError::UnknownTask { device, task });
             }
-            let station = device.station(DeviceId(id)).0;
+            let station = station.0;
             if let Some(other) = stations.insert(station, &device.name) {
                 let whose = format!("device `{}`", device.name);
                 let reason =
@@ -261,6 +261,23 @@ impl Project {
             }
         }
         Ok(())
+    }
+
+    /// The station addresses of the devices, in their order in the project: those that are given, and else by their
+    /// positions in the order of frames, as MainDevices count them. Where the wiring contradicts itself, by the order in
+    /// the project.
+    #[must_use]
+    pub fn stations(&self) -> Vec<StationAddress> {
+        let mut positions: Vec<usize> = (0..self.devices.len()).collect();
+        if let Ok(tree) = self.tree() {
+            for (position, node) in tree.order().iter().enumerate() {
+                if let Some(known) = positions.get_mut(*node) {
+                    *known = position;
+                }
+            }
+        }
+        let devices = self.devices.iter().zip(positions);
+        devices.map(|(device, position)| device.station_at(position)).collect()
     }
 
     /// How the devices are wired; node *n* is device *n*.
@@ -380,8 +397,7 @@ serial = 4711
         let tree = project.tree().unwrap();
         assert_eq!(tree.upstream(1), Some(End::Controller(0, Port::B)));
         assert_eq!(tree.closes_at(), Some((2, Port::B)));
-        assert_eq!(project.devices[0].station(DeviceId(0)), StationAddress(0x1001));
-        assert_eq!(project.devices[2].station(DeviceId(2)), StationAddress(0x2000));
+        assert_eq!(project.stations(), [0x1001, 0x1002, 0x2000].map(StationAddress));
         assert_eq!(project.devices[1].identity(), None);
         assert_eq!(project.devices[1].rule(), RevisionRule::Any, "no revision to compare");
     }

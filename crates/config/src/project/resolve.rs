@@ -1,7 +1,7 @@
 //! From a project to what the planner needs: each device with what its description says and what the
 //! user chose, in processing order.
 
-use linesman_proto::address::{DeviceId, RegisterAddress, StationAlias};
+use linesman_proto::address::{RegisterAddress, StationAlias};
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::mailbox::soe::{Idn, VALUE};
 use linesman_proto::sii::Direction;
@@ -125,7 +125,7 @@ impl Project {
             let Some(known) = known else {
                 return Err(ResolveError::Unknown { device: device.name.clone() });
             };
-            let planned = self.planned(device, DeviceId(node as u32), known);
+            let planned = self.planned(device, place, known);
             devices.push(planned.map_err(wrong)?);
         }
         let options = self.network.options(&self.tasks);
@@ -145,7 +145,7 @@ impl Project {
     fn planned(
         &self,
         device: &ProjectDevice,
-        id: DeviceId,
+        position: usize,
         known: Described,
     ) -> Result<PlannedDevice, String> {
         let Described {
@@ -186,7 +186,7 @@ impl Project {
         let [vendor, product, revision] = identity.unwrap_or_default();
         Ok(PlannedDevice {
             name: device.name.clone(),
-            station: device.station(id),
+            station: device.station_at(position),
             identity: linesman_proto::sii::Identity {
                 vendor_id: device.vendor_id.unwrap_or(vendor),
                 product_code: device.product_code.unwrap_or(product),

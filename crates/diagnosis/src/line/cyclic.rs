@@ -159,6 +159,21 @@ impl Cyclic {
         true
     }
 
+    /// Notes that the working counter rises though nobody has ordered it: it was too low from the first time on that the
+    /// datagram was seen.
+    pub fn note_low_before(&mut self, rise: Seen<u16>) {
+        let is_first = self.deficits.is_empty() && !self.is_laid_out_anew;
+        if is_first && rise.value > self.highest.value && self.wkc.value == self.first.value {
+            self.deficits.push_back(Deficit {
+                expected: rise.value,
+                first: self.first,
+                lowest: self.first.value,
+                count: self.count,
+                ended: Some(rise.at),
+            });
+        }
+    }
+
     /// Takes a working counter. `ordered` tells, when it falls, whether the MainDevice asked for it by taking a
     /// SubDevice out of SAFEOP or OP. Says whether it is news.
     pub fn record(&mut self, wkc: Seen<u16>, ordered: impl FnOnce() -> Ordered) -> bool {

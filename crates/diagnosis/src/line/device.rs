@@ -43,6 +43,8 @@ pub struct Device {
     pub reported_wrong: Option<Seen<()>>,
     /// Its station address now.
     pub station: Option<StationAddress>,
+    /// When it last answered while process data lacked shares.
+    pub heard_short: Option<Instant>,
     /// When it was read at its position without the station address that it had been given: it has started anew.
     pub lost_address: Option<Seen<()>>,
     /// Its alias.
@@ -173,6 +175,9 @@ pub struct Planned {
     pub rule: RevisionRule,
     /// The station address it is to have.
     pub station: StationAddress,
+    /// Whether the project gives that address; else it follows from its position, and MainDevices count from numbers of
+    /// their own.
+    pub station_is_given: bool,
     /// Its station alias, where the project gives one.
     pub alias: Option<u16>,
 }
@@ -260,6 +265,7 @@ impl Device {
             chip: None,
             reported_wrong: None,
             station: None,
+            heard_short: None,
             lost_address: None,
             alias: None,
             position: None,

@@ -165,7 +165,8 @@ impl Line {
     /// itself gives no tree.
     #[must_use]
     pub fn planned(network: Network, project: &Project) -> Self {
-        let devices = project.devices.iter().enumerate().map(|(index, planned)| {
+        let devices = project.devices.iter().zip(project.stations()).enumerate();
+        let devices = devices.map(|(index, (planned, station))| {
             let id = DeviceId(index as u32);
             let mut device = Device::new(id);
             device.name = Some(planned.name.clone());
@@ -173,7 +174,8 @@ impl Line {
             device.planned = Some(Planned {
                 identity: planned.identity(),
                 rule: planned.rule(),
-                station: planned.station(id),
+                station,
+                station_is_given: planned.station.is_some(),
                 alias: planned.alias,
             });
             device

@@ -5,7 +5,7 @@
 //! **How it is found.** An observation file or a pasted text tells of frames that did not come back, of datagrams
 //! that were not back in time and never came, or of damaged frames that the card dropped, while the error
 //! counters of the SubDevices were not read, or did not move. Beside another MainDevice, and in its recordings, frames
-//! are seen to go out and not to come back, two or more, and nobody reads counters. Other findings that explain lost
+//! are seen to go out and not to come back, and nobody reads counters: a note where it is one. Other findings that explain lost
 //! frames take precedence.
 //!
 //! **What it means.** A frame that is damaged on the line comes back, and the card counts it: so many damaged
@@ -97,8 +97,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let line = view.line;
     let traffic = &line.traffic;
-    let lost = traffic.lost;
-    let (Some(first), Some(last)) = (lost.first, lost.last) else { return None };
+    // In a ring one copy may be lost alone.
+    let tallies = [traffic.lost, traffic.copies_lost[0], traffic.copies_lost[1]];
+    let first = tallies.iter().filter_map(|tally| tally.first).min()?;
+    let last = tallies.iter().filter_map(|tally| tally.last).max()?;
+    let count: u64 = tallies.iter().map(|tally| tally.sum).sum();
     // A recorder that misses requests misses returns, too.
     let is_recorder = traffic.unrecorded.sum > 0 || traffic.datagrams_cut > 0 || traffic.missed > 0;
     // What is lost in a row is another rule's; of those that are still missing it is not known whether they are the
@@ -107,10 +110,9 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         let is_open = one.ended.is_none() && !view.has_ended;
         is_open || one.frames >= nobody_answers::CERTAIN
     });
-    let single = lost.sum.saturating_sub(in_a_row.map(|one| one.frames).sum());
+    let single = count.saturating_sub(in_a_row.map(|one| one.frames).sum());
     let went_on = traffic.latest_returned.is_some_and(|returned| returned.at > first);
-    if single < SEVERAL || !went_on || line.sees_all_orders || traffic.is_one_sided() || is_recorder
-    {
+    if single == 0 || !went_on || line.sees_all_orders || traffic.is_one_sided() || is_recorder {
         return None;
     }
     let explains = |one: &Condition| {
@@ -131,15 +133,24 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let damaged = line.host.is_watched.then_some(line.host.card(Path::A).crc.sum);
     // Many cards count no damaged frame at all: none counted proves nothing.
     let condition = causes(view, damaged.unwrap_or(0), false, first);
-    let count = lost.sum;
-    let text = format!(
-        "{count} of {} frames did not come back, single ones or a few in a row, the last at {last}",
-        traffic.sent
-    );
+    let what = if traffic.lost.sum == 0 { "copies of frames in the ring" } else { "frames" };
+    let text = match count {
+        1 => format!("one of {} {what} did not come back, at {last}", traffic.sent),
+        _ => format!(
+            "{count} of {} {what} did not come back, single ones or a few in a row, the last at {last}",
+            traffic.sent
+        ),
+    };
     let known = traffic.first_lost.and_then(|seen| seen.frame).unwrap_or(0);
     let mut condition = condition.confirmed(last).explaining([Symptom::FramesLost]);
+    let is_rare = count.saturating_mul(RARE) <= traffic.sent;
     condition.severity =
-        if count.saturating_mul(RARE) <= traffic.sent { Severity::Info } else { Severity::Warning };
+        if is_rare || single < SEVERAL || traffic.lost.sum == 0 {
+            // A ring that lost one copy has lost nothing.
+            Severity::Info
+        } else {
+            Severity::Warning
+        };
     condition = condition.shown_by(Evidence::frame(first, known, text));
     let rhythm = rhythm(traffic);
     condition.evidence.extend(rhythm.map(|text| Evidence::host(Some(last), text)));
@@ -226,7 +237,8 @@ fn causes(view: &View<'_>, damaged: u64, is_watched: bool, since: Instant) -> Co
             .or(FaultName::EmcNoise, 0.2)
             .or_at(FaultName::NicDamaged, Place::Host, 0.15)
             .or(FaultName::TransmitterDamaged, 0.1)
-            .or(FaultName::DeviceInternal, 0.1)
+            .or(FaultName::ReceiverDamaged, 0.05)
+            .or(FaultName::DeviceInternal, 0.05)
     } else if is_watched {
         Condition::new(&PAGE, Place::Host, FaultName::HostDrops, since)
             .confidence(0.4)
@@ -241,8 +253,9 @@ fn causes(view: &View<'_>, damaged: u64, is_watched: bool, since: Instant) -> Co
             .or(FaultName::LinkFlapping, 0.1)
             .or_at(FaultName::NicDamaged, Place::Host, 0.09)
             .or(FaultName::TransmitterDamaged, 0.07)
+            .or(FaultName::ReceiverDamaged, 0.07)
             .or(FaultName::DeviceInternal, 0.07)
-            .or_at(FaultName::LateFrames, Place::Host, 0.06)
+            .or(FaultName::FalseLink, 0.02)
     }
 }
 

@@ -46,7 +46,7 @@ const TOGETHER: Span = Span::s(10);
 /// Where nobody keeps step, what is late by this part of the cycle is told: half of what is doubtful to whoever does.
 const NOTABLE: u64 = 10;
 /// What is late by this part of the cycle all the time is told, whatever is usual here …
-const HELD_BACK: u64 = 5;
+const HELD_BACK: u64 = 10;
 /// … if it is so many frames …
 const SEVERAL: u64 = 16;
 /// … and such a share, in percent.

@@ -303,7 +303,9 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     });
     let nobody_known = suspects.devices.is_empty() && (lasts || link_changed.is_some());
     // Again and again for a moment: a contact that opens, and nothing that hangs.
-    let is_flapping = suspects.devices.is_empty() && deficits.len() >= FLAPS;
+    let is_flapping = (!links.is_empty() || !suspects.is_certain || suspects.devices.is_empty())
+        && deficits.len() >= FLAPS;
+    let is_open = suspects.devices.len() > 1 && !suspects.is_certain && !lasts;
     let (cause, confidence, others) = match known {
         None if is_flapping => {
             (FaultName::LinkFlapping, 0.4, [(FaultName::LinkOpen, 0.2), (FaultName::BrownOut, 0.1)])
@@ -319,6 +321,12 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
             FaultName::LinkOpen,
             0.3,
             [(FaultName::DeviceOff, 0.2), (FaultName::FirmwareFault, 0.15)],
+        ),
+        // It came and went by itself: nothing that hangs, and nothing that was set up wrongly.
+        None if is_open => (
+            FaultName::LinkOpen,
+            0.35,
+            [(FaultName::FirmwareFault, 0.25), (FaultName::BrownOut, 0.1)],
         ),
         Some(Trouble::Absent(_)) => {
             (FaultName::DeviceOff, 0.4, [(FaultName::LinkOpen, 0.35), (FaultName::BrownOut, 0.1)])

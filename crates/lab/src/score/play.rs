@@ -69,6 +69,8 @@ pub struct CaseReport {
     pub healthy_listened: Option<HealthyListened>,
     /// What listeners heard, where that is kept.
     pub heard: Vec<Heard>,
+    /// The project of the line as TOML, where that is kept.
+    pub project: Option<String>,
     /// Cycle of the process data.
     pub cycle: Span,
     /// Its faults.
@@ -154,6 +156,7 @@ fn empty(case: &Case, devices: usize) -> CaseReport {
         healthy: None,
         healthy_listened: None,
         heard: Vec::new(),
+        project: None,
         cycle: case.cycle,
         faults: Vec::new(),
         unplayable: None,
@@ -263,6 +266,7 @@ impl<'a> Play<'a> {
 
     fn run_all(&mut self) -> Result<CaseReport, Stop> {
         let mut report = empty(self.case, self.lab.tree().len());
+        report.project = self.options.keeps_heard.then(|| self.lab.project().to_toml());
         let mut active: Vec<Active> = Vec::new();
         if self.built_in.is_empty() {
             self.lab.wait_up(BRING_UP)?;

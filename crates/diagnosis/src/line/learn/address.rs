@@ -58,6 +58,8 @@ pub struct Addresses {
     settled_by: Option<(usize, Option<u16>, Option<u16>)>,
     /// Whether something was said of single controllers, so that they keep their numbers.
     is_named: bool,
+    /// The first station address by which planned SubDevices were counted.
+    planned_from: Option<u16>,
     /// Station addresses that were asked and never answered.
     unanswered: BTreeMap<StationAddress, Unanswered>,
 }
@@ -234,6 +236,10 @@ impl Addresses {
         }
         if !answers {
             return None;
+        }
+        self.count_planned(line, Some(station));
+        if let Some(id) = self.stations.get(&station) {
+            return Some(*id);
         }
         let by_number = self.by_number(line, station, MOST_BY_NUMBER);
         let by_number = by_number.filter(|id| line.device(*id).is_some_and(Self::is_free));

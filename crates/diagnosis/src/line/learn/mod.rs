@@ -46,6 +46,7 @@ impl Learner {
     /// Puts controllers that were met in the middle of a run into order, as far as it can be told.
     /// Identities may change: only for a line of which nothing was said yet.
     pub fn settle(&mut self, line: &mut Line) {
+        self.addresses.count_planned(line, None);
         if self.addresses.expect_unanswered(line) | self.addresses.settle(line) {
             // What was under way was noted by the identities of before.
             self.transfers = sii::Transfers::default();
@@ -239,6 +240,10 @@ impl Learner {
             }
             return;
         };
+        if answer.sum > 0 && !is_position {
+            self.addresses.answers_at_last(line, StationAddress(answer.reply.adp()));
+        }
+        let is_short = line.cyclic.iter().any(Cyclic::has_deficit);
         let Some(device) = line.devices.get_mut(id.index()) else { return };
         if answer.effect.multiple_write {
             clock::handed_round(line, id, answer);
@@ -268,7 +273,15 @@ impl Learner {
                 // Whether it is there, others tell: who does not fetch requests takes no new one.
                 return;
             }
-            if answer.is_last && answer.is_everywhere() && device.answered.is_some() {
+            let is_asked = answer.is_last && answer.is_everywhere();
+            if is_asked && device.answered.is_none() && !is_position {
+                let seen = Seen::new((), answer.at, Some(answer.frame));
+                let station = StationAddress(answer.reply.adp());
+                self.addresses.asked_in_vain(line, station, seen);
+                line.touch();
+                return;
+            }
+            if is_asked && device.answered.is_some() {
                 let is_news = device.silent.is_none();
                 device.is_silent(answer.at, Some(answer.frame));
                 if is_news {
@@ -292,6 +305,9 @@ impl Learner {
             return;
         }
         let is_news = device.answered.is_none() || device.silent.is_some();
+        if is_short {
+            device.heard_short = Some(answer.at);
+        }
         device.answers(answer.at, Some(answer.frame));
         if is_news {
             line.touch();

@@ -1,5 +1,6 @@
 //! Process data: logical datagrams and the working counters that they come back with.
 
+use linesman_proto::address::LogicalAddress;
 use linesman_proto::time::Span;
 
 use super::Answer;
@@ -11,6 +12,12 @@ const JUST_BEGUN: Span = Span::ms(200);
 const BELOW_PLAN: Span = Span::s(1);
 /// Most logical datagrams that are followed.
 const MOST_CYCLIC: usize = 256;
+
+/// Whether nobody has been seen to set up a datagram's process data or to ask anybody for a state.
+fn is_unordered(devices: &[Device], start: LogicalAddress, len: u16) -> bool {
+    devices.iter().all(|device| device.al.requested.is_none())
+        && owners(devices, start, len).next().is_none()
+}
 
 /// A datagram to whoever has an FMMU there. Says whether an answer was expected.
 pub(super) fn returned(line: &mut Line, latest: &mut usize, answer: &Answer<'_>) -> bool {
@@ -65,6 +72,9 @@ pub(super) fn returned(line: &mut Line, latest: &mut usize, answer: &Answer<'_>)
             Ordered::No
         }
     };
+    if !sees_all && seen.value > highest && is_unordered(devices, start, len) {
+        cyclic.note_low_before(seen);
+    }
     let mut news = cyclic.record(seen, ordered);
     if cyclic.planned.is_some_and(|planned| cyclic.highest.value < planned) {
         let since = cyclic.wkc.at.max(cyclic.first.at);

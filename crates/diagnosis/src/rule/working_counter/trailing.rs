@@ -17,28 +17,30 @@ const ANSWERS_LATE: Span = Span::ms(100);
 /// One device that fails alone has other reasons.
 const SEVERAL: usize = 2;
 
-/// Links behind which all shares that a lasting deficit lacks belong, most likely first.
+/// Links behind which all shares that a deficit lacks belong, most likely first.
 pub(super) fn suspects(line: &Line, deficit: &Deficit) -> Option<Suspects> {
-    let tree = line.tree.as_ref().filter(|tree| {
-        tree.closes_at().is_none() && tree.len() <= line.devices.len() && deficit.ended.is_none()
-    })?;
+    let tree = line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len())?;
     let since = deficit.first.at;
+    let until = deficit.ended.unwrap_or(line.now);
+    // What was short in several ways was not cut off at one place.
+    if deficit.ended.is_some() && deficit.first.value != deficit.lowest {
+        return None;
+    }
     let traffic = &line.traffic;
-    let counts_all =
-        traffic.broadcast_now.is_some_and(|now| now.value >= traffic.broadcast_answers)
-            && traffic.broadcast_read.is_some_and(|read| read > since + ANSWERS_LATE);
+    let counts_all = traffic
+        .broadcast_now
+        .is_some_and(|now| now.value >= traffic.broadcast_answers)
+        && traffic.broadcast_read.is_some_and(|read| since + ANSWERS_LATE < read && read <= until);
     if counts_all {
         return None;
     }
-    let gone = traffic
-        .broadcast_now
-        .filter(|now| now.at.before(AT_ONCE) <= line.now && now.at + AT_ONCE >= since);
+    let gone = traffic.broadcast_now.filter(|now| now.at <= until && now.at + AT_ONCE >= since);
     let gone = gone.map(|now| usize::from(traffic.broadcast_answers.saturating_sub(now.value)));
     let fits = |node: &usize| {
         let behind = tree.subtree(*node);
         is_between(tree, *node)
-            && !behind.iter().any(|node| is_heard(line, *node, since))
-            && !is_link_read(line, tree, *node, since)
+            && !behind.iter().any(|node| is_heard(line, *node, deficit))
+            && !is_link_read(line, tree, *node, (since, until))
             && (owners(line, behind) >= SEVERAL || gone == Some(behind.len()))
             && line.cyclic.iter().all(|cyclic| lacks(line, cyclic, behind, since))
     };
@@ -58,20 +60,26 @@ pub(super) fn suspects(line: &Line, deficit: &Deficit) -> Option<Suspects> {
     Some(Suspects { is_certain: true, devices: devices.collect(), links })
 }
 
-/// Not the first link: without it no frame comes back.
+/// Not the first link, without which no frame comes back, nor one of a ring, where frames come from the other side.
 fn is_between(tree: &Tree, node: usize) -> bool {
     matches!(tree.upstream(node), Some(End::Controller(..)))
+        && tree.link_above(node).is_none_or(|link| !tree.is_on_ring(link))
 }
 
-fn is_heard(line: &Line, node: usize, since: Instant) -> bool {
-    line.devices[node].answered.is_some_and(|answered| answered.at > since + ANSWERS_LATE)
+/// Whether a SubDevice answered in the time of a deficit.
+fn is_heard(line: &Line, node: usize, deficit: &Deficit) -> bool {
+    let (device, from) = (&line.devices[node], deficit.first.at + ANSWERS_LATE);
+    match deficit.ended {
+        None => device.answered.is_some_and(|answered| answered.at > from),
+        Some(ended) => device.heard_short.is_some_and(|heard| from < heard && heard <= ended),
+    }
 }
 
 /// Whether the near end told of its link since: then that is known, and other rules tell.
-fn is_link_read(line: &Line, tree: &Tree, node: usize, since: Instant) -> bool {
+fn is_link_read(line: &Line, tree: &Tree, node: usize, (since, until): (Instant, Instant)) -> bool {
     let Some(End::Controller(near, _)) = tree.upstream(node) else { return false };
     let dl = &line.devices[near].dl;
-    !dl.is_assumed && dl.latest_reading.is_some_and(|read| read >= since)
+    !dl.is_assumed && dl.latest_reading.is_some_and(|read| since <= read && read <= until)
 }
 
 fn owners(line: &Line, behind: &[usize]) -> usize {
@@ -86,9 +94,13 @@ fn owners(line: &Line, behind: &[usize]) -> usize {
 fn lacks(line: &Line, cyclic: &Cyclic, behind: &[usize], since: Instant) -> bool {
     let own = line.owners(cyclic).filter(|owner| behind.contains(&owner.device.index()));
     let share: u16 = own.filter_map(|owner| shares(cyclic, &owner).first().copied()).sum();
-    let open = cyclic.deficits.back().filter(|deficit| {
+    let then = cyclic.deficits.iter().rev().find(|deficit| {
         let at = deficit.first.at;
-        deficit.ended.is_none() && at <= since + AT_ONCE && since <= at + AT_ONCE
+        at <= since + AT_ONCE && since <= at + AT_ONCE
     });
-    share == open.map_or(0, |deficit| deficit.expected.saturating_sub(cyclic.wkc.value))
+    let lacking = |deficit: &Deficit| {
+        let now = if deficit.ended.is_some() { deficit.lowest } else { cyclic.wkc.value };
+        deficit.expected.saturating_sub(now)
+    };
+    share == then.map_or(0, lacking)
 }

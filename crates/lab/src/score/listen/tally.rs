@@ -160,7 +160,8 @@ impl ListenTally {
         let outcome = match said.outcome {
             Outcome::Missed => "missed",
             Outcome::Wrong => "wrong",
-            Outcome::Found | Outcome::Open | Outcome::NoTrace => return,
+            Outcome::Open => "open",
+            Outcome::Found | Outcome::NoTrace => return,
         };
         if self.wrong.len() < MOST_WRONG {
             self.wrong.push(WrongListened {

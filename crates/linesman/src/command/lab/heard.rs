@@ -29,6 +29,10 @@ pub(super) fn create(directory: &FilePath, habit: Habit) -> Result<(), Failure> 
 
 /// Writes the recordings of a case.
 pub(super) fn write(directory: &FilePath, case: &CaseReport) -> Result<(), Failure> {
+    if let Some(project) = &case.project {
+        let path = directory.join(format!("{}.toml", case.seed));
+        files::write_new_bytes(&path, "the project", project.as_bytes())?;
+    }
     for heard in &case.heard {
         let path = directory.join(format!("{}-{}.pcapng", case.seed, heard.joined));
         let bytes = pcapng(heard).map_err(|error| files::in_file(&path, &error))?;

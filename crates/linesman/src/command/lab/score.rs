@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME", default_value_t)]
     habit: Habit,
     /// With --habit: write what each listener heard to this new directory, as SEED-start.pcapng, SEED-during.pcapng and
-    /// SEED-after.pcapng, or SEED-late.pcapng of healthy lines
+    /// SEED-after.pcapng, or SEED-late.pcapng of healthy lines, and the project as SEED.toml
     #[arg(long, value_name = "DIRECTORY")]
     record: Option<PathBuf>,
     /// Also each case that was judged wrongly, with what was said

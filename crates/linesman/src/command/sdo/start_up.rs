@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use linesman_config::project::{Project, ProjectDevice, StartUpEntry};
-use linesman_proto::address::{DeviceId, StationAddress};
+use linesman_config::project::{Project, StartUpEntry};
+use linesman_proto::address::StationAddress;
 use linesman_proto::mailbox::coe::ObjectAddress;
 
 use crate::failure::Failure;
@@ -29,11 +29,12 @@ pub(super) fn add(
 ) -> Result<String, Failure> {
     let text = files::text(path, "a project")?;
     let mut project = Project::parse(&text).map_err(|error| files::in_file(path, &error))?;
-    let is_meant = |device: &ProjectDevice, node: usize| match name {
-        Some(name) => device.name == name,
-        None => device.station(DeviceId(node as u32)) == StationAddress(station),
+    let stations = project.stations();
+    let is_meant = |node: &usize| match name {
+        Some(name) => project.devices[*node].name == name,
+        None => stations[*node] == StationAddress(station),
     };
-    let node = (0..project.devices.len()).find(|node| is_meant(&project.devices[*node], *node));
+    let node = (0..project.devices.len()).find(is_meant);
     let Some(node) = node else {
         let who = match name {
             Some(name) => format!("device is called `{name}`"),

@@ -72,6 +72,37 @@ impl Addresses {
         Some(DeviceId(place as u32))
     }
 
+    /// Gives planned SubDevices the station addresses by which the MainDevice counts positions, where the project does not
+    /// give them and none was met by the address that it was taken to have: from the number of the MainDevice that was
+    /// recognised, or else from a known one in whose order a station address has a place that was `met`.
+    pub(in crate::line::learn) fn count_planned(
+        &mut self,
+        line: &mut Line,
+        met: Option<StationAddress>,
+    ) {
+        let count = self.order.len();
+        let place = |first: u16, met: StationAddress| met.0.checked_sub(first).map(usize::from);
+        let holds = |first: &u16, met| place(*first, met).is_some_and(|place| place < count);
+        let known =
+            || FIRST_STATIONS.into_iter().find(|first| met.is_some_and(|met| holds(first, met)));
+        let first = own_first_station(line).or_else(known);
+        let Some(first) = first.filter(|first| self.planned_from != Some(*first)) else { return };
+        let is_counted = |device: &Device| {
+            device.planned.as_ref().is_some_and(|planned| !planned.station_is_given)
+        };
+        if line.devices.iter().any(|one| is_counted(one) && one.answered.is_some()) {
+            return;
+        }
+        self.planned_from = Some(first);
+        for (position, id) in self.order.clone().into_iter().enumerate() {
+            if line.device(id).is_some_and(is_counted) {
+                let station = StationAddress(first.wrapping_add(position as u16));
+                self.stations.retain(|_, owner| *owner != id);
+                self.stations.insert(station, id);
+            }
+        }
+    }
+
     /// Puts controllers that were met by their station addresses in the middle of a run into order: every known
     /// MainDevice gives these addresses in the order of positions. Identities change, so this is only for a line of
     /// which nothing was said yet. Says whether any changed.

@@ -47,7 +47,11 @@ impl Addresses {
         match self.unanswered.get_mut(&station) {
             Some(known) => (known.last, known.times) = (seen.at, known.times + 1),
             None if count < MOST_UNANSWERED => {
-                let others_answer = !self.stations.is_empty();
+                // Planned ones have their addresses before anybody was met, and get them before process data.
+                let is_planned = line.devices.iter().any(|one| one.planned.is_some());
+                let is_met = !is_planned || line.devices.iter().any(|one| one.answered.is_some());
+                let others_answer =
+                    is_met && !self.stations.is_empty() && (!is_planned || !line.cyclic.is_empty());
                 let unanswered = Unanswered { first: seen, last: seen.at, times: 1, others_answer };
                 self.unanswered.insert(station, unanswered);
                 line.asked_in_vain.push(station);
@@ -59,8 +63,11 @@ impl Addresses {
     /// Makes controllers of station addresses that were asked often enough in vain, where others answer: somebody
     /// expects a SubDevice there. Says whether there are new ones.
     pub(in crate::line::learn) fn expect_unanswered(&mut self, line: &mut Line) -> bool {
-        let is_planned = line.devices.iter().any(|one| one.planned.is_some());
-        if is_planned || self.stations.is_empty() {
+        if line.devices.iter().any(|one| one.planned.is_some()) {
+            self.planned_unanswered(line);
+            return false;
+        }
+        if self.stations.is_empty() {
             return false;
         }
         // Who looks for SubDevices asks at other numbers, too.
@@ -97,5 +104,35 @@ impl Addresses {
             }
         }
         has_new
+    }
+
+    /// A SubDevice that was planned answers for the first time: if it was asked in vain before, it was away.
+    pub(in crate::line::learn) fn answers_at_last(
+        &mut self,
+        line: &mut Line,
+        station: StationAddress,
+    ) {
+        let Some(asked) = self.unanswered.remove(&station) else { return };
+        line.asked_in_vain.retain(|one| *one != station);
+        let device = self.stations.get(&station).and_then(|id| line.device_mut(*id));
+        if let Some(device) = device.filter(|one| asked.others_answer && one.silent.is_none()) {
+            device.is_silent(asked.first.at, asked.first.frame);
+        }
+    }
+
+    /// Notes of SubDevices that were planned, and have never answered though they were asked often enough, that they are
+    /// silent: where others answer.
+    fn planned_unanswered(&self, line: &mut Line) {
+        if line.devices.iter().all(|one| one.answered.is_none()) {
+            return;
+        }
+        for (station, asked) in self.unanswered.iter().filter(|(_, one)| one.is_expected()) {
+            let device = self.stations.get(station).and_then(|id| line.device_mut(*id));
+            let device = device.filter(|one| one.answered.is_none() && one.silent.is_none());
+            if let Some(device) = device {
+                device.is_silent(asked.first.at, asked.first.frame);
+                line.touch();
+            }
+        }
     }
 }
