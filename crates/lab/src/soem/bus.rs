@@ -13,10 +13,12 @@ use std::task::Poll;
 
 use linesman_maindevice::{DatagramData, Reply, Request, Target};
 use linesman_proto::address::{Path, RegisterAddress, WorkingCounter};
+use linesman_proto::command::Command;
 use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, HEADER_LEN, MIN_LEN, MacAddress};
 use linesman_proto::frame::{
-    DATAGRAM_HEADER_LEN, DATAGRAM_OVERHEAD, ETHERCAT_HEADER_LEN, FrameBuilder,
+    DATAGRAM_HEADER_LEN, DATAGRAM_OVERHEAD, ETHERCAT_HEADER_LEN, FrameBuilder, FrameView,
 };
+use linesman_proto::register;
 use linesman_proto::time::{Instant, Span};
 
 /// Source address of the frames of the first card, and of the second one.
@@ -213,7 +215,7 @@ impl Bus {
         let bytes = board.buffers[index].sent.clone();
         board.outgoing.push_back((Path::A, bytes));
         if board.ring {
-            let companion = Request::read(Target::All, RegisterAddress(0), 2);
+            let companion = Request::read(Target::All, register::ESC_TYPE.address, 2);
             let bytes = frame(&[companion], index, SOURCES[1]);
             board.outgoing.push_back((Path::B, bytes));
         }
@@ -283,6 +285,14 @@ impl Bus {
         };
         requests.iter().map_while(reply).collect()
     }
+}
+
+/// Whether a frame, sent or come back, is what the second card sends beside one of the first.
+pub(crate) fn is_companion(view: &FrameView<'_>) -> bool {
+    view.source().marked() == SOURCES[1].marked()
+        && view.datagrams().map_while(Result::ok).all(|datagram| {
+            datagram.command() == Some(Command::Brd) && datagram.ado() == register::ESC_TYPE.address
+        })
 }
 
 /// A datagram that nobody has answered.

@@ -31,6 +31,7 @@ use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
 use self::bus::Bus;
+pub(crate) use self::bus::is_companion;
 pub(crate) use self::device::Hook;
 use self::device::{Device, OP, SAFE_OP};
 pub(crate) use self::orders::Order;
