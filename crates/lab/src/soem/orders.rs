@@ -12,7 +12,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
 use super::bus::{Bus, SURELY};
-use super::device::{Device, OP};
+use super::device::Device;
 use super::{mailbox, states};
 
 /// How long an object is waited for, as the failure tells it.
@@ -106,21 +106,21 @@ impl Orders {
         self.lock().events.push_back(Event::SdoUploaded { id, object, result });
     }
 
+    /// Whoever is to be in OP again is brought there step by step, as one that has left it by itself.
     async fn bring(&self, bus: &Bus, devices: &[Device], of: Option<DeviceId>, state: AlState) {
-        let all = 0..devices.len();
-        let range = of.map_or(all, |id| id.index()..id.index() + 1);
-        let bits = u16::from(state.bits());
-        for at in range {
-            if bits == OP {
+        let range = of.map_or(0..devices.len(), |id| id.index()..id.index() + 1);
+        if state == AlState::Op {
+            range.for_each(|at| {
                 self.lock().held.remove(&at);
-            } else {
-                self.lock().held.insert(at);
-            }
+            });
+            return;
         }
-        match of {
+        self.lock().held.extend(range);
+        let bits = u16::from(state.bits());
+        match of.map(|id| devices.get(id.index())) {
             None => states::request_all(bus, bits).await,
-            Some(id) => {
-                if let Some(device) = devices.get(id.index()) {
+            Some(device) => {
+                if let Some(device) = device {
                     states::request(bus, device, bits, SURELY).await;
                 }
             }
