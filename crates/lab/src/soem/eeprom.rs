@@ -161,7 +161,7 @@ impl Categories {
 
     async fn word(&mut self, bus: &Bus, device: &mut Device, at: u16) -> u16 {
         let low = self.byte(bus, device, at).await;
-        let high = self.byte(bus, device, at + 1).await;
+        let high = self.byte(bus, device, at.saturating_add(1)).await;
         u16::from_le_bytes([low, high])
     }
 
