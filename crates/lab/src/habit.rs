@@ -29,6 +29,8 @@ pub enum Habit {
     Counters,
     /// As states, with the error counters of all ports once a second, cleared each time, as `TwinCAT` does.
     Clearing,
+    /// As a program with SOEM: its own start-up, frames and recovery.
+    Soem,
 }
 
 /// How often a habit other than ours looks.
@@ -38,8 +40,15 @@ const NEVER: Span = Span::s(86_400);
 
 impl Habit {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Own, Self::ProcessData, Self::States, Self::Links, Self::Counters, Self::Clearing];
+    pub const ALL: [Self; 7] = [
+        Self::Own,
+        Self::ProcessData,
+        Self::States,
+        Self::Links,
+        Self::Counters,
+        Self::Clearing,
+        Self::Soem,
+    ];
 
     /// The name on the command line and in tables.
     #[must_use]
@@ -51,6 +60,7 @@ impl Habit {
             Self::Links => "links",
             Self::Counters => "counters",
             Self::Clearing => "clearing",
+            Self::Soem => "soem",
         }
     }
 
@@ -64,16 +74,17 @@ impl Habit {
             Self::Links => "as states, and DL status of each when something is wrong",
             Self::Counters => "as states, and all error counters each second",
             Self::Clearing => "as states, and error counters read and cleared each second",
+            Self::Soem => "SOEM: its start-up, states of all every 50 ms, its recovery",
         }
     }
 
-    /// What is read beside process data.
+    /// What our MainDevice reads beside process data.
     fn polling(self) -> Polling {
         let rounds = |links, counters| Polling::Rounds(Rounds { links, counters });
         match self {
             Self::Own => Polling::EachDevice,
             Self::ProcessData => Polling::Nothing,
-            Self::States => rounds(false, CounterPoll::None),
+            Self::States | Self::Soem => rounds(false, CounterPoll::None),
             Self::Links => rounds(true, CounterPoll::None),
             Self::Counters => rounds(false, CounterPoll::Read),
             Self::Clearing => rounds(false, CounterPoll::ReadAndCleared),

@@ -4,6 +4,7 @@ mod cargo;
 mod count;
 mod exec;
 mod fuzz;
+mod habits;
 mod interop;
 mod peers;
 mod product;
@@ -105,6 +106,7 @@ const STEPS: &[Step] = &[
     Step { name: "demo", quick: false, alone: false, run: product::demo },
     Step { name: "stories", quick: false, alone: false, run: product::stories },
     Step { name: "swarm", quick: false, alone: false, run: product::swarm },
+    Step { name: "habits", quick: false, alone: false, run: habits::run },
     Step { name: "fuzz", quick: false, alone: false, run: fuzz::run },
     Step { name: "interop", quick: false, alone: false, run: interop::run },
     Step { name: "bench-peers", quick: false, alone: true, run: peers::run },

@@ -27,7 +27,7 @@ pub(super) fn release(context: &Context<'_>) -> Result<Outcome> {
 }
 
 /// Builds the binary unless the step before has just done so.
-fn built(context: &Context<'_>) -> Result<Option<Outcome>> {
+pub(super) fn built(context: &Context<'_>) -> Result<Option<Outcome>> {
     match release(context)? {
         Outcome::Passed { .. } => Ok(None),
         failed @ (Outcome::Failed { .. } | Outcome::Skipped(_)) => Ok(Some(failed)),

@@ -8,7 +8,7 @@ use linesman_config::project::{Described, ProjectDevice};
 use linesman_diagnosis::Asked;
 use linesman_diagnosis::observe::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_maindevice::watch::Watch;
-use linesman_maindevice::{Event, ProbeRequest, Target};
+use linesman_maindevice::{Event, ProbeRequest, Target, Transmit};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::Outgoing;
@@ -42,7 +42,7 @@ impl Lab {
         let mut transmit = std::mem::take(&mut self.transmit);
         let mut count = 0_u32;
         while !self.is_paused()
-            && let Some(sent) = self.main.poll_transmit(self.now, &mut transmit)
+            && let Some(sent) = self.poll_transmit(&mut transmit)
         {
             let at = sent.at.max(self.now);
             let frame = &transmit[..sent.len];
@@ -55,7 +55,7 @@ impl Lab {
             }
         }
         self.transmit = transmit;
-        while let Some(event) = self.main.poll_event() {
+        while let Some(event) = self.poll_event() {
             self.handle_event(event);
         }
         if let Some(watch) = &mut self.watch {
@@ -91,6 +91,21 @@ impl Lab {
             self.finding_events.push_back(event);
         }
         Ok(())
+    }
+
+    /// The next frame of who drives the line.
+    fn poll_transmit(&mut self, buffer: &mut [u8]) -> Option<Transmit> {
+        match &self.other {
+            Some(other) => other.poll_transmit(self.now, buffer),
+            None => self.main.poll_transmit(self.now, buffer),
+        }
+    }
+
+    fn poll_event(&mut self) -> Option<Event> {
+        match &self.other {
+            Some(other) => other.poll_event(),
+            None => self.main.poll_event(),
+        }
     }
 
     pub(super) fn show(&mut self, direction: Direction, path: Path, time: Instant, bytes: &[u8]) {
@@ -191,7 +206,7 @@ impl Lab {
     }
 
     /// The plan for what was found, with the names of the project where they fit.
-    fn make_plan(&self, inventory: &Inventory) -> Result<Plan, String> {
+    pub(super) fn make_plan(&self, inventory: &Inventory) -> Result<Plan, String> {
         if self.project.chooses() {
             return self.chosen_plan(inventory);
         }

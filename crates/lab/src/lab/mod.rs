@@ -7,6 +7,7 @@
 mod error;
 mod exchange;
 mod object;
+mod other;
 mod pause;
 mod register;
 mod truth;
@@ -38,6 +39,7 @@ use self::pause::Socket;
 use self::veil::Veil;
 use crate::habit::Habit;
 use crate::options::{Begin, LabOptions};
+use crate::soem::Soem;
 
 /// How often the card's counters are looked at.
 const HOST_INTERVAL: Span = Span::ms(100);
@@ -65,6 +67,8 @@ pub struct Lab {
     tree: Tree,
     segment: Segment,
     main: MainDevice,
+    /// The MainDevice of others that drives the line in place of ours.
+    other: Option<Soem>,
     engine: Engine,
     tap: Option<Tap>,
     recorder: Option<Tap>,
@@ -147,6 +151,7 @@ impl Lab {
             tree,
             segment,
             main,
+            other: None,
             engine: Engine::new(setup),
             tap: None,
             recorder: None,
@@ -172,7 +177,9 @@ impl Lab {
             options,
         };
         lab.segment.listen(!is_own);
-        if lab.options.begin != Begin::Idle {
+        if lab.options.habit == Habit::Soem && lab.options.begin == Begin::Run {
+            lab.start_other(file);
+        } else if lab.options.begin != Begin::Idle {
             lab.main.scan(lab.now);
         }
         Ok(lab)

@@ -42,9 +42,9 @@ impl Lab {
         id: DeviceId,
         object: ObjectAddress,
     ) -> Result<Option<Result<Vec<u8>, MailboxFailure>>, LabError> {
-        let (of, now) = (self.in_plan(id), self.now);
+        let of = self.in_plan(id);
         let mark = self.event_mark();
-        self.main.sdo_upload(now, of, object, false);
+        self.upload(of, object);
         let answer = |lab: &Self| {
             lab.events_since(mark).find_map(|event| {
                 let Event::SdoUploaded { id, object: about, result } = event else { return None };

@@ -33,7 +33,10 @@ impl Lab {
 
     /// When the MainDevice has something to do.
     pub(super) fn main_due(&mut self) -> Option<Instant> {
-        self.paused_until().or_else(|| self.main.poll_timeout())
+        self.paused_until().or_else(|| match &self.other {
+            Some(other) => other.poll_timeout(),
+            None => self.main.poll_timeout(),
+        })
     }
 
     /// Hands a frame to the MainDevice, or keeps it until the pause is over.
@@ -41,7 +44,14 @@ impl Lab {
         if self.is_paused() {
             self.socket.waiting.push_back((path, frame.to_vec()));
         } else {
-            self.main.handle_frame(at, path, frame);
+            self.hand_over(at, path, frame);
+        }
+    }
+
+    fn hand_over(&mut self, at: Instant, path: Path, frame: &[u8]) {
+        match &mut self.other {
+            Some(other) => other.handle_frame(at, path, frame),
+            None => self.main.handle_frame(at, path, frame),
         }
     }
 
@@ -51,8 +61,11 @@ impl Lab {
             return;
         }
         while let Some((path, frame)) = self.socket.waiting.pop_front() {
-            self.main.handle_frame(self.now, path, &frame);
+            self.hand_over(self.now, path, &frame);
         }
-        self.main.handle_timeout(self.now);
+        match &mut self.other {
+            Some(other) => other.handle_timeout(self.now),
+            None => self.main.handle_timeout(self.now),
+        }
     }
 }

@@ -51,7 +51,7 @@ impl Lab {
         })?;
         let request = ProbeRequest { target: Target::Station(station), register, len, write };
         let mark = self.event_mark();
-        self.main.probe(self.now, request.clone());
+        self.probe(request.clone());
         let answer = |lab: &Self| {
             lab.events_since(mark).find_map(|event| {
                 let Event::Probed { request: about, result } = event else { return None };

@@ -105,11 +105,9 @@ fn once(
         StopAndStart => {
             let Some(plan) = lab.plan().cloned() else { return Ok(()) };
             let down = if stream.chance(0.5) { AlState::Init } else { AlState::PreOp };
-            let now = lab.now();
-            lab.main_mut().stop(now, down);
-            lab.run_until(now + lasts * 2)?;
-            let now = lab.now();
-            lab.main_mut().start(now, plan);
+            lab.stop_main(down);
+            lab.run_until(lab.now() + lasts * 2)?;
+            lab.start_main(plan);
             lab.run_while(BACK, Span::ms(20), Lab::is_up)?;
         }
         // In a ring the second card is in use.
@@ -122,9 +120,7 @@ fn once(
         }
         Outputs => {
             for _ in 0..40 {
-                for byte in lab.main_mut().outputs_mut() {
-                    *byte = stream.below(256) as u8;
-                }
+                lab.change_outputs(|byte| *byte = stream.below(256) as u8);
                 lab.run_until(lab.now() + cycle)?;
             }
         }
@@ -140,11 +136,9 @@ fn order(
     lasts: Span,
 ) -> Result<(), LabError> {
     let device = device.map(|device| lab.in_plan(device));
-    let now = lab.now();
-    lab.main_mut().request_state(now, device, state);
-    lab.run_until(now + lasts)?;
-    let now = lab.now();
-    lab.main_mut().request_state(now, device, AlState::Op);
+    lab.request_state(device, state);
+    lab.run_until(lab.now() + lasts)?;
+    lab.request_state(device, AlState::Op);
     lab.run_while(BACK, Span::ms(20), Lab::is_up)?;
     Ok(())
 }

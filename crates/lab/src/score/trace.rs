@@ -5,11 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use linesman_proto::address::Path;
 use linesman_proto::command::{Addressing, Command};
+use linesman_proto::ethernet::MIN_LEN;
 use linesman_proto::frame::{Datagram, FrameView};
 use linesman_proto::register::table;
 use linesman_proto::time::{Instant, Span};
 
 use super::tape::TapedFrame;
+use crate::soem;
 
 /// A sign of trouble.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -69,9 +71,10 @@ pub(super) fn find(whole: &[TapedFrame], left: &[TapedFrame], snap: Option<usize
     let touched = |frame: &&TapedFrame| {
         FrameView::parse(&frame.bytes).is_ok_and(|view| view.source().is_marked())
     };
-    let is_ring = whole.iter().any(|frame| !frame.is_sent && !touched(&frame));
+    let is_copy = |frame: &TapedFrame| !frame.is_sent && !is_companion(frame);
+    let is_ring = whole.iter().any(|frame| is_copy(frame) && !touched(&frame));
     let mut seen = Seen { is_ring, ..Seen::default() };
-    for frame in left.iter().filter(|frame| !frame.is_sent).filter(touched) {
+    for frame in left.iter().filter(|frame| is_copy(frame)).filter(touched) {
         let kept = snap.map_or(frame.bytes.len(), |snap| snap.min(frame.bytes.len()));
         seen.take(&frame.bytes[..kept], &best);
     }
@@ -94,7 +97,7 @@ pub(super) fn heard(
 ) -> Vec<Trace> {
     let mut traces = find(whole, heard, None);
     let mut seen = AsUsual::new(whole, cycle, from_start);
-    for frame in heard {
+    for frame in heard.iter().filter(|frame| !is_companion(frame)) {
         seen.take(frame, &mut traces);
     }
     traces.sort_unstable();
@@ -136,10 +139,12 @@ impl AsUsual {
             last_sent: None,
             last_data: BTreeMap::new(),
             out: BTreeMap::new(),
-            is_ring: whole.iter().any(|frame| frame.path == Some(Path::B)),
+            // Beside SOEM's frames the second card sends no copies.
+            is_ring: whole.iter().any(|frame| frame.path == Some(Path::B))
+                && !whole.iter().any(is_companion),
             first_copies: BTreeMap::new(),
         };
-        for frame in whole {
+        for frame in whole.iter().filter(|frame| !is_companion(frame)) {
             usual.learn(frame);
         }
         usual.out.clear();
@@ -271,6 +276,11 @@ fn data_of(view: &FrameView<'_>) -> Option<u32> {
     found.map(|datagram| datagram.logical().0)
 }
 
+/// Whether a frame is what SOEM's second card sends beside one of the first.
+fn is_companion(frame: &TapedFrame) -> bool {
+    FrameView::parse(&frame.bytes).is_ok_and(|view| soem::is_companion(&view))
+}
+
 /// A datagram to which all add that have what it asks for.
 fn key_of_all(datagram: &Datagram<'_>) -> Option<Key> {
     let address = match datagram.command()?.addressing() {
@@ -384,7 +394,9 @@ impl Seen {
         }
         if let Some(status) = at(0x0130) {
             let state = status & 0x0F;
-            if status & 0x10 != 0 && state != 1 {
+            // A controller without a processor repeats the acknowledgement as its state; there is no code then.
+            let has_code = [0x0134, 0x0135].into_iter().filter_map(at).any(|byte| byte != 0);
+            if status & 0x10 != 0 && state != 1 && (has_code || at(0x0135).is_none()) {
                 self.traces.push(Trace::AlError);
             }
             if self.states.insert(station, state).is_some_and(|before| state < before) {
@@ -398,7 +410,8 @@ impl Seen {
         let key = |frame: &TapedFrame| {
             let view = FrameView::parse(&frame.bytes).ok()?;
             let first = view.datagrams().next()?.ok()?;
-            Some((first.index(), first.code(), frame.bytes.len()))
+            // A frame that is too short for the wire comes back longer than it was handed to the card.
+            Some((first.index(), first.code(), frame.bytes.len().max(MIN_LEN)))
         };
         let mut open: Vec<(usize, (u8, u8, usize))> = Vec::new();
         let mut closed = BTreeSet::new();

@@ -12,6 +12,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::FrameTally;
 
 use super::ground::{Fate, Ground, Moved};
+use crate::habit::Habit;
 use crate::lab::{Lab, Tap};
 use crate::swarm::counter::{Kind, expected};
 
@@ -241,6 +242,10 @@ impl Witness {
     }
 
     fn working_counter(&self, full: bool, lab: &Lab) -> Result<(), String> {
+        if lab.options().habit == Habit::Soem {
+            let why = "SOEM maps process data by itself, by no plan; use `expect reached`";
+            return Err(why.to_owned());
+        }
         let Some(plan) = lab.plan() else { return Err("there is no plan yet".to_owned()) };
         let frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
         let cycle = lab.options().cycle;

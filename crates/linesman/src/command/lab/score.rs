@@ -33,8 +33,9 @@ pub(crate) struct Arguments {
     /// cleared-counters
     #[arg(long, value_name = "NAME")]
     perturb: Option<Perturbation>,
-    /// Let the MainDevice play a habit of others: process-data, states, links, counters or clearing. Then nobody asks
-    /// for registers, and who listens beside it is judged: from the start, joined during a fault, joined after it
+    /// Let the MainDevice play a habit of others: process-data, states, links, counters, clearing or soem. Then
+    /// nobody asks for registers, and who listens beside it is judged: from the start, joined during a fault, joined
+    /// after it
     #[arg(long, value_name = "NAME", default_value_t)]
     habit: Habit,
     /// With --habit: write what each listener heard to this new directory, as SEED-start.pcapng, SEED-during.pcapng and
