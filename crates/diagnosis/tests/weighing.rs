@@ -43,6 +43,8 @@ fn link_of(place: &PlaceReport) -> Option<(u32, u32)> {
 fn no(finding: &FindingReport) -> Option<u32> {
     match finding.place {
         PlaceReport::Device { no, .. } => Some(no),
+        // The way into one, from somewhere.
+        PlaceReport::Link { a, b: None, .. } => Some(a.no),
         PlaceReport::Link { .. } | PlaceReport::Network { .. } | PlaceReport::Host => None,
     }
 }

@@ -144,13 +144,12 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let known = traffic.first_lost.and_then(|seen| seen.frame).unwrap_or(0);
     let mut condition = condition.confirmed(last).explaining([Symptom::FramesLost]);
     let is_rare = count.saturating_mul(RARE) <= traffic.sent;
-    condition.severity =
-        if is_rare || single < SEVERAL || traffic.lost.sum == 0 {
-            // A ring that lost one copy has lost nothing.
-            Severity::Info
-        } else {
-            Severity::Warning
-        };
+    condition.severity = if is_rare || single < SEVERAL || traffic.lost.sum == 0 {
+        // A ring that lost one copy has lost nothing.
+        Severity::Info
+    } else {
+        Severity::Warning
+    };
     condition = condition.shown_by(Evidence::frame(first, known, text));
     let rhythm = rhythm(traffic);
     condition.evidence.extend(rhythm.map(|text| Evidence::host(Some(last), text)));
