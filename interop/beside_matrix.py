@@ -153,7 +153,11 @@ GOOD = ("right", "open", "none")
 def place_of(finding):
     place = finding["place"]
     if place["kind"] == "link":
-        return (place["a"]["no"], place["b"]["no"]) if place["b"] else (place["a"]["no"],)
+        near = place["a"]["no"]
+        if place["b"]:
+            return near, place["b"]["no"]
+        # The way into a SubDevice, from where was not seen.
+        return near or (near,)
     return place["no"] if place["kind"] == "device" else place["kind"]
 
 

@@ -72,7 +72,7 @@ const ROWS: [Row; 6] = [
     ("emergency", 5, &[("S240", "emergency", "4")]),
     ("lec-link-open-early", 5, &[("H102", "link-open", "3.B-4.A")]),
     ("soem-link-open-early", 5, &[("H102", "link-open", "3.B-4.A")]),
-    ("soem-link-open-late", 5, &[("H102", "link-open", "4")]),
+    ("soem-link-open-late", 5, &[("H102", "link-open", "4.A-?")]),
 ];
 
 #[test]

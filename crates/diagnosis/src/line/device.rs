@@ -401,7 +401,7 @@ impl Device {
         if let Some(absence) = absences.find(|absence| overlaps(absence.since.at, absence.ended)) {
             return Some(Trouble::Absent(*absence));
         }
-        let mut errors = self.al.errors.iter();
+        let mut errors = self.al.errors.iter().filter(|error| !error.may_be_echo());
         if let Some(error) = errors.find(|error| overlaps(error.status.at, error.ended)) {
             return Some(Trouble::Error(*error));
         }

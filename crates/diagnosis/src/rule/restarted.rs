@@ -15,6 +15,8 @@
 //! **What to do.** Measure the supply of the SubDevice under load, at the device; look what is switched
 //! at these moments.
 
+mod unseen;
+
 use std::collections::BTreeSet;
 
 use linesman_config::fault::{Class, FaultName};
@@ -105,6 +107,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             falls.push(Fall { device, change, is_restart, gone });
         }
     }
+    conditions.extend(unseen::restarted(line));
     for fall in &falls {
         let together: Vec<_> = falls
             .iter()
@@ -117,6 +120,17 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             fell(line, fall)
         });
     }
+}
+
+/// What a restart of a SubDevice brings about for itself.
+fn follows_from_restart(id: DeviceId) -> [Symptom; 5] {
+    [
+        Symptom::Silent(id),
+        Symptom::StateLost(id),
+        Symptom::WorkingCounter(id),
+        Symptom::Mailbox(id),
+        Symptom::Emergency(id),
+    ]
 }
 
 /// When the device was gone before it came back in INIT: as long as a neighbour had no link to it, the

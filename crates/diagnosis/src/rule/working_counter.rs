@@ -117,13 +117,16 @@ fn suspects(
     let missing = deficit.expected - deficit.lowest;
     let owners: Vec<_> = line.owners(cyclic).collect();
     if owners.is_empty() {
-        // The set-up was not seen: whoever is in trouble right then.
-        let devices: Vec<_> = line
+        // The set-up was not seen: whoever is in trouble right then, above all who is away.
+        let troubled = line
             .devices
             .iter()
-            .filter(|device| trouble(device, deficit, view.now).is_some())
-            .map(|device| device.id)
-            .collect();
+            .filter_map(|device| Some((device.id, trouble(device, deficit, view.now)?)));
+        let troubled: Vec<(DeviceId, Trouble)> = troubled.collect();
+        let is_away = |trouble: &Trouble| matches!(trouble, Trouble::Absent(_));
+        let are_away = troubled.iter().any(|(_, trouble)| is_away(trouble));
+        let suspected = troubled.iter().filter(|(_, trouble)| !are_away || is_away(trouble));
+        let devices: Vec<DeviceId> = suspected.map(|(id, _)| *id).collect();
         return Suspects { is_certain: devices.len() == 1, devices, links: Vec::new() };
     }
     let shares: Vec<(DeviceId, Vec<u16>)> =

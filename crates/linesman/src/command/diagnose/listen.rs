@@ -4,6 +4,7 @@ use linesman_diagnosis::ask::AskSetup;
 use linesman_diagnosis::{Direction, Engine, InputKind, Setup};
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
+use linesman_link::interface::find;
 use linesman_proto::address::Network;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::asking::Asking;
@@ -63,7 +64,7 @@ pub(super) fn run(
     let Listening { mut session, engine, recorder, asking, is_local, .. } = listening;
     session.end_recording(recorder, output);
     let Some(mut engine) = engine else {
-        return Err(lost.map_or_else(|| silence(names, heard_for), Failure::from));
+        return Err(lost.map_or_else(|| silence(names, heard_for, without_link(names)), Failure::from));
     };
     if let Some(asking) = asking {
         engine.note_asking(asking.report());
@@ -179,13 +180,40 @@ fn begin(session: &Session, clock: HostClock, probes: bool) -> Engine {
     Engine::new(Setup { input: InputKind::Listened, probes, start, clock, ..session.setup.clone() })
 }
 
-fn silence(names: &[String], heard_for: Instant) -> Failure {
+/// The first of some cards that is switched on and has no link.
+fn without_link(names: &[String]) -> Option<&str> {
+    let is_dark = |name: &&String| find(name).is_ok_and(|card| card.up && !card.carrier);
+    names.iter().find(is_dark).map(String::as_str)
+}
+
+fn silence(names: &[String], heard_for: Instant, dark: Option<&str>) -> Failure {
     let name = names.join("+");
     let reason =
         format!("listen:{name}: no EtherCAT frame was heard in {}", time(heard_for.as_nanos()));
+    if let Some(card) = dark {
+        let advice = format!(
+            "look at {card}, its cable and plugs, and at the supply of the first SubDevice: a MainDevice sends \
+             nothing by a card without link"
+        );
+        return Failure::new(format!("{reason}, and card {card} has no link"), advice);
+    }
     let advice = format!(
         "check that the MainDevice runs, and that its line passes this card; when nobody else \
          drives the line, `linesman diagnose {name}` does"
     );
     Failure::new(reason, advice)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn silence_on_a_card_without_link_names_the_link() {
+        let names = ["eth0".to_owned()];
+        let told = silence(&names, Instant::from_nanos(2_000_000_000), Some("eth0"));
+        assert!(told.report().reason.contains("card eth0 has no link"), "{:?}", told.report());
+        let told = silence(&names, Instant::from_nanos(2_000_000_000), None);
+        assert!(!told.report().reason.contains("link"), "{:?}", told.report());
+    }
 }

@@ -1,0 +1,87 @@
+//! SubDevices that were without a station address while others were exchanging process data, and whose fall nobody has
+//! seen: whoever joined late finds them so.
+
+use linesman_config::fault::FaultName;
+use linesman_proto::address::DeviceId;
+use linesman_proto::register::table;
+use linesman_proto::time::{Instant, Span};
+
+use super::{RESTARTED, TOGETHER, follows_from_restart};
+use crate::finding::{Condition, Evidence, Place, Symptom};
+use crate::line::{Device, Line, Seen};
+
+/// Who answers again after so long, and is set up by then, is as it was.
+const SET_UP_WITHIN: Span = Span::s(10);
+/// Who is heard to be away for so long is more than dipped.
+const LONG_HEARD: Span = Span::s(1);
+
+/// One finding for all that have lost their addresses at about the same time.
+pub(super) fn restarted(line: &Line) -> Option<Condition> {
+    let has_no_fall =
+        |device: &Device| !device.al.changes.iter().any(crate::line::AlChange::is_own_fall);
+    let unseen = |device: &Device| {
+        let seen = device.lost_address.filter(|_| has_no_fall(device))?;
+        Some((device.id, seen))
+    };
+    let all: Vec<(DeviceId, Seen<()>)> = line.devices.iter().filter_map(unseen).collect();
+    let latest = all.iter().map(|(_, seen)| seen.at).max()?;
+    let together: Vec<(DeviceId, Seen<()>)> =
+        all.into_iter().filter(|(_, seen)| seen.at + TOGETHER >= latest).collect();
+    let (first, seen) = *together.first()?;
+    let label = line.label(first);
+    let others = match together.len() {
+        1 => String::new(),
+        count => format!(" and {} that follow upon it", count - 1),
+    };
+    let text = format!(
+        "{label}{others} had no station address while others exchanged process data, and was given one anew: it has \
+         started anew, and an open link does not do that"
+    );
+    let silent = line.device(first).and_then(|device| device.absences.back());
+    let since = silent.map_or(seen.at, |absence| absence.since.at.min(seen.at));
+    // Who joined late has seen the last of it: it may have lasted longer.
+    let was_long = seen.at.since(since) >= LONG_HEARD;
+    let (cause, others) = match (was_long, together.len() > 1) {
+        (true, true) => {
+            (FaultName::SupplyOff, [(FaultName::DeviceOff, 0.2), (FaultName::BrownOut, 0.15)])
+        }
+        (true, false) => {
+            (FaultName::DeviceOff, [(FaultName::SupplyOff, 0.15), (FaultName::BrownOut, 0.15)])
+        }
+        (false, true) => {
+            (FaultName::BrownOut, [(FaultName::SupplyOff, 0.3), (FaultName::DeviceOff, 0.1)])
+        }
+        (false, false) => {
+            (FaultName::BrownOut, [(FaultName::DeviceOff, 0.2), (FaultName::SupplyOff, 0.1)])
+        }
+    };
+    let place = Place::device(line.network, first);
+    let ids = || together.iter().map(|(id, _)| *id);
+    let mut condition = Condition::new(&RESTARTED, place, cause, since)
+        .confidence(0.45)
+        .or(others[0].0, others[0].1)
+        .or(others[1].0, others[1].1)
+        .confirmed(seen.at)
+        .about([Symptom::StateLost(first)])
+        .explaining(ids().flat_map(follows_from_restart))
+        .shown_by(Evidence::register(first, table::STATION_ADDRESS.address, &seen, text))
+        .advise("Measure the supply of this SubDevice under load, at its terminals.")
+        .advise("Check plug and clamp of the supply; move them while watching the line.")
+        .advise("Look what is switched on at the moments of the restarts.");
+    if let Some(ended) = ended(line, ids()) {
+        condition = condition.ended(ended);
+    }
+    Some(condition)
+}
+
+/// When all of them answered by their addresses again.
+fn ended(line: &Line, ids: impl Iterator<Item = DeviceId>) -> Option<Instant> {
+    let back = ids.map(|id| {
+        let device = line.device(id)?;
+        let answered = device.answered.filter(|_| device.silent.is_none())?;
+        let given = device.lost_address?.at;
+        (answered.at > given).then_some(answered.at.min(given + SET_UP_WITHIN))
+    });
+    let back: Option<Vec<Instant>> = back.collect();
+    back?.into_iter().max()
+}
