@@ -98,32 +98,7 @@ CASES = [
 
 ALL = tuple(CLIENTS)
 # Cells in which it says something wrong, with what it says and what it should say: to be mended, not to grow.
-NAMES = tuple(one.name for one in CASES)
-OUTAGES = ("link-open 0.5 s", "link-open 2 s", "device-off")
-CUTS = ("link-open", "supply-off", "one pair open")
-KNOWN_WRONG = [
-    (
-        ("KickCAT",), tuple(name for name in NAMES if name not in ("host-drops", "false-link")), ("late",),
-        "S200 init-refused: AL status reads 0x0018, OP with the error bit",
-        "what the fault allows: its code is 0, and SubDevices without a processor echo the acknowledgement that KickCAT "
-        "writes with each request (AL control 0x0018); it stood so before",
-    ),
-    (("KickCAT",), ("host-drops",), WHENS, "H100 link-open at the first link", "lost frames, the place left open"),
-    (
-        ("SOEM", "KickCAT"), ("false-link",), WHENS, "H100 at the first link",
-        "nothing comes back of what passed before: false-link or link-open with the place left open",
-    ),
-    (("SOEM",), CUTS, ("late",), "link-open at 4-5", "1-5, or the place left open: K2 hangs on K1, not on A1"),
-    (("ethercrab",), (*CUTS, "brown-out"), ("late",), "link-open at 4-5", "1-5, or the place left open"),
-    (("ethercrab",), OUTAGES, ("late",), "device-off at 6", "4, or the place left open: who is missing was not seen"),
-    (("SOEM",), ("brown-out",), ("late",), "HEALTHY with 120 unanswered", "INCONCLUSIVE, or that two have started anew"),
-    (("SOEM", "ethercrab"), ("late-frames",), ("late",), "HEALTHY", "round trips of up to 1.5 ms, or INCONCLUSIVE"),
-    (("SOEM",), ("paused",), ("late",), "S200 init-refused at 6", "watchdog-starved: 0x001B in OP, after a pause"),
-    (("ethercrab",), ("paused",), WHENS, "S200 or S201 at 6", "watchdog-starved after a pause of the MainDevice"),
-    (("SOEM",), ("firmware-fault", "mailbox-stuck"), ("late",), "HEALTHY", "requests that A1 does not take"),
-    (("SOEM",), ("watchdog-starved",), ("late",), "S200 init-refused at 6", "watchdog-starved: 0x001B in OP again and again"),
-    (("ethercrab",), ("watchdog-starved",), WHENS, "S200 or S201 at 6", "SAFEOP whose code nobody read, without a cause"),
-]
+KNOWN_WRONG = []
 
 
 def known_wrong(cell):

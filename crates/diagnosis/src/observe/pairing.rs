@@ -14,6 +14,7 @@
 
 mod loss;
 mod one_way;
+mod returned;
 mod sent_by;
 
 use std::collections::VecDeque;
@@ -249,21 +250,6 @@ impl Pairing {
         self.senders.take_changed()
     }
 
-    /// How many requests turned out to be returns whose request was not seen, since this was asked.
-    pub fn take_mistaken(&mut self) -> u64 {
-        std::mem::take(&mut self.mistaken)
-    }
-
-    /// How many frames came back a second time, since this was asked.
-    pub fn take_doubled(&mut self) -> u64 {
-        std::mem::take(&mut self.doubled)
-    }
-
-    /// How many requests were sent and not recorded, as their numbers tell, since this was asked.
-    pub fn take_unrecorded(&mut self) -> u64 {
-        std::mem::take(&mut self.unrecorded)
-    }
-
     /// Whether a frame of unknown direction is on its way back.
     fn is_return(&self, found: Option<usize>, source: MacAddress, print: Fingerprint) -> bool {
         if self.is_one_way_for_sure() {
@@ -470,17 +456,6 @@ impl Pairing {
         if found > 0 {
             self.overtake(found, frame.time, settle);
         }
-    }
-
-    fn remember(&mut self, print: Fingerprint, time: Instant) {
-        self.returned[self.returned_next] = Some((print, time));
-        self.returned_next = (self.returned_next + 1) % REMEMBERED;
-    }
-
-    /// Whether the same came back within some time.
-    fn was_returned(&self, print: Fingerprint, time: Instant, within: Span) -> bool {
-        let known = self.returned.iter().flatten();
-        known.into_iter().any(|(other, at)| *other == print && gap(*at, time) <= within)
     }
 }
 

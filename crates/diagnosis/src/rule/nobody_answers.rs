@@ -27,17 +27,18 @@
 //! supply, cable and the choice of the card, in this order.
 
 mod parted;
+mod restarted;
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::register::{ErrorCounter, table};
+use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, LinkEnd, Place, Severity, Symptom};
-use crate::line::{Device, Line, Seen, Silence, search};
+use crate::line::{Line, Seen, Silence, search};
 use crate::locate::Survey;
 
 /// The page.
@@ -208,9 +209,11 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
     let frame = since.frame.unwrap_or(0);
     let lasted = silence.last.at.since(silence.since.at);
     let found = found_hole(line, silence);
-    let restarted = restarted_with(line, silence);
+    let restarted = restarted::others_with(line, silence);
     let mut condition = match (found, is_spoiled, is_hole) {
-        _ if let Some((count, seen)) = restarted => without_supply(line, silence, count, seen),
+        _ if let Some((count, seen)) = restarted => {
+            restarted::without_supply(line, silence, count, seen)
+        }
         (Some(found), ..) => placed(line, since.at, found),
         (None, true, _) => spoiling(line, since.at),
         (None, false, true) => hole(view, silence),
@@ -289,33 +292,6 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         );
     }
     advise(condition, carrier)
-}
-
-/// How many SubDevices, the first of the line among them, were given their station addresses anew after a silence: they
-/// had lost them, and their supply.
-fn restarted_with(line: &Line, silence: &Silence) -> Option<(usize, Seen<()>)> {
-    let ended = silence.ended?;
-    let lost = |device: &Device| device.lost_address.filter(|seen| seen.at >= ended);
-    let first = first_device(line).unwrap_or_default();
-    let seen = line.device(first).and_then(lost)?;
-    Some((line.devices.iter().filter_map(lost).count(), seen))
-}
-
-/// Nothing came back while the first SubDevice had no supply.
-fn without_supply(line: &Line, silence: &Silence, count: usize, seen: Seen<()>) -> Condition {
-    let first = first_device(line).unwrap_or_default();
-    let place = Place::device(line.network, first);
-    let text = format!(
-        "{count} SubDevices, {} the first of them, were given their station addresses anew after it: they had started \
-         anew",
-        line.label(first)
-    );
-    Condition::new(&PAGE, place, FaultName::BrownOut, silence.since.at)
-        .confidence(0.5)
-        .or(FaultName::DeviceOff, 0.2)
-        .or(FaultName::SupplyOff, 0.2)
-        .shown_by(Evidence::register(first, table::STATION_ADDRESS.address, &seen, text))
-        .advise(format!("Measure the supply of {} under load.", line.label(first)))
 }
 
 /// Frames do not come back at all: the first hop, or what is behind it.

@@ -64,7 +64,9 @@ pub(super) fn run(
     let Listening { mut session, engine, recorder, asking, is_local, .. } = listening;
     session.end_recording(recorder, output);
     let Some(mut engine) = engine else {
-        return Err(lost.map_or_else(|| silence(names, heard_for, without_link(names)), Failure::from));
+        return Err(
+            lost.map_or_else(|| silence(names, heard_for, without_link(names)), Failure::from)
+        );
     };
     if let Some(asking) = asking {
         engine.note_asking(asking.report());
