@@ -52,7 +52,7 @@ pub struct ProjectDevice {
     #[serde(default = "port_a")]
     #[schemars(regex(pattern = "^[A-D]$"))]
     pub entry: String,
-    /// Station address; 0x1001 and up in order unless said.
+    /// Station address; 0x1001 and up by position in the order of frames unless said.
     #[serde(default)]
     pub station: Option<u16>,
     /// How far it is driven: `OP` unless said, `SAFEOP`, `PREOP`, `INIT` or `BOOT`.

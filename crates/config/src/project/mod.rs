@@ -403,6 +403,14 @@ serial = 4711
     }
 
     #[test]
+    fn stations_follow_the_order_of_frames_and_not_of_the_file() {
+        let text = "name = \"p\"\n[[device]]\nname = \"K1\"\non = \"maindevice\"\n[[device]]\nname = \"K3\"\n\
+                    on = \"K1.C\"\n[[device]]\nname = \"T2\"\non = \"K1.B\"\n";
+        let project = Project::parse(text).unwrap();
+        assert_eq!(project.stations(), [0x1001, 0x1003, 0x1002].map(StationAddress));
+    }
+
+    #[test]
     fn mistakes_are_named() {
         let broken = |from: &str, to: &str| {
             Project::parse(&PLANT.replace(from, to)).unwrap_err().to_string()
