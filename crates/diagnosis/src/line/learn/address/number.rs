@@ -23,8 +23,10 @@ fn first_station(
     known: impl Iterator<Item = u16>,
     count: usize,
 ) -> Option<(u16, bool)> {
-    let (least, most) =
-        known.fold((u16::MAX, 0), |(least, most), one| (least.min(one), most.max(one)));
+    let (least, most) = known.fold(None, |bounds: Option<(u16, u16)>, one| {
+        let (least, most) = bounds.unwrap_or((one, one));
+        Some((least.min(one), most.max(one)))
+    })?;
     let fits = |first: u16, count: usize| first <= least && usize::from(most - first) < count;
     let own = own_first_station(line).filter(|first| fits(*first, MOST_BY_NUMBER));
     let guessed = || FIRST_STATIONS.into_iter().find(|first| fits(*first, count));
