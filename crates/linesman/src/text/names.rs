@@ -56,7 +56,7 @@ impl Names {
             PlaceReport::Link { network: _, a, b, direction } => {
                 let near = self.end(*a);
                 let far =
-                    b.map_or_else(|| "a far end that was never seen".to_owned(), |b| self.end(b));
+                    b.map_or_else(|| "an end that was never seen".to_owned(), |b| self.end(b));
                 match direction {
                     Some(DirectionReport::AToB) => {
                         format!("link {near} → {far}, in this direction")
@@ -98,7 +98,7 @@ mod tests {
             ),
             (
                 link(end(2, 'B'), None, Some(DirectionReport::Both)),
-                "link SubDevice 2 port B ↔ a far end that was never seen, both directions",
+                "link SubDevice 2 port B ↔ an end that was never seen, both directions",
             ),
             (PlaceReport::Device { network: 0, no: 9 }, "SubDevice 9"),
             (PlaceReport::Host, "this computer"),

@@ -2,16 +2,13 @@
 
 use std::path::Path as FilePath;
 
+use linesman_diagnosis::{Direction, FrameSeen};
 use linesman_lab::habit::Habit;
 use linesman_lab::score::listen::Heard;
 use linesman_lab::score::{CaseReport, TapedFrame};
-use linesman_link::capture::{
-    CaptureInterfaceId, CaptureWriteError, FrameDirection, FrameToWrite, InterfaceToWrite,
-    LinkType, PcapngWriter,
-};
 use linesman_link::unix_time::UnixTime;
-use linesman_proto::address::Path;
-use linesman_proto::time::Instant;
+use linesman_proto::address::Network;
+use linesman_runtime::record::Recorder;
 
 use crate::failure::Failure;
 use crate::files;
@@ -27,46 +24,37 @@ pub(super) fn create(directory: &FilePath, habit: Habit) -> Result<(), Failure> 
     std::fs::create_dir(directory).map_err(|error| files::in_file(directory, &error))
 }
 
-/// Writes the recordings of a case.
+/// Writes the recordings of a case, and its project.
 pub(super) fn write(directory: &FilePath, case: &CaseReport) -> Result<(), Failure> {
     if let Some(project) = &case.project {
         let path = directory.join(format!("{}.toml", case.seed));
         files::write_new_bytes(&path, "the project", project.as_bytes())?;
     }
     for heard in &case.heard {
-        let path = directory.join(format!("{}-{}.pcapng", case.seed, heard.joined));
-        let bytes = pcapng(heard).map_err(|error| files::in_file(&path, &error))?;
-        files::write_new_bytes(&path, "what was heard", &bytes)?;
+        record(&directory.join(format!("{}-{}.pcapng", case.seed, heard.joined)), heard)?;
     }
     Ok(())
 }
 
-fn pcapng(heard: &Heard) -> Result<Vec<u8>, CaptureWriteError> {
-    let mut writer = PcapngWriter::new(Vec::new(), "linesman lab score")?;
-    let mut cards = [None; 2];
-    for frame in &heard.frames {
-        let path = frame.path.unwrap_or(Path::A);
-        let interface = match cards[path.index()] {
-            Some(interface) => interface,
-            None => describe(&mut writer, path)?,
-        };
-        cards[path.index()] = Some(interface);
-        writer.write_frame(&to_write(frame, interface))?;
+fn record(path: &FilePath, heard: &Heard) -> Result<(), Failure> {
+    let names = ["card-A", "card-B"].map(str::to_owned);
+    let mut recorder = Recorder::create(path, "linesman lab score", UnixTime::EPOCH, &names)
+        .map_err(|error| files::in_file(path, &error))?;
+    for (frame, number) in heard.frames.iter().zip(1..) {
+        recorder.frame(&seen(frame, number));
     }
-    writer.finish()
+    recorder.finish().map_err(|error| files::in_file(path, &error))
 }
 
-fn describe(
-    writer: &mut PcapngWriter<Vec<u8>>,
-    path: Path,
-) -> Result<CaptureInterfaceId, CaptureWriteError> {
-    let (name, description) = (format!("card-{path}"), format!("card {path}"));
-    let (name, description) = (name.as_str(), description.as_str());
-    writer.add_interface(&InterfaceToWrite { name, description, link_type: LinkType::Ethernet })
-}
-
-fn to_write(frame: &TapedFrame, interface: CaptureInterfaceId) -> FrameToWrite<'_> {
-    let direction = if frame.is_sent { FrameDirection::Outgoing } else { FrameDirection::Incoming };
-    let time = UnixTime::EPOCH + frame.time.since(Instant::ZERO);
-    FrameToWrite::new(interface, time, direction, &frame.bytes)
+fn seen(frame: &TapedFrame, number: u64) -> FrameSeen<'_> {
+    FrameSeen {
+        network: Network::default(),
+        path: frame.path,
+        direction: if frame.is_sent { Direction::Sent } else { Direction::Received },
+        time: frame.time,
+        number,
+        fcs: frame.fcs,
+        truncated: false,
+        bytes: &frame.bytes,
+    }
 }
