@@ -16,9 +16,15 @@ pub(super) fn all_known(line: &Line) -> bool {
 /// Whether it was seen how a datagram came to its working counter: FMMUs that were set up for it, or a working
 /// counter that rose while SubDevices came to SAFEOP and OP.
 fn is_known(line: &Line, cyclic: &Cyclic) -> bool {
-    let has_risen = cyclic.highest.value > cyclic.first.value;
+    let has_risen = cyclic.highest.value > cyclic.first.value && !rose_unseen(line, cyclic);
     let is_planned = cyclic.planned.is_some_and(|planned| cyclic.highest.value >= planned);
     cyclic.highest.value > 0 && (is_planned || has_risen || line.owners(cyclic).next().is_some())
+}
+
+/// Tells whether a working counter rose from the first one on while nobody read a state: the line may have come up then, or
+/// was broken before.
+fn rose_unseen(line: &Line, cyclic: &Cyclic) -> bool {
+    cyclic.low_before().is_some() && line.devices.iter().all(|device| device.al.status.is_none())
 }
 
 /// Assesses what is known of the working counters.
@@ -50,10 +56,14 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
     let is_unknown = |one: &&Cyclic| one.highest.value > 0 && !is_known(line, one);
     let unknown: Vec<&Cyclic> = cyclic().filter(is_unknown).collect();
     if !unknown.is_empty() {
-        let text = format!(
-            "the working counter that belongs to {} is not known; it was the same all the time",
-            names(&unknown)
-        );
+        let how = match unknown.iter().any(|one| rose_unseen(line, one)) {
+            true => {
+                "it has risen, and nobody has read a state: the line came up then, or was broken before"
+            }
+            false => "it was the same all the time",
+        };
+        let text =
+            format!("the working counter that belongs to {} is not known; {how}", names(&unknown));
         let gap = Gap::new(Reason::ExpectedWorkingCounterUnknown, text)
             .essential_if(!basis.states_read)
             .step(step());

@@ -174,6 +174,14 @@ impl Cyclic {
         }
     }
 
+    /// The working counter was too low from the first time on that the datagram was seen, and rose though nobody had
+    /// ordered it.
+    #[must_use]
+    pub fn low_before(&self) -> Option<&Deficit> {
+        let first = self.deficits.front().filter(|_| self.planned.is_none())?;
+        (first.first == self.first).then_some(first)
+    }
+
     /// Takes a working counter. `ordered` tells, when it falls, whether the MainDevice asked for it by taking a
     /// SubDevice out of SAFEOP or OP. Says whether it is news.
     pub fn record(&mut self, wkc: Seen<u16>, ordered: impl FnOnce() -> Ordered) -> bool {

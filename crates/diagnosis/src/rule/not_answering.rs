@@ -48,6 +48,8 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// A link that was lost so often flaps.
 const FLAPS: usize = 3;
+/// The next step where the wiring is not known.
+const NAME_PROJECT: &str = "Name the project or ENI, `--project FILE`: it has the wiring.";
 /// SubDevices are asked in turn: who falls silent within this time did so at once.
 const AT_ONCE: Span = Span::ms(200);
 
@@ -227,7 +229,7 @@ fn without_supply(line: &Line, branch: &Branch) -> Condition {
     }
 }
 
-/// Whether a branch is silent since the same time as another one.
+/// Tells whether a branch is silent since the same time as another one.
 fn fell_with_others(branch: &Branch, all: &[Branch]) -> bool {
     let lasts = |one: &Branch| one.ended.is_none();
     let near = |one: Instant, other: Instant| one.since(other).max(other.since(one)) <= AT_ONCE;
@@ -238,6 +240,7 @@ fn fell_with_others(branch: &Branch, all: &[Branch]) -> bool {
 /// Several branches that fell silent at once, with others between them that answer: what they have in common is a supply.
 fn several(line: &Line, branches: &[&Branch]) -> Option<Condition> {
     let first = branches.first()?;
+    let entry = place_of(line, first)?;
     let since = branches.iter().map(|branch| branch.since).min_by_key(|seen| seen.at)?;
     let heads = || branches.iter().filter_map(|branch| branch.devices.first().copied());
     let head = heads().next()?;
@@ -253,7 +256,7 @@ fn several(line: &Line, branches: &[&Branch]) -> Option<Condition> {
     let mut condition = Condition::new(&PAGE, place, FaultName::SupplyOff, since.at)
         .confidence(0.5)
         .or(FaultName::DeviceOff, 0.15)
-        .or_at(FaultName::LinkOpen, entry_of(line, head), 0.1)
+        .or_at(FaultName::LinkOpen, entry, 0.1)
         .confirmed(since.at)
         .about(all().map(Symptom::Silent))
         .explaining(all().flat_map(follows_from_silence))
@@ -261,23 +264,24 @@ fn several(line: &Line, branches: &[&Branch]) -> Option<Condition> {
     for other in heads().skip(1) {
         condition = condition.or_at(FaultName::SupplyOff, Place::device(line.network, other), 0.1);
     }
-    let last = first.devices.last().copied().unwrap_or(head);
-    Some(
-        condition
-            .advise(format!("Measure the supply that {} have in common.", names.join(", ")))
-            .advise(format!(
-                "If all of them have it, follow the way into {} to {}: plugs, cable or contact.",
-                line.label(head),
-                line.label(last)
-            ))
-            .advise("Name the project or ENI, `--project FILE`: it has the wiring."),
-    )
+    condition = condition
+        .advise(format!("Measure the supply that {} have in common.", names.join(", ")))
+        .advise(format!("Where that is well, look at the plugs and the cable of {entry}."));
+    if first.link.is_none() {
+        condition = condition.advise(NAME_PROJECT);
+    }
+    Some(condition)
 }
 
-/// The link by which frames come into a SubDevice, where what it hangs on was not seen.
-fn entry_of(line: &Line, id: DeviceId) -> Place {
-    let (a, direction) = (End::Controller(id, Port::A), Some(LinkDirection::Both));
-    Place::Link { network: line.network, a, b: None, direction }
+/// The link that a branch hangs behind, by the end that is known.
+fn place_of(line: &Line, branch: &Branch) -> Option<Place> {
+    let direction = Some(LinkDirection::Both);
+    if let Some(link) = branch.link {
+        return Some(Place::link(line.network, link, direction));
+    }
+    // Frames come in by port A.
+    let a = End::Controller(*branch.devices.first()?, Port::A);
+    Some(Place::Link { network: line.network, a, b: None, direction })
 }
 
 /// One link, and all behind it silent.
@@ -286,10 +290,7 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
     let first = branch.devices.first().copied().unwrap_or_default();
     let device = Place::device(line.network, first);
     let direction = Some(LinkDirection::Both);
-    let place = match branch.link {
-        Some(link) => Place::link(line.network, link, direction),
-        None => entry_of(line, first),
-    };
+    let place = place_of(line, branch).unwrap_or(device);
     // A link that comes and goes takes the same shares from process data, again and again.
     let outages = line.cyclic.iter().map(|cyclic| cyclic.deficits.len()).max().unwrap_or(0);
     let flaps = outages >= FLAPS;
@@ -340,7 +341,7 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
             .advise(format!(
                 "Follow the way into {label}: plugs, cable or contact, to where it comes from."
             ))
-            .advise("Name the project or ENI, `--project FILE`: it has the wiring."),
+            .advise(NAME_PROJECT),
     };
     match branch.ended {
         Some(ended) => condition.ended(ended),

@@ -75,7 +75,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for cyclic in &view.line.cyclic {
         let is_history =
             |deficit: &&Deficit| deficit.ended.is_some_and(|ended| ended + JUDGED_FOR < view.now);
-        for deficit in cyclic.deficits.iter().filter(|deficit| !is_history(deficit)) {
+        let judged = |deficit: &&Deficit| {
+            !is_history(deficit) && !may_be_start_up(view.line, cyclic, deficit)
+        };
+        for deficit in cyclic.deficits.iter().filter(judged) {
             let explained = explained(conditions, deficit);
             let suspects = suspects(view, &lost, cyclic, deficit, &explained);
             groups.entry(suspects).or_default().push((cyclic, deficit));
@@ -84,6 +87,19 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for (suspects, deficits) in &groups {
         conditions.push(condition(view, suspects, deficits));
     }
+}
+
+/// Tells whether a working counter that was low from the first frame on may have risen as a MainDevice brought the line
+/// up: a SubDevice was seen to go up, or nobody read a state.
+fn may_be_start_up(line: &Line, cyclic: &Cyclic, deficit: &Deficit) -> bool {
+    let went_up = |device: &Device| {
+        device.al.changes.iter().any(|change| {
+            change.from.state().state() < change.to.state().state() && !change.from.error()
+        })
+    };
+    cyclic.low_before() == Some(deficit)
+        && (line.devices.iter().any(went_up)
+            || line.devices.iter().all(|device| device.al.status.is_none()))
 }
 
 /// Whose share other findings of that time account for.

@@ -243,7 +243,6 @@ impl Learner {
         if answer.sum > 0 && !is_position {
             self.addresses.answers_at_last(line, StationAddress(answer.reply.adp()));
         }
-        let is_short = line.cyclic.iter().any(Cyclic::has_deficit);
         let Some(device) = line.devices.get_mut(id.index()) else { return };
         if answer.effect.multiple_write {
             clock::handed_round(line, id, answer);
@@ -305,7 +304,7 @@ impl Learner {
             return;
         }
         let is_news = device.answered.is_none() || device.silent.is_some();
-        if is_short {
+        if line.cyclic.iter().any(Cyclic::has_deficit) {
             device.heard_short = Some(answer.at);
         }
         device.answers(answer.at, Some(answer.frame));

@@ -1,24 +1,22 @@
 //! SubDevices that were without a station address while others were exchanging process data, and whose fall nobody has
-//! seen: whoever joined late finds them so.
+//! seen.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::DeviceId;
 use linesman_proto::register::table;
+use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
 use super::{RESTARTED, TOGETHER, follows_from_restart};
 use crate::finding::{Condition, Evidence, Place, Symptom};
-use crate::line::{Device, Line, Seen};
+use crate::line::{AlChange, Device, Line, Seen};
 
-/// Who answers again after so long, and is set up by then, is as it was.
-const SET_UP_WITHIN: Span = Span::s(10);
-/// Who is heard to be away for so long is more than dipped.
+/// An absence that is heard for so long is more than a dip of a supply.
 const LONG_HEARD: Span = Span::s(1);
 
 /// One finding for all that have lost their addresses at about the same time.
 pub(super) fn restarted(line: &Line) -> Option<Condition> {
-    let has_no_fall =
-        |device: &Device| !device.al.changes.iter().any(crate::line::AlChange::is_own_fall);
+    let has_no_fall = |device: &Device| !device.al.changes.iter().any(AlChange::is_own_fall);
     let unseen = |device: &Device| {
         let seen = device.lost_address.filter(|_| has_no_fall(device))?;
         Some((device.id, seen))
@@ -31,7 +29,7 @@ pub(super) fn restarted(line: &Line) -> Option<Condition> {
     let label = line.label(first);
     let others = match together.len() {
         1 => String::new(),
-        count => format!(" and {} that follow upon it", count - 1),
+        count => format!(" and {} others", count - 1),
     };
     let text = format!(
         "{label}{others} had no station address while others exchanged process data, and was given one anew: it has \
@@ -74,13 +72,15 @@ pub(super) fn restarted(line: &Line) -> Option<Condition> {
     Some(condition)
 }
 
-/// When all of them answered by their addresses again.
+/// The time when the last of them was seen in OP again.
 fn ended(line: &Line, ids: impl Iterator<Item = DeviceId>) -> Option<Instant> {
     let back = ids.map(|id| {
         let device = line.device(id)?;
-        let answered = device.answered.filter(|_| device.silent.is_none())?;
-        let given = device.lost_address?.at;
-        (answered.at > given).then_some(answered.at.min(given + SET_UP_WITHIN))
+        let is_back = device.silent.is_none()
+            && !device.al.has_error()
+            && device.al.state() == Some(AlState::Op);
+        let status = device.al.status.filter(|_| is_back)?;
+        (status.at > device.lost_address?.at).then_some(status.at)
     });
     let back: Option<Vec<Instant>> = back.collect();
     back?.into_iter().max()

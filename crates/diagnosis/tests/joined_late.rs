@@ -1,0 +1,186 @@
+//! What was before anybody listened, as far as frames still tell: whoever joins a line that somebody else drives.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+mod support;
+
+use linesman_config::fault::FaultName;
+use linesman_config::project::Project;
+use linesman_diagnosis::Setup;
+use linesman_diagnosis::coverage::InputKind;
+use linesman_diagnosis::report::{Diagnosis, FindingReport, PlaceReport, Severity, Verdict};
+use linesman_proto::ethernet::MacAddress;
+use support::script::{Datagram, Script, apwr, fprd, lrw};
+use support::text;
+
+const SOEM: MacAddress = MacAddress([0x01; 6]);
+const KICKCAT: MacAddress = MacAddress([0xCA, 0xDE, 0xCA, 0xDE, 0xDE, 0xFF]);
+const INIT: [u8; 6] = [1, 0, 0, 0, 0, 0];
+const SAFE_OP: [u8; 6] = [4, 0, 0, 0, 0, 0];
+const OP: [u8; 6] = [8, 0, 0, 0, 0, 0];
+/// SAFEOP with error, sync manager watchdog.
+const WATCHDOG: [u8; 6] = [0x14, 0, 0, 0, 0x1B, 0];
+
+fn listening(sender: MacAddress, project: Option<Project>) -> Script {
+    let setup = Setup { input: InputKind::Listened, project, ..Setup::default() };
+    Script { sender, is_live: true, ..Script::with(setup) }
+}
+
+/// Cycles of 2 ms with this working counter; every 20 ms the states of stations from `base` on, none where one is away.
+fn cycles(script: &mut Script, count: u64, counter: u16, base: u16, states: &[Option<[u8; 6]>]) {
+    let begin = script.now;
+    for cycle in 0..count {
+        script.now = script.now.max(begin + cycle * 2_000_000);
+        script.exchange(&[lrw(0x0100_0000, 8, counter)]);
+        if cycle.is_multiple_of(10) && !states.is_empty() {
+            let polled = states.iter().zip(base..);
+            let polls: Vec<Datagram> = polled
+                .map(|(state, station)| match state {
+                    Some(state) => fprd(station, 0x0130, state),
+                    None => fprd(station, 0x0130, &[0; 6]).wkc(0),
+                })
+                .collect();
+            script.exchange(&polls);
+        }
+    }
+}
+
+fn report(script: &mut Script) -> Diagnosis {
+    script.finish();
+    script.engine.diagnosis()
+}
+
+fn codes(report: &Diagnosis) -> Vec<&str> {
+    report.findings.iter().map(|finding| finding.code.as_str()).collect()
+}
+
+fn device(finding: &FindingReport) -> Option<u32> {
+    match finding.place {
+        PlaceReport::Device { no, .. } => Some(no),
+        PlaceReport::Link { .. } | PlaceReport::Network { .. } | PlaceReport::Host => None,
+    }
+}
+
+fn is_network(finding: &FindingReport) -> bool {
+    matches!(finding.place, PlaceReport::Network { .. })
+}
+
+#[test]
+fn watchdog_expired_before_the_first_reading_leaves_the_place_open() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 100, 6, 0x1001, &[Some(OP), Some(OP), Some(WATCHDOG)]);
+    cycles(&mut script, 600, 6, 0x1001, &[Some(OP); 3]);
+    let report = report(&mut script);
+    assert_eq!(codes(&report), ["S202"], "{}", text(&report));
+    let finding = &report.findings[0];
+    assert!(is_network(finding), "{}", text(&report));
+    let others: Vec<_> = finding.alternatives.iter().map(|other| other.cause).collect();
+    assert!(others.contains(&FaultName::LinkOpen), "{}", text(&report));
+}
+
+#[test]
+fn watchdog_expired_while_it_is_listened_is_at_its_subdevice() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 100, 6, 0x1001, &[Some(OP); 3]);
+    cycles(&mut script, 600, 6, 0x1001, &[Some(OP), Some(OP), Some(WATCHDOG)]);
+    let report = report(&mut script);
+    assert_eq!((codes(&report), device(&report.findings[0])), (vec!["S202"], Some(3)));
+}
+
+#[test]
+fn subdevice_that_is_given_its_address_anew_has_started_anew() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 20, 4, 0x1001, &[Some(OP), Some(OP), None]);
+    script.exchange(&[apwr(2, 0x0010, &[0x03, 0x10], 3)]);
+    cycles(&mut script, 20, 4, 0x1001, &[Some(OP), Some(OP), Some(INIT)]);
+    let begun = script.engine.diagnosis();
+    let restarted = begun.findings.iter().find(|finding| finding.code == "H150").unwrap();
+    assert_eq!((restarted.cause, device(restarted)), (FaultName::BrownOut, Some(3)));
+    assert_eq!(restarted.closed_ns, None, "in INIT it is not back: {}", text(&begun));
+    cycles(&mut script, 600, 6, 0x1001, &[Some(OP); 3]);
+    let report = report(&mut script);
+    assert_eq!(report.findings[0].code, "H150", "{}", text(&report));
+    assert!(report.findings[0].closed_ns.is_some(), "{}", text(&report));
+}
+
+#[test]
+fn working_counter_that_rises_unasked_was_short_before() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 100, 4, 0x1001, &[Some(OP); 3]);
+    cycles(&mut script, 600, 6, 0x1001, &[Some(OP); 3]);
+    let report = report(&mut script);
+    assert_eq!(codes(&report), ["S210"], "{}", text(&report));
+    assert!(is_network(&report.findings[0]) && report.findings[0].closed_ns.is_some());
+}
+
+#[test]
+fn working_counter_that_rises_as_the_line_comes_up_is_no_finding() {
+    // A state that rises tells it; where nobody reads states, nobody knows.
+    let unread: &[Option<[u8; 6]>] = &[];
+    let before = [Some(OP), Some(OP), Some(SAFE_OP)];
+    let rows = [
+        (&before[..], &[Some(OP); 3][..], Verdict::Healthy),
+        (unread, unread, Verdict::Inconclusive),
+    ];
+    for (first, then, verdict) in rows {
+        let mut script = listening(SOEM, None);
+        cycles(&mut script, 100, 4, 0x1001, first);
+        cycles(&mut script, 600, 6, 0x1001, then);
+        let report = report(&mut script);
+        assert_eq!((codes(&report), report.verdict), (vec![], verdict), "{}", text(&report));
+    }
+}
+
+#[test]
+fn branches_that_fall_silent_at_once_have_a_supply_in_common() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 100, 6, 0x1001, &[Some(OP); 6]);
+    let dark = [Some(OP), None, Some(OP), Some(OP), None, Some(OP)];
+    cycles(&mut script, 600, 4, 0x1001, &dark);
+    let report = report(&mut script);
+    let finding = &report.findings[0];
+    assert_eq!((finding.code.as_str(), finding.cause), ("H102", FaultName::SupplyOff));
+    assert_eq!((device(finding), report.findings.len()), (Some(2), 1), "{}", text(&report));
+    let places = finding.alternatives.iter().filter(|other| other.cause == FaultName::SupplyOff);
+    assert_eq!(places.count(), 1, "the other one: {}", text(&report));
+}
+
+#[test]
+fn planned_subdevices_have_the_addresses_of_the_maindevice_that_drives() {
+    // In the file K3 comes before T2, in the order of frames behind it.
+    let project = Project::parse(
+        "name = \"p\"\n[[device]]\nname = \"K1\"\non = \"maindevice\"\n[[device]]\nname = \"K3\"\non = \"K1.C\"\n\
+         [[device]]\nname = \"T2\"\non = \"K1.B\"\n",
+    )
+    .unwrap();
+    for (sender, base) in [(SOEM, 0x1001), (KICKCAT, 1001)] {
+        let mut script = listening(sender, Some(project.clone()));
+        cycles(&mut script, 300, 4, base, &[Some(OP), Some(OP), None]);
+        let report = report(&mut script);
+        assert_eq!(report.devices.len(), 3, "{}", text(&report));
+        let cut = &report.findings[0];
+        assert_eq!(
+            (cut.code.as_str(), cut.cause),
+            ("H102", FaultName::LinkOpen),
+            "{}",
+            text(&report)
+        );
+        let PlaceReport::Link { a, b: Some(b), .. } = cut.place else {
+            panic!("{}", text(&report))
+        };
+        assert_eq!((a.no, b.no), (1, 2), "K3 is the second of the file: {}", text(&report));
+    }
+}
+
+#[test]
+fn one_lost_frame_is_a_note_with_all_that_it_may_be() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 300, 6, 0x1001, &[Some(OP); 3]);
+    script.vanish(&[lrw(0x0100_0000, 8, 6)]);
+    cycles(&mut script, 300, 6, 0x1001, &[Some(OP); 3]);
+    let report = report(&mut script);
+    assert_eq!(report.verdict, Verdict::Inconclusive, "{}", text(&report));
+    let finding = &report.findings[0];
+    assert_eq!((finding.code.as_str(), finding.severity), ("H114", Severity::Info));
+    assert!(finding.alternatives.iter().any(|other| other.cause == FaultName::ReceiverDamaged));
+}
