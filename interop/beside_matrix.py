@@ -97,14 +97,6 @@ CASES = [
 ]
 
 ALL = tuple(CLIENTS)
-# Cells in which it says something wrong, with what it says and what it should say: to be mended, not to grow.
-KNOWN_WRONG = []
-
-
-def known_wrong(cell):
-    return any(
-        cell.client in clients and cell.name in names and cell.when in whens for clients, names, whens, _, _ in KNOWN_WRONG
-    )
 
 
 @dataclasses.dataclass
@@ -277,8 +269,8 @@ def played(names, words=(), only=None):
 
 
 def agrees(cell):
-    """Whether it came out as it is to be: right, or known to be wrong. Some of the latter come out right at times."""
-    return cell.outcome in GOOD or known_wrong(cell)
+    """Whether it came out as it is to be."""
+    return cell.outcome in GOOD
 
 
 def settled(names, words=()):
