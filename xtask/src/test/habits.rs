@@ -18,11 +18,11 @@ const LIMIT: u64 = 60;
 /// Habits, and how many findings of their swarm name a place without a fault. A number may only fall: the step says when
 /// one can be lowered.
 const WRONG_PLACES: [(&str, usize); 6] = [
-    ("process-data", 14),
-    ("states", 8),
-    ("links", 8),
+    ("process-data", 11),
+    ("states", 4),
+    ("links", 3),
     ("counters", 2),
-    ("clearing", 8),
+    ("clearing", 4),
     ("soem", 6),
 ];
 
