@@ -68,7 +68,7 @@ type Row = (&'static str, u64, &'static [(&'static str, &'static str, &'static s
 
 const ROWS: [Row; 6] = [
     ("device-off", 5, &[("H150", "device-off", "5")]),
-    ("ecs-device-off-late", 4, &[("H102", "device-off", "4")]),
+    ("ecs-device-off-late", 4, &[("H150", "device-off", "4")]),
     ("emergency", 5, &[("S240", "emergency", "4")]),
     ("lec-link-open-early", 5, &[("H102", "link-open", "3.B-4.A")]),
     ("soem-link-open-early", 5, &[("H102", "link-open", "3.B-4.A")]),

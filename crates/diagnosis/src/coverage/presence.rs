@@ -80,7 +80,7 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         let text = format!(
             "{} SubDevices answered a broadcast at first, and {} from {} on, while process data were exchanged: where the \
              others had been was not seen",
-            rose.value, traffic.broadcast_answers, rose.at
+            rose.fewer.value, rose.more.value, rose.more.at
         );
         let gap = Gap::new(Reason::NumberUnknown, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);

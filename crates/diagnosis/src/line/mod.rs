@@ -48,7 +48,7 @@ pub use learn::Learner;
 pub use reported::{Counting, ErrorSum, Reported, ReportedTrouble};
 pub use search::LoopWrite;
 pub use sii_image::{Power, SiiImage};
-pub use traffic::{Silence, Traffic};
+pub use traffic::{CountRise, Silence, Traffic};
 pub use trip::Trips;
 pub use way::{WayStep, Ways};
 

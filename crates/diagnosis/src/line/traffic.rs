@@ -16,6 +16,15 @@ pub const LOST_KEPT: usize = 64;
 /// Silences kept.
 pub const SILENCES_KEPT: usize = 16;
 
+/// Rise of the number of controllers that answer a broadcast read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct CountRise {
+    /// The number before, with the first read that had it.
+    pub fewer: Seen<u16>,
+    /// The number since.
+    pub more: Seen<u16>,
+}
+
 /// A stretch of time in which requests went out and nothing came back.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Silence {
@@ -181,9 +190,9 @@ pub struct Traffic {
     pub broadcast_answers: u16,
     /// The working counter of the latest broadcast read, with when it last changed.
     pub broadcast_now: Option<Seen<u16>>,
-    /// When more controllers answered a broadcast read than ever before though process data were exchanged already, and
-    /// how many it had been.
-    pub broadcast_rose: Option<Seen<u16>>,
+    /// The latest time that more controllers answered a broadcast read than ever before though process data were exchanged
+    /// already.
+    pub broadcast_rose: Option<CountRise>,
     /// When a broadcast read that all controllers answer last came back.
     pub broadcast_read: Option<Instant>,
     /// In a ring, the latest broadcast read ever whose copies were both processed by somebody: by how many

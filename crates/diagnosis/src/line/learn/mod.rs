@@ -21,7 +21,7 @@ pub use address::Addresses;
 use answer::{Answer, answers};
 use count::CountDoubt;
 
-use super::{Cyclic, Device, Line, Seen, SharedBy};
+use super::{CountRise, Cyclic, Device, Line, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
 
 /// Process RAM begins here: mailboxes and process data.
@@ -166,8 +166,11 @@ impl Learner {
         let most = line.traffic.broadcast_answers;
         let is_confirmed = is_counted_twice || passed.is_none();
         if counts && self.broadcast_doubt.is_believed(answer.sum, most, is_confirmed) {
-            if answer.is_single && most > 0 && answer.sum > most && !line.cyclic.is_empty() {
-                line.traffic.broadcast_rose = Some(Seen::new(most, answer.at, Some(answer.frame)));
+            if answer.is_single && answer.sum > most && !line.cyclic.is_empty() {
+                let more = Seen::new(answer.sum, answer.at, Some(answer.frame));
+                let fewer = line.traffic.broadcast_now.filter(|now| now.value == most && most > 0);
+                let rise = fewer.map(|fewer| CountRise { fewer, more });
+                line.traffic.broadcast_rose = rise.or(line.traffic.broadcast_rose);
             }
             line.traffic.broadcast_answers = most.max(answer.sum);
             line.traffic.broadcast_read = line.traffic.broadcast_read.max(Some(answer.at));

@@ -36,7 +36,8 @@ pub(super) fn restarted(line: &Line) -> Option<Condition> {
          started anew, and an open link does not do that"
     );
     let silent = line.device(first).and_then(|device| device.absences.back());
-    let since = silent.map_or(seen.at, |absence| absence.since.at.min(seen.at));
+    let heard_since = silent.map_or(seen.at, |absence| absence.since.at.min(seen.at));
+    let since = uncounted(line, together.len(), seen.at).unwrap_or(heard_since).min(heard_since);
     // Who joined late has seen the last of it: it may have lasted longer.
     let was_long = seen.at.since(since) >= LONG_HEARD;
     let (cause, others) = match (was_long, together.len() > 1) {
@@ -70,6 +71,15 @@ pub(super) fn restarted(line: &Line) -> Option<Condition> {
         condition = condition.ended(ended);
     }
     Some(condition)
+}
+
+/// The time since which `count` SubDevices that came back at `back` were missing when SubDevices were counted.
+fn uncounted(line: &Line, count: usize, back: Instant) -> Option<Instant> {
+    let rise = line.traffic.broadcast_rose?;
+    let is_same = usize::from(rise.more.value - rise.fewer.value) == count
+        && rise.more.at.before(TOGETHER) <= back
+        && back <= rise.more.at + TOGETHER;
+    is_same.then_some(rise.fewer.at)
 }
 
 /// The time when the last of them was seen in OP again.
