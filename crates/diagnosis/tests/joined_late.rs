@@ -20,6 +20,8 @@ const SAFE_OP: [u8; 6] = [4, 0, 0, 0, 0, 0];
 const OP: [u8; 6] = [8, 0, 0, 0, 0, 0];
 /// SAFEOP with error, sync manager watchdog.
 const WATCHDOG: [u8; 6] = [0x14, 0, 0, 0, 0x1B, 0];
+/// SAFEOP with error, synchronization error.
+const OUT_OF_STEP: [u8; 6] = [0x14, 0, 0, 0, 0x1A, 0];
 
 fn listening(sender: MacAddress, project: Option<Project>) -> Script {
     let setup = Setup { input: InputKind::Listened, project, ..Setup::default() };
@@ -183,4 +185,45 @@ fn one_lost_frame_is_a_note_with_all_that_it_may_be() {
     let finding = &report.findings[0];
     assert_eq!((finding.code.as_str(), finding.severity), ("H114", Severity::Info));
     assert!(finding.alternatives.iter().any(|other| other.cause == FaultName::ReceiverDamaged));
+}
+
+#[test]
+fn frames_lost_before_subdevices_lose_their_step_explain_it() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 100, 6, 0x1001, &[Some(OP); 3]);
+    for _ in 0..4 {
+        script.vanish(&[lrw(0x0100_0000, 8, 6)]);
+        cycles(&mut script, 2, 6, 0x1001, &[]);
+    }
+    cycles(&mut script, 100, 4, 0x1001, &[Some(OP), Some(OP), Some(OUT_OF_STEP)]);
+    cycles(&mut script, 600, 6, 0x1001, &[Some(OP); 3]);
+    let report = report(&mut script);
+    assert_eq!(codes(&report), ["H114"], "{}", text(&report));
+    let lost = &report.findings[0];
+    assert_eq!(lost.severity, Severity::Error, "a SubDevice has left OP");
+    assert!(lost.consequences.iter().any(|one| one.code == "T400"), "{}", text(&report));
+}
+
+#[test]
+fn error_of_step_before_the_first_reading_may_come_of_lost_frames() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 100, 6, 0x1001, &[Some(OP), Some(OP), Some(OUT_OF_STEP)]);
+    cycles(&mut script, 600, 6, 0x1001, &[Some(OP); 3]);
+    let report = report(&mut script);
+    assert_eq!(codes(&report), ["T400"], "{}", text(&report));
+    let others: Vec<_> = report.findings[0].alternatives.iter().map(|one| one.cause).collect();
+    for cause in [FaultName::LinkOpen, FaultName::LateFrames, FaultName::CableDegraded] {
+        assert!(others.contains(&cause), "{cause:?}: {others:?}");
+    }
+}
+
+#[test]
+fn recording_that_begins_with_a_return_has_one_maindevice() {
+    let mut script = listening(MacAddress([0x00, 0x1B, 0x21, 1, 2, 3]), None);
+    for _ in 0..3 {
+        script.give_back(&[lrw(0x0100_0000, 8, 6)]);
+    }
+    cycles(&mut script, 600, 6, 0x03E9, &[Some(OP); 3]);
+    let report = report(&mut script);
+    assert_eq!(codes(&report), Vec::<&str>::new(), "{}", text(&report));
 }

@@ -92,6 +92,16 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
         );
         all.lacks(Extent::InPart, gap);
     }
+    let swallowed: u64 = traffic.swallowed.iter().map(|one| one.frames).sum();
+    if basis.input != InputKind::Driven && swallowed > copies {
+        let text = format!(
+            "of {swallowed} frames in the ring what came back had been processed by nobody, and the other copy did not come"
+        );
+        let gap = Gap::new(Reason::FramesLost, text).essential().step(
+            "read the error counters of all SubDevices and of both cards: something loses what card A sends",
+        );
+        all.lacks(Extent::InPart, gap);
+    }
     if traffic.copies_gone.sum > 0 {
         let text = "both copies of a frame came back through the ring, and later one alone";
         let gap = Gap::new(Reason::FramesLost, text).essential().step(

@@ -117,9 +117,11 @@ pub struct Trips {
 }
 
 /// Frames of one length.
-#[derive(Clone, Copy, Default, Debug)]
+#[derive(Clone, Default, Debug)]
 struct Usual {
     count: u32,
+    /// The first ones, with how long they took, until the fastest are known.
+    first: Vec<LateFrame>,
     shortest: u64,
     next_shortest: u64,
     /// How much longer than the shortest they usually are.
@@ -162,9 +164,18 @@ impl Trips {
         }
         let least = LEAST.max(self.worst_learnt * WORST);
         let is_calm = self.late_count == 0 || self.in_time >= CALM;
-        let compared = self.usual.entry(len).or_default().take(took, least, is_calm);
-        if let Some((longer, _)) = compared {
-            self.count_step(LateFrame { sent, frame, by: Span::ns(longer) });
+        let usual = self.usual.entry(len).or_default();
+        let compared = usual.take(took, least, is_calm);
+        match compared {
+            Some((longer, _)) => {
+                let first = std::mem::take(&mut usual.first);
+                let shortest = Span::ns(usual.shortest);
+                for early in first {
+                    self.count_step(LateFrame { by: early.by.saturating_sub(shortest), ..early });
+                }
+                self.count_step(LateFrame { sent, frame, by: Span::ns(longer) });
+            }
+            None => usual.first.push(LateFrame { sent, frame, by: Span::ns(took) }),
         }
         let late = compared.filter(|(_, is_late)| *is_late).map(|(longer, _)| longer);
         self.frames += 1;
@@ -289,6 +300,16 @@ mod tests {
             }
         }
         assert_eq!(trips.late_count, 0);
+    }
+
+    #[test]
+    fn frames_held_back_before_the_fastest_are_known_are_counted() {
+        let mut trips = Trips::default();
+        play(&mut trips, 0, &(0..60).map(|nth| 20 + nth * 13).collect::<Vec<u64>>());
+        play(&mut trips, 60, &[20; 500]);
+        let held = trips.held_back(Span::us(200)).unwrap();
+        assert_eq!((held.count, held.compared), (39, 560), "from 282 µs on");
+        assert_eq!(held.first.frame, 21);
     }
 
     #[test]

@@ -120,6 +120,10 @@ impl Senders {
     /// Somebody sent a request; a repeated one may be that of a second card.
     pub(super) fn note(&mut self, frame: &FrameSeen<'_>, mac: MacAddress, is_repeated: bool) {
         let own = u64::from(!is_repeated);
+        if frame.direction == Direction::Sent {
+            // Returns that a recording begins with are of requests before its first one.
+            self.all.retain(|sender| !sender.is_elsewhere || sender.mac != mac.marked());
+        }
         let count = self.all.len();
         match self.all.iter_mut().find(|sender| sender.mac == mac) {
             Some(sender) => {

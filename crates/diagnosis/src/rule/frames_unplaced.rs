@@ -20,12 +20,12 @@
 
 use linesman_config::fault::{Class, FaultName};
 
-use linesman_proto::address::Path;
+use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View, nobody_answers};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Line, Tally, Traffic};
+use crate::line::{Device, Line, Tally, Traffic};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -50,6 +50,9 @@ const QUIET: Span = Span::s(2);
 /// Of so many frames one is too much for a line that is to work.
 const OFTEN: u64 = 1_000;
 
+/// So many lost frames may cost a SubDevice its step: the usual limit of its counter of missed events (0x10F1:02) is 4,
+/// and each miss counts 3.
+const FOR_A_STEP: usize = 2;
 /// So many intervals make a rhythm.
 const RHYTHM: usize = 6;
 
@@ -142,9 +145,16 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         ),
     };
     let known = traffic.first_lost.and_then(|seen| seen.frame).unwrap_or(0);
-    let mut condition = condition.confirmed(last).explaining([Symptom::FramesLost]);
+    let hurt: Vec<DeviceId> = out_of_step(line).collect();
+    let follows = |id: &DeviceId| [Symptom::StateLost(*id), Symptom::WorkingCounter(*id)];
+    let mut condition = condition
+        .confirmed(last)
+        .explaining([Symptom::FramesLost])
+        .explaining(hurt.iter().flat_map(follows));
     let is_rare = count.saturating_mul(RARE) <= traffic.sent;
-    condition.severity = if is_rare || single < SEVERAL || traffic.lost.sum == 0 {
+    condition.severity = if !hurt.is_empty() {
+        Severity::Error
+    } else if is_rare || single < SEVERAL || traffic.lost.sum == 0 {
         // A ring that lost one copy has lost nothing.
         Severity::Info
     } else {
@@ -166,6 +176,16 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         condition = condition.ended(last);
     }
     Some(advise(condition, line, damaged, damaged.unwrap_or(0)))
+}
+
+/// SubDevices that lost their step with the frames after some frames got lost.
+fn out_of_step(line: &Line) -> impl Iterator<Item = DeviceId> {
+    let lost = &line.traffic.lost_at;
+    let follows = move |device: &&Device| {
+        let has_lost = |at: &&Instant| device.lost_step_within(**at, **at);
+        lost.iter().filter(has_lost).nth(FOR_A_STEP - 1).is_some()
+    };
+    line.devices.iter().filter(follows).map(|device| device.id)
 }
 
 /// The rhythm in which frames got lost, in words: at equal intervals, or in bursts.

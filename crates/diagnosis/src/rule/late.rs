@@ -147,7 +147,9 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
         .shown_by(Evidence::frame(last.sent + last.by, last.frame, late.text.clone()))
         .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
         .advise("Take switches and media converters out of the way between card and first SubDevice.");
-    let in_step = line.devices.iter().filter(|device| device.sync_on.is_some_and(|on| on.value));
+    // Whoever joins late has not seen who was set up to keep step.
+    let may_keep_step = |device: &&Device| device.sync_on.map_or(is_recorded, |on| on.value);
+    let in_step = line.devices.iter().filter(may_keep_step);
     let hurt: Vec<&Device> =
         in_step.filter(|device| device.lost_step_within(first.sent, last.sent + last.by)).collect();
     if hurt.is_empty() && is_recorded {

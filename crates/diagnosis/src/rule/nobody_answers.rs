@@ -370,11 +370,19 @@ fn hole(view: &View<'_>, silence: &Silence) -> Condition {
         Some((link, sure)) => (link, sure),
         None => (network, 0.5),
     };
-    Condition::new(&PAGE, place, FaultName::FalseLink, silence.since.at)
+    let condition = Condition::new(&PAGE, place, FaultName::FalseLink, silence.since.at)
         .confidence(confidence)
         .or_at(FaultName::NicDamaged, Place::Host, CARD)
         .or_at(FaultName::HostDrops, Place::Host, CARD)
-        .or_at(FaultName::CableDegraded, first_link(line), CARD)
+        .or_at(FaultName::CableDegraded, first_link(line), CARD);
+    if place != network || line.sees_all_orders {
+        return condition;
+    }
+    // Nobody can be asked for counters: whatever spoils every frame looks so.
+    condition
+        .or(FaultName::DeviceInternal, CARD)
+        .or(FaultName::TransmitterDamaged, CARD / 2.0)
+        .or(FaultName::ReceiverDamaged, CARD / 2.0)
 }
 
 /// Frames do come back, but damaged, and no counter can be asked where.

@@ -32,6 +32,35 @@ pub(super) fn errors(line: &Line) -> Vec<(&Device, &AlError)> {
     unseen
 }
 
+/// What keeps process data away for longer than a watchdog holds.
+fn outage(condition: Condition) -> Condition {
+    condition
+        .or(FaultName::LinkOpen, 0.2)
+        .or(FaultName::LinkFlapping, 0.1)
+        .or(FaultName::DeviceOff, 0.1)
+        .or(FaultName::SupplyOff, 0.05)
+        .or(FaultName::BrownOut, 0.05)
+        .or_at(FaultName::HostJitter, Place::Host, 0.05)
+}
+
+/// What costs SubDevices their step: a few frames that are late or lost are enough.
+fn missed_frames(condition: Condition) -> Condition {
+    condition
+        .or(FaultName::LinkOpen, 0.15)
+        .or_at(FaultName::LateFrames, Place::Host, 0.1)
+        .or_at(FaultName::HostDrops, Place::Host, 0.07)
+        .or(FaultName::CableDegraded, 0.07)
+        .or(FaultName::LinkFlapping, 0.07)
+        .or_at(FaultName::HostJitter, Place::Host, 0.05)
+        .or(FaultName::DeviceOff, 0.05)
+        .or(FaultName::EmcNoise, 0.03)
+        .or(FaultName::TransmitterDamaged, 0.02)
+        .or(FaultName::ReceiverDamaged, 0.02)
+        .or(FaultName::DeviceInternal, 0.02)
+        .or(FaultName::SupplyOff, 0.02)
+        .or(FaultName::BrownOut, 0.02)
+}
+
 /// The finding: that it happened, to whom, and what it may have been.
 pub(super) fn condition(view: &View<'_>, unseen: &[(&Device, &AlError)]) -> Option<Condition> {
     let line = view.line;
@@ -58,14 +87,8 @@ pub(super) fn condition(view: &View<'_>, unseen: &[(&Device, &AlError)]) -> Opti
         names.join(", ")
     );
     let place = Place::Network { network: line.network };
-    let mut condition = Condition::new(page, place, first, since)
-        .confidence(0.3)
-        .or(FaultName::LinkOpen, 0.2)
-        .or(FaultName::LinkFlapping, 0.1)
-        .or(FaultName::DeviceOff, 0.1)
-        .or(FaultName::SupplyOff, 0.05)
-        .or(FaultName::BrownOut, 0.05)
-        .or_at(FaultName::HostJitter, Place::Host, 0.05)
+    let condition = Condition::new(page, place, first, since).confidence(0.3);
+    let mut condition = if expired { outage(condition) } else { missed_frames(condition) }
         .confirmed(since)
         .about(ids().map(Symptom::StateLost))
         .explaining(ids().flat_map(|id| {
