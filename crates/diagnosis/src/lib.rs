@@ -1,16 +1,16 @@
-//! Frames in, findings out: where, why and what to do.
+//! Diagnosis of EtherCAT networks: takes frames, and returns findings with place, cause and advice.
 //!
-//! [`observe`] pairs what went out with what came back, [`mod@line`] is what is known of the network,
-//! [`main_device`] recognises who drives it, each [`rule`] looks at the line for one kind of trouble, [`finding`] gives conditions a life,
-//! [`coverage`] says what could be judged at all, and [`report`] is the answer as people and programs read it. [`Engine`] drives them all.
+//! [`observe`] pairs requests with returns, [`mod@model`] holds what is known of the network, [`main_device`] recognises the
+//! MainDevice that drives it, each [`rule`] tests the model for one kind of trouble, [`finding`] opens and closes findings,
+//! [`coverage`] tells what could be judged, and [`report`] is the result for people and programs. [`Engine`] drives them all.
 
 pub mod ask;
 pub mod coverage;
 pub mod engine;
 pub mod finding;
-pub mod line;
 pub mod locate;
 pub mod main_device;
+pub mod model;
 pub mod observation_file;
 pub mod observe;
 pub mod pasted;

@@ -147,8 +147,8 @@ fn no_answer_at_all_is_one_finding_that_says_what_to_check() {
 fn identities_and_stations_are_learnt_from_the_frames() {
     let Some(folder) = real_captures() else { return };
     let engine = read_capture(&folder.join("ec-replay-ek1100-el2828-el2889.pcapng"));
-    let line = engine.line(Network(0)).unwrap();
-    let found: Vec<_> = line
+    let model = engine.model(Network(0)).unwrap();
+    let found: Vec<_> = model
         .devices
         .iter()
         .map(|device| {
@@ -159,6 +159,6 @@ fn identities_and_stations_are_learnt_from_the_frames() {
     let expected = [(0x1000, 2, 0x044C_2C52), (0x1001, 2, 0x0B0C_3052), (0x1002, 2, 0x0B49_3052)];
     assert_eq!(found, expected);
     // A coupler with two terminals behind it.
-    let tree = line.tree.as_ref().unwrap();
+    let tree = model.tree.as_ref().unwrap();
     assert_eq!((tree.parent(1), tree.parent(2)), (Some(0), Some(1)));
 }

@@ -511,10 +511,10 @@ fn a_run_joined_in_the_middle_is_put_in_the_order_of_stations() {
     }
     script.exchange(&[brd(0x0130, &[8, 0], 3)]);
     script.finish();
-    let line = script.engine.line(Network(0)).unwrap();
-    let stations: Vec<_> = line.devices.iter().map(|device| device.station.unwrap().0).collect();
+    let model = script.engine.model(Network(0)).unwrap();
+    let stations: Vec<_> = model.devices.iter().map(|device| device.station.unwrap().0).collect();
     assert_eq!(stations, [0x1001, 0x1002, 0x1003]);
-    let tree = line.tree.as_ref().unwrap();
+    let tree = model.tree.as_ref().unwrap();
     assert_eq!([tree.parent(0), tree.parent(1), tree.parent(2)], [None, Some(0), Some(1)]);
 }
 

@@ -426,8 +426,8 @@ fn a_single_copy_that_is_lost_in_a_whole_ring_is_counted_at_its_card() {
         }
         script.index = script.index.wrapping_add(1);
     }
-    let line = script.engine.line(Network(0)).unwrap();
-    let lost = line.traffic.copies_lost.map(|tally| tally.sum);
+    let model = script.engine.model(Network(0)).unwrap();
+    let lost = model.traffic.copies_lost.map(|tally| tally.sum);
     assert_eq!(lost, [1, 0]);
 }
 
@@ -511,8 +511,8 @@ proptest! {
             });
         }
         engine.finish(Instant::default(), true);
-        let line = engine.line(Network(0)).unwrap();
-        prop_assert!(line.devices.len() <= 4096 && line.cyclic.len() <= 256);
+        let model = engine.model(Network(0)).unwrap();
+        prop_assert!(model.devices.len() <= 4096 && model.cyclic.len() <= 256);
         let report = engine.diagnosis();
         prop_assert!(report.network.unanswered <= report.network.datagrams);
     }

@@ -4,7 +4,7 @@
 
 use linesman_config::fault::FaultName;
 use linesman_config::project::Project;
-use linesman_diagnosis::line::{Line, Seen, SeenIdentity};
+use linesman_diagnosis::model::{NetworkModel, Seen, SeenIdentity};
 use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::{FindingReport, PlaceReport};
 use linesman_diagnosis::{Diagnosis, Engine, Setup};
@@ -61,13 +61,13 @@ fn another_device_is_named_with_both_identities() {
 /// where they were read.
 fn scanned(planned: &[u32], found: &[u32], has_ports: bool) -> Diagnosis {
     let project = Project::parse(&text(planned, "")).unwrap();
-    let mut line = Line::planned(Network(0), &project);
+    let mut model = NetworkModel::planned(Network(0), &project);
     let at = Instant::ZERO + Span::ms(1);
-    while line.devices.len() < found.len() {
-        line.add_device();
+    while model.devices.len() < found.len() {
+        model.add_device();
     }
     for (index, product) in found.iter().enumerate() {
-        let device = line.device_mut(DeviceId(index as u32)).unwrap();
+        let device = model.device_mut(DeviceId(index as u32)).unwrap();
         let read = |value| Some(Seen::new(value, at, None));
         device.identity = SeenIdentity {
             vendor_id: read(2),
@@ -84,10 +84,10 @@ fn scanned(planned: &[u32], found: &[u32], has_ports: bool) -> Diagnosis {
         }
         device.answers(at, None);
     }
-    line.traffic.positions_seen = found.len() as u16;
-    line.now = at;
-    line.touch();
-    Engine::with_line(Setup { project: Some(project), ..Setup::default() }, line).diagnosis()
+    model.traffic.positions_seen = found.len() as u16;
+    model.now = at;
+    model.touch();
+    Engine::with_line(Setup { project: Some(project), ..Setup::default() }, model).diagnosis()
 }
 
 /// Findings by place, code and cause.

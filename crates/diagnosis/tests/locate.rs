@@ -7,8 +7,8 @@
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::finding::{LinkDirection, Place};
-use linesman_diagnosis::line::Line;
-use linesman_diagnosis::locate::{LastHop, Located, Survey};
+use linesman_diagnosis::locate::{LastHop, LocateInput, Located};
+use linesman_diagnosis::model::NetworkModel;
 use linesman_diagnosis::observe::{HostEvent, HostObservation};
 use linesman_diagnosis::rule::{View, frame_errors};
 use linesman_proto::address::{DeviceId, Network, Path};
@@ -25,7 +25,7 @@ struct Bench {
     types: Vec<(bool, bool)>,
     real: Vec<ErrorCounters>,
     card: u64,
-    line: Line,
+    model: NetworkModel,
     now: Instant,
 }
 
@@ -36,14 +36,14 @@ fn bump(value: &mut Option<u8>, by: u64) {
 
 impl Bench {
     fn new(tree: Tree, types: Vec<(bool, bool)>) -> Self {
-        let mut line = Line::new(Network(0));
+        let mut model = NetworkModel::new(Network(0));
         for _ in 0..tree.len() {
-            line.add_device();
+            model.add_device();
         }
-        line.tree = Some(tree.clone());
+        model.tree = Some(tree.clone());
         let zero = ErrorCounters::from_bytes(&[0; ErrorCounters::LEN], ErrorCounters::START);
         let real = vec![zero; tree.len()];
-        let mut bench = Self { tree, types, real, card: 0, line, now: Instant::ZERO };
+        let mut bench = Self { tree, types, real, card: 0, model, now: Instant::ZERO };
         bench.read_all();
         bench
     }
@@ -76,9 +76,9 @@ impl Bench {
 
     fn read(&mut self, node: usize) {
         self.now += Span::ms(1);
-        self.line.now = self.now;
+        self.model.now = self.now;
         let counters = self.real[node];
-        self.line.devices[node].counters.record_counters(&counters, self.now, Some(1));
+        self.model.devices[node].counters.record_counters(&counters, self.now, Some(1));
     }
 
     fn read_all(&mut self) {
@@ -89,18 +89,18 @@ impl Bench {
 
     fn watch_card(&mut self) {
         self.now += Span::ms(1);
-        self.line.now = self.now;
+        self.model.now = self.now;
         let what = HostEvent::CardErrors { crc: std::mem::take(&mut self.card), other: 0 };
         let (network, path) = (Network(0), Path::A);
-        self.line.host.record(&HostObservation { network, path, time: self.now, what });
+        self.model.host.record(&HostObservation { network, path, time: self.now, what });
     }
 
     fn located(&self, has_ended: bool) -> Located {
-        Located::on(&Survey::of(&self.line, has_ended).unwrap())
+        Located::on(&LocateInput::of(&self.model, has_ended).unwrap())
     }
 
     fn conditions(&self) -> Vec<linesman_diagnosis::finding::Condition> {
-        let view = View { line: &self.line, now: self.now, has_ended: false };
+        let view = View { model: &self.model, now: self.now, has_ended: false };
         let mut conditions = Vec::new();
         (frame_errors::RULE.judge)(&view, &mut conditions);
         conditions
@@ -243,7 +243,7 @@ fn the_last_hop_is_told_by_the_card() {
 #[test]
 fn without_the_cards_counters_the_last_hop_is_a_set() {
     let mut bench = Bench::new(fifteen(), vec![(true, false); 15]);
-    bench.line.traffic.lost.add(3, bench.now);
+    bench.model.traffic.lost.add(3, bench.now);
     bench.read_all();
     let conditions = bench.conditions();
     assert_eq!(conditions.len(), 1, "{conditions:?}");
@@ -264,14 +264,14 @@ fn copies_that_a_card_of_a_ring_misses_are_lost_on_its_last_hop_whatever_was_los
     let wired = [Wired { on: End::MainDevice(Path::A), entry: A }, on(1, B), on(2, B)];
     let ring = Tree::from_wiring(&wired, Some((2, B))).unwrap();
     let mut bench = Bench::new(ring, vec![(true, false); 3]);
-    bench.line.traffic.first = Some(bench.now);
+    bench.model.traffic.first = Some(bench.now);
     // Two frames while the line came up; then those alone that come back to card A.
-    bench.line.traffic.lost.add(1, bench.now);
-    bench.line.traffic.lost.add(1, bench.now + Span::ms(1));
+    bench.model.traffic.lost.add(1, bench.now);
+    bench.model.traffic.lost.add(1, bench.now + Span::ms(1));
     bench.read_all();
     bench.now += Span::s(2);
     for _ in 0..9 {
-        bench.line.traffic.copies_lost[Path::A.index()].add(1, bench.now);
+        bench.model.traffic.copies_lost[Path::A.index()].add(1, bench.now);
         bench.now += Span::ms(7);
     }
     bench.read_all();
@@ -416,20 +416,20 @@ fn one_reading_after_a_long_time_says_nothing_of_the_same_moment() {
 #[test]
 fn old_counters_are_history() {
     let tree = fifteen();
-    let mut line = Line::new(Network(0));
+    let mut model = NetworkModel::new(Network(0));
     for _ in 0..15 {
-        line.add_device();
+        model.add_device();
     }
-    line.tree = Some(tree);
+    model.tree = Some(tree);
     let old = ErrorCounters::from_bytes(&[200; ErrorCounters::LEN], ErrorCounters::START);
     for round in 0..5 {
-        for device in &mut line.devices {
-            line.now = Instant::ZERO + Span::ms(10 * round);
-            device.counters.record_counters(&old, line.now, Some(round));
+        for device in &mut model.devices {
+            model.now = Instant::ZERO + Span::ms(10 * round);
+            device.counters.record_counters(&old, model.now, Some(round));
         }
     }
-    let survey = Survey::of(&line, true).unwrap();
-    assert_eq!(Located::on(&survey), Located::default());
+    let input = LocateInput::of(&model, true).unwrap();
+    assert_eq!(Located::on(&input), Located::default());
 }
 
 #[test]
@@ -457,7 +457,7 @@ fn errors_of_a_plug_being_pulled_are_no_damage() {
 fn ports_that_nobody_read_share_the_suspicion() {
     let tree = fifteen();
     let mut bench = Bench::new(tree, vec![(false, false); 15]);
-    bench.line.devices[2].counters = Default::default();
+    bench.model.devices[2].counters = Default::default();
     bench.hit(3, 2, true);
     for node in (0..15).filter(|node| *node != 2).chain((0..15).filter(|node| *node != 2)) {
         bench.read(node);
@@ -522,11 +522,11 @@ fn counters_at_their_end_are_as_good_as_none() {
     // Somebody's old errors: port A of SubDevice 14 counts no more.
     *bench.real[13].slot(ErrorCounter::InvalidFrame(A)) = Some(255);
     *bench.real[13].slot(ErrorCounter::PhysicalLayer(A)) = Some(255);
-    bench.line = Line::new(Network(0));
+    bench.model = NetworkModel::new(Network(0));
     for _ in 0..15 {
-        bench.line.add_device();
+        bench.model.add_device();
     }
-    bench.line.tree = Some(tree.clone());
+    bench.model.tree = Some(tree.clone());
     bench.read_all();
     let route = Route::intact(&tree);
     bench.hit(route.hop_to(13, A).unwrap(), 4, true);

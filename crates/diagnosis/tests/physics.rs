@@ -103,10 +103,10 @@ fn every_link_and_direction_is_named_with_1_10_and_1000_hits() {
                     DirectionReport::BToA => (wired.downstream, wired.upstream),
                     _ => (wired.upstream, wired.downstream),
                 };
-                let line = format!("{}>{}", name(&file, from), name(&file, to));
-                let case = format!("{line}, {hits} hits");
+                let model = format!("{}>{}", name(&file, from), name(&file, to));
+                let case = format!("{model}, {hits} hits");
                 let fault = FaultEntry::new(FaultName::CableDegraded)
-                    .at(line)
+                    .at(model)
                     .from_to(150.0, Some(to_ms as f64))
                     .with("hits", hits);
                 let diagnosis = run(&file, &fault, to_ms + 200, true);
@@ -181,15 +181,15 @@ fn each_cut_is_one_finding_at_its_link() {
     let tree = tree(&file);
     for link in 1..tree.links().len() {
         let wired = tree.links()[link];
-        let line = format!("{}-{}", name(&file, wired.upstream), name(&file, wired.downstream));
-        let fault = FaultEntry::new(FaultName::LinkOpen).at(line.clone()).from_to(200.0, None);
+        let model = format!("{}-{}", name(&file, wired.upstream), name(&file, wired.downstream));
+        let fault = FaultEntry::new(FaultName::LinkOpen).at(model.clone()).from_to(200.0, None);
         let diagnosis = run(&file, &fault, 600, true);
-        let finding = only(&diagnosis, &line);
-        assert!(is_at(&finding.place, &tree, link, DirectionReport::Both), "{line}: {finding:#?}");
+        let finding = only(&diagnosis, &model);
+        assert!(is_at(&finding.place, &tree, link, DirectionReport::Both), "{model}: {finding:#?}");
         assert_eq!(finding.cause, FaultName::LinkOpen);
         assert!(finding.confirmed_ns.is_some());
         let End::Controller(node, _) = wired.downstream else { panic!() };
-        assert_eq!(finding.consequences.len(), tree.subtree(node).len(), "{line}: {finding:#?}");
+        assert_eq!(finding.consequences.len(), tree.subtree(node).len(), "{model}: {finding:#?}");
     }
 }
 
@@ -203,17 +203,17 @@ fn noise_on_random_plants_is_found_where_it_is() {
         let mut chance = seed.stream("test");
         let link = chance.below(tree.links().len() as u64) as usize;
         let wired = tree.links()[link];
-        let line = format!("{}>{}", name(&file, wired.upstream), name(&file, wired.downstream));
+        let model = format!("{}>{}", name(&file, wired.upstream), name(&file, wired.downstream));
         let fault = FaultEntry::new(FaultName::TransmitterDamaged)
-            .at(line.clone())
+            .at(model.clone())
             .from_to(200.0, Some(1_200.0))
             .with("hits_per_s", 300.0);
         let diagnosis = run(&file, &fault, 1_500, true);
-        let finding = only(&diagnosis, &line);
+        let finding = only(&diagnosis, &model);
         let is_host = link == 0 && finding.place == PlaceReport::Host;
         assert!(
             is_host || is_at(&finding.place, &tree, link, DirectionReport::AToB),
-            "{seed:?}, {line}: {finding:#?}"
+            "{seed:?}, {model}: {finding:#?}"
         );
     }
 }

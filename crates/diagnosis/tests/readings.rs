@@ -51,8 +51,8 @@ fn counts_above_255_are_totals_and_255_of_a_register_is_its_end() {
          290000 }} }}\nports.B = {{ lost_link = 255 }}\n"
     );
     let file = ObservationFile::parse(&text).unwrap();
-    let line = file.line(None);
-    let counters = &line.device(DeviceId(1)).unwrap().counters;
+    let model = file.model(None);
+    let counters = &model.device(DeviceId(1)).unwrap().counters;
     let frames = counters.track(ErrorCounter::InvalidFrame(Port::A)).unwrap();
     assert_eq!((frames.total.rise(), frames.last.value, frames.is_at_end()), (656, 154_656, false));
     assert!(!frames.may_be_old && !frames.total.is_lower_bound());
@@ -63,8 +63,8 @@ fn counts_above_255_are_totals_and_255_of_a_register_is_its_end() {
     assert!(evidence.contains("656 of its own"), "{evidence}");
     // A tool that adds counters up does not stop at 255.
     let totals = ObservationFile::parse(&format!("totals = true\n{text}")).unwrap();
-    let line = totals.line(None);
-    let lost = line.device(DeviceId(1)).unwrap().counters.track(ErrorCounter::LostLink(Port::B));
+    let model = totals.model(None);
+    let lost = model.device(DeviceId(1)).unwrap().counters.track(ErrorCounter::LostLink(Port::B));
     assert!(!lost.unwrap().is_at_end());
 }
 
@@ -85,8 +85,8 @@ fn several_readings_are_a_history_of_rises_clears_and_states() {
     ]
     .concat();
     let file = ObservationFile::parse(&text).unwrap();
-    let line = file.line(None);
-    let device = line.device(DeviceId(1)).unwrap();
+    let model = file.model(None);
+    let device = model.device(DeviceId(1)).unwrap();
     let track = device.counters.track(ErrorCounter::InvalidFrame(Port::A)).unwrap();
     let rises: Vec<_> = track.rises.iter().map(|rise| (rise.before, rise.after)).collect();
     assert_eq!(rises, [(700, 900), (900, 4)], "the first reading is history");
@@ -347,8 +347,8 @@ fn a_working_counter_that_recovers_between_readings_is_over() {
     };
     let base = format!("{TWO}[[working_counter]]\nname = \"d\"\nexpected = 9\n");
     let text = [base, reading(20, 9), reading(30, 0), reading(40, 9)].concat();
-    let line = ObservationFile::parse(&text).unwrap().line(None);
-    let deficit = line.cyclic[0].deficits[0];
+    let model = ObservationFile::parse(&text).unwrap().model(None);
+    let deficit = model.cyclic[0].deficits[0];
     assert_eq!((deficit.lowest, deficit.ended.is_some()), (0, true));
 }
 
@@ -401,7 +401,7 @@ fn errors_that_move_with_a_device_blame_it_and_errors_that_stay_clear_it() {
 #[test]
 fn a_known_controller_tells_whether_bad_frames_are_counted_again() {
     // The second port counts as many as the first one; whether these are the same depends on its controller.
-    let line = |controller: &str| {
+    let model = |controller: &str| {
         format!(
             "[[device]]\nname = \"K1\"\non = \"maindevice\"\nports.A = {{ frame = 20, physical = 50 }}\n\
              [[device]]\nname = \"K2\"\non = \"K1.B\"\n{controller}ports.A = {{ frame = 20, physical = 50 }}\n"
@@ -409,15 +409,15 @@ fn a_known_controller_tells_whether_bad_frames_are_counted_again() {
     };
     let places =
         |text: &str| judge(text).findings.iter().map(|one| one.place.clone()).collect::<Vec<_>>();
-    assert_eq!(places(&line("controller = \"ET1100\"\n")).len(), 2, "it counts its own alone");
+    assert_eq!(places(&model("controller = \"ET1100\"\n")).len(), 2, "it counts its own alone");
     // What is counted again is one damage; so it is taken where nobody says.
     let frames_of = |text: &str| {
         let all = judge(text);
         all.findings.iter().map(texts).collect::<String>().matches("of its own").count()
     };
-    assert_eq!(frames_of(&line("controller = \"fpga\"\n")), 1);
-    assert_eq!(frames_of(&line("")), 1);
-    assert_eq!(frames_of(&line("controller = \"asic\"\n")), 2);
+    assert_eq!(frames_of(&model("controller = \"fpga\"\n")), 1);
+    assert_eq!(frames_of(&model("")), 1);
+    assert_eq!(frames_of(&model("controller = \"asic\"\n")), 2);
 }
 
 #[test]

@@ -97,7 +97,7 @@ fn who_is_gone_whose_firmware_fails_and_whose_cycle_is_too_fast_are_told_apart()
         ("kind = 'firmware-fault'\ndevice = 'T2'\nhow = 'hangs'", &[FirmwareFault], false),
     ] {
         let lab = broken(text, true);
-        let line = lab.engine().line(Network(0)).unwrap();
+        let line = lab.engine().model(Network(0)).unwrap();
         let is_low = line.cyclic.iter().any(|cyclic| !cyclic.deficits.is_empty());
         let diagnosis = lab.diagnosis();
         let said: Vec<_> =

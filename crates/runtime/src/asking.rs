@@ -52,7 +52,7 @@ impl Asking {
         while let Some(probe) = engine.poll_probe() {
             self.asker.want(&probe);
         }
-        let Some(line) = engine.line(Network(0)) else { return Ok(()) };
+        let Some(line) = engine.model(Network(0)) else { return Ok(()) };
         let len = self.asker.poll_transmit(self.clock.now(), line, &mut self.buffer);
         if let Some(frame) = len.and_then(|len| self.buffer.get(..len)) {
             // Where the card's queue is full it is lost, as on the line.

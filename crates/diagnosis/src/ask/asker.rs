@@ -1,4 +1,4 @@
-//! The questions from the first look at the MainDevice to the end: when the next one leaves, and when none does any more.
+//! State machine of the questions: recognises the MainDevice, schedules each question, and decides when to stop.
 
 use linesman_proto::address::{Position, RegisterAddress};
 use linesman_proto::command::Command;
@@ -7,15 +7,15 @@ use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::frame::{Datagram, FrameBuilder, FrameView};
 use linesman_proto::time::{Instant, Span};
 
-use super::carrier::{self, Carrier, Refusal};
-use super::disturbance::{Disturbance, Fared, Guard};
-use super::gap::{Gap, Gaps};
-use super::outcome::{News, Over};
+use super::carrier::{self, AskRefusal, Carrier};
+use super::disturbance::{Disturbance, DisturbanceWatch, FrameOutcomes};
+use super::gap::{Gaps, SendWindow};
+use super::outcome::{EndReason, News};
 use super::report::{AskingReport, AskingState, CarrierName};
-use super::turns::{Question, Target, Turns};
+use super::schedule::{Question, QuestionSchedule, Target};
 use crate::engine::{Asked, Probe, ProbeEffect};
-use crate::line::Line;
 use crate::main_device::MainDeviceKind;
+use crate::model::NetworkModel;
 use crate::observe::question::is_question;
 use crate::observe::{Direction, Fingerprint, FrameSeen, Pairing, companion};
 use crate::report::Number;
@@ -57,12 +57,12 @@ enum Phase {
     /// SubDevices are asked.
     Asking,
     /// It is over.
-    Over(Over),
+    Ended(EndReason),
 }
 
 /// A question that is under way.
 #[derive(Clone, Debug)]
-struct Out {
+struct PendingQuestion {
     index: u8,
     sent: Instant,
     gives_up: Instant,
@@ -77,12 +77,12 @@ pub struct Asker {
     phase: Phase,
     carrier: Carrier,
     gaps: Gaps,
-    guard: Guard,
+    guard: DisturbanceWatch,
     /// How frames fared before the MainDevice was learnt anew.
-    before: (Fared, Fared),
+    before: (FrameOutcomes, FrameOutcomes),
     pairing: Pairing,
-    turns: Turns,
-    out: Option<Out>,
+    turns: QuestionSchedule,
+    out: Option<PendingQuestion>,
     next: Instant,
     look_at: Option<Instant>,
     /// When it was last looked what is due.
@@ -110,10 +110,10 @@ impl Asker {
             phase: Phase::Learning(Instant::ZERO),
             carrier: Carrier::Udp,
             gaps: Gaps::default(),
-            guard: Guard::default(),
-            before: (Fared::default(), Fared::default()),
+            guard: DisturbanceWatch::default(),
+            before: (FrameOutcomes::default(), FrameOutcomes::default()),
             pairing: Pairing::default(),
-            turns: Turns::default(),
+            turns: QuestionSchedule::default(),
             out: None,
             next: Instant::ZERO,
             look_at: None,
@@ -189,12 +189,17 @@ impl Asker {
         }
     }
 
-    /// The question that leaves now, as a frame in `buffer`: its length. `line` is what is known of the line.
-    pub fn poll_transmit(&mut self, now: Instant, line: &Line, buffer: &mut [u8]) -> Option<usize> {
-        self.settle(now, line);
+    /// The question that leaves now, as a frame in `buffer`: its length. `model` is what is known of the line.
+    pub fn poll_transmit(
+        &mut self,
+        now: Instant,
+        model: &NetworkModel,
+        buffer: &mut [u8],
+    ) -> Option<usize> {
+        self.settle(now, model);
         self.look_at = None;
         let is_ready = match self.phase {
-            Phase::Learning(_) | Phase::Over(_) => false,
+            Phase::Learning(_) | Phase::Ended(_) => false,
             Phase::Trial { .. } | Phase::Asking => self.out.is_none() && !self.guard.is_in_doubt(),
         };
         if !is_ready {
@@ -205,12 +210,12 @@ impl Asker {
             return None;
         }
         match self.gaps.look(now) {
-            Gap::Open => self.ask(now, line, buffer),
-            Gap::Until(at) => {
+            SendWindow::Open => self.ask(now, model, buffer),
+            SendWindow::Until(at) => {
                 self.look_at = Some(at);
                 None
             }
-            Gap::Closed => None,
+            SendWindow::Closed => None,
         }
     }
 
@@ -220,7 +225,7 @@ impl Asker {
         let out = self.out.as_ref().map(|out| out.gives_up);
         let [learnt, steady] = match self.phase {
             Phase::Learning(since) => [Some(since), self.guard.last_order()],
-            Phase::Trial { .. } | Phase::Asking | Phase::Over(_) => [None, None],
+            Phase::Trial { .. } | Phase::Asking | Phase::Ended(_) => [None, None],
         }
         .map(|from| from.map(|from| from + LEARN));
         let all = [out, learnt, steady, self.look_at, self.pairing.timeout(), self.guard.timeout()];
@@ -237,7 +242,7 @@ impl Asker {
     #[must_use]
     pub fn report(&self, now: Instant) -> AskingReport {
         let (reason, next_step) = self.reason(now).unzip();
-        let sum = |one: Fared, other: Fared| Fared {
+        let sum = |one: FrameOutcomes, other: FrameOutcomes| FrameOutcomes {
             frames: one.frames + other.frames,
             lost: one.lost + other.lost,
             late: one.late + other.late,
@@ -246,7 +251,7 @@ impl Asker {
             state: match &self.phase {
                 Phase::Learning(_) => AskingState::Learning,
                 Phase::Trial { .. } | Phase::Asking => AskingState::Asking,
-                Phase::Over(over) => over.state(),
+                Phase::Ended(over) => over.state(),
             },
             carrier: (self.questions > 0).then_some(match self.carrier {
                 Carrier::Udp => CarrierName::Udp,
@@ -266,7 +271,7 @@ impl Asker {
 
     /// Why no question is sent, and what to do about it.
     fn reason(&self, now: Instant) -> Option<(String, String)> {
-        if let Phase::Over(over) = &self.phase {
+        if let Phase::Ended(over) = &self.phase {
             return Some((over.reason(), over.next_step().to_owned()));
         }
         if !self.gaps.is_driven(now) {
@@ -291,33 +296,33 @@ impl Asker {
     }
 
     /// Gives up what is lost, and goes on to the next phase.
-    fn settle(&mut self, now: Instant, line: &Line) {
+    fn settle(&mut self, now: Instant, model: &NetworkModel) {
         self.looked = now;
         let Self { pairing, guard, .. } = self;
         pairing.expire(now, &mut |exchange| guard.exchanged(exchange));
         if let Some(out) = self.out.take_if(|out| out.gives_up <= now) {
             let usual = self.gaps.usual_trip().unwrap_or_default();
             self.guard.question(out.sent, out.sent + usual);
-            self.tried(0, line);
+            self.tried(0, model);
         }
         if let Some(counted) = self.counted.take() {
-            self.tried(counted, line);
+            self.tried(counted, model);
         }
         self.guard.look(now, self.gaps.cycle());
         match self.phase {
-            Phase::Learning(since) => self.learn(since, now, line),
+            Phase::Learning(since) => self.learn(since, now, model),
             Phase::Trial { .. } | Phase::Asking => {
                 if let Some((disturbance, is_near)) = self.guard.take_found() {
                     self.disturbed(disturbance, is_near, now);
                 }
             }
-            Phase::Over(_) => {}
+            Phase::Ended(_) => {}
         }
     }
 
     fn disturbed(&mut self, disturbance: Disturbance, is_near: bool, now: Instant) {
         if is_near || !self.setup.keeps_on {
-            self.end(Over::Stopped(disturbance));
+            self.end(EndReason::Stopped(disturbance));
             return;
         }
         let guard = std::mem::take(&mut self.guard);
@@ -333,12 +338,12 @@ impl Asker {
         self.news = Some(News::Again(disturbance));
     }
 
-    fn learn(&mut self, since: Instant, now: Instant, line: &Line) {
+    fn learn(&mut self, since: Instant, now: Instant, model: &NetworkModel) {
         if self.source.is_none() && self.elsewhere >= FEW {
-            return self.end(Over::Refused(Refusal::Elsewhere));
+            return self.end(EndReason::Refused(AskRefusal::Elsewhere));
         }
         if self.by_other_card >= FEW {
-            return self.end(Over::Refused(Refusal::Ring));
+            return self.end(EndReason::Refused(AskRefusal::Ring));
         }
         // What was learnt while it was set up says nothing of its operation.
         let last_order = self
@@ -353,31 +358,31 @@ impl Asker {
         if now.since(since) < LEARN || !is_steady || self.guard.others.frames < LEARN_FRAMES {
             return;
         }
-        let recognised = line.habits.recognised();
-        let refusal = Refusal::of(recognised.as_ref()).filter(|_| !self.setup.is_forced);
+        let recognised = model.habits.recognised();
+        let refusal = AskRefusal::of(recognised.as_ref()).filter(|_| !self.setup.is_forced);
         if let Some(refusal) = refusal {
-            return self.end(Over::Refused(refusal));
+            return self.end(EndReason::Refused(refusal));
         }
         self.guard.begin(self.gaps.cycle());
         self.phase = Phase::Trial { tries: 0, most: 0 };
         self.next = now;
     }
 
-    fn end(&mut self, over: Over) {
+    fn end(&mut self, over: EndReason) {
         self.out = None;
-        self.phase = Phase::Over(over.clone());
-        self.news = Some(News::Over(over));
+        self.phase = Phase::Ended(over.clone());
+        self.news = Some(News::Ended(over));
     }
 
     /// A trial of the carrier has ended: so many controllers answered.
-    fn tried(&mut self, answered: u16, line: &Line) {
+    fn tried(&mut self, answered: u16, model: &NetworkModel) {
         let Phase::Trial { tries, most } = &mut self.phase else { return };
         (*tries, *most) = (*tries + 1, (*most).max(answered));
         let (tries, most) = (*tries, *most);
-        let kind = line.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind);
-        let counted = line.traffic.broadcast_now.map(|count| count.value);
+        let kind = model.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind);
+        let counted = model.traffic.broadcast_now.map(|count| count.value);
         let present =
-            counted.unwrap_or_else(|| u16::try_from(line.device_count()).unwrap_or(u16::MAX));
+            counted.unwrap_or_else(|| u16::try_from(model.device_count()).unwrap_or(u16::MAX));
         if most > 0 && most >= present {
             self.turns.begin(most, kind);
             self.phase = Phase::Asking;
@@ -392,19 +397,19 @@ impl Asker {
                 self.carrier = plain;
                 self.phase = Phase::Trial { tries: 0, most: 0 };
             }
-            None => self.end(Over::NoCarrier { answered: most, present, kind }),
+            None => self.end(EndReason::NoCarrier { answered: most, present, kind }),
         }
     }
 
-    fn ask(&mut self, now: Instant, line: &Line, buffer: &mut [u8]) -> Option<usize> {
+    fn ask(&mut self, now: Instant, model: &NetworkModel, buffer: &mut [u8]) -> Option<usize> {
         let question = match self.phase {
-            Phase::Asking => Some(self.turns.next(line)?),
-            Phase::Trial { .. } | Phase::Learning(_) | Phase::Over(_) => None,
+            Phase::Asking => Some(self.turns.next(model)?),
+            Phase::Trial { .. } | Phase::Learning(_) | Phase::Ended(_) => None,
         };
         let index = self.carrier.index(self.questions);
         let len = build(self.carrier, index, question.as_ref(), buffer)?;
         let lost_after = LOST_AFTER.max(self.gaps.usual_trip().unwrap_or_default() * LOST_TRIPS);
-        self.out = Some(Out { index, sent: now, gives_up: now + lost_after, question });
+        self.out = Some(PendingQuestion { index, sent: now, gives_up: now + lost_after, question });
         self.questions += 1;
         self.last = Some(now);
         self.next = now + Span::ns(1_000_000_000 / u64::from(self.setup.per_s));

@@ -67,7 +67,7 @@ pub const fn plain(kind: MainDeviceKind, highest_index: u8) -> Option<Carrier> {
 
 /// Why no question is sent beside this MainDevice.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Refusal {
+pub enum AskRefusal {
     /// Its frames come in by the card: it sends them from another computer.
     Elsewhere,
     /// It drives a ring: two cards, of which this is one.
@@ -78,7 +78,7 @@ pub enum Refusal {
     Kind(MainDeviceKind),
 }
 
-impl Refusal {
+impl AskRefusal {
     /// Why a MainDevice of this kind is not asked beside, unless the user insists; `None`: it may be.
     #[must_use]
     pub fn of(recognised: Option<&Recognised>) -> Option<Self> {
@@ -132,7 +132,7 @@ impl Refusal {
     }
 }
 
-impl fmt::Display for Refusal {
+impl fmt::Display for AskRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Elsewhere => f.write_str(
@@ -168,21 +168,21 @@ mod tests {
     fn weak_mark_alone_is_not_recognised() {
         let weak = [Mark::FirstStation(1)];
         let igh = recognised(MainDeviceKind::Igh, Certainty::Perhaps, &weak);
-        assert_eq!(Refusal::of(Some(&igh)), Some(Refusal::Unrecognised));
+        assert_eq!(AskRefusal::of(Some(&igh)), Some(AskRefusal::Unrecognised));
         let igh = recognised(MainDeviceKind::Igh, Certainty::Likely, &weak);
-        assert_eq!(Refusal::of(Some(&igh)), None);
+        assert_eq!(AskRefusal::of(Some(&igh)), None);
         let source = [Mark::Source(linesman_proto::ethernet::MacAddress([1; 6]))];
         let soem = recognised(MainDeviceKind::Soem, Certainty::Perhaps, &source);
-        assert_eq!(Refusal::of(Some(&soem)), None);
-        assert_eq!(Refusal::of(None), Some(Refusal::Unrecognised));
+        assert_eq!(AskRefusal::of(Some(&soem)), None);
+        assert_eq!(AskRefusal::of(None), Some(AskRefusal::Unrecognised));
     }
 
     #[test]
     fn kinds_that_mind_other_frames_are_refused_with_reason_and_step() {
         for kind in [MainDeviceKind::Ethercrab, MainDeviceKind::Twincat, MainDeviceKind::Linesman] {
             let found = recognised(kind, Certainty::Likely, &[]);
-            let refusal = Refusal::of(Some(&found)).unwrap();
-            assert_eq!(refusal, Refusal::Kind(kind));
+            let refusal = AskRefusal::of(Some(&found)).unwrap();
+            assert_eq!(refusal, AskRefusal::Kind(kind));
             assert!(refusal.may_be_forced() && !refusal.next_step().is_empty());
             assert!(refusal.to_string().contains(kind.name()), "{refusal}");
         }

@@ -104,7 +104,7 @@ impl fmt::Display for Disturbance {
 
 /// Frames of the MainDevice, and how many of them fared badly.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub struct Fared {
+pub struct FrameOutcomes {
     /// Those that came back, or were lost.
     pub frames: u64,
     /// Those that were lost.
@@ -115,14 +115,14 @@ pub struct Fared {
 
 /// A stretch of time near a question.
 #[derive(Clone, Copy, Debug)]
-struct Stretch {
+struct QuestionWindow {
     from: Instant,
     to: Instant,
 }
 
 /// Watches whether a MainDevice fares worse.
 #[derive(Clone, Default, Debug)]
-pub struct Guard {
+pub struct DisturbanceWatch {
     is_asking: bool,
     /// By command, logical address and length: the lowest working counter.
     lowest: BTreeMap<(u8, u32, u16), u16>,
@@ -131,16 +131,16 @@ pub struct Guard {
     cycle: Option<Span>,
     longest: Span,
     /// Frames that no question was near.
-    pub others: Fared,
+    pub others: FrameOutcomes,
     /// Frames that a question was near.
-    pub near: Fared,
-    stretches: VecDeque<Stretch>,
+    pub near: FrameOutcomes,
+    stretches: VecDeque<QuestionWindow>,
     /// When the first loss near a question was noticed.
     doubt: Option<Instant>,
     found: Option<(Disturbance, bool)>,
 }
 
-impl Guard {
+impl DisturbanceWatch {
     /// What was seen so far is usual; questions begin. `cycle` is that of the MainDevice.
     pub fn begin(&mut self, cycle: Option<Span>) {
         (self.is_asking, self.cycle) = (true, cycle);
@@ -153,7 +153,7 @@ impl Guard {
             self.stretches.pop_front();
         }
         let from = sent.before(self.longest);
-        self.stretches.push_back(Stretch { from, to: back + NEAR.max(cycle) });
+        self.stretches.push_back(QuestionWindow { from, to: back + NEAR.max(cycle) });
     }
 
     /// The MainDevice has sent a frame.

@@ -6,7 +6,7 @@ use linesman_proto::command::Addressing;
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
-use crate::line::Beat;
+use crate::model::CycleTiming;
 
 /// Tasks that are followed.
 const TASKS: usize = 16;
@@ -34,7 +34,7 @@ type Task = (u8, u32, u16);
 
 /// What may be done at a time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Gap {
+pub enum SendWindow {
     /// A question may leave now.
     Open,
     /// Not now. It is worth looking again at this time, or with the next frame.
@@ -46,13 +46,13 @@ pub enum Gap {
 /// The ways of a MainDevice, as far as gaps depend on them.
 #[derive(Clone, Default, Debug)]
 pub struct Gaps {
-    tasks: BTreeMap<Task, Beat>,
+    tasks: BTreeMap<Task, CycleTiming>,
     /// When the frames were sent that are under way.
     out: VecDeque<Instant>,
     last_sent: Option<Instant>,
     last_returned: Option<Instant>,
     /// The latest trips, in a circle.
-    trips: VecDeque<Span>,
+    round_trips: VecDeque<Span>,
 }
 
 impl Gaps {
@@ -80,31 +80,31 @@ impl Gaps {
     pub fn returned(&mut self, sent: Instant, at: Instant) {
         self.out.retain(|out| *out > sent);
         self.last_returned = self.last_returned.max(Some(at));
-        if self.trips.len() == TRIPS {
-            self.trips.pop_front();
+        if self.round_trips.len() == TRIPS {
+            self.round_trips.pop_front();
         }
-        self.trips.push_back(at.since(sent));
+        self.round_trips.push_back(at.since(sent));
     }
 
     /// Frames were missed: nothing is known of those under way.
     pub fn forget(&mut self) {
         self.out.clear();
-        self.tasks.values_mut().for_each(Beat::skip);
+        self.tasks.values_mut().for_each(CycleTiming::skip);
     }
 
     /// The shortest cycle of its process data, once it is known.
     #[must_use]
     pub fn cycle(&self) -> Option<Span> {
-        self.tasks.values().filter_map(Beat::cycle).min()
+        self.tasks.values().filter_map(CycleTiming::cycle).min()
     }
 
     /// The time within which nine of ten frames come back; `None` before the first one.
     #[must_use]
     pub fn usual_trip(&self) -> Option<Span> {
-        let mut trips: Vec<Span> = self.trips.iter().copied().collect();
-        trips.sort_unstable();
-        let last = trips.len().checked_sub(1)?;
-        trips.get(last * USUAL_OF_TEN / 10).copied()
+        let mut round_trips: Vec<Span> = self.round_trips.iter().copied().collect();
+        round_trips.sort_unstable();
+        let last = round_trips.len().checked_sub(1)?;
+        round_trips.get(last * USUAL_OF_TEN / 10).copied()
     }
 
     /// Whether it drives the line at `now`: it sends, and something comes back.
@@ -125,13 +125,13 @@ impl Gaps {
 
     /// What may be done at `now`.
     #[must_use]
-    pub fn look(&self, now: Instant) -> Gap {
+    pub fn look(&self, now: Instant) -> SendWindow {
         let Some(trip) = self.usual_trip().filter(|_| self.is_driven(now)) else {
-            return Gap::Closed;
+            return SendWindow::Closed;
         };
         let lost_after = LOST_AFTER.max(trip * LOST_TRIPS);
         if self.out.iter().any(|sent| now.since(*sent) < lost_after) {
-            return Gap::Closed;
+            return SendWindow::Closed;
         }
         let needed = trip + MARGIN;
         for beat in self.tasks.values() {
@@ -142,10 +142,10 @@ impl Gaps {
             }
             let paused_at = due + PAUSE.max(cycle * PAUSE_CYCLES);
             if now < paused_at {
-                return Gap::Until(paused_at);
+                return SendWindow::Until(paused_at);
             }
         }
-        Gap::Open
+        SendWindow::Open
     }
 }
 
@@ -174,15 +174,23 @@ mod tests {
         driven(&mut gaps, 50);
         let last = 49 * 2_000;
         assert_eq!(gaps.cycle(), Some(Span::ms(2)));
-        assert_eq!(gaps.look(at_us(last + 200)), Gap::Open);
-        assert_eq!(gaps.look(at_us(last + 1_800)), Gap::Open);
-        assert_ne!(gaps.look(at_us(last + 1_900)), Gap::Open, "it would meet the next frame");
-        assert_ne!(gaps.look(at_us(last + 2_050)), Gap::Open, "the next frame is late, and due");
+        assert_eq!(gaps.look(at_us(last + 200)), SendWindow::Open);
+        assert_eq!(gaps.look(at_us(last + 1_800)), SendWindow::Open);
+        assert_ne!(
+            gaps.look(at_us(last + 1_900)),
+            SendWindow::Open,
+            "it would meet the next frame"
+        );
+        assert_ne!(
+            gaps.look(at_us(last + 2_050)),
+            SendWindow::Open,
+            "the next frame is late, and due"
+        );
         let frame = Frame::of(&[lrw(0, &[0; 4])]);
         gaps.sent(at_us(last + 2_100), &frame.view());
-        assert_eq!(gaps.look(at_us(last + 2_150)), Gap::Closed, "its frame is under way");
+        assert_eq!(gaps.look(at_us(last + 2_150)), SendWindow::Closed, "its frame is under way");
         gaps.returned(at_us(last + 2_100), at_us(last + 2_200));
-        assert_eq!(gaps.look(at_us(last + 2_250)), Gap::Open);
+        assert_eq!(gaps.look(at_us(last + 2_250)), SendWindow::Open);
     }
 
     #[test]
@@ -191,22 +199,22 @@ mod tests {
         driven(&mut gaps, 50);
         let frame = Frame::of(&[fprd(0x1001, 0x0130, 2)]);
         gaps.sent(at_us(98_500), &frame.view());
-        assert_eq!(gaps.look(at_us(98_600)), Gap::Closed);
+        assert_eq!(gaps.look(at_us(98_600)), SendWindow::Closed);
         // The next one comes back: frames keep their order.
         let frame = Frame::of(&[lrw(0, &[0; 4])]);
         gaps.sent(at_us(100_000), &frame.view());
         gaps.returned(at_us(100_000), at_us(100_100));
-        assert_eq!(gaps.look(at_us(100_200)), Gap::Open);
+        assert_eq!(gaps.look(at_us(100_200)), SendWindow::Open);
     }
 
     #[test]
     fn nothing_is_asked_while_nobody_drives() {
         let mut gaps = Gaps::default();
-        assert_eq!(gaps.look(at_us(5)), Gap::Closed);
+        assert_eq!(gaps.look(at_us(5)), SendWindow::Closed);
         driven(&mut gaps, 50);
         assert!(gaps.is_driven(at_us(98_000 + 50_000)));
         assert!(!gaps.is_driven(at_us(98_000 + 200_000)));
-        assert_eq!(gaps.look(at_us(98_000 + 200_000)), Gap::Closed);
+        assert_eq!(gaps.look(at_us(98_000 + 200_000)), SendWindow::Closed);
     }
 
     #[test]
@@ -216,11 +224,11 @@ mod tests {
             let sent = at_us(poll * 100_000);
             let frame = Frame::of(&[fprd(0x1001, 0x0130, 2)]);
             gaps.sent(sent, &frame.view());
-            assert_ne!(gaps.look(sent + Span::us(50)), Gap::Open, "it is under way");
+            assert_ne!(gaps.look(sent + Span::us(50)), SendWindow::Open, "it is under way");
             gaps.returned(sent, sent + Span::us(100));
         }
         assert_eq!((gaps.cycle(), gaps.has_room()), (None, true));
-        assert_eq!(gaps.look(at_us(2_900_000 + 50_000)), Gap::Open);
+        assert_eq!(gaps.look(at_us(2_900_000 + 50_000)), SendWindow::Open);
         assert!(!gaps.is_driven(at_us(2_900_000 + 3_000_000)));
     }
 
@@ -234,6 +242,6 @@ mod tests {
             gaps.returned(sent, sent + Span::us(150));
         }
         assert!(!gaps.has_room());
-        assert!((150..250).all(|us| gaps.look(at_us(49 * 250 + us)) != Gap::Open));
+        assert!((150..250).all(|us| gaps.look(at_us(49 * 250 + us)) != SendWindow::Open));
     }
 }

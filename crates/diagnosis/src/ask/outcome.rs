@@ -1,6 +1,6 @@
 //! News of the questions: that they begin, and why they end.
 
-use super::carrier::{Carrier, Refusal};
+use super::carrier::{AskRefusal, Carrier};
 use super::disturbance::Disturbance;
 use super::report::AskingState;
 use crate::main_device::MainDeviceKind;
@@ -13,14 +13,14 @@ pub enum News {
     /// The MainDevice was in trouble of its own; it is watched anew before the next question.
     Again(Disturbance),
     /// No question is sent any more, or none was.
-    Over(Over),
+    Ended(EndReason),
 }
 
 /// Why questions have come to an end.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Over {
+pub enum EndReason {
     /// Not beside this MainDevice.
-    Refused(Refusal),
+    Refused(AskRefusal),
     /// A sign that it is disturbed.
     Stopped(Disturbance),
     /// Not all controllers answer to a carrier: so many of so many did.
@@ -34,7 +34,7 @@ pub enum Over {
     },
 }
 
-impl Over {
+impl EndReason {
     pub(super) const fn state(&self) -> AskingState {
         match self {
             Self::Refused(_) => AskingState::Refused,

@@ -1,8 +1,8 @@
-//! What was asked, and how the MainDevice fared beside it, as part of the answer.
+//! Report of the questions and of the lost frames of the MainDevice beside them.
 
 use serde::{Deserialize, Serialize};
 
-use super::disturbance::Fared;
+use super::disturbance::FrameOutcomes;
 use crate::report::Number;
 
 /// Questions beside another MainDevice: `diagnose listen:… --ask`.
@@ -71,9 +71,9 @@ pub struct FaredReport {
     pub late: Number,
 }
 
-impl From<Fared> for FaredReport {
-    fn from(fared: Fared) -> Self {
-        let Fared { frames, lost, late } = fared;
+impl From<FrameOutcomes> for FaredReport {
+    fn from(fared: FrameOutcomes) -> Self {
+        let FrameOutcomes { frames, lost, late } = fared;
         Self { frames: Number(frames), lost: Number(lost), late: Number(late) }
     }
 }

@@ -114,8 +114,8 @@ impl Bench {
 
     fn poll(&mut self) {
         let mut buffer = [0; 256];
-        let line = self.engine.line(Network(0)).unwrap();
-        let len = self.asker.poll_transmit(self.now, line, &mut buffer);
+        let model = self.engine.model(Network(0)).unwrap();
+        let len = self.asker.poll_transmit(self.now, model, &mut buffer);
         let next = self.asker.poll_timeout();
         assert!(
             next.is_none_or(|next| next > self.now),
@@ -244,16 +244,16 @@ fn answers_are_evidence_and_questions_are_no_frames_of_the_main_device() {
     bench.run(seconds(2));
     bench.engine.note_asking(bench.asker.report(bench.now));
     bench.engine.finish(bench.now, true);
-    let line = bench.engine.line(Network(0)).unwrap();
-    assert_eq!(line.traffic.frames, 2 * bench.cycles, "its own frames, out and back");
-    assert_eq!(line.traffic.senders.len(), 1, "no second MainDevice");
-    assert!(line.devices.iter().all(|device| device.dl.first.is_some()));
-    assert!(line.devices.iter().all(|device| device.counters.is_known()));
+    let model = bench.engine.model(Network(0)).unwrap();
+    assert_eq!(model.traffic.frames, 2 * bench.cycles, "its own frames, out and back");
+    assert_eq!(model.traffic.senders.len(), 1, "no second MainDevice");
+    assert!(model.devices.iter().all(|device| device.dl.first.is_some()));
+    assert!(model.devices.iter().all(|device| device.counters.is_known()));
     let diagnosis = bench.engine.diagnosis();
     let main = diagnosis.main_device.unwrap();
     assert!(main.never_reads.is_empty(), "the line was read: {main:?}");
     assert_eq!(diagnosis.asking.unwrap().state, AskingState::Asking);
-    let rise = line.devices[1].counters.last_rise();
+    let rise = model.devices[1].counters.last_rise();
     assert!(rise.is_some(), "the counters of the second have risen");
 }
 
@@ -262,19 +262,19 @@ fn main_device_elsewhere_or_of_a_kind_that_minds_is_refused() {
     let mut bench = Bench::new(SOEM);
     bench.direction = [Direction::Unknown; 2];
     bench.run(20);
-    assert_eq!(bench.news, [News::Over(Over::Refused(Refusal::Elsewhere))]);
+    assert_eq!(bench.news, [News::Ended(EndReason::Refused(AskRefusal::Elsewhere))]);
     // The computer that plays the line.
     let mut bench = Bench::new(SOEM);
     bench.direction = [Direction::Received, Direction::Sent];
     bench.run(20);
-    assert_eq!(bench.news, [News::Over(Over::Refused(Refusal::Elsewhere))]);
+    assert_eq!(bench.news, [News::Ended(EndReason::Refused(AskRefusal::Elsewhere))]);
     let mut bench = Bench::new(MacAddress([0, 1, 2, 3, 4, 5]));
     bench.run(seconds(3));
-    assert_eq!(bench.news, [News::Over(Over::Refused(Refusal::Unrecognised))]);
+    assert_eq!(bench.news, [News::Ended(EndReason::Refused(AskRefusal::Unrecognised))]);
     let mut bench = Bench::new(ETHERCRAB);
     bench.run(seconds(3));
-    let kind = Refusal::Kind(crate::main_device::MainDeviceKind::Ethercrab);
-    assert_eq!(bench.news, [News::Over(Over::Refused(kind))]);
+    let kind = AskRefusal::Kind(crate::main_device::MainDeviceKind::Ethercrab);
+    assert_eq!(bench.news, [News::Ended(EndReason::Refused(kind))]);
     assert!(bench.questions.is_empty());
     let setup = AskSetup { per_s: 20, is_forced: true, keeps_on: false };
     let mut bench = Bench::with(ETHERCRAB, setup);
@@ -297,7 +297,7 @@ fn main_device_of_a_ring_is_refused() {
         bench.now += CYCLE;
         bench.poll();
     }
-    assert_eq!(bench.news, [News::Over(Over::Refused(Refusal::Ring))]);
+    assert_eq!(bench.news, [News::Ended(EndReason::Refused(AskRefusal::Ring))]);
 }
 
 #[test]
@@ -311,13 +311,14 @@ fn subdevice_that_does_not_take_udp_ends_it_or_has_plain_frames_sent() {
     let index = FrameView::parse(last).unwrap().datagrams().next().unwrap().unwrap().index();
     assert!(index >= 0x80, "{index}");
     bench.engine.finish(bench.now, true);
-    let line = bench.engine.line(Network(0)).unwrap();
-    assert!(line.devices.iter().all(|device| device.silent.is_none()), "nobody is taken for away");
+    let model = bench.engine.model(Network(0)).unwrap();
+    assert!(model.devices.iter().all(|device| device.silent.is_none()), "nobody is taken for away");
 
     let mut bench = Bench::new(MacAddress([0xCA, 0xDE, 0xCA, 0xDE, 0xDE, 0xFF]));
     bench.devices[2].takes_udp = false;
     bench.run(seconds(4));
-    let [News::Over(over @ Over::NoCarrier { answered: 2, present: 3, .. })] = &bench.news[..]
+    let [News::Ended(over @ EndReason::NoCarrier { answered: 2, present: 3, .. })] =
+        &bench.news[..]
     else {
         panic!("{:?}", bench.news)
     };

@@ -16,10 +16,10 @@ use linesman_config::fault::FaultName;
 use linesman_proto::time::Instant;
 use serde::{Deserialize, Serialize};
 
-use crate::ask::{AskingReport, Refusal};
+use crate::ask::{AskRefusal, AskingReport};
 use crate::finding::Place;
-use crate::line::Line;
 use crate::main_device::{MainDeviceKind, next_step};
+use crate::model::NetworkModel;
 
 /// The step that has what a MainDevice does not read be read by questions.
 const ASK: &str =
@@ -335,8 +335,8 @@ pub struct Coverage {
 impl Coverage {
     /// Assesses one network.
     #[must_use]
-    pub fn of(line: &Line, input: InputKind) -> Self {
-        let basis = Basis::of(line, input);
+    pub fn of(model: &NetworkModel, input: InputKind) -> Self {
+        let basis = Basis::of(model, input);
         let assess = |subject| match subject {
             Subject::Frames => traffic::frames(&basis),
             Subject::Presence => presence::assess(&basis),
@@ -404,7 +404,7 @@ impl Coverage {
 
 /// Facts that several subjects are judged by.
 struct Basis<'a> {
-    line: &'a Line,
+    model: &'a NetworkModel,
     input: InputKind,
     /// Whether frames were seen: else registers were read out, or typed in.
     has_frames: bool,
@@ -418,12 +418,12 @@ struct Basis<'a> {
 }
 
 impl<'a> Basis<'a> {
-    fn of(line: &'a Line, input: InputKind) -> Self {
-        let has_frames = line.traffic.frames > 0;
-        let states_read = state::all_read(line);
-        let expectations_known = process_data::all_known(line);
-        let counters_tell = signal::all_tell(line);
-        Self { line, input, has_frames, states_read, expectations_known, counters_tell }
+    fn of(model: &'a NetworkModel, input: InputKind) -> Self {
+        let has_frames = model.traffic.frames > 0;
+        let states_read = state::all_read(model);
+        let expectations_known = process_data::all_known(model);
+        let counters_tell = signal::all_tell(model);
+        Self { model, input, has_frames, states_read, expectations_known, counters_tell }
     }
 
     /// The next step that gets a longer look at the line.
@@ -441,13 +441,13 @@ impl<'a> Basis<'a> {
 
     /// The next step that gets error counters read.
     fn read_counters(&self) -> String {
-        let kind = self.line.main_device_kind();
+        let kind = self.model.main_device_kind();
         match self.input {
             InputKind::Driven | InputKind::ReadOut => {
                 "clear and watch them: `linesman counters WHERE --clear --for 60`".to_owned()
             }
             InputKind::Listened
-                if Refusal::of(self.line.habits.recognised().as_ref()).is_none() =>
+                if AskRefusal::of(self.model.habits.recognised().as_ref()).is_none() =>
             {
                 format!("{ASK}; or {}", next_step::error_counters(kind))
             }
@@ -477,7 +477,7 @@ mod tests {
     #[test]
     fn nothing_seen_is_not_enough() {
         assert!(!Coverage::default().suffices());
-        let coverage = Coverage::of(&Line::default(), InputKind::Recorded);
+        let coverage = Coverage::of(&NetworkModel::default(), InputKind::Recorded);
         assert!(!coverage.suffices());
         let first = coverage.essential_gaps().next().unwrap();
         assert!(!first.next_step.is_empty(), "{first:?}");

@@ -2,25 +2,25 @@
 
 use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 use crate::finding::Place;
-use crate::line::{Device, Line};
+use crate::model::{Device, NetworkModel};
 
 /// So many station addresses are named at most.
 const STATIONS_NAMED: usize = 8;
 
 /// Assesses who is there.
 pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
-    let line = basis.line;
-    let traffic = &line.traffic;
+    let model = basis.model;
+    let traffic = &model.traffic;
     let mut all = Assessment::judged(Subject::Presence);
     let is_counted = traffic.broadcast_answers > 0 || traffic.positions_seen > 0;
-    if line.device_count() == 0 {
+    if model.device_count() == 0 {
         let text = "no SubDevice was seen to answer";
         let gap = Gap::new(Reason::NumberUnknown, text).essential().step(basis.look_longer());
         all.lacks(Extent::NotJudged, gap);
-    } else if !is_counted && !line.tree_is_planned {
+    } else if !is_counted && !model.tree_is_planned {
         let text = format!(
             "{} SubDevices answered; how many there should be was not seen",
-            line.device_count()
+            model.device_count()
         );
         // Who asks each of them for its state asks all that it knows.
         let gap = Gap::new(Reason::NumberUnknown, text)
@@ -28,7 +28,7 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
             .step("name the project, `--project machine.toml` or an ENI, or record from the start of the MainDevice");
         all.lacks(Extent::InPart, gap);
     }
-    let planned = line.devices.iter().filter(|one| one.planned.is_some()).count();
+    let planned = model.devices.iter().filter(|one| one.planned.is_some()).count();
     if planned > 0 && usize::from(traffic.broadcast_answers) > planned {
         let text = format!(
             "{} SubDevices answered a broadcast, {planned} are planned",
@@ -39,10 +39,10 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
             .step("compare the line with what was planned: `linesman scan WHERE --against FILE`");
         all.lacks(Extent::InPart, gap);
     }
-    let silent: Vec<&Device> = line.devices.iter().filter(|one| is_missed(line, one)).collect();
+    let silent: Vec<&Device> = model.devices.iter().filter(|one| is_missed(model, one)).collect();
     if !silent.is_empty() {
-        let places = silent.iter().map(|one| Place::device(line.network, one.id)).collect();
-        let labels: Vec<String> = silent.iter().map(|one| line.label(one.id)).collect();
+        let places = silent.iter().map(|one| Place::device(model.network, one.id)).collect();
+        let labels: Vec<String> = silent.iter().map(|one| model.label(one.id)).collect();
         let text = format!("no answer from {}", labels.join(", "));
         let gap = Gap::new(Reason::NoAnswer, text)
             .essential()
@@ -50,10 +50,10 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
             .step("look at these SubDevices: supply, lamps, the cable before the first of them");
         all.lacks(Extent::InPart, gap);
     }
-    if !line.asked_in_vain.is_empty() {
+    if !model.asked_in_vain.is_empty() {
         let stations: Vec<String> =
-            line.asked_in_vain.iter().take(STATIONS_NAMED).map(ToString::to_string).collect();
-        let rest = line.asked_in_vain.len() - stations.len();
+            model.asked_in_vain.iter().take(STATIONS_NAMED).map(ToString::to_string).collect();
+        let rest = model.asked_in_vain.len() - stations.len();
         let more = if rest > 0 { format!(", and {rest} more") } else { String::new() };
         let text = format!("nobody answered at station address {}{more}", stations.join(", "));
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
@@ -76,7 +76,7 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
-    if let Some(rose) = traffic.broadcast_rose.filter(|_| !line.sees_all_orders) {
+    if let Some(rose) = traffic.broadcast_rose.filter(|_| !model.sees_all_orders) {
         let text = format!(
             "{} SubDevices answered a broadcast at first, and {} from {} on, while process data were exchanged: where the \
              others had been was not seen",
@@ -89,9 +89,9 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
 }
 
 /// Whether a SubDevice was asked in vain, or is planned and nothing was seen of it.
-fn is_missed(line: &Line, device: &Device) -> bool {
+fn is_missed(model: &NetworkModel, device: &Device) -> bool {
     let is_unseen = device.answered.is_none()
         && device.planned.is_some()
-        && line.device_count() < line.devices.len();
+        && model.device_count() < model.devices.len();
     device.silent.is_some() || is_unseen
 }

@@ -1,7 +1,7 @@
 //! Working counters as evidence: whether it is known which one belongs to each cyclic datagram.
 
 use super::{Assessment, Basis, Extent, Gap, Reason, Subject};
-use crate::line::{Cyclic, Line};
+use crate::model::{Cyclic, NetworkModel};
 
 /// A datagram that came back less often is not yet cyclic.
 const FEW: u64 = 10;
@@ -9,29 +9,29 @@ const FEW: u64 = 10;
 const NAMED: usize = 3;
 
 /// Whether process data are exchanged, and the working counter that belongs to each datagram is known.
-pub(super) fn all_known(line: &Line) -> bool {
-    !line.cyclic.is_empty() && line.cyclic.iter().all(|cyclic| is_known(line, cyclic))
+pub(super) fn all_known(model: &NetworkModel) -> bool {
+    !model.cyclic.is_empty() && model.cyclic.iter().all(|cyclic| is_known(model, cyclic))
 }
 
 /// Whether it was seen how a datagram came to its working counter: FMMUs that were set up for it, or a working
 /// counter that rose while SubDevices came to SAFEOP and OP.
-fn is_known(line: &Line, cyclic: &Cyclic) -> bool {
-    let has_risen = cyclic.highest.value > cyclic.first.value && !rose_unseen(line, cyclic);
+fn is_known(model: &NetworkModel, cyclic: &Cyclic) -> bool {
+    let has_risen = cyclic.highest.value > cyclic.first.value && !rose_unseen(model, cyclic);
     let is_planned = cyclic.planned.is_some_and(|planned| cyclic.highest.value >= planned);
-    cyclic.highest.value > 0 && (is_planned || has_risen || line.owners(cyclic).next().is_some())
+    cyclic.highest.value > 0 && (is_planned || has_risen || model.owners(cyclic).next().is_some())
 }
 
 /// Tells whether a working counter rose from the first one on while nobody read a state: the line may have come up then, or
 /// was broken before.
-fn rose_unseen(line: &Line, cyclic: &Cyclic) -> bool {
-    cyclic.low_before().is_some() && line.devices.iter().all(|device| device.al.status.is_none())
+fn rose_unseen(model: &NetworkModel, cyclic: &Cyclic) -> bool {
+    cyclic.low_before().is_some() && model.devices.iter().all(|device| device.al.status.is_none())
 }
 
 /// Assesses what is known of the working counters.
 pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
-    let line = basis.line;
+    let model = basis.model;
     let mut all = Assessment::judged(Subject::ProcessData);
-    let cyclic = || line.cyclic.iter().filter(|cyclic| cyclic.count >= FEW);
+    let cyclic = || model.cyclic.iter().filter(|cyclic| cyclic.count >= FEW);
     if cyclic().next().is_none() {
         let text = "no process data were exchanged";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoProcessData, text));
@@ -53,10 +53,10 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         let gap = Gap::new(Reason::NoBringUp, text).essential().step(step());
         all.lacks(Extent::InPart, gap);
     }
-    let is_unknown = |one: &&Cyclic| one.highest.value > 0 && !is_known(line, one);
+    let is_unknown = |one: &&Cyclic| one.highest.value > 0 && !is_known(model, one);
     let unknown: Vec<&Cyclic> = cyclic().filter(is_unknown).collect();
     if !unknown.is_empty() {
-        let how = match unknown.iter().any(|one| rose_unseen(line, one)) {
+        let how = match unknown.iter().any(|one| rose_unseen(model, one)) {
             true => {
                 "it has risen, and nobody has read a state: the line came up then, or was broken before"
             }

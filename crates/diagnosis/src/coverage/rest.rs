@@ -3,7 +3,7 @@
 use super::signal::host_step;
 use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 use crate::finding::Place;
-use crate::line::Device;
+use crate::model::Device;
 
 /// The next step that gets a plan to hold the line against.
 const NAME_PROJECT: &str = "name what was planned: `--project machine.toml`, or an ENI";
@@ -11,17 +11,17 @@ const NAME_PROJECT: &str = "name what was planned: `--project machine.toml`, or 
 /// Identities against the project.
 pub(super) fn identity(basis: &Basis<'_>) -> Assessment {
     let mut all = Assessment::judged(Subject::Identity);
-    let line = basis.line;
+    let model = basis.model;
     let is_planned = |one: &&Device| one.planned.is_some_and(|planned| planned.identity.is_some());
-    if line.devices.iter().find(is_planned).is_none() {
+    if model.devices.iter().find(is_planned).is_none() {
         let text = "nothing says which SubDevices were planned";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoProject, text).step(NAME_PROJECT));
         return all;
     }
-    let planned = line.devices.iter().filter(is_planned);
+    let planned = model.devices.iter().filter(is_planned);
     let unread: Vec<Place> = planned
         .filter(|one| one.identity.identity().is_none())
-        .map(|one| Place::device(line.network, one.id))
+        .map(|one| Place::device(model.network, one.id))
         .collect();
     if !unread.is_empty() {
         let text = format!("the identities of {} SubDevices were not read", unread.len());
@@ -40,11 +40,11 @@ pub(super) fn identity(basis: &Basis<'_>) -> Assessment {
 /// Wiring against the project.
 pub(super) fn wiring(basis: &Basis<'_>) -> Assessment {
     let mut all = Assessment::judged(Subject::Wiring);
-    let line = basis.line;
-    if !line.tree_is_planned {
+    let model = basis.model;
+    if !model.tree_is_planned {
         let text = "nothing says which wiring was planned";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoProject, text).step(NAME_PROJECT));
-    } else if line.devices.iter().any(|one| one.dl.first.is_none()) {
+    } else if model.devices.iter().any(|one| one.dl.first.is_none()) {
         let text = "the open ports of some SubDevices were not read";
         all.lacks(Extent::InPart, Gap::new(Reason::LinkStatusNotRead, text));
     }
@@ -54,7 +54,7 @@ pub(super) fn wiring(basis: &Basis<'_>) -> Assessment {
 /// Mailboxes.
 pub(super) fn mailboxes(basis: &Basis<'_>) -> Assessment {
     let mut all = Assessment::judged(Subject::Mailboxes);
-    if basis.line.devices.iter().all(|one| one.mailbox.polled.is_none()) {
+    if basis.model.devices.iter().all(|one| one.mailbox.polled.is_none()) {
         let text = "nobody read a mailbox";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoMailboxRequests, text));
     }
@@ -64,16 +64,16 @@ pub(super) fn mailboxes(basis: &Basis<'_>) -> Assessment {
 /// Distributed clocks.
 pub(super) fn clocks(basis: &Basis<'_>) -> Assessment {
     let mut all = Assessment::judged(Subject::Clocks);
-    let line = basis.line;
+    let model = basis.model;
     let is_in_step = |one: &&Device| one.sync_on.is_some_and(|on| on.value);
-    let unread: Vec<Place> = line
+    let unread: Vec<Place> = model
         .devices
         .iter()
         .filter(is_in_step)
         .filter(|one| !one.clock.is_known())
-        .map(|one| Place::device(line.network, one.id))
+        .map(|one| Place::device(model.network, one.id))
         .collect();
-    let was_bring_up_seen = line.devices.iter().any(|one| one.al.requested.is_some());
+    let was_bring_up_seen = model.devices.iter().any(|one| one.al.requested.is_some());
     if !unread.is_empty() {
         let text = format!(
             "the clocks of {} SubDevices were never compared with the reference clock",
@@ -83,7 +83,7 @@ pub(super) fn clocks(basis: &Basis<'_>) -> Assessment {
             .at(unread)
             .step("read the difference to the system time, 0x092C, of each SubDevice");
         all.lacks(Extent::InPart, gap);
-    } else if !was_bring_up_seen && !line.devices.iter().any(|one| one.clock.is_known()) {
+    } else if !was_bring_up_seen && !model.devices.iter().any(|one| one.clock.is_known()) {
         let text = "whether SubDevices keep step with a clock was not seen";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoBringUp, text));
     }
@@ -93,7 +93,7 @@ pub(super) fn clocks(basis: &Basis<'_>) -> Assessment {
 /// The computer of the MainDevice.
 pub(super) fn host(basis: &Basis<'_>) -> Assessment {
     let mut all = Assessment::judged(Subject::Host);
-    if !basis.line.host.is_watched {
+    if !basis.model.host.is_watched {
         let text = "the counters of the MainDevice's card are not known";
         let gap = Gap::new(Reason::HostCountersMissing, text).step(host_step(basis));
         all.lacks(Extent::NotJudged, gap);

@@ -9,9 +9,9 @@ use linesman_proto::topology::{End, Hop};
 
 use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
 use crate::finding::{LinkDirection, Place};
-use crate::line::{CounterTrack, Device, Line};
-use crate::locate::Survey;
+use crate::locate::LocateInput;
 use crate::main_device::{MainDeviceKind, next_step};
+use crate::model::{CounterTrack, Device, NetworkModel};
 
 /// So many frames that came back, with none lost, show that a link whose counter is full spoils no frames.
 const MANY_FRAMES: u64 = 2_000;
@@ -21,7 +21,7 @@ const FROM_THE_FIRST: Span = Span::ms(100);
 
 /// How well one port of a controller told of errors.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Told {
+enum PortEvidence {
     /// Every error would have been seen.
     All,
     /// Errors of which nobody knows when they were.
@@ -33,33 +33,34 @@ enum Told {
 }
 
 /// Whether every port that checks frames told of errors.
-pub(super) fn all_tell(line: &Line) -> bool {
-    let Some(survey) = Survey::of(line, true) else { return false };
-    let mut ends = survey.routes().iter().flat_map(|route| route.hops()).map(|hop| hop.to);
+pub(super) fn all_tell(model: &NetworkModel) -> bool {
+    let Some(input) = LocateInput::of(model, true) else { return false };
+    let mut ends = input.routes().iter().flat_map(|route| route.hops()).map(|hop| hop.to);
     ends.all(|end| match end {
-        End::Controller(node, port) => {
-            line.devices.get(node).is_some_and(|device| port_tells(device, port) == Told::All)
-        }
+        End::Controller(node, port) => model
+            .devices
+            .get(node)
+            .is_some_and(|device| port_tells(device, port) == PortEvidence::All),
         End::MainDevice(_) => true,
     })
 }
 
 /// Error counters, link by link and direction by direction.
 pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
-    let line = basis.line;
-    let traffic = &line.traffic;
+    let model = basis.model;
+    let traffic = &model.traffic;
     let mut all = Assessment::judged(Subject::SignalQuality);
     // Frames that are spoiled are lost; enough that came back make up for counters that nobody read.
     let frames_tell = traffic.lost.sum == 0 && traffic.damaged.sum == 0;
     let is_shown_by_frames = basis.has_frames && frames_tell;
-    let Some(survey) = Survey::of(line, true) else {
-        let is_unread = line.devices.iter().all(|device| !device.counters.is_known());
+    let Some(input) = LocateInput::of(model, true) else {
+        let is_unread = model.devices.iter().all(|device| !device.counters.is_known());
         let (reason, text) = if is_unread {
             (Reason::CountersNotRead, "nobody read the error counters")
         } else {
             (Reason::WiringUnknown, "the wiring is not known, so no link can be told from another")
         };
-        let has_risen = line.devices.iter().any(has_risen);
+        let has_risen = model.devices.iter().any(has_risen);
         let text =
             if has_risen { format!("{text}, and some counted errors") } else { text.to_owned() };
         let gap = Gap::new(reason, text)
@@ -68,32 +69,33 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
         all.lacks(Extent::NotJudged, gap);
         return all;
     };
-    let mut told: Vec<(Told, Place)> = Vec::new();
+    let mut told: Vec<(PortEvidence, Place)> = Vec::new();
     let mut last_hops = Vec::new();
-    for hop in survey.routes().iter().flat_map(|route| route.hops()) {
+    for hop in input.routes().iter().flat_map(|route| route.hops()) {
         match hop.to {
             End::Controller(node, port) => {
-                let device = line.devices.get(node);
+                let device = model.devices.get(node);
                 told.push((
-                    device.map_or(Told::Unread, |one| port_tells(one, port)),
-                    place(&survey, hop),
+                    device.map_or(PortEvidence::Unread, |one| port_tells(one, port)),
+                    place(&input, hop),
                 ));
             }
-            End::MainDevice(_) => last_hops.push(place(&survey, hop)),
+            End::MainDevice(_) => last_hops.push(place(&input, hop)),
         }
     }
-    let at = |wanted: Told| -> Vec<Place> {
+    let at = |wanted: PortEvidence| -> Vec<Place> {
         let found = told.iter().filter(|(one, _)| *one == wanted);
         found.map(|(_, place)| *place).collect()
     };
-    let (full, once, unread) = (at(Told::Full), at(Told::Once), at(Told::Unread));
+    let (full, once, unread) =
+        (at(PortEvidence::Full), at(PortEvidence::Once), at(PortEvidence::Unread));
     if unread.len() == told.len() {
         let gap = Gap::new(Reason::CountersNotRead, "nobody read the error counters")
             .essential_if(!is_shown_by_frames)
             .step(basis.read_counters());
         all.lacks(Extent::NotJudged, gap);
     } else if !unread.is_empty() {
-        let text = format!("the error counters of {} were not read", ways(unread.len()));
+        let text = format!("the error counters of {} were not read", path_delays(unread.len()));
         let gap = Gap::new(Reason::CountersNotRead, text)
             .essential_if(!is_shown_by_frames)
             .at(unread)
@@ -103,7 +105,7 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
     if !full.is_empty() {
         let text = format!(
             "the error counter of {} stands at its end, 255, and counts no more",
-            ways(full.len())
+            path_delays(full.len())
         );
         let gap = Gap::new(Reason::CounterFull, text)
             .essential_if(!frames_tell || traffic.returned < MANY_FRAMES)
@@ -114,7 +116,7 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
     if !once.is_empty() {
         let text = format!(
             "the error counters of {} were read once: what they hold may be old",
-            ways(once.len())
+            path_delays(once.len())
         );
         let gap = Gap::new(Reason::CountersReadOnce, text)
             .essential_if(!is_shown_by_frames)
@@ -122,7 +124,7 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
             .step(basis.read_counters());
         all.lacks(Extent::InPart, gap);
     }
-    if !line.host.is_watched && !last_hops.is_empty() {
+    if !model.host.is_watched && !last_hops.is_empty() {
         let text = "errors on the last way, from the first SubDevice to the card, are counted by the card alone; its \
                     counters are not known";
         let gap = Gap::new(Reason::HostCountersMissing, text).at(last_hops).step(host_step(basis));
@@ -133,15 +135,15 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
 
 /// DL status and lost-link counters, link by link.
 pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
-    let line = basis.line;
+    let model = basis.model;
     let mut all = Assessment::judged(Subject::LinkStatus);
     came_up(basis, &mut all);
     unread_change(basis, &mut all);
-    let unread: Vec<&Device> = line.devices.iter().filter(|one| !tells_links(one)).collect();
-    if unread.is_empty() && !line.devices.is_empty() {
+    let unread: Vec<&Device> = model.devices.iter().filter(|one| !tells_links(one)).collect();
+    if unread.is_empty() && !model.devices.is_empty() {
         return all;
     }
-    let is_none_read = unread.len() == line.devices.len();
+    let is_none_read = unread.len() == model.devices.len();
     let (extent, text) = if is_none_read {
         (
             Extent::NotJudged,
@@ -151,9 +153,9 @@ pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
         let text = format!("the link status of {} SubDevices was not read", unread.len());
         (Extent::InPart, text)
     };
-    let places = unread.iter().map(|one| Place::device(line.network, one.id));
+    let places = unread.iter().map(|one| Place::device(model.network, one.id));
     let places = if is_none_read { Vec::new() } else { places.collect() };
-    let kind = line.main_device_kind();
+    let kind = model.main_device_kind();
     let step = match basis.input {
         InputKind::Typed if kind == MainDeviceKind::Unknown => {
             "give `ports.A = { link = …, lost_link = … }` of each SubDevice"
@@ -169,8 +171,8 @@ pub(super) fn link_status(basis: &Basis<'_>) -> Assessment {
 
 /// Links that were away when the look at them began, and are there now.
 fn came_up(basis: &Basis<'_>, all: &mut Assessment) {
-    let line = basis.line;
-    for device in &line.devices {
+    let model = basis.model;
+    for device in &model.devices {
         let (Some(first), Some(last)) = (device.dl.first, device.dl.last) else { continue };
         for port in Port::ALL {
             if first.value.port_state(port).link || !last.value.port_state(port).link {
@@ -178,11 +180,11 @@ fn came_up(basis: &Basis<'_>, all: &mut Assessment) {
             }
             let text = format!(
                 "port {port} of {} had no link at first and has one now: why was not seen",
-                line.label(device.id)
+                model.label(device.id)
             );
             let gap = Gap::new(Reason::LinkCameUp, text)
                 .essential()
-                .at(vec![Place::device(line.network, device.id)])
+                .at(vec![Place::device(model.network, device.id)])
                 .step(basis.look_longer());
             all.lacks(Extent::InPart, gap);
         }
@@ -191,8 +193,8 @@ fn came_up(basis: &Basis<'_>, all: &mut Assessment) {
 
 /// A change of DL status that frames tell of and that nobody has read.
 fn unread_change(basis: &Basis<'_>, all: &mut Assessment) {
-    let Some(since) = basis.line.events.dl_status.since else { return };
-    let when = match basis.line.traffic.first {
+    let Some(since) = basis.model.events.dl_status.since else { return };
+    let when = match basis.model.traffic.first {
         Some(first) if since.at.since(first) < FROM_THE_FIRST => {
             "before the first frame that was seen".to_owned()
         }
@@ -207,7 +209,7 @@ fn unread_change(basis: &Basis<'_>, all: &mut Assessment) {
             "read DL status (0x0110) of all SubDevices"
         }
         InputKind::Listened | InputKind::Recorded => {
-            next_step::link_status(basis.line.main_device_kind())
+            next_step::link_status(basis.model.main_device_kind())
         }
     };
     all.lacks(Extent::InPart, Gap::new(Reason::LinkStatusNotRead, text).essential().step(step));
@@ -226,15 +228,15 @@ pub(super) fn host_step(basis: &Basis<'_>) -> &'static str {
     }
 }
 
-fn port_tells(device: &Device, port: Port) -> Told {
+fn port_tells(device: &Device, port: Port) -> PortEvidence {
     let frames = device.counters.track(ErrorCounter::InvalidFrame(port));
     let symbols = device.counters.track(ErrorCounter::PhysicalLayer(port));
-    let Some(frames) = frames else { return Told::Unread };
+    let Some(frames) = frames else { return PortEvidence::Unread };
     let tracks = || [Some(frames), symbols].into_iter().flatten();
     if tracks().any(|track| track.is_at_end()) {
-        return Told::Full;
+        return PortEvidence::Full;
     }
-    if tracks().any(is_read_once) { Told::Once } else { Told::All }
+    if tracks().any(is_read_once) { PortEvidence::Once } else { PortEvidence::All }
 }
 
 /// Whether one of its counters of frames or symbols was seen to rise.
@@ -263,18 +265,18 @@ fn tells_links(device: &Device) -> bool {
     device.dl.latest_reading.is_some() || Port::ALL.into_iter().any(is_watched)
 }
 
-fn place(survey: &Survey<'_>, hop: &Hop) -> Place {
-    let line: &Line = survey.line();
+fn place(input: &LocateInput<'_>, hop: &Hop) -> Place {
+    let model: &NetworkModel = input.model();
     let direction = match hop.direction {
         Direction::Downstream => LinkDirection::AToB,
         Direction::Upstream => LinkDirection::BToA,
     };
-    let link = survey.tree().links()[hop.link].map(|node| DeviceId(node as u32));
-    Place::link(line.network, link, Some(direction))
+    let link = input.tree().links()[hop.link].map(|node| DeviceId(node as u32));
+    Place::link(model.network, link, Some(direction))
 }
 
 /// `1 direction of a link`, `3 directions of links`.
-fn ways(count: usize) -> String {
+fn path_delays(count: usize) -> String {
     match count {
         1 => "1 direction of a link".to_owned(),
         count => format!("{count} directions of links"),

@@ -19,10 +19,10 @@ const LONG_GAP: Span = Span::s(1);
 
 /// Lost frames.
 pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
-    let traffic = &basis.line.traffic;
+    let traffic = &basis.model.traffic;
     let mut all = Assessment::judged(Subject::Frames);
-    if !basis.has_frames && basis.line.reported.lost.is_none() {
-        let shows_elsewhere = !basis.line.cyclic.is_empty() || basis.counters_tell;
+    if !basis.has_frames && basis.model.reported.lost.is_none() {
+        let shows_elsewhere = !basis.model.cyclic.is_empty() || basis.counters_tell;
         let text = "the number of frames that the MainDevice lost was not given";
         let gap = Gap::new(Reason::NotGiven, text).essential_if(!shows_elsewhere).step(
             "give what the MainDevice counted, `[maindevice]` with `lost = …`, or its working counters",
@@ -114,14 +114,14 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
 
 /// Times.
 pub(super) fn timing(basis: &Basis<'_>) -> Assessment {
-    let traffic = &basis.line.traffic;
+    let traffic = &basis.model.traffic;
     let mut all = Assessment::judged(Subject::Timing);
     if !basis.has_frames {
         let text = "no frame was seen, so nothing is known of their times";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoFrames, text));
         return all;
     }
-    let has_cycle = basis.line.cyclic.iter().any(|cyclic| cyclic.sent.cycle().is_some());
+    let has_cycle = basis.model.cyclic.iter().any(|cyclic| cyclic.sent.cycle().is_some());
     if !has_cycle {
         let text = "no process data were seen in a cycle";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoProcessData, text));

@@ -1,5 +1,5 @@
-//! Where frames vanish though every port shows a link: ports are closed one after the other, for a moment,
-//! until frames come back.
+//! Search for the place where frames vanish though every port shows a link: ports are closed one after the other, for a
+//! moment, until frames come back.
 //!
 //! What is written still reaches all that lie before the hole. So a port is told to close (DL control,
 //! 0x0101), for temporary use (0x0100 bit 1): after about a second the controller itself goes back to what
@@ -20,8 +20,8 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use super::{Asked, Probe, ProbeEffect};
-use crate::line::search::behind;
-use crate::line::{Device, HoleSearch, Line, Seen};
+use crate::model::search::behind;
+use crate::model::{Device, HoleSearch, NetworkModel, Seen};
 
 /// So long nothing must have come back before ports are closed.
 const SILENT: Span = Span::ms(100);
@@ -47,40 +47,40 @@ pub(super) struct Bisect {
     left: Vec<usize>,
     /// The same as it was before the latest port helped: whether it did is only sure when frames vanish again.
     before: Vec<usize>,
-    step: Step,
+    step: SearchStep,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Step {
+enum SearchStep {
     /// Nothing is closed; since when.
     Open(Instant),
     /// Nothing is closed, and it is watched whether frames vanish again.
-    Watched(Mark),
+    NetworkWatch(FrameCounts),
     /// The port before this link is closed; since when.
     Closed(usize, Instant),
     /// The port before this link is closed, and something came back.
-    Helps(usize, Mark),
+    Helps(usize, FrameCounts),
 }
 
 /// What had been sent and had come back at a time.
 #[derive(Clone, Copy, Debug)]
-struct Mark {
+struct FrameCounts {
     at: Instant,
     sent: u64,
     processed: u64,
 }
 
-impl Mark {
-    const fn of(line: &Line, at: Instant) -> Self {
-        Self { at, sent: line.traffic.sent, processed: line.traffic.processed }
+impl FrameCounts {
+    const fn of(model: &NetworkModel, at: Instant) -> Self {
+        Self { at, sent: model.traffic.sent, processed: model.traffic.processed }
     }
 
     /// How many requests were sent since, and how many frames came back, processed; `None` while these are too
     /// few to tell.
-    fn since(&self, line: &Line, now: Instant) -> Option<(u64, u64)> {
-        let sent = line.traffic.sent - self.sent;
+    fn since(&self, model: &NetworkModel, now: Instant) -> Option<(u64, u64)> {
+        let sent = model.traffic.sent - self.sent;
         let is_enough = sent >= SEVERAL && now >= self.at + ROUND;
-        is_enough.then(|| (sent, line.traffic.processed - self.processed))
+        is_enough.then(|| (sent, model.traffic.processed - self.processed))
     }
 }
 
@@ -90,90 +90,90 @@ pub(super) const CONTROL: (RegisterAddress, u16) = (table::DL_CONTROL.address, 4
 
 impl Bisect {
     /// Begins a search, if the line has gone silent though the card has a link, and enough is known of it.
-    pub(super) fn begin(line: &mut Line, now: Instant) -> Option<Self> {
-        let traffic = &line.traffic;
+    pub(super) fn begin(model: &mut NetworkModel, now: Instant) -> Option<Self> {
+        let traffic = &model.traffic;
         let latest = [traffic.silences.back(), traffic.swallowed.back()];
         let silence = latest.into_iter().flatten().find(|silence| silence.ended.is_none())?;
         let since = silence.since;
-        let card = line.host.card(linesman_proto::address::Path::A);
+        let card = model.host.card(linesman_proto::address::Path::A);
         let has_link = card.carrier.is_some_and(|carrier| carrier.value);
-        let tree = line.tree.as_ref()?;
+        let tree = model.tree.as_ref()?;
         let was_searched =
-            line.hole.and_then(|hole| hole.ended).is_some_and(|ended| since.at < ended + AGAIN);
-        if now < since.at + SILENT || !has_link || was_searched || line.traffic.answered == 0 {
+            model.hole.and_then(|hole| hole.ended).is_some_and(|ended| since.at < ended + AGAIN);
+        if now < since.at + SILENT || !has_link || was_searched || model.traffic.answered == 0 {
             return None;
         }
         let left: Vec<usize> = (0..tree.links().len()).collect();
-        line.hole = Some(HoleSearch { since, found: None, has_helped: false, ended: None });
+        model.hole = Some(HoleSearch { since, found: None, has_helped: false, ended: None });
         // That nothing comes back is known already.
-        let nothing = Mark { at: now.before(ROUND), sent: 0, ..Mark::of(line, now) };
-        Some(Self { before: left.clone(), left, step: Step::Watched(nothing) })
+        let nothing = FrameCounts { at: now.before(ROUND), sent: 0, ..FrameCounts::of(model, now) };
+        Some(Self { before: left.clone(), left, step: SearchStep::NetworkWatch(nothing) })
     }
 
     /// Goes on. Gives what is to be written next; the search is over when the line says so.
-    pub(super) fn go_on(&mut self, line: &mut Line, now: Instant) -> Option<Probe> {
-        let came_back = line.traffic.latest_processed;
+    pub(super) fn go_on(&mut self, model: &mut NetworkModel, now: Instant) -> Option<Probe> {
+        let came_back = model.traffic.latest_processed;
         match self.step {
-            Step::Closed(link, at) if came_back.is_some_and(|back| back > at) => {
-                self.step = Step::Helps(link, Mark::of(line, now));
+            SearchStep::Closed(link, at) if came_back.is_some_and(|back| back > at) => {
+                self.step = SearchStep::Helps(link, FrameCounts::of(model, now));
                 None
             }
             // The request may be sent again for a while: what is written before that is over would be undone.
-            Step::Closed(_, at) if now < at + PATIENCE => None,
-            Step::Closed(link, _) => {
-                let behind = behind(line.tree.as_ref()?, link);
+            SearchStep::Closed(_, at) if now < at + PATIENCE => None,
+            SearchStep::Closed(link, _) => {
+                let behind = behind(model.tree.as_ref()?, link);
                 self.left.retain(|one| !behind.contains(one));
-                self.close_next(line, now)
+                self.close_next(model, now)
             }
-            Step::Helps(_, mark) if now < mark.at + REPEATED => None,
-            Step::Helps(link, mark) => {
-                let (sent, processed) = mark.since(line, now)?;
+            SearchStep::Helps(_, mark) if now < mark.at + REPEATED => None,
+            SearchStep::Helps(link, mark) => {
+                let (sent, processed) = mark.since(model, now)?;
                 if processed * 4 < sent {
                     // Frames come and go: this is noise, not a hole. (In a ring each card has sent its copy, and half of
                     // what was sent may come back untouched.)
-                    let all = (0..line.tree.as_ref()?.links().len()).collect();
-                    end(line, all, false, now);
-                    return set(line, link, None, now);
+                    let all = (0..model.tree.as_ref()?.links().len()).collect();
+                    end(model, all, false, now);
+                    return set(model, link, None, now);
                 }
-                let behind = behind(line.tree.as_ref()?, link);
+                let behind = behind(model.tree.as_ref()?, link);
                 self.before = self.left.clone();
                 self.left.retain(|one| behind.contains(one));
-                self.step = Step::Open(now);
+                self.step = SearchStep::Open(now);
                 // It would open by itself; but the next port may lie behind it.
-                set(line, link, None, now)
+                set(model, link, None, now)
             }
-            Step::Open(at) if now < at + SETTLE => None,
-            Step::Open(_) => {
-                self.step = Step::Watched(Mark::of(line, now));
+            SearchStep::Open(at) if now < at + SETTLE => None,
+            SearchStep::Open(_) => {
+                self.step = SearchStep::NetworkWatch(FrameCounts::of(model, now));
                 None
             }
-            Step::Watched(mark) if came_back.is_some_and(|back| back > mark.at) => {
+            SearchStep::NetworkWatch(mark) if came_back.is_some_and(|back| back > mark.at) => {
                 if now >= mark.at + HEALED {
                     // Whether the latest port helped, or the hole went just then, nobody knows.
-                    end(line, std::mem::take(&mut self.before), false, now);
+                    end(model, std::mem::take(&mut self.before), false, now);
                 }
                 None
             }
-            Step::Watched(mark) => {
-                mark.since(line, now)?;
+            SearchStep::NetworkWatch(mark) => {
+                mark.since(model, now)?;
                 if self.before.len() > self.left.len()
-                    && let Some(hole) = &mut line.hole
+                    && let Some(hole) = &mut model.hole
                 {
                     hole.has_helped = true;
                 }
-                self.close_next(line, now)
+                self.close_next(model, now)
             }
         }
     }
 
     /// Closes the port before the link that halves what is left best.
-    fn close_next(&mut self, line: &mut Line, now: Instant) -> Option<Probe> {
+    fn close_next(&mut self, model: &mut NetworkModel, now: Instant) -> Option<Probe> {
         self.before = self.left.clone();
         if self.left.len() == 1 {
-            end(line, std::mem::take(&mut self.left), true, now);
+            end(model, std::mem::take(&mut self.left), true, now);
             return None;
         }
-        let tree = line.tree.as_ref()?;
+        let tree = model.tree.as_ref()?;
         let half = self.left.len() / 2;
         let share = |link: usize| {
             let behind = behind(tree, link);
@@ -181,7 +181,7 @@ impl Bisect {
         };
         let splits = |link: &usize| {
             // Who has the whole rest behind it tells nothing.
-            near(line, *link).is_some() && share(*link) < self.left.len()
+            near(model, *link).is_some() && share(*link) < self.left.len()
         };
         let best = self
             .left
@@ -190,44 +190,44 @@ impl Bisect {
             .filter(splits)
             .min_by_key(|link| (share(*link).abs_diff(half), *link));
         let Some(link) = best else {
-            end(line, std::mem::take(&mut self.left), false, now);
+            end(model, std::mem::take(&mut self.left), false, now);
             return None;
         };
-        self.step = Step::Closed(link, now);
-        set(line, link, Some(LoopMode::Closed), now)
+        self.step = SearchStep::Closed(link, now);
+        set(model, link, Some(LoopMode::Closed), now)
     }
 }
 
 /// The search is over, with these links left: the only one is found if that is certain.
-fn end(line: &mut Line, left: Vec<usize>, is_certain: bool, now: Instant) {
-    if let Some(hole) = &mut line.hole {
+fn end(model: &mut NetworkModel, left: Vec<usize>, is_certain: bool, now: Instant) {
+    if let Some(hole) = &mut model.hole {
         let found = left.first().filter(|_| is_certain);
         hole.found = found.map(|link| Seen::new(*link, now, None));
         hole.ended = Some(now);
     }
-    line.hole_left = left;
-    line.touch();
+    model.hole_left = left;
+    model.touch();
 }
 
 /// The port before a link, with how DL control of its controller stands.
-fn near(line: &Line, link: usize) -> Option<(DeviceId, Port, DlControl)> {
-    let End::Controller(node, port) = line.tree.as_ref()?.links().get(link)?.upstream else {
+fn near(model: &NetworkModel, link: usize) -> Option<(DeviceId, Port, DlControl)> {
+    let End::Controller(node, port) = model.tree.as_ref()?.links().get(link)?.upstream else {
         return None;
     };
-    let device = line.devices.get(node)?;
+    let device = model.devices.get(node)?;
     device.station?;
     Some((device.id, port, device.dl_control?))
 }
 
 /// Sets the loop of the port before a link for a moment; `None` sets what was.
-fn set(line: &Line, link: usize, mode: Option<LoopMode>, now: Instant) -> Option<Probe> {
-    let (device, port, stands) = near(line, link)?;
+fn set(model: &NetworkModel, link: usize, mode: Option<LoopMode>, now: Instant) -> Option<Probe> {
+    let (device, port, stands) = near(model, link)?;
     let mode = mode.unwrap_or_else(|| stands.loop_mode(port));
     let [low, loops, ..] = stands.with_loop_mode(port, mode).with_temporary(true).to_bytes();
     Some(Probe {
-        network: line.network,
+        network: model.network,
         device,
-        station: line.device(device)?.station?,
+        station: model.device(device)?.station?,
         what: Asked::Written { address: CONTROL.0, data: [low, loops] },
         deadline: now + PATIENCE,
         effect: ProbeEffect::Writes,

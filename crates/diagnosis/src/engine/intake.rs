@@ -1,15 +1,15 @@
-//! A frame comes in: what it is, whom it belongs to, and what is counted of it.
+//! Intake of a frame: its kind, its network, and the counts it adds to.
 
 use linesman_proto::frame::{FrameError, FrameView};
 use linesman_proto::time::Instant;
 
-use super::watched::Watched;
-use crate::line::Seen;
-use crate::observe::{Direction, Fingerprint, FrameSeen, Outcome, companion, question};
+use super::network_watch::NetworkWatch;
+use crate::model::Seen;
+use crate::observe::{Direction, Fingerprint, FrameSeen, PairingOutcome, companion, question};
 
 /// Takes a frame at `now`.
-pub(super) fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
-    watched.line.now = now;
+pub(super) fn take(watched: &mut NetworkWatch, frame: &FrameSeen<'_>, now: Instant) {
+    watched.model.now = now;
     let parsed = FrameView::parse(frame.bytes);
     if let Ok(view) = &parsed
         && question::is_question(view)
@@ -20,8 +20,8 @@ pub(super) fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
         }
         return;
     }
-    let Watched { line, learner, pairing, .. } = watched;
-    let traffic = &mut line.traffic;
+    let NetworkWatch { model, learner, pairing, .. } = watched;
+    let traffic = &mut model.traffic;
     let view = match parsed {
         Ok(view) => view,
         Err(FrameError::OtherType { .. }) => {
@@ -33,7 +33,7 @@ pub(super) fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
             let kind = frame.bytes.get(12..14).map_or(0, |at| u16::from_be_bytes([at[0], at[1]]));
             let seen = Seen::new(kind, frame.time, Some(frame.number));
             if traffic.record_foreign(seen, frame.direction == Direction::Received) {
-                line.touch();
+                model.touch();
             }
             return;
         }
@@ -46,7 +46,7 @@ pub(super) fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
         traffic.damaged.add(1, frame.time);
         let seen = Seen::new((), frame.time, Some(frame.number));
         traffic.first_damaged.get_or_insert(seen);
-        line.touch();
+        model.touch();
         return;
     }
     if let Some(processed) = companion::processed(&view) {
@@ -56,9 +56,9 @@ pub(super) fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     let print = Fingerprint::of(&view);
     traffic.cut_short += u64::from(print.is_cut && !frame.truncated);
     traffic.datagrams_cut += u64::from(print.is_cut && frame.truncated);
-    let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(line, exchange));
+    let outcome = pairing.take(frame, &view, print, &mut |exchange| learner.learn(model, exchange));
     let (mistaken, unrecorded) = (pairing.take_mistaken(), pairing.take_unrecorded());
-    let traffic = &mut line.traffic;
+    let traffic = &mut model.traffic;
     traffic.doubled += pairing.take_doubled();
     traffic.note_unrecorded(unrecorded, frame.time);
     if mistaken > 0 {
@@ -71,19 +71,19 @@ pub(super) fn take(watched: &mut Watched, frame: &FrameSeen<'_>, now: Instant) {
     if has_other_senders {
         traffic.senders = pairing.senders().to_vec();
     }
-    if matches!(outcome, Outcome::Request | Outcome::ReturnAlone) {
-        line.habits.take(&view, frame.time, outcome == Outcome::Request);
+    if matches!(outcome, PairingOutcome::Request | PairingOutcome::ReturnAlone) {
+        model.habits.take(&view, frame.time, outcome == PairingOutcome::Request);
     }
-    let traffic = &mut line.traffic;
+    let traffic = &mut model.traffic;
     match outcome {
-        Outcome::Request | Outcome::RequestCopy => traffic.sent += 1,
-        Outcome::Return | Outcome::ReturnAlone => {
-            traffic.returned_alone += u64::from(outcome == Outcome::ReturnAlone);
+        PairingOutcome::Request | PairingOutcome::RequestCopy => traffic.sent += 1,
+        PairingOutcome::Return | PairingOutcome::ReturnAlone => {
+            traffic.returned_alone += u64::from(outcome == PairingOutcome::ReturnAlone);
             traffic.record_returned(frame.time, frame.number);
         }
-        Outcome::Duplicate => traffic.duplicates += 1,
+        PairingOutcome::Duplicate => traffic.duplicates += 1,
     }
     if has_other_senders {
-        line.touch();
+        model.touch();
     }
 }

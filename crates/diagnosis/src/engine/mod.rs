@@ -1,11 +1,11 @@
-//! The whole of diagnosis: frames and host observations in, findings out.
+//! Diagnosis engine: takes frames and host observations, and returns findings.
 
+mod background_poll;
 mod bisect;
-mod close;
+mod fast_poll;
 mod intake;
+mod network_watch;
 mod setup;
-mod survey;
-mod watched;
 
 use std::collections::VecDeque;
 
@@ -14,16 +14,16 @@ use linesman_proto::time::{Instant, Span};
 
 use crate::ask::AskingReport;
 use crate::coverage::{Coverage, InputKind};
-use crate::finding::{Book, Finding, Severity};
-use crate::line::{Line, search};
+use crate::finding::{Finding, FindingStore, Severity};
+use crate::model::{NetworkModel, search};
 use crate::observe::{FrameSeen, HostEvent, HostObservation, Pairing};
 use crate::report::{
     self, Diagnosis, FindingReport, MainDeviceReport, NetworkReport, Number, Verdict,
 };
 use crate::rule::{RULES, View};
 
+use network_watch::NetworkWatch;
 pub use setup::{Asked, Event, EventKind, Probe, ProbeEffect, Setup};
-use watched::Watched;
 
 /// The rules are asked at most this often; what they find keeps the time of its evidence.
 const JUDGE_EVERY: Span = Span::ms(10);
@@ -40,8 +40,8 @@ const JUDGE_AGAIN: Span = Span::ms(100);
 #[derive(Clone, Debug)]
 pub struct Engine {
     setup: Setup,
-    networks: Vec<Watched>,
-    book: Book,
+    networks: Vec<NetworkWatch>,
+    book: FindingStore,
     events: VecDeque<Event>,
     probes: VecDeque<Probe>,
     now: Instant,
@@ -60,17 +60,17 @@ impl Engine {
     /// An engine that has seen nothing.
     #[must_use]
     pub fn new(setup: Setup) -> Self {
-        let mut line = match &setup.project {
-            Some(project) => Line::planned(Network(0), project),
-            None => Line::new(Network(0)),
+        let mut model = match &setup.project {
+            Some(project) => NetworkModel::planned(Network(0), project),
+            None => NetworkModel::new(Network(0)),
         };
-        line.expect_exchange(&setup.exchange);
-        line.host.is_watched = setup.host_counters;
-        line.sees_all_orders = setup.input == InputKind::Driven;
+        model.expect_exchange(&setup.exchange);
+        model.host.is_watched = setup.host_counters;
+        model.sees_all_orders = setup.input == InputKind::Driven;
         Self {
             setup,
-            networks: vec![Watched::new(line)],
-            book: Book::default(),
+            networks: vec![NetworkWatch::new(model)],
+            book: FindingStore::default(),
             events: VecDeque::new(),
             probes: VecDeque::new(),
             now: Instant::default(),
@@ -83,9 +83,9 @@ impl Engine {
 
     /// An engine for a line that was filled in by other means, such as an observation file.
     #[must_use]
-    pub fn with_line(setup: Setup, line: Line) -> Self {
-        let now = line.now;
-        let mut engine = Self { networks: vec![Watched::new(line)], now, ..Self::new(setup) };
+    pub fn with_line(setup: Setup, model: NetworkModel) -> Self {
+        let now = model.now;
+        let mut engine = Self { networks: vec![NetworkWatch::new(model)], now, ..Self::new(setup) };
         engine.judge();
         engine
     }
@@ -96,7 +96,7 @@ impl Engine {
         let now = self.now;
         let watched = self.watched(frame.network);
         intake::take(watched, frame, now);
-        self.survey();
+        self.background_poll();
         self.judge_if_due();
     }
 
@@ -104,13 +104,13 @@ impl Engine {
     pub fn handle_host(&mut self, observation: &HostObservation) {
         self.now = self.now.max(observation.time);
         let now = self.now;
-        let line = &mut self.watched(observation.network).line;
+        let model = &mut self.watched(observation.network).model;
         if let HostEvent::CardErrors { crc: 1.., .. } = observation.what {
-            line.note_errors(observation.time, observation.time);
+            model.note_errors(observation.time, observation.time);
         }
-        line.host.record(observation);
-        line.now = now;
-        line.touch();
+        model.host.record(observation);
+        model.now = now;
+        model.touch();
         self.judge_if_due();
     }
 
@@ -123,16 +123,16 @@ impl Engine {
             return;
         }
         self.now = self.now.max(at);
-        let Watched { line, pairing, questions, .. } = self.watched(network);
+        let NetworkWatch { model, pairing, questions, .. } = self.watched(network);
         pairing.forget();
         questions.forget();
-        line.traffic.record_missed(count);
+        model.traffic.record_missed(count);
         // The time to the next one says nothing.
-        for cyclic in &mut line.cyclic {
+        for cyclic in &mut model.cyclic {
             cyclic.sent.skip();
             cyclic.returned.skip();
         }
-        line.touch();
+        model.touch();
     }
 
     /// The counters of the host's cards are about this line from now on, so that their silence means zero: the host was
@@ -140,8 +140,8 @@ impl Engine {
     pub fn watch_host(&mut self) {
         self.setup.host_counters = true;
         for watched in &mut self.networks {
-            watched.line.host.is_watched = true;
-            watched.line.touch();
+            watched.model.host.is_watched = true;
+            watched.model.touch();
         }
     }
 
@@ -154,10 +154,10 @@ impl Engine {
     pub fn handle_timeout(&mut self, now: Instant) {
         self.now = self.now.max(now);
         for watched in &mut self.networks {
-            watched.line.now = watched.line.now.max(now);
+            watched.model.now = watched.model.now.max(now);
             watched.expire(now, false);
         }
-        self.survey();
+        self.background_poll();
         self.judge_if_due();
     }
 
@@ -172,10 +172,13 @@ impl Engine {
             (Some(one), Some(other)) => Some(one.min(other)),
             (one, other) => one.or(other),
         };
-        let surveys =
-            self.networks.iter().flat_map(|watched| [watched.survey.next(), watched.close.next()]);
-        let survey = surveys.flatten().min().filter(|_| self.setup.probes && !self.has_ended);
-        [lost, judgement, survey].into_iter().flatten().min()
+        let surveys = self
+            .networks
+            .iter()
+            .flat_map(|watched| [watched.background_poll.next(), watched.close.next()]);
+        let background_poll =
+            surveys.flatten().min().filter(|_| self.setup.probes && !self.has_ended);
+        [lost, judgement, background_poll].into_iter().flatten().min()
     }
 
     /// What happened to findings, in order.
@@ -195,7 +198,7 @@ impl Engine {
         self.is_complete &= complete;
         for watched in &mut self.networks {
             watched.expire(at, true);
-            watched.line.touch();
+            watched.model.touch();
         }
         self.judge();
     }
@@ -207,8 +210,8 @@ impl Engine {
         let coverage = self.coverage();
         let mut findings: Vec<FindingReport> =
             roots.into_iter().map(|finding| report::build::finding(&self.book, finding)).collect();
-        if let Some(line) = self.line(Network(0)) {
-            report::reading::advise(&mut findings, line, self.setup.input);
+        if let Some(model) = self.model(Network(0)) {
+            report::reading::advise(&mut findings, model, self.setup.input);
         }
         Diagnosis {
             schema: report::SCHEMA.to_owned(),
@@ -220,7 +223,7 @@ impl Engine {
             verdict: self.verdict(&coverage),
             network: self.network_report(),
             main_device: self.main_device(),
-            devices: report::device::reports(self.line(Network(0))),
+            devices: report::device::reports(self.model(Network(0))),
             asking: self.asking.clone(),
             coverage: report::coverage::report(&coverage),
             understood: None,
@@ -230,31 +233,31 @@ impl Engine {
 
     /// The findings so far.
     #[must_use]
-    pub const fn book(&self) -> &Book {
+    pub const fn book(&self) -> &FindingStore {
         &self.book
     }
 
     /// What is known of a network; `None` before its first frame.
     #[must_use]
-    pub fn line(&self, network: Network) -> Option<&Line> {
-        let mut all = self.networks.iter().map(|watched| &watched.line);
-        all.find(|line| line.network == network)
+    pub fn model(&self, network: Network) -> Option<&NetworkModel> {
+        let mut all = self.networks.iter().map(|watched| &watched.model);
+        all.find(|model| model.network == network)
     }
 
-    fn watched(&mut self, network: Network) -> &mut Watched {
-        let known = self.networks.iter().position(|watched| watched.line.network == network);
+    fn watched(&mut self, network: Network) -> &mut NetworkWatch {
+        let known = self.networks.iter().position(|watched| watched.model.network == network);
         let index = known.unwrap_or_else(|| {
-            let mut line = Line::new(network);
-            line.host.is_watched = self.setup.host_counters;
-            line.sees_all_orders = self.setup.input == InputKind::Driven;
-            self.networks.push(Watched::new(line));
+            let mut model = NetworkModel::new(network);
+            model.host.is_watched = self.setup.host_counters;
+            model.sees_all_orders = self.setup.input == InputKind::Driven;
+            self.networks.push(NetworkWatch::new(model));
             self.networks.len() - 1
         });
         &mut self.networks[index]
     }
 
     fn has_news(&self) -> bool {
-        self.networks.iter().any(|watched| watched.line.revision() != watched.judged)
+        self.networks.iter().any(|watched| watched.model.revision() != watched.judged)
     }
 
     fn judge_if_due(&mut self) {
@@ -267,7 +270,7 @@ impl Engine {
 
     /// Whether something has gone wrong since the rules were last asked, and nothing is said of anything.
     fn is_alarmed(&self) -> bool {
-        let is_new = |watched: &Watched| watched.alarms() != watched.judged_alarms;
+        let is_new = |watched: &NetworkWatch| watched.alarms() != watched.judged_alarms;
         let is_early = self.now + JUDGE_EVERY < self.next_judgement + JUDGE_ALARM_AFTER;
         !is_early && !self.book.has_open() && self.networks.iter().any(is_new)
     }
@@ -283,20 +286,20 @@ impl Engine {
             if self.book.names_devices() {
                 watched.learner.name();
             }
-            watched.learner.settle(&mut watched.line);
+            watched.learner.settle(&mut watched.model);
             if watched.learner.is_settled() {
-                watched.line.derive_tree();
+                watched.model.derive_tree();
             }
             if !is_active {
                 // Somebody else may have searched.
-                let seen = search::seen(&watched.line);
-                watched.line.hole = seen.as_ref().map(|(hole, _)| *hole);
-                watched.line.hole_left = seen.map_or_else(Vec::new, |(_, left)| left);
+                let seen = search::seen(&watched.model);
+                watched.model.hole = seen.as_ref().map(|(hole, _)| *hole);
+                watched.model.hole_left = seen.map_or_else(Vec::new, |(_, left)| left);
             }
-            watched.judged = watched.line.revision();
+            watched.judged = watched.model.revision();
             watched.judged_alarms = watched.alarms();
             watched.conditions.clear();
-            let view = View { line: &watched.line, now, has_ended };
+            let view = View { model: &watched.model, now, has_ended };
             for rule in RULES {
                 (rule.judge)(&view, &mut watched.conditions);
             }
@@ -341,38 +344,38 @@ impl Engine {
             }
             watched.probed_for = alarms;
             watched.probed = Some(now);
-            for device in watched.line.devices.iter().filter(|device| device.answered.is_some()) {
+            for device in watched.model.devices.iter().filter(|device| device.answered.is_some()) {
                 for (address, len) in ASKED {
                     let what = Asked::Register { address: RegisterAddress(address), len };
-                    push(&mut self.probes, &watched.line, device.id, what, now);
+                    push(&mut self.probes, &watched.model, device.id, what, now);
                 }
             }
         }
         for watched in &mut self.networks {
-            for (device, object) in watched.survey.objects(&watched.line) {
-                push(&mut self.probes, &watched.line, device, Asked::Object(object), now);
+            for (device, object) in watched.background_poll.objects(&watched.model) {
+                push(&mut self.probes, &watched.model, device, Asked::Object(object), now);
             }
         }
     }
 
     /// Asks by turns for what shows trouble early and nobody reads.
-    fn survey(&mut self) {
+    fn background_poll(&mut self) {
         if !self.setup.probes || self.has_ended {
             return;
         }
         let now = self.now;
         for watched in &mut self.networks {
             let is_searching = watched.bisect.is_some();
-            let closely = watched.close.turn(&watched.line, now);
+            let closely = watched.close.turn(&watched.model, now);
             for (device, (address, len)) in
-                watched.survey.turn(&watched.line, now).into_iter().chain(closely)
+                watched.background_poll.turn(&watched.model, now).into_iter().chain(closely)
             {
                 // While nothing comes back, questions only stand in the way of a search.
                 if is_searching {
                     continue;
                 }
                 let what = Asked::Register { address: RegisterAddress(address), len };
-                push(&mut self.probes, &watched.line, device, what, now);
+                push(&mut self.probes, &watched.model, device, what, now);
             }
         }
     }
@@ -382,7 +385,7 @@ impl Engine {
     pub fn coverage(&self) -> Coverage {
         let mut coverage = Coverage::default();
         for watched in &self.networks {
-            coverage.merge(Coverage::of(&watched.line, self.setup.input));
+            coverage.merge(Coverage::of(&watched.model, self.setup.input));
         }
         if let Some(asking) = &self.asking {
             coverage.note_asking(asking);
@@ -403,34 +406,40 @@ impl Engine {
     /// The MainDevice, where it is another program.
     fn main_device(&self) -> Option<MainDeviceReport> {
         let is_other = matches!(self.setup.input, InputKind::Listened | InputKind::Recorded);
-        self.line(Network(0)).filter(|_| is_other).and_then(report::main_device::report)
+        self.model(Network(0)).filter(|_| is_other).and_then(report::main_device::report)
     }
 
     fn network_report(&self) -> NetworkReport {
-        let lines = || self.networks.iter().map(|watched| &watched.line);
-        let sum = |count: fn(&Line) -> u64| Number(lines().map(count).sum());
-        let highest = lines().map(Line::highest_state).max().flatten();
+        let lines = || self.networks.iter().map(|watched| &watched.model);
+        let sum = |count: fn(&NetworkModel) -> u64| Number(lines().map(count).sum());
+        let highest = lines().map(NetworkModel::highest_state).max().flatten();
         NetworkReport {
-            devices: sum(|line| line.device_count() as u64),
+            devices: sum(|model| model.device_count() as u64),
             al_state_highest: highest.map(|state| state.name().to_owned()),
-            datagrams: sum(|line| line.traffic.datagrams),
-            unanswered: sum(|line| line.traffic.unanswered),
-            frames: sum(|line| line.traffic.frames),
-            lost: sum(|line| line.traffic.lost.sum),
-            damaged: sum(|line| line.traffic.damaged.sum),
+            datagrams: sum(|model| model.traffic.datagrams),
+            unanswered: sum(|model| model.traffic.unanswered),
+            frames: sum(|model| model.traffic.frames),
+            lost: sum(|model| model.traffic.lost.sum),
+            damaged: sum(|model| model.traffic.damaged.sum),
         }
     }
 }
 
-fn push(probes: &mut VecDeque<Probe>, line: &Line, device: DeviceId, what: Asked, now: Instant) {
+fn push(
+    probes: &mut VecDeque<Probe>,
+    model: &NetworkModel,
+    device: DeviceId,
+    what: Asked,
+    now: Instant,
+) {
     // Who has no address cannot be asked for sure.
-    let Some(station) = line.device(device).and_then(|device| device.station) else { return };
+    let Some(station) = model.device(device).and_then(|device| device.station) else { return };
     if probes.len() < Engine::MOST_WAITING {
-        let (network, deadline) = (line.network, now + Engine::PROBE_EVERY);
+        let (network, deadline) = (model.network, now + Engine::PROBE_EVERY);
         let effect = ProbeEffect::Reads;
         probes.push_back(Probe { network, device, station, what, deadline, effect });
     }
 }
 
 /// DL status, AL status with its code, all error counters.
-const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), close::COUNTERS];
+const ASKED: [(u16, u16); 3] = [(0x0110, 2), (0x0130, 6), fast_poll::COUNTERS];

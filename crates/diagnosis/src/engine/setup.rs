@@ -1,4 +1,4 @@
-//! What goes into the engine before it begins, and what comes out beside the report.
+//! Set-up of the engine, and its output beside the report.
 
 use linesman_config::plan::PlannedExchange;
 use linesman_config::project::Project;

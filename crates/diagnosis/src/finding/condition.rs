@@ -1,4 +1,4 @@
-//! What a rule says: something is wrong there, for this reason, as these frames and registers show.
+//! Conditions: the statement of a rule at one moment, with place, cause and evidence.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, RegisterAddress};
@@ -7,7 +7,7 @@ use linesman_proto::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::Place;
-use crate::line::{Rise, Seen};
+use crate::model::{Rise, Seen};
 use crate::rule::RulePage;
 
 /// How bad it is.

@@ -1,12 +1,11 @@
-//! What is wrong: [`Condition`] is what a rule says at one moment, [`Finding`] is a condition with a
-//! life.
+//! Findings: [`Condition`] is the statement of a rule at one moment, [`Finding`] a condition over time.
 
-pub mod apart;
-pub mod book;
 pub mod condition;
+pub mod disambiguation;
 pub mod place;
+pub mod store;
 
-pub use apart::told_apart_by;
-pub use book::{Book, Change, Finding};
 pub use condition::{Action, Alternative, Condition, Evidence, EvidenceKind, Severity, Symptom};
+pub use disambiguation::told_apart_by;
 pub use place::{LinkDirection, LinkEnd, Place};
+pub use store::{Change, Finding, FindingStore};

@@ -1,4 +1,4 @@
-//! Where a finding is.
+//! Places of findings: link, SubDevice, network, this computer.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! What can do such damage: from places and counts to causes, with how sure each is.
+//! Causes of damage, from places and counts, each with its confidence.
 //!
 //! | seen | most likely |
 //! |---|---|
@@ -19,15 +19,15 @@ use linesman_proto::topology::route::Direction;
 use linesman_proto::topology::{End, Hop};
 
 use super::damage::{Damage, LastHop, Located};
+use super::input::LocateInput;
 use super::rhythm::{falls_together, is_steady};
-use super::survey::Survey;
 
 /// From this many hits on, their distribution says something.
 const MANY: u64 = 8;
 
 /// Where a cause sits.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Spot {
+pub enum CausePlace {
     /// A link (index in the tree), in one direction or both.
     Link(usize, Option<Direction>),
     /// A controller (index in the tree).
@@ -42,7 +42,7 @@ pub struct Suspect {
     /// Why.
     pub cause: FaultName,
     /// Where.
-    pub spot: Spot,
+    pub spot: CausePlace,
     /// How sure, 0 to 1.
     pub weight: f64,
 }
@@ -90,7 +90,7 @@ impl Suspicion {
 
     /// All causes on a line, in the order in which frames get there.
     #[must_use]
-    pub fn all(survey: &Survey<'_>, located: &Located) -> Vec<Self> {
+    pub fn all(input: &LocateInput<'_>, located: &Located) -> Vec<Self> {
         let mut links: Vec<Group> = Vec::new();
         let mut senders: Vec<Group> = Vec::new();
         for damage in &located.hops {
@@ -128,7 +128,7 @@ impl Suspicion {
             let suspects = inside(&group);
             group.with(suspects)
         }));
-        let noisy = share_source(survey, links);
+        let noisy = share_source(input, links);
         all.extend(noisy);
         all
     }
@@ -221,10 +221,13 @@ fn inside(group: &Group) -> Vec<Suspect> {
     let frames: u64 = group.damages.iter().map(|damage| damage.frames).sum();
     let hop = damage.hop;
     let weight = if frames >= 3 { 0.8 } else { 0.6 };
-    let mut list =
-        vec![Suspect { cause: FaultName::DeviceInternal, spot: Spot::Device(group.key), weight }];
+    let mut list = vec![Suspect {
+        cause: FaultName::DeviceInternal,
+        spot: CausePlace::Device(group.key),
+        weight,
+    }];
     // A wrong symbol may decode as another valid one: seldom, and not again and again.
-    let link = Spot::Link(hop.link, Some(hop.direction));
+    let link = CausePlace::Link(hop.link, Some(hop.direction));
     for (cause, weight) in [(FaultName::CableDegraded, 0.1), (FaultName::ReceiverDamaged, 0.05)] {
         list.push(Suspect { cause, spot: link, weight });
     }
@@ -233,7 +236,7 @@ fn inside(group: &Group) -> Vec<Suspect> {
 }
 
 /// Links that are hit at the same times have one source; the first of them leads.
-fn share_source(survey: &Survey<'_>, mut links: Vec<Group>) -> Vec<Suspicion> {
+fn share_source(input: &LocateInput<'_>, mut links: Vec<Group>) -> Vec<Suspicion> {
     links.sort_by_key(|group| group.damages.is_empty());
     let mut all: Vec<Suspicion> = Vec::new();
     let mut taken = vec![false; links.len()];
@@ -246,13 +249,12 @@ fn share_source(survey: &Survey<'_>, mut links: Vec<Group>) -> Vec<Suspicion> {
         }
         let leader = &links[index];
         let others = order[at + 1..].iter().copied().filter(|other| !taken[*other]);
-        let together = with_same_source(survey, &links, index, others);
+        let together = with_same_source(input, &links, index, others);
         let mut members: Vec<&Group> = vec![leader];
         members.extend(together.iter().map(|other| &links[*other]));
         let common = (members.len() > 1).then(|| common_device(&members)).flatten();
         let suspicion = |group: &Group| {
-            let list =
-                if members.len() > 1 { shared(group, common) } else { single(survey, group) };
+            let list = if members.len() > 1 { shared(group, common) } else { single(input, group) };
             group.clone().with(list)
         };
         let mut lead = suspicion(leader);
@@ -267,7 +269,7 @@ fn share_source(survey: &Survey<'_>, mut links: Vec<Group>) -> Vec<Suspicion> {
 
 /// Those of the `others` that are hit together with the first link, or with one that is.
 fn with_same_source(
-    survey: &Survey<'_>,
+    input: &LocateInput<'_>,
     links: &[Group],
     first: usize,
     others: impl Iterator<Item = usize>,
@@ -280,7 +282,7 @@ fn with_same_source(
     let mut one = first;
     for next in 0.. {
         let (together, apart) = left.into_iter().partition(|other: &usize| {
-            falls_together(survey, &links[one].damages, &links[*other].damages)
+            falls_together(input, &links[one].damages, &links[*other].damages)
         });
         left = apart;
         found.extend::<Vec<usize>>(together);
@@ -314,14 +316,14 @@ fn shared(group: &Group, common: Option<(usize, FaultName)>) -> Vec<Suspect> {
         weight: if common.is_some() { 0.55 } else { 0.75 },
     }];
     if let Some((node, cause)) = common {
-        list.push(Suspect { cause, spot: Spot::Device(node), weight: 0.25 });
+        list.push(Suspect { cause, spot: CausePlace::Device(node), weight: 0.25 });
     }
     list.push(Suspect { cause: FaultName::CableDegraded, spot, weight: 0.15 });
     list
 }
 
 /// One link, or the last hop, by itself.
-fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
+fn single(input: &LocateInput<'_>, group: &Group) -> Vec<Suspect> {
     use FaultName::{
         CableDegraded, DeviceInternal, EmcNoise, HostDrops, NicDamaged, ReceiverDamaged,
         TransmitterDamaged,
@@ -334,19 +336,19 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
     let hits: u64 = group.damages.iter().map(|d| d.frames.max(d.symbols.unwrap_or(0))).sum::<u64>();
     let is_unread = group.damages.iter().all(|damage| damage.symbols.is_none());
     let is_all_clean = !group.damages.is_empty() && group.damages.iter().all(is_clean);
-    let is_both = matches!(spot, Spot::Link(_, None));
+    let is_both = matches!(spot, CausePlace::Link(_, None));
     let at_card = [hop.from, hop.to].into_iter().any(|end| end.node().is_none());
 
     let weights: Vec<(FaultName, f64)> = match (&group.last_hop, is_both) {
         (Some(LastHop::Unknown { .. }), _) => {
             let mut list = vec![
                 suspect(CableDegraded, spot, 0.25),
-                suspect(NicDamaged, Spot::Host, 0.2),
-                suspect(HostDrops, Spot::Host, 0.2),
+                suspect(NicDamaged, CausePlace::Host, 0.2),
+                suspect(HostDrops, CausePlace::Host, 0.2),
                 suspect(TransmitterDamaged, spot, 0.1),
             ];
             if let Some(node) = hop.from.node() {
-                list.push(suspect(DeviceInternal, Spot::Device(node), 0.1));
+                list.push(suspect(DeviceInternal, CausePlace::Device(node), 0.1));
             }
             list.push(suspect(EmcNoise, spot, 0.1));
             return list;
@@ -354,11 +356,11 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
         (Some(LastHop::Damaged { .. }), false) => {
             let mut list = vec![
                 suspect(CableDegraded, spot, 0.35),
-                suspect(NicDamaged, Spot::Host, 0.2),
+                suspect(NicDamaged, CausePlace::Host, 0.2),
                 suspect(TransmitterDamaged, spot, 0.15),
             ];
             if let Some(node) = hop.from.node() {
-                list.push(suspect(DeviceInternal, Spot::Device(node), 0.15));
+                list.push(suspect(DeviceInternal, CausePlace::Device(node), 0.15));
             }
             list.push(suspect(EmcNoise, spot, 0.1));
             return list;
@@ -366,7 +368,7 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
         (_, false) if is_all_clean && at_card => {
             // Clean symbols, bad frames, and the sender is the card.
             return vec![
-                suspect(NicDamaged, Spot::Host, 0.75),
+                suspect(NicDamaged, CausePlace::Host, 0.75),
                 suspect(CableDegraded, spot, 0.1),
                 suspect(ReceiverDamaged, spot, 0.05),
             ];
@@ -385,9 +387,7 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
             (ReceiverDamaged, 0.1),
         ],
         (None, false)
-            if hits >= MANY
-                && is_steady(survey, &group.damages)
-                && other_way_counts(survey, hop) =>
+            if hits >= MANY && is_steady(input, &group.damages) && other_way_counts(input, hop) =>
         {
             vec![
                 (TransmitterDamaged, 0.35),
@@ -416,17 +416,17 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
             // The output stage of the card is a part of the host, and so is its input stage.
             (TransmitterDamaged, End::MainDevice(_), _)
             | (ReceiverDamaged, _, End::MainDevice(_)) => {
-                suspect(NicDamaged, Spot::Host, weight * share)
+                suspect(NicDamaged, CausePlace::Host, weight * share)
             }
             _ => suspect(cause, spot, weight * share),
         })
         .collect();
     if is_unread {
-        let sender = hop.from.node().map_or(Spot::Host, Spot::Device);
+        let sender = hop.from.node().map_or(CausePlace::Host, CausePlace::Device);
         list.push(suspect(DeviceInternal, sender, 0.1));
     } else if !is_both && let Some(node) = hop.from.node() {
         // Controllers in programmable logic make a symbol error of a frame that was bad before.
-        list.push(suspect(DeviceInternal, Spot::Device(node), 0.04));
+        list.push(suspect(DeviceInternal, CausePlace::Device(node), 0.04));
     }
     if let Some(damage) = group.damages.first() {
         add_earlier(&mut list, damage);
@@ -435,13 +435,13 @@ fn single(survey: &Survey<'_>, group: &Group) -> Vec<Suspect> {
 }
 
 /// Whether the other direction of a link could tell of symbols, so that their absence says something.
-fn other_way_counts(survey: &Survey<'_>, hop: Hop) -> bool {
+fn other_way_counts(input: &LocateInput<'_>, hop: Hop) -> bool {
     let End::Controller(node, port) = hop.from else { return true };
-    let track = survey.track(node, ErrorCounter::PhysicalLayer(port));
+    let track = input.track(node, ErrorCounter::PhysicalLayer(port));
     track.is_some_and(|track| !track.is_at_end() || track.spell_rise() > 0)
 }
 
-const fn suspect(cause: FaultName, spot: Spot, weight: f64) -> Suspect {
+const fn suspect(cause: FaultName, spot: CausePlace, weight: f64) -> Suspect {
     Suspect { cause, spot, weight }
 }
 
@@ -458,16 +458,16 @@ fn add_earlier(list: &mut Vec<Suspect>, damage: &Damage) {
         suspect.weight *= share;
     }
     for hop in damage.or_earlier.iter().rev().take(4) {
-        let spot = Spot::Link(hop.link, Some(hop.direction));
+        let spot = CausePlace::Link(hop.link, Some(hop.direction));
         list.push(suspect(FaultName::CableDegraded, spot, total * share));
     }
 }
 
 /// The link with the direction in which it damages frames.
-fn link_spot(group: &Group) -> Spot {
+fn link_spot(group: &Group) -> CausePlace {
     let hops = group.damages.iter().map(|damage| damage.hop);
     let mut all = hops.chain(group.last_hop.as_ref().map(LastHop::hop));
-    let Some(first) = all.next() else { return Spot::Host };
+    let Some(first) = all.next() else { return CausePlace::Host };
     let is_one = all.all(|hop| hop.direction == first.direction);
-    Spot::Link(first.link, is_one.then_some(first.direction))
+    CausePlace::Link(first.link, is_one.then_some(first.direction))
 }

@@ -1,4 +1,4 @@
-//! From counters to hops: which bad frames were bad already when they came, and which became so.
+//! Damage of each hop from error counters: frames that were bad on arrival are told from those that became bad.
 //!
 //! The checks are walked in order, with the number of bad frames that earlier checks counted. A port
 //! with forwarded counting counts those apart; one without counts them again as invalid, so what is
@@ -12,9 +12,9 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Hop, Route};
 
-use super::spells::Spells;
-use super::survey::Survey;
-use crate::line::{CounterTrack, Counting, Rise};
+use super::input::LocateInput;
+use super::intervals::Intervals;
+use crate::model::{CounterTrack, Counting, Rise};
 
 /// Damage on one hop: a link in one direction, with the sender and the receiver at its ends.
 #[derive(Clone, PartialEq, Debug)]
@@ -85,13 +85,17 @@ pub struct Located {
 impl Located {
     /// Searches a line.
     #[must_use]
-    pub fn on(survey: &Survey<'_>) -> Self {
+    pub fn on(input: &LocateInput<'_>) -> Self {
         let mut located = Self::default();
         let mut nothing_counted = true;
         let mut ends = Vec::new();
-        for route in survey.routes() {
-            let mut walk =
-                Walk { survey, carried: Carried::default(), horizon: Instant::MAX, is_read: false };
+        for route in input.routes() {
+            let mut walk = ErrorWalk {
+                input,
+                carried: Carried::default(),
+                horizon: Instant::MAX,
+                is_read: false,
+            };
             located.hops.extend(walk.along(route));
             nothing_counted &= walk.carried.frames == 0;
             ends.push(walk.card(route));
@@ -125,8 +129,8 @@ struct Carried {
     is_lower_bound: bool,
 }
 
-struct Walk<'s, 'a> {
-    survey: &'s Survey<'a>,
+struct ErrorWalk<'s, 'a> {
+    input: &'s LocateInput<'a>,
     carried: Carried,
     /// What was counted up to then is in all readings walked by so far.
     horizon: Instant,
@@ -136,7 +140,7 @@ struct Walk<'s, 'a> {
 
 /// A counter as far as it can be compared with those before it.
 #[derive(Clone, Copy, Default, Debug)]
-struct Reading {
+struct CounterReading {
     /// Rises up to the horizon.
     settled: u64,
     /// All rises.
@@ -146,13 +150,13 @@ struct Reading {
     is_lower_bound: bool,
 }
 
-impl Walk<'_, '_> {
+impl ErrorWalk<'_, '_> {
     fn along(&mut self, route: &Route) -> Vec<Damage> {
         let mut found = Vec::new();
         let mut unread = Vec::new();
         for hop in route.hops() {
             let End::Controller(node, port) = hop.to else { continue };
-            let invalid = self.survey.track(node, ErrorCounter::InvalidFrame(port));
+            let invalid = self.input.track(node, ErrorCounter::InvalidFrame(port));
             // A counter that stood at 255 when the errors began is as good as none.
             let Some(invalid) = invalid.filter(|track| !is_stuck(track)) else {
                 found.extend(self.symbols_alone(route, *hop, node, port));
@@ -188,7 +192,7 @@ impl Walk<'_, '_> {
             // What is damaged before here would have been counted here.
             unread.clear();
             self.is_read = true;
-            if let Some(at) = self.survey.last_read(node, port) {
+            if let Some(at) = self.input.last_read(node, port) {
                 self.horizon = self.horizon.min(at);
             }
         }
@@ -197,13 +201,13 @@ impl Walk<'_, '_> {
 
     /// Symbols that a port counted whose frame counter stands at its end, or was not read.
     fn symbols_alone(&self, route: &Route, hop: Hop, node: usize, port: Port) -> Option<Damage> {
-        let track = self.survey.track(node, ErrorCounter::PhysicalLayer(port))?;
+        let track = self.input.track(node, ErrorCounter::PhysicalLayer(port))?;
         let physical = self.read(hop, track);
         let symbols = physical.settled.saturating_sub(physical.excused);
         // A frame that came in bad may show as a symbol; without the frame counter only more than
         // those are damage of the hop itself.
         let is_own = symbols > self.carried.frames && !is_stuck(track);
-        let first = self.survey.rises(track).next().map(|rise| rise.at);
+        let first = self.input.rises(track).next().map(|rise| rise.at);
         let last = track.last_rise().map(|rise| rise.at);
         is_own.then_some(Damage {
             path: route.path(),
@@ -229,10 +233,10 @@ impl Walk<'_, '_> {
         port: Port,
     ) -> Option<Damage> {
         let (nearest, earlier) = unread.split_last()?;
-        let track = self.survey.track(node, ErrorCounter::Forwarded(port))?;
+        let track = self.input.track(node, ErrorCounter::Forwarded(port))?;
         let forwarded = self.read(hop, track);
         let frames = forwarded.settled.saturating_sub(self.carried.frames);
-        let first = self.survey.rises(track).next().map(|rise| rise.at);
+        let first = self.input.rises(track).next().map(|rise| rise.at);
         let last = track.last_rise().map(|rise| rise.at);
         self.carried.frames = self.carried.frames.max(forwarded.total);
         (frames > 0).then_some(Damage {
@@ -256,10 +260,10 @@ impl Walk<'_, '_> {
         port: Port,
         invalid: &CounterTrack,
     ) -> Option<(u64, Option<u64>, bool)> {
-        let read = |counter| self.survey.track(node, counter).map(|track| self.read(hop, track));
+        let read = |counter| self.input.track(node, counter).map(|track| self.read(hop, track));
         let invalid = self.read(hop, invalid);
         let forwarded = read(ErrorCounter::Forwarded(port)).unwrap_or_default();
-        let physical = self.survey.track(node, ErrorCounter::PhysicalLayer(port));
+        let physical = self.input.track(node, ErrorCounter::PhysicalLayer(port));
         let physical = physical.filter(|track| !is_stuck(track));
         let physical = physical.map(|track| self.read(hop, track));
         let is_physical_read = physical.is_some();
@@ -304,18 +308,18 @@ impl Walk<'_, '_> {
 
     /// How a controller counts, where that is known.
     fn counting(&self, node: Option<usize>) -> Option<Counting> {
-        self.survey.line().devices.get(node?)?.counting
+        self.input.model().devices.get(node?)?.counting
     }
 
     /// How many symbol errors of a port came with bad frames. A reading may come between the symbol and the end of
     /// its frame: then the one shows in this reading, the other in the next.
     fn counted_with_frames(&self, node: usize, port: Port) -> u64 {
         let rises = |counter| {
-            let track = self.survey.track(node, counter);
-            track.into_iter().flat_map(|track| self.survey.rises(track))
+            let track = self.input.track(node, counter);
+            track.into_iter().flat_map(|track| self.input.rises(track))
         };
         let bad = [ErrorCounter::InvalidFrame(port), ErrorCounter::Forwarded(port)];
-        let frames: Spells =
+        let frames: Intervals =
             bad.into_iter().flat_map(rises).map(|rise| (rise.after_time, rise.at)).collect();
         let with_frames = rises(ErrorCounter::PhysicalLayer(port)).filter(|rise| {
             frames.meet((rise.after_time.before(Span::ns(1)), rise.at + Span::ns(1)))
@@ -323,20 +327,20 @@ impl Walk<'_, '_> {
         with_frames.map(|rise| rise.difference.rise).sum()
     }
 
-    fn read(&self, hop: Hop, track: &CounterTrack) -> Reading {
+    fn read(&self, hop: Hop, track: &CounterTrack) -> CounterReading {
         let total = track.spell_rise();
-        let horizon = if self.survey.has_ended() { Instant::MAX } else { self.horizon };
-        let mut reading = Reading {
+        let horizon = if self.input.has_ended() { Instant::MAX } else { self.horizon };
+        let mut reading = CounterReading {
             settled: total,
             total,
             excused: 0,
             is_lower_bound: track.total.is_lower_bound(),
         };
-        for rise in self.survey.rises(track) {
+        for rise in self.input.rises(track) {
             let by = rise.difference.rise;
             if rise.at > horizon {
                 reading.settled = reading.settled.saturating_sub(by);
-            } else if self.survey.falls_with_link_change(hop.link, rise)
+            } else if self.input.falls_with_link_change(hop.link, rise)
                 || (by == 1 && self.was_cut_before(hop, rise))
             {
                 reading.excused += by;
@@ -350,17 +354,17 @@ impl Walk<'_, '_> {
     fn was_cut_before(&self, hop: Hop, rise: &Rise) -> bool {
         let End::Controller(node, _) = hop.from else { return false };
         let others = Port::ALL.into_iter().map(|port| End::Controller(node, port));
-        let mut links = others.filter_map(|end| self.survey.tree().link_at(end));
-        links.any(|link| self.survey.falls_with_link_change(link, rise))
+        let mut links = others.filter_map(|end| self.input.tree().link_at(end));
+        links.any(|link| self.input.falls_with_link_change(link, rise))
     }
 
     /// When the port counted: the first and the latest reading that showed a rise.
     fn period(&self, node: usize, port: Port) -> (Instant, Instant) {
         let counters = [ErrorCounter::InvalidFrame(port), ErrorCounter::PhysicalLayer(port)];
-        let tracks = || counters.into_iter().filter_map(|c| self.survey.track(node, c));
-        let rises = || tracks().flat_map(|track| self.survey.rises(track)).map(|rise| rise.at);
+        let tracks = || counters.into_iter().filter_map(|c| self.input.track(node, c));
+        let rises = || tracks().flat_map(|track| self.input.rises(track)).map(|rise| rise.at);
         let (first, last) = (rises().min(), rises().max());
-        let now = self.survey.line().now;
+        let now = self.input.model().now;
         (first.unwrap_or(now), last.unwrap_or(now))
     }
 
@@ -368,16 +372,16 @@ impl Walk<'_, '_> {
     fn card(&self, route: &Route) -> Option<LastHop> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
-        let errors = self.survey.line().host.card(card).crc;
+        let errors = self.input.model().host.card(card).crc;
         let (first, last) = (errors.first_of_spell?, errors.last?);
         // At the end of the input no reading comes any more. If nothing came back at last, the
         // counters could not even be asked, and their silence says nothing.
-        let silences = &self.survey.line().traffic.silences;
+        let silences = &self.input.model().traffic.silences;
         let is_silent = silences.back().is_some_and(|silence| silence.ended.is_none());
-        let may_judge = self.survey.has_ended() && !is_silent;
+        let may_judge = self.input.has_ended() && !is_silent;
         let read_since = |at: Instant| may_judge || self.horizon > at;
         // What controllers had counted when they were cleared nobody has read.
-        let devices = self.survey.line().devices.iter();
+        let devices = self.input.model().devices.iter();
         let cleared = devices.filter_map(|device| device.counters.cleared_by_order()).max();
         if cleared.is_some_and(|cleared| last <= cleared + CARD_READ_WITHIN) {
             return None;
@@ -401,26 +405,26 @@ impl Walk<'_, '_> {
     fn unknown(&self, route: &Route) -> Option<LastHop> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
-        let line = self.survey.line();
+        let model = self.input.model();
         // In a ring one of the two copies is lost at a time; a few whole ones were lost while it came up.
-        let copies = line.traffic.copies_lost[card.index()];
-        let whole = line.traffic.lost;
+        let copies = model.traffic.copies_lost[card.index()];
+        let whole = model.traffic.lost;
         let lost = if copies.of_spell() > whole.of_spell() { copies } else { whole };
         let (first, last) = (lost.first_of_spell?, lost.last?);
-        let is_silent = self.carried.frames == 0 && !line.host.is_watched;
+        let is_silent = self.carried.frames == 0 && !model.host.is_watched;
         // Counters that were read before the frame was missed say nothing of it.
         let is_read = self.is_read && self.horizon >= first;
-        let is_first = line.traffic.first.is_some_and(|begin| last < begin + COMING_UP);
+        let is_first = model.traffic.first.is_some_and(|begin| last < begin + COMING_UP);
         // Somebody who looks for the place where all of them vanish does so in a silence, not in noise.
         let was_searched =
-            line.hole.is_some_and(|hole| first <= hole.since.at && hole.since.at <= last);
-        let is_cut = line.traffic.datagrams_cut > 0;
-        let is_unrecorded = line.traffic.was_badly_recorded(first, last);
+            model.hole.is_some_and(|hole| first <= hole.since.at && hole.since.at <= last);
+        let is_cut = model.traffic.datagrams_cut > 0;
+        let is_unrecorded = model.traffic.was_badly_recorded(first, last);
         let is_explained = is_unrecorded
             || is_cut
             || is_first
             || was_searched
-            || self.survey.any_link_changed(first, last);
+            || self.input.any_link_changed(first, last);
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,
             card,

@@ -1,4 +1,4 @@
-//! Where frames are damaged: the counters of all controllers, read in the order of the checks.
+//! Location of damaged frames: the counters of all controllers, in the order in which the ports check frames.
 //!
 //! A controller checks a frame where it comes in from outside, and counts a bad one; whether later
 //! controllers count it again depends on their type. But all of them lie *behind* the damage: the
@@ -8,15 +8,15 @@
 //! References: S1 14 (error counters); how to find an error, `REQUIREMENTS` HW-18, HW-22 to HW-28.
 
 pub mod cause;
+pub mod cut_distance;
 pub mod damage;
-pub mod drops;
+pub mod input;
+pub mod intervals;
+pub mod link_losses;
 mod rhythm;
-pub mod spells;
-pub mod survey;
-pub mod way;
 
 pub use cause::{Suspect, Suspicion};
 pub use damage::{Damage, LastHop, Located};
-pub use drops::{Drop, Drops};
-pub use spells::Spells;
-pub use survey::Survey;
+pub use input::LocateInput;
+pub use intervals::Intervals;
+pub use link_losses::{LinkLoss, LinkLosses};

@@ -1,13 +1,13 @@
-//! How errors come in time: two places in step, or one place steadily.
+//! Pattern of errors over time: two places in step, or one place steadily.
 
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Span;
 use linesman_proto::topology::End;
 
 use super::damage::Damage;
-use super::spells::{Spell, Spells, meet};
-use super::survey::Survey;
-use crate::line::Rise;
+use super::input::LocateInput;
+use super::intervals::{Interval, Intervals, meet};
+use crate::model::Rise;
 
 /// Readings further apart than this say nothing of what came at the same moment.
 const CLOSE_READING: Span = Span::ms(150);
@@ -26,9 +26,9 @@ const ENOUGH_MEETINGS: usize = 2;
 ///
 /// Whether they meet more often than by chance is seen from the same two series, moved against each other in
 /// circles: each keeps its own rhythm, and how often places are hit and read does not matter.
-pub(super) fn falls_together(survey: &Survey<'_>, a: &[Damage], b: &[Damage]) -> bool {
-    let (a, b) = (hits(survey, a), hits(survey, b));
-    let ends = |hits: &[Spell]| Some((*hits.first()?, *hits.last()?));
+pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]) -> bool {
+    let (a, b) = (hits(input, a), hits(input, b));
+    let ends = |hits: &[Interval]| Some((*hits.first()?, *hits.last()?));
     let (Some((a_first, a_last)), Some((b_first, b_last))) = (ends(&a), ends(&b)) else {
         return false;
     };
@@ -36,16 +36,16 @@ pub(super) fn falls_together(survey: &Survey<'_>, a: &[Damage], b: &[Damage]) ->
         return true;
     }
     let both = (a_first.0.max(b_first.0), a_last.1.min(b_last.1));
-    let within = |hits: &[Spell]| -> Vec<Spell> {
+    let within = |hits: &[Interval]| -> Vec<Interval> {
         hits.iter().copied().filter(|hit| meet(*hit, both)).collect()
     };
-    let (a, b) = (within(&a), Spells::from_iter(within(&b)));
+    let (a, b) = (within(&a), Intervals::from_iter(within(&b)));
     let met = a.iter().filter(|hit| b.meet(**hit)).count();
     let around = both.1.since(both.0).as_nanos();
     if met < ENOUGH_MEETINGS || around == 0 {
         return false;
     }
-    let moved = |(begin, end): Spell, by: u64| {
+    let moved = |(begin, end): Interval, by: u64| {
         let moved = both.0 + Span::ns((begin.since(both.0).as_nanos() + by) % around);
         (moved, moved + end.since(begin))
     };
@@ -58,10 +58,10 @@ pub(super) fn falls_together(survey: &Survey<'_>, a: &[Damage], b: &[Damage]) ->
 
 /// When a place was hit, in order, as far as it was read closely: a hit lies between the reading before a rise
 /// and the reading that shows it.
-fn hits(survey: &Survey<'_>, damages: &[Damage]) -> Vec<Spell> {
-    let rises = damages.iter().flat_map(|damage| rises(survey, damage));
+fn hits(input: &LocateInput<'_>, damages: &[Damage]) -> Vec<Interval> {
+    let rises = damages.iter().flat_map(|damage| rises(input, damage));
     let between = rises.map(|rise| (rise.after_time, rise.at));
-    let mut hits: Vec<Spell> =
+    let mut hits: Vec<Interval> =
         between.filter(|(begin, end)| end.since(*begin) <= CLOSE_READING).collect();
     hits.sort_unstable();
     hits.dedup();
@@ -69,13 +69,13 @@ fn hits(survey: &Survey<'_>, damages: &[Damage]) -> Vec<Spell> {
 }
 
 /// Whether errors come in nearly each reading, as a damaged part makes them, and not in bursts.
-pub(super) fn is_steady(survey: &Survey<'_>, damages: &[Damage]) -> bool {
+pub(super) fn is_steady(input: &LocateInput<'_>, damages: &[Damage]) -> bool {
     damages.iter().all(|damage| {
         let End::Controller(node, port) = damage.hop.to else { return false };
-        let Some(track) = survey.track(node, ErrorCounter::PhysicalLayer(port)) else {
+        let Some(track) = input.track(node, ErrorCounter::PhysicalLayer(port)) else {
             return false;
         };
-        let rises: Vec<&Rise> = survey.rises(track).collect();
+        let rises: Vec<&Rise> = input.rises(track).collect();
         let (Some(first), Some(last)) = (rises.first(), rises.last()) else { return false };
         let reading = last.at.since(last.after_time).as_nanos();
         let period = last.at.since(first.after_time).as_nanos();
@@ -85,12 +85,12 @@ pub(super) fn is_steady(survey: &Survey<'_>, damages: &[Damage]) -> bool {
 }
 
 /// The rises of the receiving port that show a damage.
-fn rises<'a>(survey: &Survey<'a>, damage: &Damage) -> Vec<&'a Rise> {
+fn rises<'a>(input: &LocateInput<'a>, damage: &Damage) -> Vec<&'a Rise> {
     let End::Controller(node, port) = damage.hop.to else { return Vec::new() };
     let counters = [ErrorCounter::PhysicalLayer(port), ErrorCounter::InvalidFrame(port)];
     counters
         .into_iter()
-        .filter_map(|counter| survey.track(node, counter))
-        .flat_map(|track| survey.rises(track))
+        .filter_map(|counter| input.track(node, counter))
+        .flat_map(|track| input.rises(track))
         .collect()
 }

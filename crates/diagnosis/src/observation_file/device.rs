@@ -1,4 +1,4 @@
-//! What was read of a SubDevice and its ports.
+//! Readings of a SubDevice and its ports.
 
 use linesman_config::attachment::Attachment;
 use linesman_proto::port::{Port, PortMap};
@@ -7,7 +7,7 @@ use linesman_proto::state::DeviceState;
 use serde::Deserialize;
 
 use super::value::{Count, Word};
-use crate::line::Counting;
+use crate::model::Counting;
 
 /// A SubDevice as somebody read it.
 #[derive(Clone, PartialEq, Debug, Deserialize, schemars::JsonSchema)]

@@ -1,4 +1,4 @@
-//! What happened meanwhile: emergencies, and parts that were exchanged to find a fault.
+//! Events between readings: emergencies, and parts that were exchanged to find a fault.
 
 use serde::Deserialize;
 

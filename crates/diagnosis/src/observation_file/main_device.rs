@@ -1,4 +1,4 @@
-//! What the MainDevice counts of its frames, and its card.
+//! Counts of the MainDevice: its frames and its card.
 
 use serde::Deserialize;
 

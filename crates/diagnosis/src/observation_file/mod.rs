@@ -38,8 +38,8 @@ pub use value::{Address, Count, Date, Word};
 pub use working_counter::{LogicalCommand, ObservedWorkingCounter};
 
 use crate::engine::{Engine, Setup};
-use crate::line::reported::WiringBasis;
 use crate::main_device::MainDeviceKind;
+use crate::model::reported::WiringBasis;
 use crate::report::Diagnosis;
 use place::Lines;
 
@@ -177,9 +177,9 @@ impl ObservationFile {
     /// The same with the line behind it: an engine that has come to its end.
     #[must_use]
     pub fn judged(&self, setup: Setup) -> Engine {
-        let line = self.line(setup.project.as_ref());
-        let at = line.now;
-        let mut engine = Engine::with_line(setup, line);
+        let model = self.model(setup.project.as_ref());
+        let at = model.now;
+        let mut engine = Engine::with_line(setup, model);
         engine.finish(at, true);
         engine
     }

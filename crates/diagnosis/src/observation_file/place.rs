@@ -6,7 +6,7 @@ use linesman_proto::topology::{End, Tree};
 
 use super::value::Date;
 use super::{ExchangedPart, ObservationError, ObservationFile, ObservedExchange, Reading};
-use crate::line::reported::ExchangePlace;
+use crate::model::reported::ExchangePlace;
 
 /// Where the tables of a file begin.
 #[derive(Clone, Debug, Default)]

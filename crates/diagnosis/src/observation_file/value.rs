@@ -21,26 +21,26 @@ pub struct Count(pub u64);
 pub struct Address(pub u32);
 
 /// A number with what is expected of it.
-trait Number: Sized {
+trait CheckedNumber: Sized {
     const EXPECTED: &'static str;
     fn of(value: u64) -> Option<Self>;
 }
 
-impl Number for Word {
+impl CheckedNumber for Word {
     const EXPECTED: &'static str = "a number from 0 to 65535, or text such as \"0x0412\"";
     fn of(value: u64) -> Option<Self> {
         u16::try_from(value).ok().map(Self)
     }
 }
 
-impl Number for Count {
+impl CheckedNumber for Count {
     const EXPECTED: &'static str = "a count from 0 up, or text such as \"0x12\"";
     fn of(value: u64) -> Option<Self> {
         Some(Self(value))
     }
 }
 
-impl Number for Address {
+impl CheckedNumber for Address {
     const EXPECTED: &'static str = "an address of 32 bits, or text such as \"0x01000000\"";
     fn of(value: u64) -> Option<Self> {
         u32::try_from(value).ok().map(Self)
@@ -59,9 +59,9 @@ pub(crate) fn number(text: &str) -> Option<u64> {
     }
 }
 
-struct Reader<T>(PhantomData<T>);
+struct ValueVisitor<T>(PhantomData<T>);
 
-impl<T: Number> de::Visitor<'_> for Reader<T> {
+impl<T: CheckedNumber> de::Visitor<'_> for ValueVisitor<T> {
     type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -88,7 +88,7 @@ macro_rules! read_as_number {
         $(
             impl<'de> Deserialize<'de> for $name {
                 fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                    deserializer.deserialize_any(Reader(PhantomData))
+                    deserializer.deserialize_any(ValueVisitor(PhantomData))
                 }
             }
 

@@ -1,4 +1,4 @@
-//! What a frame keeps on its way through the line, and what changes.
+//! Fingerprint of a frame: the fields that stay the same on its way through the line.
 //!
 //! Controllers keep command, index, length and, but for positions, the address of each datagram;
 //! they change working counters, positions and data. The former pair a frame with its request, the

@@ -1,5 +1,4 @@
-//! What comes in: frames as they were seen, and what the host noticed; and which frames belong
-//! together.
+//! Input of the diagnosis: frames as they were seen, observations of the host, and the pairing of requests with returns.
 
 pub(crate) mod companion;
 mod exchange;
@@ -12,7 +11,7 @@ mod sequence;
 
 pub use exchange::{Exchange, FrameCopy};
 pub use fingerprint::Fingerprint;
-pub use pairing::{Outcome, Pairing};
+pub use pairing::{Pairing, PairingOutcome};
 pub use question::Questions;
 pub use seen::{Direction, FrameSeen, HostEvent, HostObservation};
 pub use sender::Sender;

@@ -1,4 +1,4 @@
-//! Which frames belong together.
+//! Pairing of requests with their returns.
 //!
 //! A live socket knows what it sent and what it received. Most captures do not: there a frame is a
 //! return when it fits an outstanding request and differs from it in what controllers change, or
@@ -46,7 +46,7 @@ const REMEMBERED: usize = 8;
 
 /// What a frame turned out to be, besides the exchange it may complete.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Outcome {
+pub enum PairingOutcome {
     /// A request.
     Request,
     /// The same request by the other card.
@@ -126,7 +126,7 @@ impl Pairing {
         view: &FrameView<'_>,
         print: Fingerprint,
         settle: &mut impl FnMut(&Exchange<'_>),
-    ) -> Outcome {
+    ) -> PairingOutcome {
         let source = view.source();
         let is_unknown = frame.direction == Direction::Unknown;
         // In a recording of returns alone the copy that card B sent looks like a request; what card A sent is no
@@ -150,7 +150,7 @@ impl Pairing {
         });
         if is_unknown && self.is_one_way_for_sure() && !source.is_marked() {
             // The copy of a ring's second card, which no controller has touched.
-            return Outcome::Duplicate;
+            return PairingOutcome::Duplicate;
         }
         let is_return = match frame.direction {
             Direction::Sent => false,
@@ -164,13 +164,13 @@ impl Pairing {
         }
         let Some(found) = found else {
             if self.was_returned(print, frame.time, RECORDED_TWICE) {
-                return Outcome::Duplicate;
+                return PairingOutcome::Duplicate;
             }
             if frame.direction == Direction::Received
                 && self.was_returned(print, frame.time, TIMEOUT)
             {
                 self.doubled += 1;
-                return Outcome::Duplicate;
+                return PairingOutcome::Duplicate;
             }
             if frame.direction == Direction::Unknown {
                 self.weigh_one_way(source, print, settle);
@@ -190,13 +190,13 @@ impl Pairing {
                 sent_by: None,
             });
             self.returns += 1;
-            return Outcome::ReturnAlone;
+            return PairingOutcome::ReturnAlone;
         };
         self.one_way = OneWay::No;
         self.remember(print, frame.time);
         self.returns += 1;
         self.give_back(found, frame, view, settle);
-        Outcome::Return
+        PairingOutcome::Return
     }
 
     /// Settles what a live socket waited for in vain.
@@ -283,7 +283,7 @@ impl Pairing {
         is_repeated: bool,
         print: Fingerprint,
         settle: &mut impl FnMut(&Exchange<'_>),
-    ) -> Outcome {
+    ) -> PairingOutcome {
         if let Some(path) = frame.path
             && let Some(pending) = self.pending.iter_mut().rev().find(|pending| {
                 pending.print == print
@@ -294,7 +294,7 @@ impl Pairing {
             pending.sent[path.index()] = true;
             pending.copy_by = Some(source);
             pending.out += 1;
-            return Outcome::RequestCopy;
+            return PairingOutcome::RequestCopy;
         }
         let is_unknown_card = frame.path.is_none();
         let is_other_card = |pending: &&mut Pending| {
@@ -311,7 +311,7 @@ impl Pairing {
             pending.out += 1;
             self.other_card = Some(source);
             self.senders.note(frame, source, is_repeated);
-            return Outcome::RequestCopy;
+            return PairingOutcome::RequestCopy;
         }
         let was_recorded = |pending: &Pending| {
             pending.print == print
@@ -323,7 +323,7 @@ impl Pairing {
         if frame.direction == Direction::Unknown
             && self.pending.iter().rev().take(8).any(was_recorded)
         {
-            return Outcome::Duplicate;
+            return PairingOutcome::Duplicate;
         }
         // For the two cards of a ring some commands are replaced by NOP, now in the one copy, now in the other.
         let is_twin = |pending: &Pending| {
@@ -377,7 +377,7 @@ impl Pairing {
             returns_before: self.returns,
             sums,
         });
-        Outcome::Request
+        PairingOutcome::Request
     }
 
     /// A return of a request that was not seen: where requests are, somebody else sent it.
@@ -476,7 +476,7 @@ mod tests {
     #[test]
     fn lost_frame_does_not_take_the_return_of_a_later_one_with_its_index() {
         let mut pairing = Pairing::default();
-        let (mut trips, mut lost) = (Vec::new(), Vec::new());
+        let (mut round_trips, mut lost) = (Vec::new(), Vec::new());
         // SOEM has 16 indexes and uses them in turn.
         for cycle in 0..200_u64 {
             let at = Instant::ZERO + Span::ms(2 * cycle);
@@ -503,13 +503,13 @@ mod tests {
                 pairing.take(&seen, &view, Fingerprint::of(&view), &mut |exchange| {
                     let sent = exchange.request.unwrap();
                     match exchange.reply {
-                        Some(reply) => trips.push(reply.time.since(sent.time)),
+                        Some(reply) => round_trips.push(reply.time.since(sent.time)),
                         None => lost.push(sent.number),
                     }
                 });
             }
         }
         assert_eq!(lost, [60]);
-        assert!(trips.iter().all(|trip| *trip == Span::us(50)), "{trips:?}");
+        assert!(round_trips.iter().all(|trip| *trip == Span::us(50)), "{round_trips:?}");
     }
 }

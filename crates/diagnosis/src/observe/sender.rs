@@ -1,4 +1,4 @@
-//! Who sends requests: one MainDevice, its second card, or somebody else.
+//! Senders of requests: one MainDevice, its second card, or somebody else.
 
 use linesman_proto::address::Path;
 use linesman_proto::command::Addressing;
@@ -9,7 +9,7 @@ use linesman_proto::time::Instant;
 
 use super::sequence::IndexSequence;
 use super::{Direction, Fingerprint, FrameSeen};
-use crate::line::Seen;
+use crate::model::Seen;
 
 /// So many requests of its own make a sender one for sure.
 pub const OWN: u64 = 16;

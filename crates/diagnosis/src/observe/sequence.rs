@@ -12,7 +12,7 @@ const REGULAR_PERCENT: u32 = 80;
 
 /// The way in which a sender counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Step {
+enum IndexStep {
     /// One with each frame.
     Frame,
     /// One with each datagram.
@@ -53,21 +53,21 @@ impl IndexSequence {
         self.exact[0] += u32::from(by_frame == 0);
         self.exact[1] += u32::from(by_datagram == 0);
         match step {
-            Some(Step::Frame) => u64::from(by_frame),
-            Some(Step::Datagram) => u64::from(by_datagram.min(1)),
+            Some(IndexStep::Frame) => u64::from(by_frame),
+            Some(IndexStep::Datagram) => u64::from(by_datagram.min(1)),
             None => 0,
         }
     }
 
-    fn step(&self) -> Option<Step> {
+    fn step(&self) -> Option<IndexStep> {
         if self.frames < LEARNT_FROM {
             return None;
         }
         let is_rule = |right: u32| right * 100 >= self.frames * REGULAR_PERCENT;
         match (is_rule(self.by_frame), is_rule(self.by_datagram)) {
-            (true, true) if self.exact[1] > self.exact[0] => Some(Step::Datagram),
-            (true, _) => Some(Step::Frame),
-            (false, true) => Some(Step::Datagram),
+            (true, true) if self.exact[1] > self.exact[0] => Some(IndexStep::Datagram),
+            (true, _) => Some(IndexStep::Frame),
+            (false, true) => Some(IndexStep::Datagram),
             (false, false) => None,
         }
     }

@@ -3,7 +3,7 @@
 //! Reference: statistics of the drivers e1000e, igb, igc, r8169, and `Documentation/networking/statistics.rst` of
 //! Linux. `rx_dropped` is left aside: among it are frames that no program wanted.
 
-use super::fact::{Block, Format, What, extent};
+use super::fact::{Block, FactKind, Format, extent};
 use super::text::{Line, count};
 use crate::observation_file::{Count, ObservedMainDevice};
 
@@ -82,7 +82,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     // What else goes over the card is no matter of EtherCAT; but there is hardly anything else.
     main.sent = sum(&rows, &SENT);
     block.what = "`ethtool -S`".to_owned();
-    block.tell(What::Main(Box::new(main)));
+    block.tell(FactKind::Main(Box::new(main)));
     Some(block)
 }
 
@@ -121,7 +121,7 @@ mod tests {
 
     fn main(text: &str) -> ObservedMainDevice {
         let block = take(&lines(text)).unwrap();
-        let [Fact { what: What::Main(main), .. }] = &block.facts[..] else { panic!() };
+        let [Fact { what: FactKind::Main(main), .. }] = &block.facts[..] else { panic!() };
         *main.clone()
     }
 

@@ -1,4 +1,4 @@
-//! What a block of text tells.
+//! Facts that a block of text tells.
 
 use linesman_proto::port::{Port, PortMap};
 
@@ -92,11 +92,11 @@ impl Block {
     }
 
     /// A further fact, without a time.
-    pub(super) fn tell(&mut self, what: What) {
+    pub(super) fn tell(&mut self, what: FactKind) {
         self.tell_at(None, what);
     }
 
-    pub(super) fn tell_at(&mut self, stamp: Option<Stamp>, what: What) {
+    pub(super) fn tell_at(&mut self, stamp: Option<Stamp>, what: FactKind) {
         self.facts.push(Fact { stamp, what });
     }
 }
@@ -107,33 +107,33 @@ pub(super) struct Fact {
     /// When, where a line says so.
     pub(super) stamp: Option<Stamp>,
     /// What.
-    pub(super) what: What,
+    pub(super) what: FactKind,
 }
 
 /// What is told.
 #[derive(Clone, Debug)]
-pub(super) enum What {
+pub(super) enum FactKind {
     /// A SubDevice is there.
-    About(Whom, Box<About>),
+    SubDeviceFact(SubDeviceRef, Box<SubDeviceFact>),
     /// What was read of it.
-    Read(Whom, Box<ReadDevice>),
+    Read(SubDeviceRef, Box<ReadDevice>),
     /// What the MainDevice, or its card, counted by then.
     Main(Box<ObservedMainDevice>),
     /// What was counted since the last such line.
     Added(Box<ObservedMainDevice>),
     /// A working counter.
-    WorkingCounter(Box<ObservedWorkingCounter>, Vec<Whom>),
+    WorkingCounter(Box<ObservedWorkingCounter>, Vec<SubDeviceRef>),
     /// A SubDevice sent an emergency.
-    Emergency { whom: Whom, code: u16, register: Option<u8>, data: Vec<u8> },
+    Emergency { whom: SubDeviceRef, code: u16, register: Option<u8>, data: Vec<u8> },
     /// A SubDevice refused a request.
-    Abort { whom: Whom, index: u16, subindex: u8, code: u32 },
+    Abort { whom: SubDeviceRef, index: u16, subindex: u8, code: u32 },
     /// Those from one to another are gone, or there again.
-    Interrupted { from: Whom, to: Whom, is_back: bool },
+    Interrupted { from: SubDeviceRef, to: SubDeviceRef, is_back: bool },
 }
 
 /// Which SubDevice a text means.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) enum Whom {
+pub(super) enum SubDeviceRef {
     /// By its position, from 0.
     Position(u16),
     /// By its name, with its station address where that is given.
@@ -144,7 +144,7 @@ pub(super) enum Whom {
 
 /// What a text says of a SubDevice for all time.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
-pub(super) struct About {
+pub(super) struct SubDeviceFact {
     pub(super) name: Option<String>,
     pub(super) type_name: Option<String>,
     pub(super) station: Option<u16>,
@@ -162,7 +162,7 @@ pub(super) struct About {
     pub(super) counted: Vec<Port>,
 }
 
-impl About {
+impl SubDeviceFact {
     /// Takes over what another text says.
     pub(super) fn merge(&mut self, other: &Self) {
         fn take<T: Clone>(into: &mut Option<T>, from: &Option<T>) {

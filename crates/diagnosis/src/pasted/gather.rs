@@ -1,4 +1,4 @@
-//! From the facts of all blocks to one observation.
+//! Collection of the facts of all blocks into one observation.
 
 mod roster;
 mod timeline;
@@ -12,10 +12,10 @@ use linesman_proto::state::DeviceState;
 
 use self::roster::Roster;
 use self::timeline::Timeline;
-use super::fact::{About, Block, Format, What, Whom};
+use super::fact::{Block, FactKind, Format, SubDeviceFact, SubDeviceRef};
 use super::wiring::{self, Hints};
 use super::{Understood, UnderstoodBlock, ethtool};
-use crate::line::reported::WiringBasis;
+use crate::model::reported::WiringBasis;
 use crate::observation_file::{
     Address, Count, ObservationFile, ObservedAbort, ObservedDevice, ObservedEmergency,
     ObservedMainDevice, ObservedWorkingCounter, ReadDevice, ReadPort, Reading, Word,
@@ -78,7 +78,7 @@ struct Gatherer {
 
 /// When something was read.
 #[derive(Clone, Copy, PartialEq, Debug)]
-enum When {
+enum ReadTime {
     /// In the end.
     Last,
     /// So many seconds before the end.
@@ -94,7 +94,7 @@ impl Gatherer {
             for (number, fact) in block.facts.iter().enumerate() {
                 let when = timeline.when(blocks, index, number);
                 let mut what = fact.what.clone();
-                if let (What::Main(main), Format::Ethtool, true) =
+                if let (FactKind::Main(main), Format::Ethtool, true) =
                     (&mut what, block.format, knows_sent)
                 {
                     (main.sent, main.send_errors) = (None, None);
@@ -104,28 +104,28 @@ impl Gatherer {
         }
     }
 
-    fn take(&mut self, what: What, when: When, timeline: &Timeline) {
+    fn take(&mut self, what: FactKind, when: ReadTime, timeline: &Timeline) {
         match what {
-            What::About(..) => {}
-            What::Read(whom, read) => {
+            FactKind::SubDeviceFact(..) => {}
+            FactKind::Read(whom, read) => {
                 if let Some(index) = self.roster.find(&whom) {
                     self.read(index, *read, when);
                 }
             }
-            What::Main(main) => self.main(*main, when),
-            What::Added(main) => {
+            FactKind::Main(main) => self.main(*main, when),
+            FactKind::Added(main) => {
                 add(&mut self.added, &main);
                 let main = self.added.clone();
                 self.main(main, when);
             }
-            What::WorkingCounter(mut counter, whom) => {
+            FactKind::WorkingCounter(mut counter, whom) => {
                 let labels =
                     whom.iter().filter_map(|whom| Some(self.roster.label(self.roster.find(whom)?)));
                 counter.devices = labels.collect();
                 counter.devices.dedup();
                 self.counter(*counter, when);
             }
-            What::Emergency { whom, code, register, data } => {
+            FactKind::Emergency { whom, code, register, data } => {
                 let Some(index) = self.roster.find(&whom) else { return };
                 let (at, at_s) = timeline.time(when);
                 let device = self.roster.label(index);
@@ -139,14 +139,14 @@ impl Gatherer {
                     at_s,
                 });
             }
-            What::Abort { whom, index, subindex, code } => {
+            FactKind::Abort { whom, index, subindex, code } => {
                 let Some(at_device) = self.roster.find(&whom) else { return };
                 let (at, at_s) = timeline.time(when);
                 let device = self.roster.label(at_device);
                 let (index, code) = (Some(Word(index)), Some(Address(code)));
                 self.file.aborts.push(ObservedAbort { device, index, subindex, code, at, at_s });
             }
-            What::Interrupted { from, to, is_back } => {
+            FactKind::Interrupted { from, to, is_back } => {
                 let (Some(from), Some(to)) = (self.roster.find(&from), self.roster.find(&to))
                 else {
                     return;
@@ -170,14 +170,14 @@ impl Gatherer {
         }
     }
 
-    fn read(&mut self, index: usize, read: ReadDevice, when: When) {
+    fn read(&mut self, index: usize, read: ReadDevice, when: ReadTime) {
         match when {
-            When::Last => {
+            ReadTime::Last => {
                 if let Some(into) = self.reads.get_mut(index) {
                     merge(into, read);
                 }
             }
-            When::Before(seconds) => {
+            ReadTime::Before(seconds) => {
                 let no = u32::try_from(index + 1).ok();
                 let devices = vec![ReadDevice { no, ..read }];
                 self.readings.push((seconds, Reading { devices, ..Reading::default() }));
@@ -185,20 +185,20 @@ impl Gatherer {
         }
     }
 
-    fn main(&mut self, main: ObservedMainDevice, when: When) {
+    fn main(&mut self, main: ObservedMainDevice, when: ReadTime) {
         match when {
-            When::Last => merge_main(self.file.maindevice.get_or_insert_default(), main),
-            When::Before(seconds) => {
+            ReadTime::Last => merge_main(self.file.maindevice.get_or_insert_default(), main),
+            ReadTime::Before(seconds) => {
                 let maindevice = Some(main);
                 self.readings.push((seconds, Reading { maindevice, ..Reading::default() }));
             }
         }
     }
 
-    fn counter(&mut self, counter: ObservedWorkingCounter, when: When) {
+    fn counter(&mut self, counter: ObservedWorkingCounter, when: ReadTime) {
         match when {
-            When::Last => self.file.working_counters.push(counter),
-            When::Before(seconds) => {
+            ReadTime::Last => self.file.working_counters.push(counter),
+            ReadTime::Before(seconds) => {
                 let working_counters = vec![counter];
                 self.readings.push((seconds, Reading { working_counters, ..Reading::default() }));
             }
@@ -208,13 +208,13 @@ impl Gatherer {
     fn finish(mut self, timeline: &Timeline, assumed: &mut Vec<String>) -> ObservationFile {
         self.readings.sort_by(|(one, _), (other, _)| other.total_cmp(one));
         for (seconds, mut reading) in std::mem::take(&mut self.readings) {
-            (reading.at, reading.at_s) = timeline.time(When::Before(seconds));
+            (reading.at, reading.at_s) = timeline.time(ReadTime::Before(seconds));
             self.file.readings.push(reading);
         }
         let has_times = !self.file.readings.is_empty()
             || self.file.emergencies.iter().any(|one| one.at.is_some() || one.at_s.is_some());
         if has_times {
-            (self.file.at, self.file.at_s) = timeline.time(When::Last);
+            (self.file.at, self.file.at_s) = timeline.time(ReadTime::Last);
         }
         self.file.times_are_assumed = timeline.is_assumed();
         let mut latest: BTreeMap<u32, &str> = BTreeMap::new();
@@ -262,7 +262,7 @@ impl Gatherer {
     }
 
     /// What tells of the place of a SubDevice. `latest` is the last state that a reading has of each.
-    fn hints(&self, index: usize, about: &About, latest: &BTreeMap<u32, &str>) -> Hints {
+    fn hints(&self, index: usize, about: &SubDeviceFact, latest: &BTreeMap<u32, &str>) -> Hints {
         let own = self.reads.get(index).and_then(|read| read.state.as_deref());
         let earlier = || latest.get(&u32::try_from(index + 1).ok()?).copied();
         let state: Option<DeviceState> = own.or_else(earlier).and_then(|text| text.parse().ok());
@@ -284,7 +284,7 @@ impl Gatherer {
 }
 
 /// What a text says of a SubDevice, as an observation file has it.
-fn fill(device: &mut ObservedDevice, about: &About, read: ReadDevice) {
+fn fill(device: &mut ObservedDevice, about: &SubDeviceFact, read: ReadDevice) {
     device.type_name = about.type_name.clone().unwrap_or_default();
     device.station = about.station;
     device.vendor_id = about.vendor_id;
@@ -384,7 +384,7 @@ fn merge_main(into: &mut ObservedMainDevice, from: ObservedMainDevice) {
 fn zeros(blocks: &[Block]) -> ObservedMainDevice {
     let mut zeros = ObservedMainDevice::default();
     for what in blocks.iter().flat_map(|block| &block.facts).map(|fact| &fact.what) {
-        if let What::Added(main) = what {
+        if let FactKind::Added(main) = what {
             add(&mut zeros, main);
         }
     }
@@ -428,14 +428,14 @@ fn line_in_order(file: &mut ObservationFile) {
 }
 
 /// Whom a fact is about.
-fn whom(what: &What) -> impl Iterator<Item = &Whom> {
+fn whom(what: &FactKind) -> impl Iterator<Item = &SubDeviceRef> {
     let (one, other) = match what {
-        What::About(whom, _)
-        | What::Read(whom, _)
-        | What::Emergency { whom, .. }
-        | What::Abort { whom, .. } => (Some(whom), None),
-        What::Interrupted { from, to, .. } => (Some(from), Some(to)),
-        What::Main(_) | What::Added(_) | What::WorkingCounter(..) => (None, None),
+        FactKind::SubDeviceFact(whom, _)
+        | FactKind::Read(whom, _)
+        | FactKind::Emergency { whom, .. }
+        | FactKind::Abort { whom, .. } => (Some(whom), None),
+        FactKind::Interrupted { from, to, .. } => (Some(from), Some(to)),
+        FactKind::Main(_) | FactKind::Added(_) | FactKind::WorkingCounter(..) => (None, None),
     };
     [one, other].into_iter().flatten()
 }

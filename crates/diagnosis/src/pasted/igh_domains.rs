@@ -1,7 +1,7 @@
 //! `ethercat domains` and `ethercat domains -v` of the IgH EtherCAT Master: working counters, and who shares in
 //! them.
 
-use super::fact::{Block, Format, What, Whom, extent};
+use super::fact::{Block, FactKind, Format, SubDeviceRef, extent};
 use super::igh_slaves::configured;
 use super::text::{Line, between, hex, leading_number, so_many};
 use crate::observation_file::{LogicalCommand, ObservedWorkingCounter};
@@ -28,7 +28,7 @@ pub(super) fn working_counter(text: &str) -> Option<(u16, u16)> {
 }
 
 /// `SlaveConfig 1001:0, SM3 ( Input), LogAddr 0x00000006, Size 6`.
-fn share(line: &str) -> Option<(Whom, bool)> {
+fn share(line: &str) -> Option<(SubDeviceRef, bool)> {
     let whom = configured(between(line, "SlaveConfig ", ",")?)?;
     Some((whom, line.contains("Input")))
 }
@@ -51,7 +51,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
         }
         share(&line.text).is_some() || is_data(&line.text)
     });
-    let mut domains: Vec<(Domain, Vec<(Whom, bool)>)> = Vec::new();
+    let mut domains: Vec<(Domain, Vec<(SubDeviceRef, bool)>)> = Vec::new();
     for line in &lines[..block.lines] {
         if let Some(domain) = domain(&line.text) {
             domains.push((domain, Vec::new()));
@@ -74,9 +74,9 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
             received: Some(domain.received),
             ..ObservedWorkingCounter::default()
         };
-        let mut whom: Vec<Whom> = shares.into_iter().map(|(whom, _)| whom).collect();
+        let mut whom: Vec<SubDeviceRef> = shares.into_iter().map(|(whom, _)| whom).collect();
         whom.dedup();
-        block.tell(What::WorkingCounter(Box::new(counter), whom));
+        block.tell(FactKind::WorkingCounter(Box::new(counter), whom));
     }
     Some(block)
 }
@@ -95,10 +95,10 @@ mod tests {
         let block = take(&lines(text)).unwrap();
         assert_eq!(block.lines, 6);
         let [first, second] = &block.facts[..] else { panic!("{:?}", block.facts) };
-        let What::WorkingCounter(counter, whom) = &first.what else { panic!() };
+        let FactKind::WorkingCounter(counter, whom) = &first.what else { panic!() };
         assert_eq!((counter.received, counter.expected), (Some(2), Some(3)));
-        assert_eq!(whom[..], [Whom::Alias(1001, 0), Whom::Position(3)]);
-        let What::WorkingCounter(counter, whom) = &second.what else { panic!() };
+        assert_eq!(whom[..], [SubDeviceRef::Alias(1001, 0), SubDeviceRef::Position(3)]);
+        let FactKind::WorkingCounter(counter, whom) = &second.what else { panic!() };
         assert_eq!((counter.received, counter.expected, whom.len()), (Some(1), Some(1), 0));
         assert!(take(&lines("Domain0: nothing")).is_none());
     }

@@ -1,6 +1,6 @@
 //! `ethercat master` of the IgH EtherCAT Master: phase, devices with their links, frames, losses.
 
-use super::fact::{Block, Format, What, extent};
+use super::fact::{Block, FactKind, Format, extent};
 use super::igh_slaves::reference;
 use super::text::{Line, decimal, leading_number, value_of};
 use crate::observation_file::{Count, ObservedMainDevice};
@@ -112,7 +112,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     if phase.starts_with("Waiting") {
         main.answering = None;
     }
-    block.tell(What::Main(Box::new(main)));
+    block.tell(FactKind::Main(Box::new(main)));
     Some(block)
 }
 
@@ -163,7 +163,7 @@ Master0
 ";
 
     fn main(block: &Block) -> &ObservedMainDevice {
-        let [super::super::fact::Fact { what: What::Main(main), .. }] = &block.facts[..] else {
+        let [super::super::fact::Fact { what: FactKind::Main(main), .. }] = &block.facts[..] else {
             panic!()
         };
         main

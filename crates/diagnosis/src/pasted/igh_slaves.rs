@@ -5,7 +5,7 @@
 
 use linesman_proto::port::PortMap;
 
-use super::fact::{About, Block, Format, What, Whom, extent};
+use super::fact::{Block, FactKind, Format, SubDeviceFact, SubDeviceRef, extent};
 use super::state_word;
 use super::text::{Line, between, hex, leading_number, so_many, value_of};
 use crate::observation_file::ReadDevice;
@@ -126,7 +126,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
 }
 
 fn device(block: &mut Block, position: u16, lines: &[Line<'_>]) {
-    let mut about = About::default();
+    let mut about = SubDeviceFact::default();
     let mut read = ReadDevice::default();
     let mut open = PortMap([false; 4]);
     let mut neighbours = PortMap([None; 4]);
@@ -169,8 +169,8 @@ fn device(block: &mut Block, position: u16, lines: &[Line<'_>]) {
         about.open = Some(open);
         about.neighbours = neighbours.iter().any(|(_, next)| next.is_some()).then_some(neighbours);
     }
-    block.tell(What::About(Whom::Position(position), Box::new(about)));
-    block.tell(What::Read(Whom::Position(position), Box::new(read)));
+    block.tell(FactKind::SubDeviceFact(SubDeviceRef::Position(position), Box::new(about)));
+    block.tell(FactKind::Read(SubDeviceRef::Position(position), Box::new(read)));
 }
 
 /// A row of the short list.
@@ -237,20 +237,20 @@ pub(super) fn take_list(lines: &[Line<'_>]) -> Option<Block> {
         });
         let type_name =
             row.name.split_whitespace().next().filter(|word| numbers.is_none() && is_type(word));
-        let about = About {
+        let about = SubDeviceFact {
             type_name: type_name.map(str::to_owned),
             vendor_id: numbers.and_then(|(vendor, _)| u32::try_from(vendor).ok()),
             product_code: numbers.and_then(|(_, product)| u32::try_from(product).ok()),
             alias: Some(row.alias).filter(|alias| *alias != 0 && row.relative == 0),
-            ..About::default()
+            ..SubDeviceFact::default()
         };
         let read = ReadDevice {
             state: Some(row.state),
             configuration_failed: row.failed.then_some(true),
             ..ReadDevice::default()
         };
-        block.tell(What::About(Whom::Position(row.position), Box::new(about)));
-        block.tell(What::Read(Whom::Position(row.position), Box::new(read)));
+        block.tell(FactKind::SubDeviceFact(SubDeviceRef::Position(row.position), Box::new(about)));
+        block.tell(FactKind::Read(SubDeviceRef::Position(row.position), Box::new(read)));
     }
     block.what = format!("`ethercat slaves` of {}", so_many(count, "SubDevice"));
     Some(block)
@@ -263,10 +263,14 @@ fn is_type(word: &str) -> bool {
 }
 
 /// The SubDevice of a configuration such as `1001:0`: by alias, or by position where there is none.
-pub(super) fn configured(text: &str) -> Option<Whom> {
+pub(super) fn configured(text: &str) -> Option<SubDeviceRef> {
     let (alias, relative) = text.trim().split_once(':')?;
     let (alias, relative) = (alias.trim().parse().ok()?, relative.trim().parse().ok()?);
-    Some(if alias == 0 { Whom::Position(relative) } else { Whom::Alias(alias, relative) })
+    Some(if alias == 0 {
+        SubDeviceRef::Position(relative)
+    } else {
+        SubDeviceRef::Alias(alias, relative)
+    })
 }
 
 /// The number between `Slave ` and the end.
@@ -329,15 +333,15 @@ a line of another program
             (37, "`ethercat slaves -v` of 2 SubDevices")
         );
         let [
-            What::About(first, about),
-            What::Read(_, read),
-            What::About(_, second),
-            What::Read(_, other),
+            FactKind::SubDeviceFact(first, about),
+            FactKind::Read(_, read),
+            FactKind::SubDeviceFact(_, second),
+            FactKind::Read(_, other),
         ] = &block.facts.iter().map(|fact| fact.what.clone()).collect::<Vec<_>>()[..]
         else {
             panic!("{:?}", block.facts);
         };
-        assert_eq!(first, &Whom::Position(0));
+        assert_eq!(first, &SubDeviceRef::Position(0));
         assert_eq!((about.vendor_id, about.type_name.as_deref()), (Some(2), Some("EK1100")));
         assert_eq!(about.neighbours, Some(PortMap([None, Some(1), None, None])));
         assert_eq!(read.state.as_deref(), Some("OP"));
@@ -364,7 +368,7 @@ a line of another program
             .facts
             .iter()
             .filter_map(|fact| match &fact.what {
-                What::Read(whom, read) => {
+                FactKind::Read(whom, read) => {
                     Some((whom.clone(), read.state.clone(), read.configuration_failed))
                 }
                 _ => None,
@@ -374,12 +378,12 @@ a line of another program
         assert_eq!(
             told,
             [
-                (Whom::Position(0), state("OP"), None),
-                (Whom::Position(1), state("PREOP"), Some(true)),
-                (Whom::Position(2), state("ERR SAFEOP"), None),
+                (SubDeviceRef::Position(0), state("OP"), None),
+                (SubDeviceRef::Position(1), state("PREOP"), Some(true)),
+                (SubDeviceRef::Position(2), state("ERR SAFEOP"), None),
             ]
         );
-        let What::About(_, about) = &block.facts[4].what else { panic!() };
+        let FactKind::SubDeviceFact(_, about) = &block.facts[4].what else { panic!() };
         assert_eq!(
             (about.vendor_id, about.product_code, about.alias),
             (Some(0x539), Some(0x1000), Some(1001))

@@ -7,7 +7,7 @@
 mod message;
 
 use self::message::{Start, of_device, of_master};
-use super::fact::{Block, Fact, Format, What, Whom};
+use super::fact::{Block, Fact, FactKind, Format, SubDeviceRef};
 use super::stamp::{Stamp, at_begin};
 use super::text::{Line, leading_number, so_many};
 use crate::observation_file::{ObservedMainDevice, ReadDevice};
@@ -20,13 +20,13 @@ const START_LINES: usize = 4;
 /// A line of the log.
 struct Entry<'l> {
     stamp: Option<Stamp>,
-    from: From,
+    from: MessageSource,
     text: &'l str,
 }
 
 /// Whose line it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum From {
+enum MessageSource {
     /// The master, by its index.
     Master(u64),
     /// A SubDevice of a master, by its position.
@@ -45,11 +45,11 @@ fn entry<'l>(line: &'l Line<'_>) -> Option<Entry<'l>> {
     let found = rest.match_indices("EtherCAT").find_map(|(at, _)| sender(&rest[at..]));
     let (from, text) = match found {
         Some(found) => found,
-        None if is_link_of_card(rest) => (From::Card, rest),
+        None if is_link_of_card(rest) => (MessageSource::Card, rest),
         None if matches!(stamp, Some(Stamp::Uptime(_)))
             || (stamp.is_some() && rest.contains(" kernel:")) =>
         {
-            (From::Other, rest)
+            (MessageSource::Other, rest)
         }
         None => return None,
     };
@@ -57,7 +57,7 @@ fn entry<'l>(line: &'l Line<'_>) -> Option<Entry<'l>> {
 }
 
 /// `EtherCAT ERROR 0-3: …`, `EtherCAT WARNING 0: …`, `EtherCAT 0-main-3: …`, `EtherCAT: …`.
-fn sender(text: &str) -> Option<(From, &str)> {
+fn sender(text: &str) -> Option<(MessageSource, &str)> {
     let rest = text.strip_prefix("EtherCAT")?;
     let (head, message) = rest.split_once(':')?;
     let head = head.trim();
@@ -67,14 +67,14 @@ fn sender(text: &str) -> Option<(From, &str)> {
         .unwrap_or(head)
         .trim();
     if head.is_empty() {
-        return Some((From::Module, message));
+        return Some((MessageSource::Module, message));
     }
     let mut parts = head.split('-');
     let master = parts.next()?.trim().parse().ok()?;
     let position = parts.map(str::trim).find(|part| !["main", "backup"].contains(part));
     let from = match position {
-        None => From::Master(master),
-        Some(position) => From::Device(master, position.parse().ok()?),
+        None => MessageSource::Master(master),
+        Some(position) => MessageSource::Device(master, position.parse().ok()?),
     };
     Some((from, message))
 }
@@ -89,19 +89,19 @@ fn is_link_of_card(text: &str) -> bool {
 /// Takes all lines of the log in a row.
 pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     // A log that begins elsewhere in the kernel is one where it comes to EtherCAT.
-    if entry(lines.first()?)?.from == From::Other && foreign(lines) > 0 {
+    if entry(lines.first()?)?.from == MessageSource::Other && foreign(lines) > 0 {
         return None;
     }
     let mut block = Block::new(Format::KernelLog);
     let (end, unused) = super::fact::extent(lines, |line| entry(line).is_some());
     (block.lines, block.unused) = (end, unused);
     let entries: Vec<Entry<'_>> = lines[..end].iter().filter_map(entry).collect();
-    let mut reader = Reader::of(&entries);
+    let mut reader = LogReader::of(&entries);
     for (at, entry) in entries.iter().enumerate() {
         reader.read(at, entry);
     }
     let of_others = entries.iter().filter(|one| reader.is_of_another(one.from)).count();
-    let others = entries.iter().filter(|one| matches!(one.from, From::Other)).count();
+    let others = entries.iter().filter(|one| matches!(one.from, MessageSource::Other)).count();
     let mut what = "kernel log of the IgH EtherCAT Master".to_owned();
     let aside = [
         (others, "line", "not of EtherCAT"),
@@ -127,8 +127,10 @@ pub(super) fn foreign(lines: &[Line<'_>]) -> usize {
     let mut count = 0;
     for line in lines {
         match entry(line).map(|entry| entry.from) {
-            Some(From::Other | From::Card) => count += 1,
-            Some(From::Master(_) | From::Device(..) | From::Module) => return 0,
+            Some(MessageSource::Other | MessageSource::Card) => count += 1,
+            Some(MessageSource::Master(_) | MessageSource::Device(..) | MessageSource::Module) => {
+                return 0;
+            }
             None if line.is_blank() => count += 1,
             None => break,
         }
@@ -136,7 +138,7 @@ pub(super) fn foreign(lines: &[Line<'_>]) -> usize {
     count
 }
 
-struct Reader<'e> {
+struct LogReader<'e> {
     entries: &'e [Entry<'e>],
     master: Option<u64>,
     facts: Vec<Fact>,
@@ -153,11 +155,11 @@ struct Reader<'e> {
     refused: Option<(u16, u16, u8)>,
 }
 
-impl<'e> Reader<'e> {
+impl<'e> LogReader<'e> {
     fn of(entries: &'e [Entry<'e>]) -> Self {
         let master = entries.iter().find_map(|one| match one.from {
-            From::Master(master) | From::Device(master, _) => Some(master),
-            From::Module | From::Card | From::Other => None,
+            MessageSource::Master(master) | MessageSource::Device(master, _) => Some(master),
+            MessageSource::Module | MessageSource::Card | MessageSource::Other => None,
         });
         let mut reader = Self {
             entries,
@@ -172,20 +174,22 @@ impl<'e> Reader<'e> {
         };
         // From here on counts begin at 0.
         if let Some(first) = entries.first() {
-            let nothing = What::Added(Box::default());
+            let nothing = FactKind::Added(Box::default());
             reader.facts.push(Fact { stamp: first.stamp, what: nothing });
         }
         reader
     }
 
-    fn is_of_another(&self, from: From) -> bool {
+    fn is_of_another(&self, from: MessageSource) -> bool {
         match from {
-            From::Master(master) | From::Device(master, _) => Some(master) != self.master,
-            From::Module | From::Card | From::Other => false,
+            MessageSource::Master(master) | MessageSource::Device(master, _) => {
+                Some(master) != self.master
+            }
+            MessageSource::Module | MessageSource::Card | MessageSource::Other => false,
         }
     }
 
-    fn tell(&mut self, stamp: Option<Stamp>, what: What) {
+    fn tell(&mut self, stamp: Option<Stamp>, what: FactKind) {
         self.facts.push(Fact { stamp, what });
     }
 
@@ -203,9 +207,11 @@ impl<'e> Reader<'e> {
             return;
         }
         match entry.from {
-            From::Master(_) | From::Module | From::Card => self.read_master(at, entry),
-            From::Device(_, position) => self.read_device(position, entry),
-            From::Other => {}
+            MessageSource::Master(_) | MessageSource::Module | MessageSource::Card => {
+                self.read_master(at, entry)
+            }
+            MessageSource::Device(_, position) => self.read_device(position, entry),
+            MessageSource::Other => {}
         }
     }
 
@@ -219,7 +225,7 @@ impl<'e> Reader<'e> {
             let is_first = !up && !self.was_up && self.comes_up;
             if !is_first {
                 let main = ObservedMainDevice { link: Some(up), ..ObservedMainDevice::default() };
-                self.tell(stamp, What::Main(Box::new(main)));
+                self.tell(stamp, FactKind::Main(Box::new(main)));
             }
             self.was_up |= up;
             return;
@@ -239,14 +245,14 @@ impl<'e> Reader<'e> {
         }
         self.was_up |= told.main.answering.is_some_and(|count| count > 0);
         match is_count {
-            true => self.tell(stamp, What::Added(Box::new(told.main))),
-            false if told.tells() => self.tell(stamp, What::Main(Box::new(told.main))),
+            true => self.tell(stamp, FactKind::Added(Box::new(told.main))),
+            false if told.tells() => self.tell(stamp, FactKind::Main(Box::new(told.main))),
             false => {}
         }
     }
 
     fn read_device(&mut self, position: u16, entry: &Entry<'_>) {
-        let whom = Whom::Position(position);
+        let whom = SubDeviceRef::Position(position);
         if let Some((index, subindex)) = message::refused_request(entry.text) {
             self.refused = Some((position, index, subindex));
             return;
@@ -255,14 +261,14 @@ impl<'e> Reader<'e> {
             if let Some((of, index, subindex)) =
                 self.refused.take().filter(|(of, ..)| *of == position)
             {
-                let whom = Whom::Position(of);
-                self.tell(entry.stamp, What::Abort { whom, index, subindex, code });
+                let whom = SubDeviceRef::Position(of);
+                self.tell(entry.stamp, FactKind::Abort { whom, index, subindex, code });
             }
             return;
         }
         let read = of_device(entry.text);
         if read != ReadDevice::default() {
-            self.tell(entry.stamp, What::Read(whom, Box::new(read)));
+            self.tell(entry.stamp, FactKind::Read(whom, Box::new(read)));
         }
     }
 

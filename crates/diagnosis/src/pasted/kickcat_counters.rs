@@ -5,7 +5,7 @@
 
 use linesman_proto::register::ErrorCounters;
 
-use super::fact::{Block, Format, What, Whom};
+use super::fact::{Block, FactKind, Format, SubDeviceRef};
 use super::register_values;
 use super::text::{Line, so_many};
 use crate::observation_file::ReadDevice;
@@ -70,8 +70,8 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
         // What it does not print stays unknown: the processing unit and the application.
         register_values::fill(&mut read, ErrorCounters::START.0, &counters[..12]);
         register_values::fill(&mut read, ErrorCounters::START.0 + 16, &counters[16..]);
-        block.tell(What::About(Whom::Position(position), Box::default()));
-        block.tell(What::Read(Whom::Position(position), Box::new(read)));
+        block.tell(FactKind::SubDeviceFact(SubDeviceRef::Position(position), Box::default()));
+        block.tell(FactKind::Read(SubDeviceRef::Position(position), Box::new(read)));
     }
     Some(block)
 }
@@ -107,7 +107,9 @@ mod tests {
             format!("slave 1\n{}slave 2\n{}slave 1\n{}", counters(0), counters(3), counters(9));
         let block = take(&lines(&numbered)).unwrap();
         assert_eq!(block.facts.len(), 4, "the second round is a block of its own");
-        let What::Read(Whom::Position(1), read) = &block.facts[3].what else { panic!() };
+        let FactKind::Read(SubDeviceRef::Position(1), read) = &block.facts[3].what else {
+            panic!()
+        };
         let ports = read.ports.all();
         let port = ports[linesman_proto::port::Port::D].as_ref().unwrap();
         assert_eq!((port.frame.unwrap().0, port.lost_link.unwrap().0), (3, 3));

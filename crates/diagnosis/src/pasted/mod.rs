@@ -1,4 +1,4 @@
-//! Pasted texts: what other tools print, one or several in a file, read as one observation.
+//! Pasted texts: output of other tools, one or several in a file, read as one observation.
 //!
 //! Each format has a file that takes its lines off the front of the text, as far as they go, and says what
 //! they tell as facts ([`fact`]). [`gather`] puts the facts of all blocks together to an observation file: SubDevices

@@ -4,7 +4,7 @@
 //! Reference: `CommandRegRead.cpp` and `DataTypeHandler.cpp` of IgH: without a type, bytes `0x00 0x12`; with one, the value
 //! in hexadecimal and decimal. Numbers of SubDevices count from 1, unless one of them is 0; positions count from 0.
 
-use super::fact::{About, Block, Format, What, Whom};
+use super::fact::{Block, FactKind, Format, SubDeviceFact, SubDeviceRef};
 use super::text::{Line, hex, so_many};
 use super::{byte_list, register_values};
 use crate::main_device::MainDeviceKind;
@@ -19,7 +19,7 @@ const FIRST_STATION: u64 = 0x0100;
 
 /// The SubDevice of a reading.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Of {
+enum ReadingSubject {
     /// By its position, from 0.
     Position(u16),
     /// By a number that counts from 1, unless one of them is 0.
@@ -30,31 +30,31 @@ enum Of {
     Alias(u16),
 }
 
-impl Of {
-    const fn whom(self, counts_from_0: bool) -> Whom {
+impl ReadingSubject {
+    const fn whom(self, counts_from_0: bool) -> SubDeviceRef {
         match self {
-            Self::Position(position) => Whom::Position(position),
-            Self::Number(number) if counts_from_0 => Whom::Position(number),
-            Self::Number(number) => Whom::Position(number.saturating_sub(1)),
-            Self::Station(station) => Whom::Named(String::new(), Some(station)),
-            Self::Alias(alias) => Whom::Alias(alias, 0),
+            Self::Position(position) => SubDeviceRef::Position(position),
+            Self::Number(number) if counts_from_0 => SubDeviceRef::Position(number),
+            Self::Number(number) => SubDeviceRef::Position(number.saturating_sub(1)),
+            Self::Station(station) => SubDeviceRef::Named(String::new(), Some(station)),
+            Self::Alias(alias) => SubDeviceRef::Alias(alias, 0),
         }
     }
 }
 
 /// One reading: from which register on, the bytes.
 #[derive(Clone, PartialEq, Eq, Debug)]
-struct Value {
-    of: Of,
+struct ReadValue {
+    of: ReadingSubject,
     start: u16,
     bytes: Vec<u8>,
 }
 
 /// Which SubDevices a command is about.
 #[derive(Clone, PartialEq, Eq, Debug)]
-enum Asked {
+enum CommandTarget {
     /// This one.
-    One(Of),
+    One(ReadingSubject),
     /// These positions in turn, in a loop of the shell.
     Each(Vec<u16>),
     /// Positions from 0 on: of a loop that does not say which.
@@ -63,8 +63,8 @@ enum Asked {
 
 /// `ethercat reg_read` as it was typed.
 #[derive(Clone, PartialEq, Eq, Debug)]
-struct Command {
-    asked: Asked,
+struct RegReadCommand {
+    asked: CommandTarget,
     start: u16,
     /// Bytes; `None` where a type says it.
     size: Option<usize>,
@@ -76,7 +76,7 @@ pub(super) fn is_command(line: &Line<'_>) -> bool {
     command(&line.text).is_some()
 }
 
-fn command(text: &str) -> Option<Command> {
+fn command(text: &str) -> Option<RegReadCommand> {
     let (before, rest) = text.split_once("reg_read")?;
     let rest = rest.split([';', '|', '>', '#']).next()?;
     let mut words = rest.split_whitespace().flat_map(|word| word.split('=')).peekable();
@@ -85,14 +85,14 @@ fn command(text: &str) -> Option<Command> {
     let mut option = |name: &str, value: Option<&str>| match name {
         "-p" | "--position" => {
             asked = value.map(|value| match value.parse() {
-                Ok(position) => Asked::One(Of::Position(position)),
-                Err(_) => positions(text).map_or(Asked::Counting, Asked::Each),
+                Ok(position) => CommandTarget::One(ReadingSubject::Position(position)),
+                Err(_) => positions(text).map_or(CommandTarget::Counting, CommandTarget::Each),
             });
         }
         "-a" | "--alias" => {
             asked = value
                 .and_then(|value| value.parse().ok())
-                .map(|alias| Asked::One(Of::Alias(alias)));
+                .map(|alias| CommandTarget::One(ReadingSubject::Alias(alias)));
         }
         "-t" | "--type" => kind = value.map(str::to_owned),
         _ => {}
@@ -119,7 +119,7 @@ fn command(text: &str) -> Option<Command> {
     };
     let start = number(numbers.first()?)?;
     let size = numbers.get(1).and_then(|size| number(size)).map(usize::from);
-    Some(Command { asked: asked?, start, size, kind })
+    Some(RegReadCommand { asked: asked?, start, size, kind })
 }
 
 /// Positions of `for i in 0 1 2; do`, `for i in $(seq 0 5); do`, `for i in {0..5}; do`.
@@ -163,7 +163,7 @@ fn typed(kind: &str, text: &str) -> Option<Vec<u8>> {
 }
 
 /// `slave 3 0x0300: 00 12`, `position 2 reg 0x0110 = 0x30 0x5A`, `0x1001 0x0300: …`.
-fn labelled(text: &str) -> Option<Value> {
+fn labelled(text: &str) -> Option<ReadValue> {
     let (label, rest) = text.split_once([':', '='])?;
     // `slave 3: 0x0300: 00 12`
     let (label, bytes) = match rest.split_once([':', '=']) {
@@ -185,7 +185,7 @@ fn labelled(text: &str) -> Option<Value> {
         _ => return None,
     };
     let bytes = byte_list::read(bytes)?;
-    Some(Value { of: of(kind, number)?, start, bytes })
+    Some(ReadValue { of: of(kind, number)?, start, bytes })
 }
 
 /// The address at the end of a label, `0x0300`.
@@ -195,18 +195,18 @@ fn register(label: &str) -> Option<u16> {
     (digits.len() >= 3).then(|| u16::from_str_radix(digits, 16).ok())?
 }
 
-fn of(kind: &str, number: &str) -> Option<Of> {
+fn of(kind: &str, number: &str) -> Option<ReadingSubject> {
     let value = match number.strip_prefix("0x") {
         Some(digits) => u64::from_str_radix(digits, 16).ok()?,
         None => number.parse().ok()?,
     };
     let number = u16::try_from(value).ok()?;
     match kind.to_ascii_lowercase().as_str() {
-        "station" | "address" | "addr" => Some(Of::Station(number)),
-        _ if value >= FIRST_STATION => Some(Of::Station(number)),
-        "position" | "pos" => Some(Of::Position(number)),
+        "station" | "address" | "addr" => Some(ReadingSubject::Station(number)),
+        _ if value >= FIRST_STATION => Some(ReadingSubject::Station(number)),
+        "position" | "pos" => Some(ReadingSubject::Position(number)),
         "slave" | "subdevice" | "sub" | "device" | "dev" | "no" | "nr" | "box" => {
-            Some(Of::Number(number))
+            Some(ReadingSubject::Number(number))
         }
         _ => None,
     }
@@ -250,7 +250,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
 }
 
 /// The values that a command printed, and on how many lines.
-fn output(command: &Command, lines: &[Line<'_>]) -> Option<(Vec<Value>, usize)> {
+fn output(command: &RegReadCommand, lines: &[Line<'_>]) -> Option<(Vec<ReadValue>, usize)> {
     let mut values = Vec::new();
     let (mut end, mut bytes) = (0, Vec::new());
     for (at, line) in lines.iter().enumerate().take(MOST_LINES) {
@@ -258,20 +258,20 @@ fn output(command: &Command, lines: &[Line<'_>]) -> Option<(Vec<Value>, usize)> 
             continue;
         }
         let of = match (&command.asked, values.len()) {
-            (Asked::One(of), 0) => *of,
-            (Asked::One(_), _) => break,
-            (Asked::Each(positions), done) => match positions.get(done) {
-                Some(position) => Of::Position(*position),
+            (CommandTarget::One(of), 0) => *of,
+            (CommandTarget::One(_), _) => break,
+            (CommandTarget::Each(positions), done) => match positions.get(done) {
+                Some(position) => ReadingSubject::Position(*position),
                 None => break,
             },
-            (Asked::Counting, done) => Of::Position(u16::try_from(done).ok()?),
+            (CommandTarget::Counting, done) => ReadingSubject::Position(u16::try_from(done).ok()?),
         };
         let typed = command.kind.as_deref().and_then(|kind| typed(kind, line.trimmed()));
         let told = typed.clone().or_else(|| byte_list::read(line.trimmed()));
         // Some print a label of their own in a loop.
         let Some(told) = told else {
-            let is_label =
-                !matches!(command.asked, Asked::One(_)) && self::command(&line.text).is_none();
+            let is_label = !matches!(command.asked, CommandTarget::One(_))
+                && self::command(&line.text).is_none();
             if is_label && bytes.is_empty() && !super::is_prompt(line) {
                 continue;
             }
@@ -283,7 +283,7 @@ fn output(command: &Command, lines: &[Line<'_>]) -> Option<(Vec<Value>, usize)> 
             continue;
         }
         let bytes = std::mem::take(&mut bytes);
-        values.push(Value { of, start: command.start, bytes });
+        values.push(ReadValue { of, start: command.start, bytes });
         end = at + 1;
     }
     (end > 0).then_some((values, end))
@@ -292,7 +292,7 @@ fn output(command: &Command, lines: &[Line<'_>]) -> Option<(Vec<Value>, usize)> 
 /// Readings of each register once.
 #[derive(Default)]
 struct Round {
-    values: Vec<Value>,
+    values: Vec<ReadValue>,
     end: usize,
     unused: Vec<usize>,
     is_igh: bool,
@@ -300,8 +300,8 @@ struct Round {
 
 impl Round {
     /// Adds values; false, without them, when one of them is a second reading.
-    fn add(&mut self, values: Vec<Value>) -> bool {
-        let is_known = |value: &Value| {
+    fn add(&mut self, values: Vec<ReadValue>) -> bool {
+        let is_known = |value: &ReadValue| {
             self.values.iter().any(|known| (known.of, known.start) == (value.of, value.start))
         };
         if values.iter().any(is_known) {
@@ -320,10 +320,10 @@ impl Round {
         if self.is_igh {
             block.kind = Some(MainDeviceKind::Igh);
         }
-        let counts_from_0 = self.values.iter().any(|value| value.of == Of::Number(0));
-        let mut whom_of: Vec<Whom> = Vec::new();
-        let mut reads: Vec<(About, ReadDevice)> = Vec::new();
-        for Value { of, start, bytes } in self.values {
+        let counts_from_0 = self.values.iter().any(|value| value.of == ReadingSubject::Number(0));
+        let mut whom_of: Vec<SubDeviceRef> = Vec::new();
+        let mut reads: Vec<(SubDeviceFact, ReadDevice)> = Vec::new();
+        for ReadValue { of, start, bytes } in self.values {
             let whom = of.whom(counts_from_0);
             let at = whom_of.iter().position(|known| *known == whom).unwrap_or_else(|| {
                 whom_of.push(whom.clone());
@@ -332,7 +332,7 @@ impl Round {
             });
             let (about, read) = &mut reads[at];
             about.open = about.open.or_else(|| register_values::open_ports(start, &bytes));
-            if let Of::Station(station) = of {
+            if let ReadingSubject::Station(station) = of {
                 about.station = Some(station);
             }
             register_values::fill(read, start, &bytes);
@@ -340,8 +340,8 @@ impl Round {
         let kind = if self.is_igh { "`ethercat reg_read`" } else { "registers" };
         block.what = format!("{kind} of {}", so_many(whom_of.len(), "SubDevice"));
         for (whom, (about, read)) in whom_of.into_iter().zip(reads) {
-            block.tell(What::About(whom.clone(), Box::new(about)));
-            block.tell(What::Read(whom, Box::new(read)));
+            block.tell(FactKind::SubDeviceFact(whom.clone(), Box::new(about)));
+            block.tell(FactKind::Read(whom, Box::new(read)));
         }
         Some(block)
     }

@@ -5,7 +5,7 @@
 
 use linesman_proto::port::{Port, PortMap};
 
-use super::fact::{About, Block, Format, What, Whom, extent};
+use super::fact::{Block, FactKind, Format, SubDeviceFact, SubDeviceRef, extent};
 use super::state_word;
 use super::text::{Line, between, decimal, hex, leading_number, so_many, value_of};
 use crate::observation_file::{ObservedMainDevice, ReadDevice, Word};
@@ -73,21 +73,21 @@ fn failure(text: &str) -> Option<(u16, u64, u16)> {
 }
 
 /// `Time:    7245.107 SDO slave:2 index:160d.00 error:06020000 …` and `… EMERGENCY slave:2 error:8130`.
-fn logged(text: &str) -> Option<What> {
+fn logged(text: &str) -> Option<FactKind> {
     let rest = text.strip_prefix("Time:")?;
     let (number, _) = leading_number(rest.split_once("slave:")?.1)?;
-    let whom = Whom::Position(u16::try_from(number).ok()?.checked_sub(1)?);
+    let whom = SubDeviceRef::Position(u16::try_from(number).ok()?.checked_sub(1)?);
     let error = rest.split_once("error:")?.1;
     let error = hex(error.split_whitespace().next()?)?;
     if rest.contains(" EMERGENCY ") {
         let code = u16::try_from(error).ok()?;
-        return Some(What::Emergency { whom, code, register: None, data: Vec::new() });
+        return Some(FactKind::Emergency { whom, code, register: None, data: Vec::new() });
     }
     if !rest.contains(" SDO ") {
         return None;
     }
     let (index, subindex) = rest.split_once("index:")?.1.split_once('.')?;
-    Some(What::Abort {
+    Some(FactKind::Abort {
         whom,
         index: u16::try_from(hex(index)?).ok()?,
         subindex: u8::try_from(hex(subindex.split_whitespace().next()?)?).ok()?,
@@ -138,7 +138,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
                 al_code: Some(Word(code)).filter(|code| code.0 != 0),
                 ..ReadDevice::default()
             };
-            block.tell(What::Read(Whom::Position(position), Box::new(read)));
+            block.tell(FactKind::Read(SubDeviceRef::Position(position), Box::new(read)));
         }
         if let Some(what) = logged(text) {
             block.tell(what);
@@ -158,7 +158,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     if let Some(answering) = answering {
         let main =
             ObservedMainDevice { answering: Some(answering), ..ObservedMainDevice::default() };
-        block.tell(What::Main(Box::new(main)));
+        block.tell(FactKind::Main(Box::new(main)));
     }
     Some(block)
 }
@@ -166,7 +166,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
 fn device(block: &mut Block, lines: &[Line<'_>]) {
     let number = lines.first().and_then(|line| value_of(&line.text, "Slave")?.parse::<u16>().ok());
     let Some(position) = number.and_then(|number| number.checked_sub(1)) else { return };
-    let mut about = About::default();
+    let mut about = SubDeviceFact::default();
     let mut read = ReadDevice::default();
     let word = |text: &str| {
         text.split_whitespace().next().and_then(hex).and_then(|value| u32::try_from(value).ok())
@@ -198,9 +198,9 @@ fn device(block: &mut Block, lines: &[Line<'_>]) {
             about.revision = rest.split_once("Rev:").and_then(|(_, rest)| word(rest));
         }
     }
-    block.tell(What::About(Whom::Position(position), Box::new(about)));
+    block.tell(FactKind::SubDeviceFact(SubDeviceRef::Position(position), Box::new(about)));
     // States in the list are read last; what was refused before is told by its code.
-    block.tell(What::Read(Whom::Position(position), Box::new(read)));
+    block.tell(FactKind::Read(SubDeviceRef::Position(position), Box::new(read)));
 }
 
 #[cfg(test)]
@@ -257,7 +257,7 @@ End program
             .facts
             .iter()
             .filter_map(|fact| match &fact.what {
-                What::Read(Whom::Position(at), read) => {
+                FactKind::Read(SubDeviceRef::Position(at), read) => {
                     Some((*at, read.state.clone().unwrap(), read.al_code))
                 }
                 _ => None,
@@ -275,7 +275,9 @@ End program
             .facts
             .iter()
             .filter_map(|fact| match &fact.what {
-                What::About(_, about) => Some((about.station, about.delay_ns, about.open.unwrap())),
+                FactKind::SubDeviceFact(_, about) => {
+                    Some((about.station, about.delay_ns, about.open.unwrap()))
+                }
                 _ => None,
             })
             .collect();
@@ -288,13 +290,18 @@ End program
         );
         assert!(block.facts.iter().any(|fact| matches!(
             fact.what,
-            What::Abort { whom: Whom::Position(1), index: 0x1C12, subindex: 1, code: 0x0601_0002 }
+            FactKind::Abort {
+                whom: SubDeviceRef::Position(1),
+                index: 0x1C12,
+                subindex: 1,
+                code: 0x0601_0002
+            }
         )));
         assert!(
             block
                 .facts
                 .iter()
-                .any(|fact| matches!(fact.what, What::Emergency { code: 0x8130, .. }))
+                .any(|fact| matches!(fact.what, FactKind::Emergency { code: 0x8130, .. }))
         );
     }
 
@@ -305,7 +312,7 @@ End program
         ))
         .unwrap();
         assert!(block.what.contains("found no SubDevice"), "{}", block.what);
-        let What::Main(main) = &block.facts[0].what else { panic!() };
+        let FactKind::Main(main) = &block.facts[0].what else { panic!() };
         assert_eq!(main.answering, Some(0));
         assert!(take(&lines("3 apples found\n")).is_none());
     }

@@ -53,12 +53,13 @@ fn several_texts_are_one_observation_of_the_same_subdevices() {
 fn what_a_text_does_not_give_stays_unknown() {
     let Pasted { file, .. } = read(LIST).unwrap();
     assert_eq!(file.maindevice, None);
-    let line = file.line(None);
+    let model = file.model(None);
     assert!(
-        line.host.card(linesman_proto::address::Path::A).carrier.is_none() && !line.host.is_watched
+        model.host.card(linesman_proto::address::Path::A).carrier.is_none()
+            && !model.host.is_watched
     );
-    assert!(line.reported.lost.is_none() && line.reported.answering.is_none());
-    let third = &line.devices[2];
+    assert!(model.reported.lost.is_none() && model.reported.answering.is_none());
+    let third = &model.devices[2];
     assert!(third.error_sum.is_none() && third.delay.is_none());
     let b = linesman_proto::register::ErrorCounter::InvalidFrame(linesman_proto::port::Port::B);
     assert!(third.counters.track(b).is_none(), "the list has no second count of it");
@@ -69,9 +70,9 @@ fn a_later_list_of_the_same_kind_is_a_later_reading() {
     let later = LIST.replace("EL1008)\tOP\t0, 0", "EL1008)\tOP\t12, 0");
     let Pasted { file, understood } = read(&format!("{LIST}\n{later}")).unwrap();
     assert_eq!((understood.blocks.len(), file.readings.len()), (2, 3));
-    let line = file.line(None);
+    let model = file.model(None);
     let a = linesman_proto::register::ErrorCounter::InvalidFrame(linesman_proto::port::Port::A);
-    let track = line.devices[1].counters.track(a).unwrap();
+    let track = model.devices[1].counters.track(a).unwrap();
     assert_eq!((track.total.rise(), track.may_be_old), (12, false));
     assert_eq!(
         codes(&format!("{later}\n{later}")),
@@ -86,11 +87,11 @@ fn a_message_of_an_interruption_silences_those_between() {
         "{LIST}\n20.11.2026 10:00:00\t'Term 2 (EL1008)' (1002) - 'Term 3 (EL4102)' (1003) Communication interrupted\n"
     );
     let Pasted { file, .. } = read(&text).unwrap();
-    let line = file.line(None);
-    let absences: Vec<usize> = line.devices.iter().map(|device| device.absences.len()).collect();
+    let model = file.model(None);
+    let absences: Vec<usize> = model.devices.iter().map(|device| device.absences.len()).collect();
     assert_eq!(absences, [0, 1, 1]);
     assert!(
-        line.devices.iter().all(|device| device.silent.is_none()),
+        model.devices.iter().all(|device| device.silent.is_none()),
         "the list has them in OP again"
     );
     // Without the list they are still gone.

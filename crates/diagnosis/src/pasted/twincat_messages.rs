@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::fact::{About, Block, Fact, Format, What, Whom, extent};
+use super::fact::{Block, Fact, FactKind, Format, SubDeviceFact, SubDeviceRef, extent};
 use super::stamp::{Stamp, at_begin, date};
 use super::state_word;
 use super::text::{Line, between, cells, hex, leading_number, so_many, type_in};
@@ -15,22 +15,22 @@ use crate::observation_file::{Count, ObservedMainDevice, ReadDevice, Word};
 /// A message with whom it is about.
 struct Message<'l> {
     stamp: Option<Stamp>,
-    whom: Whom,
+    whom: SubDeviceRef,
     /// Where it is about a stretch: the last of it.
-    last: Option<Whom>,
+    last: Option<SubDeviceRef>,
     text: &'l str,
 }
 
 /// `'Term 5 (EL3154)' (1005)` at the begin of a text, and what follows.
-fn subject(text: &str) -> Option<(Whom, &str)> {
+fn subject(text: &str) -> Option<(SubDeviceRef, &str)> {
     let rest = text.strip_prefix('\'')?;
     let (name, rest) = rest.split_once('\'')?;
     let rest = rest.trim_start();
     let Some(inside) = rest.strip_prefix('(') else {
-        return Some((Whom::Named(name.to_owned(), None), rest));
+        return Some((SubDeviceRef::Named(name.to_owned(), None), rest));
     };
     let (number, rest) = inside.split_once(')')?;
-    Some((Whom::Named(name.to_owned(), Some(address_in(number)?)), rest))
+    Some((SubDeviceRef::Named(name.to_owned(), Some(address_in(number)?)), rest))
 }
 
 fn stamp_of(line: &str, before: &str) -> Option<Stamp> {
@@ -54,7 +54,7 @@ fn message<'l>(line: &'l str) -> Option<Message<'l>> {
     // The first quoted name with an address behind it.
     let found = line.match_indices('\'').find_map(|(at, _)| {
         let (whom, rest) = subject(&line[at..])?;
-        matches!(whom, Whom::Named(_, Some(_))).then_some((at, whom, rest))
+        matches!(whom, SubDeviceRef::Named(_, Some(_))).then_some((at, whom, rest))
     });
     let (at, whom, mut rest) = found?;
     let stamp = stamp_of(line, &line[..at]);
@@ -67,7 +67,10 @@ fn message<'l>(line: &'l str) -> Option<Message<'l>> {
 }
 
 /// What a message tells; `None` when it is none of those that carry a fact.
-fn facts(message: &Message<'_>, changes: &mut BTreeMap<Whom, u64>) -> Option<Vec<What>> {
+fn facts(
+    message: &Message<'_>,
+    changes: &mut BTreeMap<SubDeviceRef, u64>,
+) -> Option<Vec<FactKind>> {
     let text = message.text;
     let whom = || message.whom.clone();
     let lower = text.to_ascii_lowercase();
@@ -76,12 +79,12 @@ fn facts(message: &Message<'_>, changes: &mut BTreeMap<Whom, u64>) -> Option<Vec
         let state = between(&text[at..], "'", "'")?;
         state_word::read(state)?.state
     };
-    let read = |read: ReadDevice| What::Read(whom(), Box::new(read));
+    let read = |read: ReadDevice| FactKind::Read(whom(), Box::new(read));
     if lower.contains("communication interrupted") || lower.contains("communication re-established")
     {
         let is_back = lower.contains("re-established");
         let to = message.last.clone().unwrap_or_else(whom);
-        return Some(vec![What::Interrupted { from: whom(), to, is_back }]);
+        return Some(vec![FactKind::Interrupted { from: whom(), to, is_back }]);
     }
     if lower.contains("abnormal state change") {
         let (from, to) = (quoted("from")?, quoted("to '").or_else(|| quoted(" to"))?);
@@ -127,7 +130,7 @@ fn facts(message: &Message<'_>, changes: &mut BTreeMap<Whom, u64>) -> Option<Vec
         let (index, subindex) = object?;
         let code =
             rest.split([',', ' ', '(', ')']).filter(|word| word.starts_with("0x")).find_map(hex)?;
-        return Some(vec![What::Abort {
+        return Some(vec![FactKind::Abort {
             whom: whom(),
             index: u16::try_from(hex(index)?).ok()?,
             subindex: u8::try_from(hex(subindex)?).ok()?,
@@ -142,7 +145,7 @@ fn facts(message: &Message<'_>, changes: &mut BTreeMap<Whom, u64>) -> Option<Vec
             .filter(|part| !part.is_empty());
         let code = numbers.find(|part| part.trim_start_matches("0x").len() == 4).and_then(hex)?;
         let rest: Vec<u8> = numbers.filter_map(|part| u8::try_from(hex(part)?).ok()).collect();
-        return Some(vec![What::Emergency {
+        return Some(vec![FactKind::Emergency {
             whom: whom(),
             code: u16::try_from(code).ok()?,
             register: rest.first().copied(),
@@ -167,12 +170,12 @@ fn is_header(line: &str) -> bool {
 pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     let mut changes = BTreeMap::new();
     let tells = |line: &str,
-                 changes: &mut BTreeMap<Whom, u64>|
-     -> Option<(Option<Stamp>, Vec<What>)> {
+                 changes: &mut BTreeMap<SubDeviceRef, u64>|
+     -> Option<(Option<Stamp>, Vec<FactKind>)> {
         if let Some(count) = missed(line) {
             let main =
                 ObservedMainDevice { lost: Some(Count(count)), ..ObservedMainDevice::default() };
-            return Some((stamp_of(line, line), vec![What::Added(Box::new(main))]));
+            return Some((stamp_of(line, line), vec![FactKind::Added(Box::new(main))]));
         }
         let message = message(line)?;
         Some((message.stamp, facts(&message, changes)?))
@@ -199,42 +202,44 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     }
     block.what = so_many(count, "TwinCAT message");
     for name in told.iter().filter_map(|fact| whom(&fact.what)).cloned().collect::<Vec<_>>() {
-        block.tell(What::About(name.clone(), Box::new(about(&name))));
+        block.tell(FactKind::SubDeviceFact(name.clone(), Box::new(about(&name))));
     }
     // Frames that were missed are counted from 0 on.
     if let Some(first) = told.first() {
-        block.tell_at(first.stamp, What::Added(Box::default()));
+        block.tell_at(first.stamp, FactKind::Added(Box::default()));
     }
     block.facts.extend(told);
     Some(block)
 }
 
-const fn whom(what: &What) -> Option<&Whom> {
+const fn whom(what: &FactKind) -> Option<&SubDeviceRef> {
     match what {
-        What::Read(whom, _) | What::Emergency { whom, .. } | What::Abort { whom, .. } => Some(whom),
-        What::About(..)
-        | What::Main(_)
-        | What::Added(_)
-        | What::WorkingCounter(..)
-        | What::Interrupted { .. } => None,
+        FactKind::Read(whom, _)
+        | FactKind::Emergency { whom, .. }
+        | FactKind::Abort { whom, .. } => Some(whom),
+        FactKind::SubDeviceFact(..)
+        | FactKind::Main(_)
+        | FactKind::Added(_)
+        | FactKind::WorkingCounter(..)
+        | FactKind::Interrupted { .. } => None,
     }
 }
 
-fn about(whom: &Whom) -> About {
+fn about(whom: &SubDeviceRef) -> SubDeviceFact {
     match whom {
-        Whom::Named(name, station) => About {
+        SubDeviceRef::Named(name, station) => SubDeviceFact {
             name: Some(name.clone()).filter(|name| !name.is_empty()),
             type_name: type_in(name).map(str::to_owned),
             station: *station,
-            ..About::default()
+            ..SubDeviceFact::default()
         },
-        Whom::Position(_) | Whom::Alias(..) => About::default(),
+        SubDeviceRef::Position(_) | SubDeviceRef::Alias(..) => SubDeviceFact::default(),
     }
 }
 
 /// What a column of a list of emergencies holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Column {
+enum MessageColumn {
     Time,
     Device,
     Address,
@@ -245,26 +250,26 @@ enum Column {
     Other,
 }
 
-fn column(title: &str) -> Column {
+fn column(title: &str) -> MessageColumn {
     let title = title.trim().to_ascii_lowercase();
     let has = |words: &[&str]| words.iter().any(|word| title.contains(word));
     match title.as_str() {
-        "no" | "no." | "nr" | "#" | "number" => return Column::No,
-        "addr" | "address" | "addr." => return Column::Address,
+        "no" | "no." | "nr" | "#" | "number" => return MessageColumn::No,
+        "addr" | "address" | "addr." => return MessageColumn::Address,
         _ => {}
     }
     if has(&["time", "date", "zeit", "stamp"]) {
-        Column::Time
+        MessageColumn::Time
     } else if has(&["register"]) {
-        Column::Register
+        MessageColumn::Register
     } else if has(&["code", "emergency"]) {
-        Column::Code
+        MessageColumn::Code
     } else if has(&["device", "slave", "name", "source", "box", "terminal"]) {
-        Column::Device
+        MessageColumn::Device
     } else if has(&["data", "bytes"]) {
-        Column::Data
+        MessageColumn::Data
     } else {
-        Column::Other
+        MessageColumn::Other
     }
 }
 
@@ -281,45 +286,47 @@ fn emergency_code(text: &str) -> Option<u16> {
 
 /// Takes a list of emergencies with a header.
 pub(super) fn take_table(lines: &[Line<'_>]) -> Option<Block> {
-    let columns: Vec<Column> =
+    let columns: Vec<MessageColumn> =
         cells(&lines.first()?.text).iter().map(|title| column(title)).collect();
-    let has = |wanted: Column| columns.contains(&wanted);
-    let names = has(Column::Device) || has(Column::Address) || has(Column::No);
-    if !has(Column::Code) || !names || columns.len() < 2 {
+    let has = |wanted: MessageColumn| columns.contains(&wanted);
+    let names = has(MessageColumn::Device) || has(MessageColumn::Address) || has(MessageColumn::No);
+    if !has(MessageColumn::Code) || !names || columns.len() < 2 {
         return None;
     }
-    let row = |line: &str| -> Option<(Option<Stamp>, What, About)> {
+    let row = |line: &str| -> Option<(Option<Stamp>, FactKind, SubDeviceFact)> {
         let cells = cells(line);
-        let cell = |wanted: Column| {
+        let cell = |wanted: MessageColumn| {
             let at = columns.iter().position(|column| *column == wanted)?;
             cells.get(at).map(String::as_str).filter(|cell| !cell.is_empty())
         };
-        let code = emergency_code(cell(Column::Code)?)?;
+        let code = emergency_code(cell(MessageColumn::Code)?)?;
         let number = |column| {
             cell(column).and_then(|cell| leading_number(cell.trim())).map(|(number, _)| number)
         };
-        let station = number(Column::Address).and_then(|number| u16::try_from(number).ok());
-        let device = cell(Column::Device);
-        let whom = match (number(Column::No), device, station) {
-            (Some(no @ 1..=0xFFFF), None, None) => Whom::Position(u16::try_from(no - 1).ok()?),
+        let station = number(MessageColumn::Address).and_then(|number| u16::try_from(number).ok());
+        let device = cell(MessageColumn::Device);
+        let whom = match (number(MessageColumn::No), device, station) {
+            (Some(no @ 1..=0xFFFF), None, None) => {
+                SubDeviceRef::Position(u16::try_from(no - 1).ok()?)
+            }
             (_, Some(name), station) => match subject(name) {
                 Some((whom, _)) => whom,
-                None => Whom::Named(name.to_owned(), station),
+                None => SubDeviceRef::Named(name.to_owned(), station),
             },
-            (_, None, Some(station)) => Whom::Named(String::new(), Some(station)),
+            (_, None, Some(station)) => SubDeviceRef::Named(String::new(), Some(station)),
             (_, None, None) => return None,
         };
-        let bytes = cell(Column::Data).unwrap_or_default();
+        let bytes = cell(MessageColumn::Data).unwrap_or_default();
         let data = bytes
             .split([' ', '-', ','])
             .filter_map(|byte| u8::try_from(hex(byte)?).ok())
             .take(5)
             .collect();
-        let register = cell(Column::Register).and_then(|cell| u8::try_from(hex(cell)?).ok());
-        let stamp = cell(Column::Time)
+        let register = cell(MessageColumn::Register).and_then(|cell| u8::try_from(hex(cell)?).ok());
+        let stamp = cell(MessageColumn::Time)
             .and_then(|cell| date(cell).map(Stamp::Date).or_else(|| at_begin(cell).0));
         let about = about(&whom);
-        Some((stamp, What::Emergency { whom, code, register, data }, about))
+        Some((stamp, FactKind::Emergency { whom, code, register, data }, about))
     };
     let mut block = Block::new(Format::Messages);
     let (end, unused) = extent(&lines[1..], |line| row(&line.text).is_some());
@@ -331,7 +338,7 @@ pub(super) fn take_table(lines: &[Line<'_>]) -> Option<Block> {
     block.what = format!("list of emergencies, {}", so_many(rows.len(), "row"));
     for (stamp, what, about) in rows {
         if let Some(whom) = whom(&what) {
-            block.tell(What::About(whom.clone(), Box::new(about)));
+            block.tell(FactKind::SubDeviceFact(whom.clone(), Box::new(about)));
         }
         block.tell_at(stamp, what);
     }
@@ -345,15 +352,17 @@ mod tests {
     use super::*;
     use crate::observation_file::Date;
 
-    fn told(text: &str) -> Vec<What> {
+    fn told(text: &str) -> Vec<FactKind> {
         let block = take(&lines(text)).unwrap();
         let facts = block.facts.into_iter().map(|fact| fact.what);
-        facts.filter(|what| !matches!(what, What::About(..) | What::Added(_))).collect()
+        facts
+            .filter(|what| !matches!(what, FactKind::SubDeviceFact(..) | FactKind::Added(_)))
+            .collect()
     }
 
     fn states(text: &str) -> Vec<(Option<String>, Option<u16>)> {
         let read = told(text).into_iter().filter_map(|what| match what {
-            What::Read(_, read) => Some((read.state, read.al_code.map(|code| code.0))),
+            FactKind::Read(_, read) => Some((read.state, read.al_code.map(|code| code.0))),
             _ => None,
         });
         read.collect()
@@ -383,7 +392,9 @@ mod tests {
         );
         let without =
             told("'Box 1 (SSC-Device)' (1001): abnormal state change (from 'OP' to 'SAFEOP')\n");
-        assert!(matches!(&without[1], What::Read(_, read) if read.state_changes == Some(Count(1))));
+        assert!(
+            matches!(&without[1], FactKind::Read(_, read) if read.state_changes == Some(Count(1)))
+        );
     }
 
     #[test]
@@ -396,16 +407,18 @@ mod tests {
 Frame missed 10 times (frame no. 0)
 ";
         let all = told(text);
-        let named = |name: &str, at| Whom::Named(name.to_owned(), Some(at));
-        assert!(matches!(&all[0], What::Interrupted { from, to, is_back: false }
+        let named = |name: &str, at| SubDeviceRef::Named(name.to_owned(), Some(at));
+        assert!(matches!(&all[0], FactKind::Interrupted { from, to, is_back: false }
             if *from == named("Term 64 (EK1100)", 1015) && *to == named("Term 70 (EL1262)", 1021)));
-        assert!(matches!(&all[1], What::Interrupted { from, to, is_back: true } if from == to));
+        assert!(matches!(&all[1], FactKind::Interrupted { from, to, is_back: true } if from == to));
         assert!(matches!(
             &all[2],
-            What::Abort { index: 0x10F0, subindex: 1, code: 0x0601_0002, .. }
+            FactKind::Abort { index: 0x10F0, subindex: 1, code: 0x0601_0002, .. }
         ));
-        assert!(matches!(&all[3], What::Emergency { code: 0x8611, register: Some(0x20), data, .. }
-            if data[..] == [0x29, 0, 0, 0, 1]));
+        assert!(
+            matches!(&all[3], FactKind::Emergency { code: 0x8611, register: Some(0x20), data, .. }
+            if data[..] == [0x29, 0, 0, 0, 1])
+        );
         assert_eq!(take(&lines(text)).unwrap().what, "5 TwinCAT messages");
     }
 
@@ -434,7 +447,7 @@ Frame missed 10 times (frame no. 0)
             .facts
             .iter()
             .filter_map(|fact| match &fact.what {
-                What::Emergency { whom, code, .. } => {
+                FactKind::Emergency { whom, code, .. } => {
                     Some((whom.clone(), *code, fact.stamp.is_some()))
                 }
                 _ => None,
@@ -443,8 +456,8 @@ Frame missed 10 times (frame no. 0)
         assert_eq!(
             codes,
             [
-                (Whom::Named("Drive 3 (EL7201)".to_owned(), None), 0x8611, true),
-                (Whom::Named("Term 5 (EL3154)".to_owned(), Some(1005)), 0x5441, true),
+                (SubDeviceRef::Named("Drive 3 (EL7201)".to_owned(), None), 0x8611, true),
+                (SubDeviceRef::Named("Term 5 (EL3154)".to_owned(), Some(1005)), 0x5441, true),
             ]
         );
         assert!(take_table(&lines("Code;Description\n1;x\n")).is_none());

@@ -6,7 +6,7 @@
 
 use linesman_proto::port::Port;
 
-use super::fact::{About, Block, Format, What, Whom, extent};
+use super::fact::{Block, FactKind, Format, SubDeviceFact, SubDeviceRef, extent};
 use super::register_values;
 use super::state_word::{self, StateWord};
 use super::text::{Line, cells, count, leading_number, port, so_many, type_in, value_of};
@@ -14,7 +14,7 @@ use crate::observation_file::{Count, ObservedMainDevice, ReadDevice, ReadPort};
 
 /// What a column holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Column {
+enum OnlineColumn {
     No,
     Address,
     Name,
@@ -27,57 +27,62 @@ enum Column {
     Other,
 }
 
-fn column(title: &str) -> Column {
+fn column(title: &str) -> OnlineColumn {
     let title = title.trim().trim_matches(['>', '<', '\'']).trim();
     let lower = title.to_ascii_lowercase();
     match lower.as_str() {
-        "no" | "no." | "nr" | "nr." | "number" | "#" | "pos" | "position" => return Column::No,
+        "no" | "no." | "nr" | "nr." | "number" | "#" | "pos" | "position" => {
+            return OnlineColumn::No;
+        }
         "addr" | "addr." | "address" | "adresse" | "ethercat addr" | "ethercat address" => {
-            return Column::Address;
+            return OnlineColumn::Address;
         }
         "name" | "box name" | "device" | "device name" | "slave" | "subdevice" => {
-            return Column::Name;
+            return OnlineColumn::Name;
         }
-        "state" | "status" | "online" | "zustand" => return Column::State,
-        "crc" | "crc errors" | "crc error" => return Column::Crc,
-        "changes" => return Column::Changes,
+        "state" | "status" | "online" | "zustand" => return OnlineColumn::State,
+        "crc" | "crc errors" | "crc error" => return OnlineColumn::Crc,
+        "changes" => return OnlineColumn::Changes,
         _ => {}
     }
     if let Some(of) = lower.strip_prefix("crc port").or_else(|| lower.strip_prefix("crc ")) {
-        return port(of.trim()).map_or(Column::Other, Column::PortCrc);
+        return port(of.trim()).map_or(OnlineColumn::Other, OnlineColumn::PortCrc);
     }
     let digits = lower.strip_prefix("reg").unwrap_or(&lower).trim_start_matches([':', '.', ' ']);
     let digits = digits.strip_prefix("0x").unwrap_or(digits);
     let digits = digits.get(..4).unwrap_or("");
     match u16::from_str_radix(digits, 16) {
-        Ok(register) if register < 0x1000 && lower.contains(digits) => Column::Register(register),
-        Ok(_) | Err(_) => Column::Other,
+        Ok(register) if register < 0x1000 && lower.contains(digits) => {
+            OnlineColumn::Register(register)
+        }
+        Ok(_) | Err(_) => OnlineColumn::Other,
     }
 }
 
 /// The columns of a table, where a line is its header.
-fn header(line: &str) -> Option<Vec<Column>> {
+fn header(line: &str) -> Option<Vec<OnlineColumn>> {
     let titles = match cells(line) {
         // Words of a header may stand a blank apart.
         titles if titles.len() < 3 => line.split_whitespace().map(str::to_owned).collect(),
         titles => titles,
     };
-    let mut columns: Vec<Column> = titles.iter().map(|title| column(title)).collect();
-    let has = |wanted: Column| columns.contains(&wanted);
+    let mut columns: Vec<OnlineColumn> = titles.iter().map(|title| column(title)).collect();
+    let has = |wanted: OnlineColumn| columns.contains(&wanted);
     let counts = columns
         .iter()
-        .filter(|one| matches!(one, Column::Register(_) | Column::PortCrc(_)))
+        .filter(|one| matches!(one, OnlineColumn::Register(_) | OnlineColumn::PortCrc(_)))
         .count();
-    let is_list =
-        has(Column::Name) && has(Column::State) && (has(Column::No) || has(Column::Address));
+    let is_list = has(OnlineColumn::Name)
+        && has(OnlineColumn::State)
+        && (has(OnlineColumn::No) || has(OnlineColumn::Address));
     if !is_list && counts < 2 {
         return None;
     }
     // A table of registers has no title above the names.
-    if !has(Column::Name) && titles.first().is_some_and(String::is_empty) {
-        columns[0] = Column::Name;
-    } else if !is_list && !has(Column::Name) && !has(Column::No) {
-        columns.insert(0, Column::Name);
+    if !has(OnlineColumn::Name) && titles.first().is_some_and(String::is_empty) {
+        columns[0] = OnlineColumn::Name;
+    } else if !is_list && !has(OnlineColumn::Name) && !has(OnlineColumn::No) {
+        columns.insert(0, OnlineColumn::Name);
     }
     Some(columns)
 }
@@ -105,7 +110,7 @@ fn number_in(name: &str) -> Option<u16> {
     rest.trim().parse().ok()
 }
 
-fn row_by(columns: &[Column], line: &str) -> Option<Row> {
+fn row_by(columns: &[OnlineColumn], line: &str) -> Option<Row> {
     let cells = cells(line);
     if cells.len() < 2 {
         return None;
@@ -116,17 +121,17 @@ fn row_by(columns: &[Column], line: &str) -> Option<Row> {
     for (at, column) in columns.iter().enumerate() {
         let Some(cell) = cells.next() else { break };
         match column {
-            Column::No => row.no = cell.parse().ok(),
-            Column::Address => {
+            OnlineColumn::No => row.no = cell.parse().ok(),
+            OnlineColumn::Address => {
                 row.address = count(&cell).and_then(|value| u16::try_from(value).ok())
             }
-            Column::Name => row.name = cell,
-            Column::State => {
+            OnlineColumn::Name => row.name = cell,
+            OnlineColumn::State => {
                 row.state = state_word::read(&cell);
                 row.is_partial |= row.state.is_none() && !cell.is_empty();
                 has_value |= row.state.is_some();
             }
-            Column::Crc => {
+            OnlineColumn::Crc => {
                 // Commas part ports, and in a list with commas cells, too.
                 let is_last = at + 1 == columns.len();
                 let rest: Vec<String> = if is_last { cells.by_ref().collect() } else { Vec::new() };
@@ -138,19 +143,19 @@ fn row_by(columns: &[Column], line: &str) -> Option<Row> {
                     None => row.is_partial |= !whole.trim_matches([',', '-', ' ']).is_empty(),
                 }
             }
-            Column::Changes => row.changes = changes(&cell),
-            Column::Register(register) => {
+            OnlineColumn::Changes => row.changes = changes(&cell),
+            OnlineColumn::Register(register) => {
                 let value = count(&cell).and_then(|value| u16::try_from(value).ok());
                 row.registers.extend(value.map(|value| (*register, value)));
                 has_value |= value.is_some();
             }
-            Column::PortCrc(port) => {
+            OnlineColumn::PortCrc(port) => {
                 let read = count(&cell)
                     .map(|frames| ReadPort { frame: Some(Count(frames)), ..ReadPort::default() });
                 has_value |= read.is_some();
                 row.ports.extend(read.map(|read| (*port, read)));
             }
-            Column::Other => {}
+            OnlineColumn::Other => {}
         }
     }
     row.no = row.no.or_else(|| number_in(&row.name));
@@ -163,7 +168,13 @@ fn plain_row(line: &str) -> Option<Row> {
     let cells = cells(line);
     let words: Vec<&str> = match cells.len() {
         4.. => {
-            let columns = [Column::No, Column::Address, Column::Name, Column::State, Column::Crc];
+            let columns = [
+                OnlineColumn::No,
+                OnlineColumn::Address,
+                OnlineColumn::Name,
+                OnlineColumn::State,
+                OnlineColumn::Crc,
+            ];
             let row = row_by(&columns, line)?;
             let is_row = row.no.is_some() && row.address.is_some() && !row.name.is_empty();
             return (is_row && row.state.is_some()).then_some(row);
@@ -258,7 +269,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     let kind = if columns
         .iter()
         .flatten()
-        .any(|one| matches!(one, Column::Register(_) | Column::PortCrc(_)))
+        .any(|one| matches!(one, OnlineColumn::Register(_) | OnlineColumn::PortCrc(_)))
     {
         "list of registers"
     } else {
@@ -270,18 +281,18 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
 
 fn tell(block: &mut Block, row: Row) {
     let whom = match (row.no, row.address) {
-        (Some(no @ 1..), _) => Whom::Position(no - 1),
-        (_, Some(address)) => Whom::Named(row.name.clone(), Some(address)),
-        (Some(_) | None, None) => Whom::Named(row.name.clone(), None),
+        (Some(no @ 1..), _) => SubDeviceRef::Position(no - 1),
+        (_, Some(address)) => SubDeviceRef::Named(row.name.clone(), Some(address)),
+        (Some(_) | None, None) => SubDeviceRef::Named(row.name.clone(), None),
     };
     let type_name = type_in(&row.name);
     let mut read = ReadDevice::default();
     let is_generic = number_in(&row.name).is_some() || row.name.is_empty();
-    let about = About {
+    let about = SubDeviceFact {
         name: Some(row.name.clone()).filter(|_| !is_generic),
         type_name: type_name.map(str::to_owned),
         station: row.address.filter(|address| *address > 255),
-        ..About::default()
+        ..SubDeviceFact::default()
     };
     if let Some(state) = row.state {
         read.state = state.state;
@@ -304,8 +315,8 @@ fn tell(block: &mut Block, row: Row) {
         // The first time it was there is none at which it was gone.
         read.absences = Some(Count(present.saturating_sub(1)));
     }
-    block.tell(What::About(whom.clone(), Box::new(about)));
-    block.tell(What::Read(whom, Box::new(read)));
+    block.tell(FactKind::SubDeviceFact(whom.clone(), Box::new(about)));
+    block.tell(FactKind::Read(whom, Box::new(read)));
 }
 
 /// A row of the frames beneath the list.
@@ -375,7 +386,7 @@ pub(super) fn take_frames(lines: &[Line<'_>]) -> Option<Block> {
         return None;
     }
     block.what = "TwinCAT counters of frames".to_owned();
-    block.tell(What::Main(Box::new(main)));
+    block.tell(FactKind::Main(Box::new(main)));
     Some(block)
 }
 

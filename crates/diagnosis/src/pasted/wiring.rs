@@ -1,10 +1,10 @@
-//! How the SubDevices of a text are wired: as it tells, else as order, types and silence suggest.
+//! Wiring of the SubDevices of a text: as it tells, else as order, types and silence suggest.
 
 use linesman_proto::address::Path;
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::topology::{End, Reconstruction, SeenController};
 
-use crate::line::reported::WiringBasis;
+use crate::model::reported::WiringBasis;
 
 /// What is known of a SubDevice that tells of its place.
 #[derive(Clone, Default, Debug)]
@@ -22,10 +22,10 @@ pub(super) struct Hints {
 
 /// Where a SubDevice hangs: the one before it with its port, `None` for the MainDevice; and by which port it is
 /// entered.
-pub(super) type Place = (Option<(usize, Port)>, Port);
+pub(super) type AttachPoint = (Option<(usize, Port)>, Port);
 
 /// The places of all, in order.
-pub(super) fn places(hints: &[Hints]) -> (Vec<Place>, WiringBasis) {
+pub(super) fn places(hints: &[Hints]) -> (Vec<AttachPoint>, WiringBasis) {
     if let Some(places) = by_neighbours(hints).or_else(|| by_open_ports(hints)) {
         return (places, WiringBasis::Told);
     }
@@ -37,7 +37,7 @@ pub(super) fn places(hints: &[Hints]) -> (Vec<Place>, WiringBasis) {
 }
 
 /// As each tells who is behind its ports.
-fn by_neighbours(hints: &[Hints]) -> Option<Vec<Place>> {
+fn by_neighbours(hints: &[Hints]) -> Option<Vec<AttachPoint>> {
     if hints.len() < 2 {
         return None;
     }
@@ -57,7 +57,7 @@ fn by_neighbours(hints: &[Hints]) -> Option<Vec<Place>> {
 }
 
 /// As the open ports of all allow.
-fn by_open_ports(hints: &[Hints]) -> Option<Vec<Place>> {
+fn by_open_ports(hints: &[Hints]) -> Option<Vec<AttachPoint>> {
     let seen: Option<Vec<SeenController>> = hints
         .iter()
         .map(|hint| Some(SeenController { open: hint.open?, ..SeenController::default() }))
@@ -79,7 +79,7 @@ fn by_open_ports(hints: &[Hints]) -> Option<Vec<Place>> {
 
 /// What a port is wired to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Kind {
+enum PortKind {
     /// Contacts between terminals.
     Terminal,
     /// A cable.
@@ -88,7 +88,7 @@ enum Kind {
     Any,
 }
 
-impl Kind {
+impl PortKind {
     fn fits(self, other: Self) -> bool {
         self == other || self == Self::Any || other == Self::Any
     }
@@ -96,9 +96,9 @@ impl Kind {
 
 /// By which kind of port a type is entered, and its further ports in the order of the frames. Reference: device
 /// descriptions of the maker.
-fn ports_of(type_name: Option<&str>) -> (Kind, &'static [(Port, Kind)]) {
-    use Kind::{Any, Cable, Terminal};
+fn ports_of(type_name: Option<&str>) -> (PortKind, &'static [(Port, PortKind)]) {
     use Port::{B, C, D};
+    use PortKind::{Any, Cable, Terminal};
     let Some(name) = type_name else { return (Any, &[(B, Any)]) };
     let is = |families: &[&str]| families.iter().any(|family| name.starts_with(family));
     if is(&["EK1110"]) {
@@ -123,14 +123,14 @@ fn ports_of(type_name: Option<&str>) -> (Kind, &'static [(Port, Kind)]) {
 }
 
 /// A SubDevice to which more can still be attached: those that come later hang on it or on one before it.
-struct Spine {
+struct OpenChain {
     node: usize,
-    ports: Vec<(Port, Kind)>,
+    ports: Vec<(Port, PortKind)>,
 }
 
-fn assumed(hints: &[Hints]) -> Vec<Place> {
-    let mut places: Vec<Place> = Vec::with_capacity(hints.len());
-    let mut spine: Vec<Spine> = Vec::new();
+fn assumed(hints: &[Hints]) -> Vec<AttachPoint> {
+    let mut places: Vec<AttachPoint> = Vec::with_capacity(hints.len());
+    let mut spine: Vec<OpenChain> = Vec::new();
     for (node, hint) in hints.iter().enumerate() {
         let (entry, ports) = ports_of(hint.type_name.as_deref());
         let found = attach(hints, &spine, hint, entry);
@@ -153,15 +153,20 @@ fn assumed(hints: &[Hints]) -> Vec<Place> {
             }
         }
         places.push((above, Port::A));
-        spine.push(Spine { node, ports: ports.to_vec() });
+        spine.push(OpenChain { node, ports: ports.to_vec() });
     }
     places
 }
 
 /// The nearest place that fits: not behind somebody who is silent, for one that answers; for one that is silent
 /// behind a link that is missed, where the nearest would answer.
-fn attach(hints: &[Hints], spine: &[Spine], hint: &Hints, entry: Kind) -> Option<(usize, Port)> {
-    let fits = |depth: &usize, port: Port, kind: Kind| {
+fn attach(
+    hints: &[Hints],
+    spine: &[OpenChain],
+    hint: &Hints,
+    entry: PortKind,
+) -> Option<(usize, Port)> {
+    let fits = |depth: &usize, port: Port, kind: PortKind| {
         let above = &hints[spine[*depth].node];
         let is_reached =
             hint.answers != Some(true) || (above.answers != Some(false) && !above.missing[port]);

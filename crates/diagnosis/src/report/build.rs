@@ -1,4 +1,4 @@
-//! From findings to the report.
+//! Building of the report from findings.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::DeviceId;
@@ -11,12 +11,12 @@ use super::{
     Number, PlaceReport, calibration,
 };
 use crate::finding::{
-    Alternative, Book, Evidence, Finding, LinkDirection, LinkEnd, Place, told_apart_by,
+    Alternative, Evidence, Finding, FindingStore, LinkDirection, LinkEnd, Place, told_apart_by,
 };
 
 /// A finding with all that follows from it.
 #[must_use]
-pub fn finding(book: &Book, finding: &Finding) -> FindingReport {
+pub fn finding(book: &FindingStore, finding: &Finding) -> FindingReport {
     let consequences = book.consequences(finding.id);
     let mut report = alone(finding);
     report.consequences =

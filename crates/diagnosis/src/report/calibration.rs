@@ -1,4 +1,4 @@
-//! How often a finding is right of which its rule is so sure.
+//! Calibration: the share of findings that are right, by the confidence of their rule.
 //!
 //! A rule says how sure it is by its own evidence, so that hypotheses can be ranked. Whether 70 % is right seven
 //! times of ten only a corpus can tell: `linesman lab score` holds both against each other. The table is

@@ -1,4 +1,4 @@
-//! Coverage of the verdict as part of the answer.
+//! Coverage of the verdict in the report.
 
 use linesman_config::fault::FaultName;
 use serde::{Deserialize, Serialize};

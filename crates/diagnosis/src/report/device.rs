@@ -1,8 +1,8 @@
-//! The SubDevices as part of the answer: who they are and how they stand.
+//! SubDevices in the report: identities and states.
 
 use serde::{Deserialize, Serialize};
 
-use crate::line::{Device, Line, Seen};
+use crate::model::{Device, NetworkModel, Seen};
 
 /// A SubDevice. What the input does not say is `null`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
@@ -49,8 +49,8 @@ impl DeviceReport {
 }
 
 /// All SubDevices of a line.
-pub(crate) fn reports(line: Option<&Line>) -> Vec<DeviceReport> {
-    line.map_or_else(Vec::new, |line| line.devices.iter().map(report).collect())
+pub(crate) fn reports(model: Option<&NetworkModel>) -> Vec<DeviceReport> {
+    model.map_or_else(Vec::new, |model| model.devices.iter().map(report).collect())
 }
 
 fn report(device: &Device) -> DeviceReport {

@@ -1,12 +1,12 @@
-//! The MainDevice as part of the answer: its kind and what it reads.
+//! MainDevice in the report: its kind and what it reads.
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::{ErrorCounters, describe};
 use serde::{Deserialize, Serialize};
 
 use super::Number;
-use crate::line::Line;
 use crate::main_device::{Access, Certainty, MainDeviceKind, Mark};
+use crate::model::NetworkModel;
 
 /// The MainDevice that drives the line, recognised by its habits.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
@@ -53,20 +53,20 @@ pub struct RegisterReport {
 }
 
 /// The MainDevice of a line; `None` before its first request.
-pub(crate) fn report(line: &Line) -> Option<MainDeviceReport> {
-    let recognised = line.habits.recognised()?;
-    let cycle = line.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min();
-    let polls = line.habits.polls(line.now).into_iter().map(|poll| PollReport {
+pub(crate) fn report(model: &NetworkModel) -> Option<MainDeviceReport> {
+    let recognised = model.habits.recognised()?;
+    let cycle = model.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min();
+    let polls = model.habits.polls(model.now).into_iter().map(|poll| PollReport {
         register: poll.register.0,
         len: poll.len,
         name: name(poll.register, poll.len),
         how: poll.access,
         every_ns: poll.interval().map(|every| Number(every.as_nanos())),
     });
-    let never = line
+    let never = model
         .habits
         .never_reads()
-        .filter(|(register, len)| !line.traffic.questions.have_read(*register, *len))
+        .filter(|(register, len)| !model.traffic.questions.have_read(*register, *len))
         .map(|(register, len)| RegisterReport { register: register.0, name: name(register, len) });
     Some(MainDeviceReport {
         kind: recognised.kind,

@@ -1,4 +1,4 @@
-//! The answer, `linesman.diagnosis/1`: what the command line prints with `--json`.
+//! Report, `linesman.diagnosis/1`: the JSON that the command line prints with `--json`.
 //!
 //! Times are ns since the start of the run; numbers above 2^53 are written as strings, since not
 //! every reader of JSON keeps them.

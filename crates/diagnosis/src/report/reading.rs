@@ -1,23 +1,23 @@
-//! How to have read what would tell the place of a finding, for the MainDevice that drives the line.
+//! Advice on reading what would tell the place of a finding, for the MainDevice that drives the line.
 
 use linesman_config::fault::Class;
 
 use super::{FindingReport, PlaceReport};
-use crate::ask::Refusal;
+use crate::ask::AskRefusal;
 use crate::coverage::InputKind;
-use crate::line::Line;
 use crate::main_device::{MainDeviceKind, next_step};
+use crate::model::NetworkModel;
 
 /// Adds to findings whose place is left open, where nobody has read error counters, how this kind of MainDevice reads them.
-pub(crate) fn advise(findings: &mut [FindingReport], line: &Line, input: InputKind) {
+pub(crate) fn advise(findings: &mut [FindingReport], model: &NetworkModel, input: InputKind) {
     let is_others = matches!(input, InputKind::Listened | InputKind::Recorded | InputKind::Typed);
-    let kind = line.main_device_kind();
-    let is_read = line.devices.iter().any(|device| device.counters.is_known());
+    let kind = model.main_device_kind();
+    let is_read = model.devices.iter().any(|device| device.counters.is_known());
     if !is_others || is_read || kind == MainDeviceKind::Unknown {
         return;
     }
-    let may_ask =
-        input == InputKind::Listened && Refusal::of(line.habits.recognised().as_ref()).is_none();
+    let may_ask = input == InputKind::Listened
+        && AskRefusal::of(model.habits.recognised().as_ref()).is_none();
     for finding in findings.iter_mut().filter(|finding| is_open(finding)) {
         if may_ask {
             finding.actions.push(

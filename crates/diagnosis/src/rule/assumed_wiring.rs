@@ -5,7 +5,7 @@
 
 use super::{Rule, View};
 use crate::finding::{Condition, Evidence, Place};
-use crate::line::reported::WiringBasis;
+use crate::model::reported::WiringBasis;
 
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[], judge };
@@ -16,7 +16,7 @@ const BY_ORDER: f64 = 0.6;
 
 #[expect(clippy::ptr_arg, reason = "all rules have this form")]
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let (factor, how) = match view.line.reported.wiring {
+    let (factor, how) = match view.model.reported.wiring {
         WiringBasis::Told => return,
         WiringBasis::Types => (BY_TYPES, "by the order of the list and the types"),
         WiringBasis::Order => (BY_ORDER, "as a line in order"),

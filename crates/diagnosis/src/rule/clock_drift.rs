@@ -27,8 +27,8 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View, reference_clock};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::clock::{Astray, Reference};
-use crate::line::{Absence, Device, Line};
+use crate::model::clock::{ClockDeviation, Reference};
+use crate::model::{Absence, Device, NetworkModel};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -45,26 +45,26 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const DIFFERENCE: RegisterAddress = RegisterAddress(0x092C);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
+    let model = view.model;
     // Whoever follows a clock that stands goes astray with it.
-    if reference_clock::is_lost(line) {
+    if reference_clock::is_lost(model) {
         return;
     }
-    let astray: Vec<(&Device, Astray)> = (line.devices.iter())
+    let astray: Vec<(&Device, ClockDeviation)> = (model.devices.iter())
         .filter_map(|device| Some((device, device.clock.astray?)))
-        .filter(|(device, astray)| !was_gone(device, astray) && !was_left_alone(line, astray))
+        .filter(|(device, astray)| !was_gone(device, astray) && !was_left_alone(model, astray))
         .collect();
     if astray.is_empty() {
-        conditions.extend(alone(line));
+        conditions.extend(alone(model));
         return;
     }
-    if let Some(reference) = wrong_reference(line, &astray) {
-        conditions.push(of_reference(line, reference, &astray));
+    if let Some(reference) = wrong_reference(model, &astray) {
+        conditions.push(of_reference(model, reference, &astray));
         return;
     }
     for (device, astray) in &astray {
-        let condition = begin(line, device.id, std::slice::from_ref(astray));
-        let evidence = evidence(line, device.id, astray);
+        let condition = begin(model, device.id, std::slice::from_ref(astray));
+        let evidence = evidence(model, device.id, astray);
         conditions.push(condition.shown_by(evidence).explaining(follows(device.id)));
     }
 }
@@ -74,7 +74,7 @@ const PULLED_IN: Span = Span::s(2);
 
 /// Whether the SubDevice was gone, or started anew, meanwhile or just before: then its clock had to be set or
 /// pulled in again.
-fn was_gone(device: &Device, astray: &Astray) -> bool {
+fn was_gone(device: &Device, astray: &ClockDeviation) -> bool {
     let is_within = |at| at >= astray.near.at && at <= astray.far.at;
     let was_away = |absence: &Absence| {
         let is_over = absence.ended.is_some_and(|ended| ended + PULLED_IN < astray.near.at);
@@ -85,7 +85,7 @@ fn was_gone(device: &Device, astray: &Astray) -> bool {
 }
 
 /// Whether a SubDevice did not answer when a clock went astray, or not long before.
-fn was_silent(device: &Device, astray: &Astray) -> bool {
+fn was_silent(device: &Device, astray: &ClockDeviation) -> bool {
     let began = |since: Instant| since <= astray.far.at;
     device.silent.is_some_and(|silent| began(silent.at))
         || device.absences.iter().any(|absence| {
@@ -95,24 +95,25 @@ fn was_silent(device: &Device, astray: &Astray) -> bool {
 
 /// Whether no frame came round meanwhile, or none with the time of the reference, or the ring was in halves, so
 /// that nobody was steered, and the clock went off by no more than a sound quartz does in such a time.
-fn was_left_alone(line: &Line, astray: &Astray) -> bool {
-    let silent = line.traffic.silences.iter().map(|silence| {
-        let ended = silence.ended.unwrap_or(line.now).min(astray.far.at);
+fn was_left_alone(model: &NetworkModel, astray: &ClockDeviation) -> bool {
+    let silent = model.traffic.silences.iter().map(|silence| {
+        let ended = silence.ended.unwrap_or(model.now).min(astray.far.at);
         ended.since(silence.since.at.max(astray.near.at).min(ended)).as_nanos()
     });
     // Frames may go round without a time, too.
-    let withheld = line.references.iter();
+    let withheld = model.references.iter();
     let withheld = withheld.map(|reference| reference.withheld(astray.near.at, astray.far.at));
     let withheld = withheld.min().unwrap_or_default().as_nanos();
     let alone = silent.sum::<u64>().max(withheld);
     // Where the reference does not answer, nobody puts its time into the frame, and the others take what is there.
-    let without_reference = line.references.iter().any(|reference| {
-        line.device(reference.device).is_some_and(|device| was_silent(device, astray))
+    let without_reference = model.references.iter().any(|reference| {
+        model.device(reference.device).is_some_and(|device| was_silent(device, astray))
     });
     if without_reference {
         return true;
     }
-    let is_in_halves = line.traffic.broadcast_split.is_some_and(|split| split.at >= astray.near.at);
+    let is_in_halves =
+        model.traffic.broadcast_split.is_some_and(|split| split.at >= astray.near.at);
     if is_in_halves && astray.ppm.unsigned_abs() <= Reference::SOUND.unsigned_abs() {
         return true;
     }
@@ -123,14 +124,14 @@ fn was_left_alone(line: &Line, astray: &Astray) -> bool {
 }
 
 /// The reference clock, if it is that which runs wrong.
-fn wrong_reference(line: &Line, astray: &[(&Device, Astray)]) -> Option<DeviceId> {
-    let [reference] = line.references.as_slice() else { return None };
+fn wrong_reference(model: &NetworkModel, astray: &[(&Device, ClockDeviation)]) -> Option<DeviceId> {
+    let [reference] = model.references.as_slice() else { return None };
     if reference.wrong_speed.is_some() {
         return Some(reference.device);
     }
     // Most of those whose difference was read since, in one direction.
     let began = astray.iter().map(|(_, astray)| astray.far.at).min()?;
-    let read = line.devices.iter().filter(|device| {
+    let read = model.devices.iter().filter(|device| {
         let latest = device.clock.differences.back();
         device.id != reference.device && latest.is_some_and(|latest| latest.at >= began)
     });
@@ -144,42 +145,46 @@ const SLEWED: u64 = 500;
 
 /// A reference clock that nobody is known to leave, against the clock of the computer: one of the two is
 /// wrong. While others follow it, a difference may be a computer's clock that is being set right.
-fn alone(line: &Line) -> Option<Condition> {
-    let [reference] = line.references.as_slice() else { return None };
+fn alone(model: &NetworkModel) -> Option<Condition> {
+    let [reference] = model.references.as_slice() else { return None };
     let ppm = reference.wrong_speed?.unsigned_abs();
     let id = reference.device;
-    let mut others = line.devices.iter().filter(|device| device.id != id);
+    let mut others = model.devices.iter().filter(|device| device.id != id);
     if ppm <= SLEWED && others.any(|device| device.clock.near.is_some()) {
         return None;
     }
-    let condition = of_reference(line, id, &[]);
+    let condition = of_reference(model, id, &[]);
     Some(condition.confidence(0.6).or_at(FaultName::ClockDrift, Place::Host, 0.3))
 }
 
-fn of_reference(line: &Line, id: DeviceId, astray: &[(&Device, Astray)]) -> Condition {
-    let spans: Vec<Astray> = astray.iter().map(|(_, astray)| *astray).collect();
-    let mut condition = begin(line, id, &spans);
-    let reference = line.references.iter().find(|one| one.device == id);
+fn of_reference(
+    model: &NetworkModel,
+    id: DeviceId,
+    astray: &[(&Device, ClockDeviation)],
+) -> Condition {
+    let spans: Vec<ClockDeviation> = astray.iter().map(|(_, astray)| *astray).collect();
+    let mut condition = begin(model, id, &spans);
+    let reference = model.references.iter().find(|one| one.device == id);
     if let Some(ppm) = reference.and_then(|reference| reference.wrong_speed) {
         let text = format!(
             "the time of reference clock {} goes {} than that of the computer, by {} parts per million",
-            line.label(id),
+            model.label(id),
             if ppm > 0 { "faster" } else { "slower" },
             ppm.abs()
         );
-        condition = condition.shown_by(Evidence::host(Some(line.now), text));
+        condition = condition.shown_by(Evidence::host(Some(model.now), text));
     }
     for (device, astray) in astray.iter().take(3) {
-        condition = condition.shown_by(evidence(line, device.id, astray));
+        condition = condition.shown_by(evidence(model, device.id, astray));
     }
-    condition.explaining(line.devices.iter().flat_map(|device| follows(device.id)))
+    condition.explaining(model.devices.iter().flat_map(|device| follows(device.id)))
 }
 
-fn begin(line: &Line, id: DeviceId, astray: &[Astray]) -> Condition {
-    let since = astray.iter().map(|one| one.far.at).min().unwrap_or(line.now);
+fn begin(model: &NetworkModel, id: DeviceId, astray: &[ClockDeviation]) -> Condition {
+    let since = astray.iter().map(|one| one.far.at).min().unwrap_or(model.now);
     let condition = Condition::new(
         &PAGE,
-        Place::device(line.network, id),
+        Place::device(model.network, id),
         FaultName::ClockDrift,
         since,
     )
@@ -197,12 +202,12 @@ fn begin(line: &Line, id: DeviceId, astray: &[Astray]) -> Condition {
     }
 }
 
-fn evidence(line: &Line, id: DeviceId, astray: &Astray) -> Evidence {
+fn evidence(model: &NetworkModel, id: DeviceId, astray: &ClockDeviation) -> Evidence {
     let us = |ns: i64| ns as f64 / 1e3;
     let text = format!(
         "clock of {}: {:+.3} µs off the reference, then {:+.3} µs, at most {:+.3} µs; up to {} parts \
          per million",
-        line.label(id),
+        model.label(id),
         us(astray.near.value),
         us(astray.far.value),
         us(astray.worst.value),

@@ -20,7 +20,7 @@ use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, Line};
+use crate::model::{Device, NetworkModel};
 
 /// Somebody clears them.
 pub const CLEARED: RulePage = RulePage {
@@ -47,17 +47,17 @@ pub const RULE: Rule = Rule { pages: &[CLEARED, FULL], judge };
 const QUIET: Span = Span::s(10);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    conditions.extend(cleared(view.line));
+    conditions.extend(cleared(view.model));
     // As long as nothing is counted anywhere, it does not matter who could not.
-    if !view.line.devices.iter().any(|device| device.counters.last_rise().is_some()) {
+    if !view.model.devices.iter().any(|device| device.counters.last_rise().is_some()) {
         return;
     }
     // Beside damage that was located it belongs to that: it says what could not be seen of it.
     let located =
         conditions.iter().find(|condition| matches!(condition.page.code, "H110" | "H111"));
     let about = located.and_then(|condition| condition.explains.first().copied());
-    for device in &view.line.devices {
-        let full = full(view.line, device);
+    for device in &view.model.devices {
+        let full = full(view.model, device);
         conditions.extend(full.map(|mut full| {
             full.symptoms = about.map_or(full.symptoms, |about| vec![about]);
             full
@@ -65,12 +65,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
 }
 
-fn cleared(line: &Line) -> Option<Condition> {
+fn cleared(model: &NetworkModel) -> Option<Condition> {
     let is_well = |device: &&Device| {
         // Who starts anew has counters of 0, too.
         device.absences.is_empty() && !device.al.changes.iter().any(|change| change.is_own_fall())
     };
-    let all = line.devices.iter().filter(is_well);
+    let all = model.devices.iter().filter(is_well);
     let all: Vec<_> = all.filter_map(|device| Some((device, device.counters.cleared()?))).collect();
     let (device, first) = all.iter().min_by_key(|(_, seen)| seen.at)?;
     let last = all.iter().map(|(_, seen)| seen.at).max()?;
@@ -80,11 +80,11 @@ fn cleared(line: &Line) -> Option<Condition> {
         "{} of {} fell from {before} to {} without a write that was seen here; {times} times on \
          {} SubDevices by now",
         name(counter),
-        line.label(device.id),
+        model.label(device.id),
         device.counters.latest(counter).unwrap_or(0),
         all.len()
     );
-    let place = Place::Network { network: line.network };
+    let place = Place::Network { network: model.network };
     let condition = Condition::new(&CLEARED, place, FaultName::SecondMainDevice, first.at)
         .confidence(0.5)
         .confirmed(first.at)
@@ -94,10 +94,10 @@ fn cleared(line: &Line) -> Option<Condition> {
         .advise(
             "Until then read rates with care: what was counted between two readings may be lost.",
         );
-    Some(if last + QUIET < line.now { condition.ended(last) } else { condition })
+    Some(if last + QUIET < model.now { condition.ended(last) } else { condition })
 }
 
-fn full(line: &Line, device: &Device) -> Option<Condition> {
+fn full(model: &NetworkModel, device: &Device) -> Option<Condition> {
     // One that came to its end here has told all it had to tell.
     let is_full = |counter: &ErrorCounter| {
         let track = device.counters.track(*counter);
@@ -111,9 +111,9 @@ fn full(line: &Line, device: &Device) -> Option<Condition> {
     let text = format!(
         "at its end, 255, and counts no more: {} of {}",
         names.join(", "),
-        line.label(device.id)
+        model.label(device.id)
     );
-    let place = Place::device(line.network, device.id);
+    let place = Place::device(model.network, device.id);
     let ports = full.iter().filter_map(|counter| counter.port());
     let mut condition = Condition::new(&FULL, place, FaultName::CableDegraded, since)
         .confidence(0.3)

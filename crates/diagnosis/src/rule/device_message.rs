@@ -16,7 +16,7 @@ use linesman_proto::mailbox::coe::diagnosis::{DiagnosisMessage, Severity as Seri
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::mailbox::HistoryMessage;
+use crate::model::mailbox::HistoryMessage;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -31,15 +31,15 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    for device in &line.devices {
+    let model = view.model;
+    for device in &model.devices {
         let serious = |message: &HistoryMessage| {
             matches!(message.severity, Seriousness::Warning | Seriousness::Error)
         };
         let all = device.mailbox.messages.iter().filter(|seen| serious(&seen.value));
         let all: Vec<_> = all.collect();
         let (Some(first), Some(last)) = (all.first(), all.last()) else { continue };
-        let place = Place::device(line.network, device.id);
+        let place = Place::device(model.network, device.id);
         let mut condition = Condition::new(&PAGE, place, FaultName::FirmwareFault, first.at)
             .confidence(0.4)
             .confirmed(first.at)
@@ -50,7 +50,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
                 device.id.no()
             ));
         for seen in all {
-            let label = line.label(device.id);
+            let label = model.label(device.id);
             let text = format!("{label} noted {}", text(&seen.value));
             condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
         }

@@ -24,8 +24,8 @@ use linesman_proto::topology::{End, Tree};
 
 use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Line, Silence, search};
-use crate::locate::{Drops, LastHop, Located, Survey};
+use crate::locate::{LastHop, LinkLosses, LocateInput, Located};
+use crate::model::{NetworkModel, Silence, search};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -49,59 +49,60 @@ const AROUND: Span = Span::s(1);
 const COUNTED: Span = Span::ms(250);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let Some(tree) = &line.tree else { return };
-    let all = Drops::all(line);
-    let is_first = |drops: &&Drops| matches!(tree.links()[drops.link].upstream, End::MainDevice(_));
+    let model = view.model;
+    let Some(tree) = &model.tree else { return };
+    let all = LinkLosses::all(model);
+    let is_first =
+        |drops: &&LinkLosses| matches!(tree.links()[drops.link].upstream, End::MainDevice(_));
     // Without the first link nobody answers in any case.
-    let suspects: Vec<&Drops> = match all.iter().find(is_first) {
+    let suspects: Vec<&LinkLosses> = match all.iter().find(is_first) {
         Some(first) => vec![first],
         None => all.iter().collect(),
     };
     // A link that comes and goes is another trouble.
     // So is one of which one end never knew: what is in between takes the link from both.
-    let is_one = |drops: &&Drops| {
-        !drops.is_down && drops.count == 1 && !link_lost::is_one_sided(line, tree, drops)
+    let is_one = |drops: &&LinkLosses| {
+        !drops.is_down && drops.count == 1 && !link_lost::is_one_sided(model, tree, drops)
     };
     for drops in suspects.into_iter().filter(is_one) {
         let silence = match tree.links()[drops.link].upstream {
-            End::MainDevice(card) => behind_card(line, card),
-            End::Controller(..) => behind_link(line, drops),
+            End::MainDevice(card) => behind_card(model, card),
+            End::Controller(..) => behind_link(model, drops),
         };
         if let Some((silence, ended)) = silence {
-            conditions.push(condition(line, tree, drops, (silence, ended)));
+            conditions.push(condition(model, tree, drops, (silence, ended)));
         }
     }
 }
 
 /// Silences that are over, long enough to be no accident.
-fn silences(line: &Line) -> impl Iterator<Item = (&Silence, Instant)> {
-    let over = line.traffic.silences.iter().rev().filter_map(|one| Some((one, one.ended?)));
+fn silences(model: &NetworkModel) -> impl Iterator<Item = (&Silence, Instant)> {
+    let over = model.traffic.silences.iter().rev().filter_map(|one| Some((one, one.ended?)));
     over.filter(|(one, ended)| one.frames >= SEVERAL && ended.since(one.since.at) >= BLIND)
 }
 
 /// With another link than the first one lost, the rest of the line answers; unless all vanishes.
-fn behind_link<'a>(line: &'a Line, drops: &Drops) -> Option<(&'a Silence, Instant)> {
+fn behind_link<'a>(model: &'a NetworkModel, drops: &LinkLosses) -> Option<(&'a Silence, Instant)> {
     let (from, to) = (drops.first.before(AROUND), drops.ended()? + AROUND);
     let is_then = |at: Instant| at >= from && at <= to;
     // Who starts anew at the begin of a line takes all the others with it.
-    let fell = line.devices.iter().any(|device| {
+    let fell = model.devices.iter().any(|device| {
         let mut falls = device.al.changes.iter().filter(|change| change.is_own_fall());
         falls.any(|change| change.to.state().state() == Some(AlState::Init) && is_then(change.at))
     });
     if fell {
         return None;
     }
-    silences(line).find(|(silence, ended)| {
-        is_then(silence.since.at) && !were_damaged(line, drops.link, silence, *ended)
+    silences(model).find(|(silence, ended)| {
+        is_then(silence.since.at) && !were_damaged(model, drops.link, silence, *ended)
     })
 }
 
 /// Whether as many frames were damaged elsewhere meanwhile: those are lost, too, but somebody counts them. What
 /// a link swallows that carries nothing yet is counted by nobody.
-fn were_damaged(line: &Line, link: usize, silence: &Silence, ended: Instant) -> bool {
-    let Some(survey) = Survey::of(line, true) else { return false };
-    let located = Located::on(&survey);
+fn were_damaged(model: &NetworkModel, link: usize, silence: &Silence, ended: Instant) -> bool {
+    let Some(input) = LocateInput::of(model, true) else { return false };
+    let located = Located::on(&input);
     let is_then =
         |first: Instant, last: Instant| first <= ended + COUNTED && last >= silence.since.at;
     let hops = located
@@ -119,15 +120,15 @@ fn were_damaged(line: &Line, link: usize, silence: &Silence, ended: Instant) -> 
 
 /// The card had its link again, and still nothing came back of what it sent from then on. When the link came is
 /// known a little late at most: what was lost later was lost with the link up.
-fn behind_card(line: &Line, card: Path) -> Option<(&Silence, Instant)> {
-    let history = line.host.card(card);
+fn behind_card(model: &NetworkModel, card: Path) -> Option<(&Silence, Instant)> {
+    let history = model.host.card(card);
     let came = |silence: &Silence| match history.carrier {
         Some(carrier) => (carrier.value && history.carrier_changes > 0).then_some(carrier.at),
         // Whoever began to search so late had no link before.
-        None => search::began(line, silence)
+        None => search::began(model, silence)
             .map(|began| began.at)
             .filter(|began| began.since(silence.since.at) >= search::BEGINS_WITHIN)
-            .or_else(|| sent_again(line, silence)),
+            .or_else(|| sent_again(model, silence)),
     };
     let is_blind = |silence: &Silence| {
         came(silence).is_some_and(|came| {
@@ -136,30 +137,30 @@ fn behind_card(line: &Line, card: Path) -> Option<(&Silence, Instant)> {
                 && silence.last.at >= came + BLIND
         })
     };
-    silences(line).find(|(silence, _)| is_blind(silence))
+    silences(model).find(|(silence, _)| is_blind(silence))
 }
 
 /// When frames were sent again of which none came back, after none had left. A card without a link takes none,
 /// so none is recorded: it had its link again.
-fn sent_again(line: &Line, silence: &Silence) -> Option<Instant> {
-    line.quiet_before(silence).map(|pause| pause.to)
+fn sent_again(model: &NetworkModel, silence: &Silence) -> Option<Instant> {
+    model.quiet_before(silence).map(|pause| pause.to)
 }
 
 fn condition(
-    line: &Line,
+    model: &NetworkModel,
     tree: &Tree,
-    drops: &Drops,
+    drops: &LinkLosses,
     (silence, ended): (&Silence, Instant),
 ) -> Condition {
     let link = tree.links()[drops.link].map(|node| DeviceId(node as u32));
-    let place = Place::link(line.network, link, Some(LinkDirection::Both));
+    let place = Place::link(model.network, link, Some(LinkDirection::Both));
     let since = silence.since;
     let text = format!(
         "nothing came back for {:.1} ms, {} frames, about when this link came up again; then everything did",
         ended.since(since.at).as_secs_f64() * 1e3,
         silence.frames
     );
-    let all = line.devices.iter().flat_map(|device| {
+    let all = model.devices.iter().flat_map(|device| {
         let id = device.id;
         [
             Symptom::Silent(id),
@@ -174,7 +175,7 @@ fn condition(
         .confirmed(ended)
         .ended(ended.max(drops.ended().unwrap_or(ended)))
         .shown_by(Evidence::frame(since.at, since.frame.unwrap_or(0), text))
-        .explaining(link_lost::follows(line, tree, drops.link))
+        .explaining(link_lost::follows(model, tree, drops.link))
         .explaining([Symptom::FramesLost, Symptom::NobodyAnswers, Symptom::NoCarrier])
         .explaining(all)
         .advise(

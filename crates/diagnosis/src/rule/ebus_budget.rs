@@ -22,7 +22,7 @@ use linesman_proto::register::table;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
-use crate::line::{Device, Line, Power, Seen};
+use crate::model::{Device, NetworkModel, Power, Seen};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -37,36 +37,36 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// Vendor, product and revision: what a description is of.
-type Kind = (u32, u32, u32);
+type DeviceKind = (u32, u32, u32);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let Some(tree) = &line.tree else { return };
+    let model = view.model;
+    let Some(tree) = &model.tree else { return };
     let feeds = |device: &Device| device.power.is_some_and(|seen| seen.value.ebus_current_ma < 0);
-    if !line.devices.iter().any(feeds) {
+    if !model.devices.iter().any(feeds) {
         return;
     }
-    let is_whole = usize::from(line.traffic.positions_seen) >= tree.len();
-    if !is_whole || !line.devices.iter().all(is_as_planned) || super::wiring::judges(line) {
+    let is_whole = usize::from(model.traffic.positions_seen) >= tree.len();
+    if !is_whole || !model.devices.iter().all(is_as_planned) || super::wiring::judges(model) {
         // Whoever is wired otherwise than planned is fed otherwise, too: first things first.
         return;
     }
-    let known: BTreeMap<Kind, Seen<Power>> =
-        line.devices.iter().filter_map(|device| Some((kind(device)?, device.power?))).collect();
+    let known: BTreeMap<DeviceKind, Seen<Power>> =
+        model.devices.iter().filter_map(|device| Some((kind(device)?, device.power?))).collect();
     let power = |device: &Device| {
         device.power.or_else(|| known.get(&kind(device)?).copied()).map(|seen| seen.value)
     };
-    let powers: Vec<Option<Power>> = line.devices.iter().map(power).collect();
+    let powers: Vec<Option<Power>> = model.devices.iter().map(power).collect();
     let draws = tree.order().iter().filter_map(|node| {
         let power = powers.get(*node)?.as_ref();
         Some(Draw {
-            device: line.devices[*node].id,
+            device: model.devices[*node].id,
             current_ma: power.map(|power| power.ebus_current_ma),
             ports: power.map(|power| &power.ports),
         })
     });
     for group in ebus::groups(tree, draws) {
-        conditions.extend(overloaded(line, &group));
+        conditions.extend(overloaded(model, &group));
     }
 }
 
@@ -79,19 +79,23 @@ fn is_as_planned(device: &Device) -> bool {
     }
 }
 
-fn kind(device: &Device) -> Option<Kind> {
+fn kind(device: &Device) -> Option<DeviceKind> {
     let identity = &device.identity;
     let value = |seen: Option<Seen<u32>>| seen.map(|seen| seen.value);
     Some((value(identity.vendor_id)?, value(identity.product_code)?, value(identity.revision)?))
 }
 
-fn overloaded(line: &Line, group: &EbusGroup) -> Option<Condition> {
+fn overloaded(model: &NetworkModel, group: &EbusGroup) -> Option<Condition> {
     let first = group.first_negative()?;
-    let seen = line.device(group.feeder)?.power?;
-    let (feeder, label) = (line.label(group.feeder), line.label(first));
+    let seen = model.device(group.feeder)?.power?;
+    let (feeder, label) = (model.label(group.feeder), model.label(first));
     let behind = group.members.iter().find(|member| member.device == first)?;
-    let condition =
-        Condition::new(&PAGE, Place::device(line.network, first), FaultName::EbusOverload, seen.at);
+    let condition = Condition::new(
+        &PAGE,
+        Place::device(model.network, first),
+        FaultName::EbusOverload,
+        seen.at,
+    );
     let text = format!(
         "{feeder} supplies {} mA; up to and with {label} {} mA are taken from it, by all behind it {} mA",
         group.supply_ma,

@@ -16,7 +16,7 @@ use linesman_proto::mailbox::coe::{Emergency, EmergencyClass};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, Line, Seen};
+use crate::model::{Device, NetworkModel, Seen};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -34,21 +34,21 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const SHOWN: usize = 3;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    for device in &view.line.devices {
+    for device in &view.model.devices {
         let is_error = |seen: &&Seen<Emergency>| seen.value.class() != EmergencyClass::Reset;
         let errors: Vec<_> = device.emergencies.iter().filter(is_error).collect();
         let Some(first) = errors.first() else { continue };
-        conditions.push(condition(view.line, device, first, &errors));
+        conditions.push(condition(view.model, device, first, &errors));
     }
 }
 
 fn condition(
-    line: &Line,
+    model: &NetworkModel,
     device: &Device,
     first: &Seen<Emergency>,
     errors: &[&Seen<Emergency>],
 ) -> Condition {
-    let place = Place::device(line.network, device.id);
+    let place = Place::device(model.network, device.id);
     let mut condition = Condition::new(&PAGE, place, FaultName::Emergency, first.at)
         .confidence(0.8)
         .or(FaultName::FirmwareFault, 0.1)
@@ -58,7 +58,7 @@ fn condition(
         let sorts: Vec<_> = seen.value.register.names().collect();
         let text = format!(
             "{} sent emergency 0x{:04X} ({}), error register: {}",
-            line.label(device.id),
+            model.label(device.id),
             seen.value.code,
             seen.value.class().text(),
             if sorts.is_empty() { "no error".to_owned() } else { sorts.join(", ") }

@@ -19,7 +19,7 @@ use linesman_proto::register::ErrorCounter;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
-use crate::line::{Device, ErrorSum};
+use crate::model::{Device, ErrorSum};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -39,24 +39,24 @@ const FEW: u64 = 3;
 const NAMED: usize = 6;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
+    let model = view.model;
     let is_placed = conditions.iter().any(|one| matches!(one.page.code, "H110" | "H111" | "H112"));
-    let order: Vec<usize> = match &line.tree {
+    let order: Vec<usize> = match &model.tree {
         Some(tree) => tree.order().to_vec(),
-        None => (0..line.devices.len()).collect(),
+        None => (0..model.devices.len()).collect(),
     };
-    let risen = order.iter().filter_map(|node| line.devices.get(*node)).filter_map(|device| {
+    let risen = order.iter().filter_map(|node| model.devices.get(*node)).filter_map(|device| {
         // Counters of ports say more.
         let sum = device.error_sum.filter(|sum| sum.rise > 0 && !device.counters.is_known());
         let sum = sum.map(|sum| (sum, "damaged frames"));
-        let is_placed = is_placed || line.traffic.frames > 0;
+        let is_placed = is_placed || model.traffic.frames > 0;
         let (sum, what) = sum.or_else(|| unplaced(device).filter(|_| !is_placed))?;
         Some((device, sum, what))
     });
     let risen: Vec<(&Device, ErrorSum, &str)> = risen.collect();
     let Some((first, sum, _)) = risen.first() else { return };
     let since = risen.iter().filter_map(|(_, sum, _)| sum.first_rise).min().unwrap_or(view.now);
-    let place = Place::device(line.network, first.id);
+    let place = Place::device(model.network, first.id);
     let mut condition = Condition::new(&PAGE, place, FaultName::CableDegraded, since)
         .confidence(0.35)
         .or(FaultName::EmcNoise, 0.25)
@@ -65,7 +65,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         .confirmed(since)
         .advise(format!(
             "Read the error counters of each port (0x0300 to 0x0307) of {} and its neighbours.",
-            line.label(first.id)
+            model.label(first.id)
         ))
         .advise(
             "Clear the totals, wait some minutes, and look which of them rise, and which first.",
@@ -78,7 +78,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         condition.severity = Severity::Info;
     }
     for (device, sum, what) in risen.iter().take(NAMED) {
-        let label = line.label(device.id);
+        let label = model.label(device.id);
         let text = match sum.may_be_old {
             true => {
                 format!("{label} counts {} {what}, of whatever time", sum.rise)
@@ -90,9 +90,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     if let Some(more) = risen.len().checked_sub(NAMED).filter(|more| *more > 0) {
         condition = condition.shown_by(Evidence::host(None, format!("and {more} others behind")));
     }
-    if sum.last_rise.is_some_and(|last| last < line.now)
+    if sum.last_rise.is_some_and(|last| last < model.now)
         && let Some(last) = risen.iter().filter_map(|(_, sum, _)| sum.last_rise).max()
-        && last < line.now
+        && last < model.now
     {
         condition = condition.ended(last);
     }

@@ -9,8 +9,8 @@ use linesman_proto::topology::End;
 
 use super::{Rule, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place};
-use crate::line::Line;
-use crate::line::reported::{ExchangePlace, Outcome, Part, PartExchange};
+use crate::model::NetworkModel;
+use crate::model::reported::{ExchangeOutcome, ExchangePlace, Part, PartExchange};
 
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[], judge };
@@ -22,30 +22,30 @@ const MOST: f64 = 0.95;
 
 #[expect(clippy::ptr_arg, reason = "all rules have this form")]
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    for exchange in &view.line.reported.exchanges {
-        for condition in conditions.iter_mut().filter(|one| is_about(view.line, exchange, one)) {
+    for exchange in &view.model.reported.exchanges {
+        for condition in conditions.iter_mut().filter(|one| is_about(view.model, exchange, one)) {
             weigh(view, exchange, condition);
         }
     }
 }
 
 /// Whether an exchange says something of a condition.
-fn is_about(line: &Line, exchange: &PartExchange, condition: &Condition) -> bool {
+fn is_about(model: &NetworkModel, exchange: &PartExchange, condition: &Condition) -> bool {
     // What stayed did so where the part had been.
-    let to = exchange.to.filter(|_| exchange.outcome == Outcome::Moved);
+    let to = exchange.to.filter(|_| exchange.outcome == ExchangeOutcome::Moved);
     let places = std::iter::once(condition.place)
         .chain(condition.alternatives.iter().filter_map(|other| other.place));
     let mut places = places;
     places.any(|place| {
-        let here = |at: ExchangePlace| touches(line, at, &place);
+        let here = |at: ExchangePlace| touches(model, at, &place);
         here(exchange.at) || to.is_some_and(here)
     })
 }
 
-fn touches(line: &Line, at: ExchangePlace, place: &Place) -> bool {
+fn touches(model: &NetworkModel, at: ExchangePlace, place: &Place) -> bool {
     match (at, place) {
         (ExchangePlace::Link(link), Place::Link { a, b, .. }) => {
-            let known = line.links().nth(link);
+            let known = model.links().nth(link);
             known.is_some_and(|known| known.upstream == *a && Some(known.downstream) == *b)
         }
         (ExchangePlace::Device(id), Place::Link { a, b, .. }) => {
@@ -61,7 +61,7 @@ fn touches(line: &Line, at: ExchangePlace, place: &Place) -> bool {
 }
 
 /// How far a cause at a place is one of the part that was exchanged: 0 not at all, 1 fully.
-fn share(line: &Line, exchange: &PartExchange, cause: FaultName, place: &Place) -> f64 {
+fn share(model: &NetworkModel, exchange: &PartExchange, cause: FaultName, place: &Place) -> f64 {
     use FaultName::{
         CableDegraded, DeviceInternal, DeviceOff, FirmwareFault, HostDrops, LinkFlapping, LinkOpen,
         NicDamaged, ReceiverDamaged, RingOpen, TransmitterDamaged,
@@ -71,7 +71,7 @@ fn share(line: &Line, exchange: &PartExchange, cause: FaultName, place: &Place) 
         Part::Cable => {
             // A cable elsewhere is another one.
             let mut places = [Some(exchange.at), exchange.to].into_iter().flatten();
-            let is_it = places.any(|at| touches(line, at, place));
+            let is_it = places.any(|at| touches(model, at, place));
             let is_cable = matches!(cause, CableDegraded | LinkFlapping | LinkOpen | RingOpen);
             whole(is_it && is_cable)
         }
@@ -125,20 +125,20 @@ fn weigh(view: &View<'_>, exchange: &PartExchange, condition: &mut Condition) {
             .map(|other| (other.cause, other.place.unwrap_or(condition.place), other.confidence)),
     );
     let total: f64 = causes.iter().map(|(.., confidence)| confidence).sum();
-    let moved = exchange.outcome == Outcome::Moved;
+    let moved = exchange.outcome == ExchangeOutcome::Moved;
     let is_known =
-        causes.iter().any(|(cause, place, _)| share(view.line, exchange, *cause, place) > 0.0);
+        causes.iter().any(|(cause, place, _)| share(view.model, exchange, *cause, place) > 0.0);
     if moved && !is_known {
         // Nobody had thought of the part with which the errors went.
         let place = match (exchange.part, exchange.at) {
-            (Part::Device, ExchangePlace::Device(id)) => Place::device(view.line.network, id),
+            (Part::Device, ExchangePlace::Device(id)) => Place::device(view.model.network, id),
             (Part::Card, _) => Place::Host,
             (Part::Cable | Part::Device, _) => condition.place,
         };
         causes.push((own_cause(exchange.part), place, 0.2));
     }
     for (cause, place, confidence) in &mut causes {
-        let share = share(view.line, exchange, *cause, place);
+        let share = share(view.model, exchange, *cause, place);
         *confidence *= match moved {
             true => share * FACTOR + (1.0 - share) / FACTOR,
             false => share / FACTOR + (1.0 - share),
@@ -162,13 +162,13 @@ fn weigh(view: &View<'_>, exchange: &PartExchange, condition: &mut Condition) {
 }
 
 fn say(view: &View<'_>, exchange: &PartExchange, condition: &mut Condition) {
-    let line = view.line;
+    let model = view.model;
     let name = |at: ExchangePlace| match at {
-        ExchangePlace::Link(link) => match line.links().nth(link) {
-            Some(known) => Place::link(line.network, known, None).to_string(),
+        ExchangePlace::Link(link) => match model.links().nth(link) {
+            Some(known) => Place::link(model.network, known, None).to_string(),
             None => "a link".to_owned(),
         },
-        ExchangePlace::Device(id) => line.label(id),
+        ExchangePlace::Device(id) => model.label(id),
         ExchangePlace::Host => "the computer".to_owned(),
     };
     let what = match exchange.part {
@@ -182,26 +182,26 @@ fn say(view: &View<'_>, exchange: &PartExchange, condition: &mut Condition) {
         (_, None) => String::new(),
     };
     let (then, action) = match (exchange.outcome, exchange.part) {
-        (Outcome::Moved, Part::Cable) => {
+        (ExchangeOutcome::Moved, Part::Cable) => {
             ("went with it", "Replace that cable, and look at what it rubbed on or was bent over.")
         }
-        (Outcome::Moved, Part::Device) => ("went with it", "Replace that SubDevice."),
-        (Outcome::Moved, Part::Card) => ("went with it", "Replace that network card."),
-        (Outcome::Stayed, Part::Cable) => (
+        (ExchangeOutcome::Moved, Part::Device) => ("went with it", "Replace that SubDevice."),
+        (ExchangeOutcome::Moved, Part::Card) => ("went with it", "Replace that network card."),
+        (ExchangeOutcome::Stayed, Part::Cable) => (
             "stayed",
             "The cable is not it: exchange one of the two devices next, and look for sources of noise.",
         ),
-        (Outcome::Stayed, Part::Device) => (
+        (ExchangeOutcome::Stayed, Part::Device) => (
             "stayed",
             "That SubDevice is not it: exchange the cable, then the device at the other end.",
         ),
-        (Outcome::Stayed, Part::Card) => {
+        (ExchangeOutcome::Stayed, Part::Card) => {
             ("stayed", "The network card is not it: exchange the cable to the first SubDevice.")
         }
     };
     let text = format!("{what} was exchanged{with}, and the errors {then}");
     condition.evidence.push(Evidence::host(None, text));
-    if exchange.outcome == Outcome::Stayed && exchange.part == Part::Cable {
+    if exchange.outcome == ExchangeOutcome::Stayed && exchange.part == Part::Cable {
         condition.actions.retain(|action| !action.starts_with("Exchange the cable"));
     }
     condition.actions.insert(0, action.to_owned());

@@ -24,8 +24,8 @@ use linesman_proto::topology::{End, Tree};
 use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Line, Seen};
-use crate::locate::way;
+use crate::locate::cut_distance;
+use crate::model::{NetworkModel, Seen};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -49,23 +49,23 @@ const ANSWERS_LATE: Span = Span::ms(100);
 const MOST_LINKS: usize = 4;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let reported = &line.reported;
+    let model = view.model;
+    let reported = &model.reported;
     conditions.extend(seen(view, conditions));
     // Without a link nobody answers; where the wiring is known, the link itself is told.
-    let carrier = line.host.card(Path::A).carrier.filter(|carrier| !carrier.value);
-    let unlinked = carrier.filter(|_| line.devices.is_empty() && line.traffic.frames == 0);
+    let carrier = model.host.card(Path::A).carrier.filter(|carrier| !carrier.value);
+    let unlinked = carrier.filter(|_| model.devices.is_empty() && model.traffic.frames == 0);
     let told = reported.answering.or_else(|| Some(Seen::new(0, unlinked?.at, None)));
     let Some(answering) = told else { return };
-    let known = line.devices.len().max(usize::from(reported.answering_most));
+    let known = model.devices.len().max(usize::from(reported.answering_most));
     let count = usize::from(answering.value);
     if count >= known && count > 0 {
         return;
     }
     // A link that is known to be lost says more.
     let is_placed = conditions.iter().any(|one| matches!(one.page.code, "H100" | "H101"));
-    let at = place(line, count);
-    let network = Place::Network { network: line.network };
+    let at = place(model, count);
+    let network = Place::Network { network: model.network };
     let text = match (count, known, unlinked) {
         (_, _, Some(_)) => "the card has no link".to_owned(),
         (0, 0, None) => "no SubDevice answers a broadcast".to_owned(),
@@ -92,13 +92,13 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         ),
         _ => condition.advise(format!("Look at {at}: the lamps on both sides, the plugs, the supply behind.")),
     };
-    let gone = line.devices.iter().map(|device| device.id);
+    let gone = model.devices.iter().map(|device| device.id);
     let follows = gone
         .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
     condition =
         condition.explaining(follows).explaining([Symptom::FramesLost, Symptom::FramesLate]);
     if is_placed {
-        let first_gone = line.devices.iter().find(|device| device.silent.is_some());
+        let first_gone = model.devices.iter().find(|device| device.silent.is_some());
         let symptom = match (count, first_gone) {
             (0, _) => Some(Symptom::NobodyAnswers),
             (_, Some(device)) => Some(Symptom::Silent(device.id)),
@@ -111,25 +111,25 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 /// Behind the last that answers, where nothing branches.
-fn place(line: &Line, count: usize) -> Place {
-    let network = Place::Network { network: line.network };
+fn place(model: &NetworkModel, count: usize) -> Place {
+    let network = Place::Network { network: model.network };
     if count == 0 {
-        let first = line.links().find(|link| link.upstream == End::MainDevice(Path::A));
+        let first = model.links().find(|link| link.upstream == End::MainDevice(Path::A));
         return Place::Link {
-            network: line.network,
+            network: model.network,
             a: End::MainDevice(Path::A),
             b: first.map(|link| link.downstream),
             direction: None,
         };
     }
-    let Some(tree) = line.tree.as_ref().filter(|tree| count < tree.len() && is_chain(tree)) else {
+    let Some(tree) = model.tree.as_ref().filter(|tree| count < tree.len() && is_chain(tree)) else {
         return network;
     };
     let lost = tree.order().get(count).and_then(|node| tree.link_above(*node));
     let link = lost.and_then(|link| tree.links().get(link));
     link.map_or(network, |link| {
         let named = link.map(|node| DeviceId(node as u32));
-        Place::link(line.network, named, Some(LinkDirection::Both))
+        Place::link(model.network, named, Some(LinkDirection::Both))
     })
 }
 
@@ -139,16 +139,16 @@ fn is_chain(tree: &Tree) -> bool {
 
 /// Broadcasts that were seen: fewer SubDevices than before count in them, for good, and nothing else says who is gone.
 fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
-    let line = view.line;
-    let traffic = &line.traffic;
+    let model = view.model;
+    let traffic = &model.traffic;
     let now = traffic.broadcast_now.filter(|_| traffic.frames > 0)?;
     let most = traffic.broadcast_answers;
     let lasts = view.has_ended || view.now.since(now.at) >= LASTS;
     // In a ring each card counts its own half; without any answer another rule tells.
     let is_ring = traffic.was_processed_by_one
         || traffic.broadcast_split.is_some()
-        || line.tree.as_ref().is_some_and(|tree| tree.closes_at().is_some());
-    let is_ordered = line.loops_ordered.is_some_and(|ordered| ordered >= now.at.before(ORDERED));
+        || model.tree.as_ref().is_some_and(|tree| tree.closes_at().is_some());
+    let is_ordered = model.loops_ordered.is_some_and(|ordered| ordered >= now.at.before(ORDERED));
     if now.value == 0 || now.value >= most || !lasts || is_ring || is_ordered {
         return None;
     }
@@ -165,8 +165,8 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         return None;
     }
     let missing = usize::from(most - now.value);
-    let links = candidates(line, missing, now.at);
-    let network = Place::Network { network: line.network };
+    let links = candidates(model, missing, now.at);
+    let network = Place::Network { network: model.network };
     let at = links.first().copied().unwrap_or(network);
     let share = 1.0 / links.len().max(1) as f64;
     let text = format!("{} SubDevices answer a broadcast; it were {most} before", now.value);
@@ -186,8 +186,8 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         false => condition
             .advise(format!("Look at {at}: the lamps on both sides, the plugs, the supply behind.")),
     };
-    condition.evidence.extend(way::evidence(line, now.at));
-    let gone = line.devices.iter().map(|device| device.id);
+    condition.evidence.extend(cut_distance::evidence(model, now.at));
+    let gone = model.devices.iter().map(|device| device.id);
     let follows = gone
         .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
     Some(condition.explaining(follows))
@@ -195,22 +195,22 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
 
 /// Links behind which there are just as many SubDevices as are missing, none of them heard since: cables before
 /// contacts of the terminal bus.
-fn candidates(line: &Line, missing: usize, since: Instant) -> Vec<Place> {
-    let Some(tree) = line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) else {
+fn candidates(model: &NetworkModel, missing: usize, since: Instant) -> Vec<Place> {
+    let Some(tree) = model.tree.as_ref().filter(|tree| tree.len() <= model.devices.len()) else {
         return Vec::new();
     };
     let is_heard = |node: &usize| {
-        line.devices[*node].answered.is_some_and(|answered| answered.at > since + ANSWERS_LATE)
+        model.devices[*node].answered.is_some_and(|answered| answered.at > since + ANSWERS_LATE)
     };
     let fits = |node: &usize| {
         let branch = tree.subtree(*node);
         branch.len() == missing && !branch.iter().any(is_heard)
     };
     let mut heads: Vec<usize> = tree.order().iter().copied().filter(fits).collect();
-    heads.sort_by_key(|node| is_on_terminal_bus(line, *node));
-    way::keep_fitting(line, tree, &mut heads, since);
+    heads.sort_by_key(|node| is_on_terminal_bus(model, *node));
+    cut_distance::keep_fitting(model, tree, &mut heads, since);
     let link = |node: usize| tree.links().get(tree.link_above(node)?).copied();
     let links = heads.into_iter().filter_map(link).take(MOST_LINKS);
     let named = links.map(|link| link.map(|node| DeviceId(node as u32)));
-    named.map(|link| Place::link(line.network, link, Some(LinkDirection::Both))).collect()
+    named.map(|link| Place::link(model.network, link, Some(LinkDirection::Both))).collect()
 }

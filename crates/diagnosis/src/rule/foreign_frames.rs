@@ -20,8 +20,8 @@ use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
-use crate::line::{CounterHistory, Device, Line, Rise};
-use crate::locate::Spells;
+use crate::locate::Intervals;
+use crate::model::{CounterHistory, Device, NetworkModel, Rise};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -41,9 +41,9 @@ const QUIET: Span = Span::s(5);
 const AROUND: Span = Span::s(2);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let traffic = &line.traffic;
-    let destroyed = destroyed(line);
+    let model = view.model;
+    let traffic = &model.traffic;
+    let destroyed = destroyed(model);
     let counted = |rises: &[&Rise]| -> u64 { rises.iter().map(|rise| rise.difference.rise).sum() };
     let seen = traffic.first_foreign;
     let firsts =
@@ -51,7 +51,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let lasts = destroyed.iter().filter_map(|(_, rises)| rises.last().map(|rise| rise.at));
     let Some(first) = firsts.chain(seen.map(|seen| seen.at)).min() else { return };
     let last = lasts.chain(traffic.latest_foreign).max().unwrap_or(first);
-    let place = Place::Network { network: line.network };
+    let place = Place::Network { network: model.network };
     let mut condition = Condition::new(&PAGE, place, FaultName::ForeignFrames, first)
         .confidence(if seen.is_some() { 0.9 } else { 0.7 })
         .confirmed(seen.map_or(last, |seen| seen.at));
@@ -67,7 +67,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         let Some(rise) = rises.last() else { continue };
         let text = format!(
             "{} destroyed {} frames in its processing unit, and no port counted a damaged one",
-            line.label(device.id),
+            model.label(device.id),
             counted(rises)
         );
         let address = ErrorCounter::ProcessingUnit.address();
@@ -96,18 +96,18 @@ fn may_be_old(device: &Device) -> bool {
 }
 
 /// Who destroyed frames that were not damaged, with the rises that show it.
-fn destroyed(line: &Line) -> Vec<(&Device, Vec<&Rise>)> {
+fn destroyed(model: &NetworkModel) -> Vec<(&Device, Vec<&Rise>)> {
     let found = |device| {
         let track = CounterHistory::track(device, ErrorCounter::ProcessingUnit);
         track.into_iter().flat_map(|track| &track.rises)
     };
-    if line.devices.iter().all(|device| found(&device.counters).next().is_none()) {
+    if model.devices.iter().all(|device| found(&device.counters).next().is_none()) {
         return Vec::new();
     }
-    let explained = explained(line);
+    let explained = explained(model);
     let is_clean =
         |rise: &&Rise| !explained.meet((rise.after_time.before(AROUND), rise.at + AROUND));
-    let clean = line
+    let clean = model
         .devices
         .iter()
         .map(|device| (device, found(&device.counters).filter(is_clean).collect::<Vec<_>>()));
@@ -115,8 +115,8 @@ fn destroyed(line: &Line) -> Vec<(&Device, Vec<&Rise>)> {
 }
 
 /// When processing units find errors for another reason: damage at a port anywhere, or a link that comes or goes.
-fn explained(line: &Line) -> Spells {
-    let devices = || line.devices.iter();
+fn explained(model: &NetworkModel) -> Intervals {
+    let devices = || model.devices.iter();
     let tracks = devices().flat_map(|device| device.counters.tracks()).filter(|(counter, _)| {
         !matches!(counter, ErrorCounter::ProcessingUnit | ErrorCounter::Pdi)
     });

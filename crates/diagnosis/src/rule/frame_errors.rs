@@ -42,9 +42,9 @@ use linesman_proto::topology::route::Direction;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::AlError;
-use crate::locate::cause::Spot;
-use crate::locate::{Damage, LastHop, Located, Survey, Suspicion};
+use crate::locate::cause::CausePlace;
+use crate::locate::{Damage, LastHop, LocateInput, Located, Suspicion};
+use crate::model::AlError;
 
 /// The signal suffers on a link.
 pub const ON_LINK: RulePage = RulePage {
@@ -80,16 +80,16 @@ const QUIET: Span = Span::s(2);
 pub const RULE: Rule = Rule { pages: &[ON_LINK, INSIDE, LAST_HOP], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let Some(survey) = Survey::of(view.line, view.has_ended) else { return };
-    let located = Located::on(&survey);
-    for suspicion in Suspicion::all(&survey, &located) {
-        add(view, &survey, &suspicion, None, conditions);
+    let Some(input) = LocateInput::of(view.model, view.has_ended) else { return };
+    let located = Located::on(&input);
+    for suspicion in Suspicion::all(&input, &located) {
+        add(view, &input, &suspicion, None, conditions);
     }
 }
 
 fn add(
     view: &View<'_>,
-    survey: &Survey<'_>,
+    input: &LocateInput<'_>,
     suspicion: &Suspicion,
     leader: Option<&Suspicion>,
     conditions: &mut Vec<Condition>,
@@ -102,10 +102,10 @@ fn add(
     let is_unknown = matches!(suspicion.last_hop, Some(LastHop::Unknown { .. }));
     let page = match (is_unknown, most_likely.spot) {
         (true, _) => &LAST_HOP,
-        (false, Spot::Link(..)) => &ON_LINK,
-        (false, Spot::Device(_) | Spot::Host) => &INSIDE,
+        (false, CausePlace::Link(..)) => &ON_LINK,
+        (false, CausePlace::Device(_) | CausePlace::Host) => &INSIDE,
     };
-    let at = place(survey, most_likely.spot);
+    let at = place(input, most_likely.spot);
     let mut condition =
         Condition::new(page, at, most_likely.cause, first).confidence(most_likely.weight);
     if suspicion.frames() == 0 {
@@ -116,7 +116,7 @@ fn add(
         condition.severity = Severity::Info;
     }
     for other in &suspicion.suspects[1..] {
-        let place = place(survey, other.spot);
+        let place = place(input, other.spot);
         condition.alternatives.push(Alternative {
             cause: other.cause,
             place: (place != at).then_some(place),
@@ -128,32 +128,32 @@ fn add(
     }
     // A full counter does not show whether it goes on; frames that are still missing do.
     let is_full = suspicion.damages.iter().any(|damage| damage.is_lower_bound);
-    let latest_lost = view.line.traffic.latest_lost.filter(|_| is_full && suspicion.frames() > 0);
+    let latest_lost = view.model.traffic.latest_lost.filter(|_| is_full && suspicion.frames() > 0);
     let last = latest_lost.map_or(last, |lost| last.max(lost.at));
-    if last + QUIET < view.line.now {
+    if last + QUIET < view.model.now {
         condition = condition.ended(last);
     }
     for damage in &suspicion.damages {
-        show(survey, damage, &mut condition);
+        show(input, damage, &mut condition);
     }
     if let Some(last_hop) = &suspicion.last_hop {
         condition.evidence.push(card_evidence(last_hop));
     }
-    if is_history(survey, suspicion) {
+    if is_history(input, suspicion) {
         condition = condition.may_be_old();
     }
     // What follows from sums alone, while SubDevices went away and came back, is not claimed.
     if condition.evidence.is_empty() {
         return;
     }
-    for action in actions(survey, most_likely.cause, most_likely.spot) {
+    for action in actions(input, most_likely.cause, most_likely.spot) {
         condition = condition.advise(action);
     }
-    let mine = symptoms(survey, suspicion);
+    let mine = symptoms(input, suspicion);
     condition.symptoms.extend(mine.iter().copied());
     condition.explains.extend(mine);
     for other in &suspicion.beneath {
-        condition.explains.extend(symptoms(survey, other));
+        condition.explains.extend(symptoms(input, other));
     }
     if suspicion.frames() > 0 {
         condition.explains.push(Symptom::FramesLost);
@@ -166,15 +166,15 @@ fn add(
     }
     conditions.push(condition);
     for other in &suspicion.beneath {
-        add(view, survey, other, Some(suspicion), conditions);
+        add(view, input, other, Some(suspicion), conditions);
     }
 }
 
 /// Whether all that shows a damage was read but once, and nothing says that it goes on: it may have been counted
 /// long ago.
-fn is_history(survey: &Survey<'_>, suspicion: &Suspicion) -> bool {
+fn is_history(input: &LocateInput<'_>, suspicion: &Suspicion) -> bool {
     let may_be_old = |node: usize, counter: ErrorCounter| {
-        survey.track(node, counter).is_none_or(|track| track.may_be_old || track.total.rise() == 0)
+        input.track(node, counter).is_none_or(|track| track.may_be_old || track.total.rise() == 0)
     };
     let is_old = |damage: &Damage| {
         let End::Controller(node, port) = damage.hop.to else { return false };
@@ -184,7 +184,7 @@ fn is_history(survey: &Survey<'_>, suspicion: &Suspicion) -> bool {
                 .shown_at
                 .is_none_or(|(node, port)| may_be_old(node, ErrorCounter::Forwarded(port)))
     };
-    let goes_on = survey.line().reported.loss_rate.is_some_and(|rate| rate > 0.0);
+    let goes_on = input.model().reported.loss_rate.is_some_and(|rate| rate > 0.0);
     let damages = &suspicion.damages;
     !goes_on && suspicion.last_hop.is_none() && !damages.is_empty() && damages.iter().all(is_old)
 }
@@ -198,15 +198,15 @@ fn starved(view: &View<'_>) -> impl Iterator<Item = Symptom> {
             code == AlStatusCode::SYNC_MANAGER_WATCHDOG || code.explain().class == CodeClass::Timing
         })
     };
-    let starved = view.line.devices.iter().filter(move |device| {
+    let starved = view.model.devices.iter().filter(move |device| {
         !device.al.errors.is_empty() && device.al.errors.iter().all(is_of_time)
     });
     starved.map(|device| Symptom::StateLost(device.id))
 }
 
 /// What the damage is about: the ports that found it first, and the card.
-fn symptoms(survey: &Survey<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
-    let ports = suspicion.damages.iter().filter_map(|damage| match survey.name(damage.hop.to) {
+fn symptoms(input: &LocateInput<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
+    let ports = suspicion.damages.iter().filter_map(|damage| match input.name(damage.hop.to) {
         End::Controller(id, port) => Some(Symptom::PortErrors(id, port)),
         End::MainDevice(_) => None,
     });
@@ -217,30 +217,30 @@ fn symptoms(survey: &Survey<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
     ports.chain(card).collect()
 }
 
-fn place(survey: &Survey<'_>, spot: Spot) -> Place {
-    let network = survey.line().network;
+fn place(input: &LocateInput<'_>, spot: CausePlace) -> Place {
+    let network = input.model().network;
     match spot {
-        Spot::Link(link, direction) => {
+        CausePlace::Link(link, direction) => {
             let direction = match direction {
                 Some(Direction::Downstream) => LinkDirection::AToB,
                 Some(Direction::Upstream) => LinkDirection::BToA,
                 None => LinkDirection::Both,
             };
-            let link = survey.tree().links()[link].map(|node| DeviceId(node as u32));
+            let link = input.tree().links()[link].map(|node| DeviceId(node as u32));
             Place::link(network, link, Some(direction))
         }
-        Spot::Device(node) => Place::device(network, DeviceId(node as u32)),
-        Spot::Host => Place::Host,
+        CausePlace::Device(node) => Place::device(network, DeviceId(node as u32)),
+        CausePlace::Host => Place::Host,
     }
 }
 
 /// The counters that show a damage, with what they mean.
-fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
+fn show(input: &LocateInput<'_>, damage: &Damage, condition: &mut Condition) {
     let End::Controller(node, port) = damage.hop.to else { return };
     let id = DeviceId(node as u32);
-    let from = end_text(survey, damage.hop.from);
+    let from = end_text(input, damage.hop.from);
     let at_least = if damage.is_lower_bound { "at least " } else { "" };
-    let label = survey.line().label(id);
+    let label = input.model().label(id);
     let frames = damage.frames;
     let frames_text = format!(
         "{label}, port {port}, is the first in the order of checks that counts bad frames \
@@ -257,9 +257,9 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
         (ErrorCounter::PhysicalLayer(port), damage.symbols.unwrap_or(0), symbols_text),
     ];
     for (counter, count, mut text) in shown {
-        let track = survey.track(node, counter);
+        let track = input.track(node, counter);
         if let Some(rise) = track.filter(|_| count > 0).and_then(|track| track.last_rise()) {
-            let first = track.and_then(|track| survey.rises(track).next()).unwrap_or(rise);
+            let first = track.and_then(|track| input.rises(track).next()).unwrap_or(rise);
             // Else the values beside it would contradict it.
             if count > rise.after.saturating_sub(first.before) {
                 text += "; the counter was cleared in between";
@@ -271,11 +271,11 @@ fn show(survey: &Survey<'_>, damage: &Damage, condition: &mut Condition) {
     }
     if let Some((node, marked_at)) = damage.shown_at {
         let (by, counter) = (DeviceId(node as u32), ErrorCounter::Forwarded(marked_at));
-        if let Some(rise) = survey.track(node, counter).and_then(|track| track.last_rise()) {
+        if let Some(rise) = input.track(node, counter).and_then(|track| track.last_rise()) {
             let text = format!(
                 "{} counts {frames} frames that were bad already when they came; port {port} of \
                  {label}, whose own counter tells nothing, has let them pass",
-                survey.line().label(by),
+                input.model().label(by),
             );
             let evidence = Evidence::rise(by, counter.address(), Some(marked_at), rise, text);
             condition.evidence.push(evidence);
@@ -298,21 +298,21 @@ fn card_evidence(last_hop: &LastHop) -> Evidence {
     Evidence::host(Some(last_hop.last()), text)
 }
 
-fn end_text(survey: &Survey<'_>, end: End) -> String {
-    match survey.name(end) {
+fn end_text(input: &LocateInput<'_>, end: End) -> String {
+    match input.name(end) {
         End::MainDevice(card) => format!("the MainDevice (card {card})"),
-        End::Controller(id, port) => format!("{}, port {port}", survey.line().label(id)),
+        End::Controller(id, port) => format!("{}, port {port}", input.model().label(id)),
     }
 }
 
 /// What to do, in the order in which it is worth doing. Reference: HW-25.
-fn actions(survey: &Survey<'_>, cause: FaultName, spot: Spot) -> Vec<String> {
+fn actions(input: &LocateInput<'_>, cause: FaultName, spot: CausePlace) -> Vec<String> {
     let ends = |link: usize| {
-        let link = survey.tree().links()[link];
-        (end_text(survey, link.upstream), end_text(survey, link.downstream))
+        let link = input.tree().links()[link];
+        (end_text(input, link.upstream), end_text(input, link.downstream))
     };
     match spot {
-        Spot::Link(link, _) => {
+        CausePlace::Link(link, _) => {
             let (a, b) = ends(link);
             let mut list = Vec::new();
             if cause == FaultName::EmcNoise {
@@ -335,14 +335,14 @@ fn actions(survey: &Survey<'_>, cause: FaultName, spot: Spot) -> Vec<String> {
             );
             list
         }
-        Spot::Device(node) => {
-            let label = survey.line().label(DeviceId(node as u32));
+        CausePlace::Device(node) => {
+            let label = input.model().label(DeviceId(node as u32));
             vec![
                 format!("Exchange {label}: symbols after it are clean, frames are not."),
                 "Before that, check its supply; the cable behind it is not the cause.".to_owned(),
             ]
         }
-        Spot::Host => vec![
+        CausePlace::Host => vec![
             "Try another network card, or another socket of the computer.".to_owned(),
             "Check the plug and the cable at the card.".to_owned(),
         ],

@@ -25,7 +25,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View, nobody_answers};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, Line, Tally, Traffic};
+use crate::model::{Device, NetworkModel, Tally, Traffic};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -66,12 +66,12 @@ struct Missing {
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    if line.traffic.frames > 0 {
+    let model = view.model;
+    if model.traffic.frames > 0 {
         conditions.extend(seen(view, conditions));
         return;
     }
-    if !line.reported.tells_of_frames() && !line.host.is_watched {
+    if !model.reported.tells_of_frames() && !model.host.is_watched {
         return;
     }
     let explains = |symptom: Symptom| {
@@ -80,7 +80,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             .any(|one| one.explains.contains(&symptom) || one.symptoms.contains(&symptom))
     };
     let (lost_told, card_told) = (explains(Symptom::FramesLost), explains(Symptom::CardErrors));
-    let mut missing = missing(line);
+    let mut missing = missing(model);
     if lost_told {
         missing.lost = 0;
     }
@@ -98,8 +98,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 ///
 /// Who drives the line asks for counters, and says no more than these do.
 fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
-    let line = view.line;
-    let traffic = &line.traffic;
+    let model = view.model;
+    let traffic = &model.traffic;
     // In a ring one copy may be lost alone.
     let tallies = [traffic.lost, traffic.copies_lost[0], traffic.copies_lost[1]];
     let first = tallies.iter().filter_map(|tally| tally.first).min()?;
@@ -115,7 +115,7 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     });
     let single = count.saturating_sub(in_a_row.map(|one| one.frames).sum());
     let went_on = traffic.latest_returned.is_some_and(|returned| returned.at > first);
-    if single == 0 || !went_on || line.sees_all_orders || traffic.is_one_sided() || is_recorder {
+    if single == 0 || !went_on || model.sees_all_orders || traffic.is_one_sided() || is_recorder {
         return None;
     }
     let explains = |one: &Condition| {
@@ -133,7 +133,7 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     if conditions.iter().any(explains) {
         return None;
     }
-    let damaged = line.host.is_watched.then_some(line.host.card(Path::A).crc.sum);
+    let damaged = model.host.is_watched.then_some(model.host.card(Path::A).crc.sum);
     // Many cards count no damaged frame at all: none counted proves nothing.
     let condition = causes(view, damaged.unwrap_or(0), false, first);
     let what = if traffic.lost.sum == 0 { "copies of frames in the ring" } else { "frames" };
@@ -145,7 +145,7 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         ),
     };
     let known = traffic.first_lost.and_then(|seen| seen.frame).unwrap_or(0);
-    let hurt: Vec<DeviceId> = out_of_step(line).collect();
+    let hurt: Vec<DeviceId> = out_of_step(model).collect();
     let follows = |id: &DeviceId| [Symptom::StateLost(*id), Symptom::WorkingCounter(*id)];
     let mut condition = condition
         .confirmed(last)
@@ -163,7 +163,7 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     condition = condition.shown_by(Evidence::frame(first, known, text));
     let rhythm = rhythm(traffic);
     condition.evidence.extend(rhythm.map(|text| Evidence::host(Some(last), text)));
-    let counters = line.devices.iter().filter(|device| device.counters.is_known()).count();
+    let counters = model.devices.iter().filter(|device| device.counters.is_known()).count();
     let text = match (counters, damaged) {
         (0, None) => {
             "nobody reads error counters, and those of the MainDevice's card are not known"
@@ -175,17 +175,17 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     if last + QUIET < view.now {
         condition = condition.ended(last);
     }
-    Some(advise(condition, line, damaged, damaged.unwrap_or(0)))
+    Some(advise(condition, model, damaged, damaged.unwrap_or(0)))
 }
 
 /// SubDevices that lost their step with the frames after some frames got lost.
-fn out_of_step(line: &Line) -> impl Iterator<Item = DeviceId> {
-    let lost = &line.traffic.lost_at;
+fn out_of_step(model: &NetworkModel) -> impl Iterator<Item = DeviceId> {
+    let lost = &model.traffic.lost_at;
     let follows = move |device: &&Device| {
         let has_lost = |at: &&Instant| device.lost_step_within(**at, **at);
         lost.iter().filter(has_lost).nth(FOR_A_STEP - 1).is_some()
     };
-    line.devices.iter().filter(follows).map(|device| device.id)
+    model.devices.iter().filter(follows).map(|device| device.id)
 }
 
 /// The rhythm in which frames got lost, in words: at equal intervals, or in bursts.
@@ -215,41 +215,41 @@ fn rhythm(traffic: &Traffic) -> Option<String> {
     })
 }
 
-fn missing(line: &Line) -> Missing {
-    let reported = &line.reported;
+fn missing(model: &NetworkModel) -> Missing {
+    let reported = &model.reported;
     let sum = |tally: Option<Tally>| tally.map_or(0, |tally| tally.sum);
     // What was not back in time and came later was late.
     let came = sum(reported.unmatched).saturating_add(sum(reported.late));
     let vanished = sum(reported.timed_out).saturating_sub(came);
-    let crc = line.host.card(Path::A).crc;
+    let crc = model.host.card(Path::A).crc;
     let tallies = [reported.lost, reported.timed_out, reported.corrupted, Some(crc)];
     let first =
         tallies.into_iter().flatten().filter(|tally| tally.sum > 0).min_by_key(|one| one.first);
     Missing {
         lost: sum(reported.lost).max(vanished),
-        damaged: line.host.is_watched.then_some(crc.sum),
+        damaged: model.host.is_watched.then_some(crc.sum),
         corrupted: sum(reported.corrupted),
         first: first.unwrap_or_default(),
     }
 }
 
 fn condition(view: &View<'_>, missing: &Missing, damaged: u64) -> Condition {
-    let line = view.line;
+    let model = view.model;
     let since = missing.first.first.unwrap_or(view.now);
     let condition = causes(view, damaged, missing.damaged.is_some(), since);
     let mut condition = condition.confirmed(since).explaining([Symptom::FramesLost]);
-    condition.severity = severity(line, missing.lost.saturating_add(damaged), damaged);
-    for text in texts(line, missing) {
+    condition.severity = severity(model, missing.lost.saturating_add(damaged), damaged);
+    for text in texts(model, missing) {
         condition = condition.shown_by(Evidence::host(Some(since), text));
     }
-    advise(condition, line, missing.damaged, damaged).advise(
+    advise(condition, model, missing.damaged, damaged).advise(
         "Note the counts, wait some minutes, and read them again: only what rises is of now.",
     )
 }
 
 /// What loses frames without a trace in the counters of SubDevices; `is_watched` where those of the card are known.
 fn causes(view: &View<'_>, damaged: u64, is_watched: bool, since: Instant) -> Condition {
-    let network = Place::Network { network: view.line.network };
+    let network = Place::Network { network: view.model.network };
     if damaged > 0 {
         Condition::new(&PAGE, network, FaultName::CableDegraded, since)
             .confidence(0.35)
@@ -279,9 +279,14 @@ fn causes(view: &View<'_>, damaged: u64, is_watched: bool, since: Instant) -> Co
 }
 
 /// What to read next.
-fn advise(condition: Condition, line: &Line, card_damaged: Option<u64>, damaged: u64) -> Condition {
+fn advise(
+    condition: Condition,
+    model: &NetworkModel,
+    card_damaged: Option<u64>,
+    damaged: u64,
+) -> Condition {
     let mut condition = condition;
-    if line.devices.iter().all(|device| !device.counters.is_known()) {
+    if model.devices.iter().all(|device| !device.counters.is_known()) {
         condition = condition.advise(
             "Read the error counters of all SubDevices (0x0300 to 0x0313), in order: they name the link.",
         );
@@ -301,8 +306,8 @@ fn advise(condition: Condition, line: &Line, card_damaged: Option<u64>, damaged:
 }
 
 /// One lost frame is worth knowing; what is rare, and not going on, too.
-fn severity(line: &Line, count: u64, damaged: u64) -> Severity {
-    let reported = &line.reported;
+fn severity(model: &NetworkModel, count: u64, damaged: u64) -> Severity {
+    let reported = &model.reported;
     let is_over = reported.loss_rate.is_some_and(|rate| rate <= 0.0) && damaged == 0;
     let is_rare = reported.sent.is_some_and(|sent| count.saturating_mul(RARE) <= sent);
     let is_often = reported.sent.is_some_and(|sent| count.saturating_mul(OFTEN) >= sent.max(1));
@@ -315,8 +320,8 @@ fn severity(line: &Line, count: u64, damaged: u64) -> Severity {
     }
 }
 
-fn texts(line: &Line, missing: &Missing) -> Vec<String> {
-    let reported = &line.reported;
+fn texts(model: &NetworkModel, missing: &Missing) -> Vec<String> {
+    let reported = &model.reported;
     let mut texts = Vec::new();
     if missing.lost > 0 {
         let of = reported.sent.map_or(String::new(), |sent| format!(" of {sent}"));
@@ -345,14 +350,14 @@ fn texts(line: &Line, missing: &Missing) -> Vec<String> {
     if missing.corrupted > 0 {
         texts.push(format!("{} frames came back with a content that cannot be", missing.corrupted));
     }
-    let read = line.devices.iter().filter(|device| device.counters.is_known()).count();
+    let read = model.devices.iter().filter(|device| device.counters.is_known()).count();
     texts.push(match read {
         0 => "no error counter of a SubDevice was read".to_owned(),
-        read if read == line.devices.len() => {
+        read if read == model.devices.len() => {
             "no error counter of a SubDevice names a place".to_owned()
         }
         read => {
-            format!("the error counters of {read} of {} SubDevices were read", line.devices.len())
+            format!("the error counters of {read} of {} SubDevices were read", model.devices.len())
         }
     });
     match reported.loss_rate {

@@ -20,7 +20,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::Tally;
+use crate::model::Tally;
 
 /// Frames dropped after they came back.
 pub const DROPS: RulePage = RulePage {
@@ -61,7 +61,7 @@ const OFTEN: u64 = 3;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for path in Path::ALL {
-        let card = view.line.host.card(path);
+        let card = view.model.host.card(path);
         let dropped = both(&card.card_drops, &card.socket_drops);
         if let Some((first, last)) = span(&dropped) {
             let text = format!(
@@ -86,7 +86,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
                 card.late.times,
                 card.late.largest as f64 / 1e6
             );
-            let devices = view.line.devices.iter().map(|device| device.id);
+            let devices = view.model.devices.iter().map(|device| device.id);
             let condition = begin(view, &LATE, FaultName::HostJitter, first, last)
                 .confidence(0.85)
                 .confirmed(first)
@@ -102,7 +102,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             let text =
                 format!("{} frames could not be sent by card {path}", card.send_failures.sum);
             // Who refuses frames for a while and then takes all of them stood still; damage comes again.
-            let returned = view.line.traffic.latest_returned.map(|seen| seen.at);
+            let returned = view.model.traffic.latest_returned.map(|seen| seen.at);
             let stood_still = last.since(first) <= QUIET && returned.is_some_and(|at| at > last);
             let (cause, other) = match stood_still {
                 true => (FaultName::WatchdogStarved, FaultName::NicDamaged),
@@ -135,7 +135,7 @@ fn begin(
     last: Instant,
 ) -> Condition {
     let condition = Condition::new(page, Place::Host, cause, first);
-    if last + QUIET < view.line.now { condition.ended(last) } else { condition }
+    if last + QUIET < view.model.now { condition.ended(last) } else { condition }
 }
 
 fn span(tally: &Tally) -> Option<(Instant, Instant)> {

@@ -27,7 +27,7 @@ use linesman_proto::time::Instant;
 use super::wiring::displaced;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, Line, Planned, Seen};
+use crate::model::{Device, NetworkModel, Planned, Seen};
 
 /// Another device.
 pub const WRONG: RulePage = RulePage {
@@ -80,19 +80,22 @@ impl Slot {
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    if !line.devices.iter().any(|device| device.planned.is_some_and(|plan| plan.identity.is_some()))
+    let model = view.model;
+    if !model
+        .devices
+        .iter()
+        .any(|device| device.planned.is_some_and(|plan| plan.identity.is_some()))
     {
         return;
     }
-    if super::wiring::judges(line) || super::ring_reversed::judges(line) {
+    if super::wiring::judges(model) || super::ring_reversed::judges(model) {
         return;
     }
-    let slots = slots(line);
+    let slots = slots(model);
     if slots.iter().all(|slot| slot.mismatch().is_none()) {
         return;
     }
-    if let Some(condition) = moved(line, &slots) {
+    if let Some(condition) = moved(model, &slots) {
         conditions.push(condition);
         return;
     }
@@ -104,19 +107,20 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
                     && Slot::between(slot, there).is_none()
                     && Slot::between(there, slot).is_none()
             });
-            conditions.extend(wrong(line, slot, what, other.map(|(_, there)| there.id)));
+            conditions.extend(wrong(model, slot, what, other.map(|(_, there)| there.id)));
         }
     }
 }
 
 /// All places in the order of processing, those beyond the plan last.
-fn slots(line: &Line) -> Vec<Slot> {
-    let planned = line.tree.iter().flat_map(|tree| tree.order()).map(|node| DeviceId(*node as u32));
+fn slots(model: &NetworkModel) -> Vec<Slot> {
+    let planned =
+        model.tree.iter().flat_map(|tree| tree.order()).map(|node| DeviceId(*node as u32));
     let mut order: Vec<DeviceId> = planned.collect();
-    let rest = line.devices.iter().map(|device| device.id);
+    let rest = model.devices.iter().map(|device| device.id);
     let rest: Vec<DeviceId> = rest.filter(|id| !order.contains(id)).collect();
     order.extend(rest);
-    order.into_iter().filter_map(|id| line.device(id)).map(slot).collect()
+    order.into_iter().filter_map(|id| model.device(id)).map(slot).collect()
 }
 
 fn slot(device: &Device) -> Slot {
@@ -133,7 +137,7 @@ fn slot(device: &Device) -> Slot {
 }
 
 /// One stretch too few or too many that explains all differences.
-fn moved(line: &Line, slots: &[Slot]) -> Option<Condition> {
+fn moved(model: &NetworkModel, slots: &[Slot]) -> Option<Condition> {
     let planned = slots.iter().filter(|slot| slot.planned.is_some()).count();
     let found = slots.iter().rposition(|slot| slot.found.is_some())? + 1;
     let first = slots.iter().position(|slot| slot.mismatch().is_some())?;
@@ -156,8 +160,8 @@ fn moved(line: &Line, slots: &[Slot]) -> Option<Condition> {
     }
     let slot = &slots[first];
     let seen = slot.found?;
-    let place = Place::device(line.network, slot.id);
-    let label = line.label(slot.id);
+    let place = Place::device(model.network, slot.id);
+    let label = model.label(slot.id);
     let how_many = if by == 1 { "one SubDevice".to_owned() } else { format!("{by} SubDevices") };
     let (page, cause, text) = if is_missing {
         let is = if by == 1 { "is" } else { "are" };
@@ -189,14 +193,14 @@ fn shifted(slots: &[Slot], first: usize) -> Vec<Symptom> {
 }
 
 fn wrong(
-    line: &Line,
+    model: &NetworkModel,
     slot: &Slot,
     what: Mismatch,
     swapped_with: Option<DeviceId>,
 ) -> Option<Condition> {
     let (planned, seen) = (slot.planned.as_ref()?.0, slot.found?);
-    let label = line.label(slot.id);
-    let place = Place::device(line.network, slot.id);
+    let label = model.label(slot.id);
+    let place = Place::device(model.network, slot.id);
     let text = format!(
         "{label} has another {what} than planned: found {}; planned {}",
         identity::text(&seen.value),
@@ -208,7 +212,7 @@ fn wrong(
             .or(FaultName::DeviceWrong, 0.2)
             .advise(format!(
                 "Exchange it with {}: each sits in the other's place.",
-                line.label(other)
+                model.label(other)
             )),
         None => Condition::new(&WRONG, place, FaultName::DeviceWrong, seen.at)
             .confidence(0.85)

@@ -18,8 +18,8 @@ use linesman_proto::time::Instant;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::motion::LifeSign;
-use crate::line::{Cyclic, Device, Line};
+use crate::model::input_activity::LifeSign;
+use crate::model::{Cyclic, Device, NetworkModel};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -34,17 +34,17 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    for cyclic in line.cyclic.iter().filter(|cyclic| !cyclic.has_deficit()) {
+    let model = view.model;
+    for cyclic in model.cyclic.iter().filter(|cyclic| !cyclic.has_deficit()) {
         let now = cyclic.returned.last().unwrap_or(view.now);
-        if line.owners(cyclic).next().is_none() {
+        if model.owners(cyclic).next().is_none() {
             let sign = cyclic.motion.stopped(0, cyclic.len, now);
-            conditions.extend(sign.map(|sign| condition(line, cyclic, None, &sign)));
+            conditions.extend(sign.map(|sign| condition(model, cyclic, None, &sign)));
             continue;
         }
-        for device in &line.devices {
+        for device in &model.devices {
             let sign = stopped(cyclic, device, now).filter(|_| !device.al.is_asked_down());
-            conditions.extend(sign.map(|sign| condition(line, cyclic, Some(device), &sign)));
+            conditions.extend(sign.map(|sign| condition(model, cyclic, Some(device), &sign)));
         }
     }
 }
@@ -58,13 +58,18 @@ fn stopped(cyclic: &Cyclic, device: &Device, now: Instant) -> Option<LifeSign> {
     })
 }
 
-fn condition(line: &Line, cyclic: &Cyclic, device: Option<&Device>, sign: &LifeSign) -> Condition {
-    let place = device.map_or(Place::Network { network: line.network }, |device| {
-        Place::device(line.network, device.id)
+fn condition(
+    model: &NetworkModel,
+    cyclic: &Cyclic,
+    device: Option<&Device>,
+    sign: &LifeSign,
+) -> Condition {
+    let place = device.map_or(Place::Network { network: model.network }, |device| {
+        Place::device(model.network, device.id)
     });
     let whose = device.map_or_else(
         || "whose they are was not seen".to_owned(),
-        |device| format!("inputs of {}", line.label(device.id)),
+        |device| format!("inputs of {}", model.label(device.id)),
     );
     let since = sign.last.at;
     let text = format!(

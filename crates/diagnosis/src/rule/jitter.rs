@@ -21,7 +21,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Absence, Beat, Cyclic, Device, Off};
+use crate::model::{Absence, CycleDeviation, CycleTiming, Cyclic, Device};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -76,15 +76,15 @@ const TOGETHER: Span = Span::s(10);
 const QUIET: Span = Span::s(2);
 
 /// The latest stretch of uneven intervals.
-struct Spell<'a> {
+struct Interval<'a> {
     cyclic: &'a Cyclic,
     cycle: Span,
     /// Whether the frames left unevenly already.
     at_sending: bool,
-    off: Vec<Off>,
+    off: Vec<CycleDeviation>,
 }
 
-impl Spell<'_> {
+impl Interval<'_> {
     fn worst(&self) -> Span {
         self.off.iter().map(|off| off.by).max().unwrap_or(Span::ZERO)
     }
@@ -102,17 +102,17 @@ impl Spell<'_> {
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let has_sync = |device: &&Device| device.sync_on.is_some_and(|on| on.value);
-    let in_step: Vec<&Device> = view.line.devices.iter().filter(has_sync).collect();
+    let in_step: Vec<&Device> = view.model.devices.iter().filter(has_sync).collect();
     // A MainDevice that seeks SubDevices and sets them up sends when it has the time.
-    let away: Vec<&Absence> = view.line.devices.iter().flat_map(|one| &one.absences).collect();
-    let cyclic = view.line.cyclic.iter();
+    let away: Vec<&Absence> = view.model.devices.iter().flat_map(|one| &one.absences).collect();
+    let cyclic = view.model.cyclic.iter();
     let spells = cyclic.filter_map(|cyclic| spell(cyclic, !in_step.is_empty(), &away));
     let worst = spells.max_by_key(|spell| spell.worst());
     let Some(spell) = worst else { return };
     let (Some(first), Some(last)) = (spell.off.first(), spell.off.last()) else { return };
     // Whoever runs free takes outputs when they come. A recording, which has the times at which frames came to the
     // card, is the only witness of what the computer did before.
-    let is_recorded = !view.line.traffic.direction_known;
+    let is_recorded = !view.model.traffic.direction_known;
     if in_step.is_empty() && !(is_recorded && spell.at_sending) {
         return;
     }
@@ -124,9 +124,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     };
     // Single frames are kept back by the computer, most of them by a queue; who waits for those that are out sends
     // unevenly, too.
-    let trips = &view.line.trips;
-    let is_single = spell.at_sending || trips.late_count > 0;
-    let (cause, other) = if is_single && !trips.is_queue() {
+    let round_trips = &view.model.round_trips;
+    let is_single = spell.at_sending || round_trips.late_count > 0;
+    let (cause, other) = if is_single && !round_trips.is_queue() {
         (FaultName::HostJitter, FaultName::LateFrames)
     } else {
         (FaultName::LateFrames, FaultName::HostJitter)
@@ -149,17 +149,17 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             "Lengthen the cycle, or move the shift of the SYNC signal away from the frame.",
         );
     }
-    if last.at + QUIET < view.line.now {
+    if last.at + QUIET < view.model.now {
         condition = condition.ended(last.at);
     }
     conditions.push(condition);
 }
 
 /// The latest spell of a datagram: of its sending, else of its return; where nobody keeps step, of less, too.
-fn spell<'a>(cyclic: &'a Cyclic, keeps_step: bool, away: &[&Absence]) -> Option<Spell<'a>> {
-    let of = |beat: &Beat, at_sending| {
+fn spell<'a>(cyclic: &'a Cyclic, keeps_step: bool, away: &[&Absence]) -> Option<Interval<'a>> {
+    let of = |beat: &CycleTiming, at_sending| {
         let cycle = beat.cycle()?;
-        let mut off: Vec<Off> = Vec::new();
+        let mut off: Vec<CycleDeviation> = Vec::new();
         let all = if keeps_step { &beat.off } else { &beat.uneven };
         for one in all.iter().rev() {
             if off.last().is_some_and(|later| later.at.since(one.at) > TOGETHER) {
@@ -170,12 +170,12 @@ fn spell<'a>(cyclic: &'a Cyclic, keeps_step: bool, away: &[&Absence]) -> Option<
             }
         }
         off.reverse();
-        (off.len() >= OFTEN).then_some(Spell { cyclic, cycle, at_sending, off })
+        (off.len() >= OFTEN).then_some(Interval { cyclic, cycle, at_sending, off })
     };
     of(&cyclic.sent, true).or_else(|| of(&cyclic.returned, false))
 }
 
-fn evidence(spell: &Spell<'_>, at: Instant, in_step: usize) -> Evidence {
+fn evidence(spell: &Interval<'_>, at: Instant, in_step: usize) -> Evidence {
     let ms = |span: Span| span.as_nanos() as f64 / 1e6;
     let worst = spell.worst();
     let percent = worst.as_nanos() as f64 * 100.0 / spell.cycle.as_nanos() as f64;

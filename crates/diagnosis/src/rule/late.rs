@@ -24,8 +24,8 @@ use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::trip::LateFrame;
-use crate::line::{Device, Line};
+use crate::model::round_trip::LateFrame;
+use crate::model::{Device, NetworkModel};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -68,47 +68,47 @@ struct Late {
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
+    let model = view.model;
     // Nobody waits for a frame that is sent when its sender likes.
-    let keeps_step = line.devices.iter().any(|device| device.sync_on.is_some_and(|on| on.value));
-    let Some(cycle) = shortest_cycle(line) else { return };
+    let keeps_step = model.devices.iter().any(|device| device.sync_on.is_some_and(|on| on.value));
+    let Some(cycle) = shortest_cycle(model) else { return };
     let matters = |late: &Late| keeps_step || late.worst * NOTABLE >= cycle;
-    let unusual = unusual(line, cycle).filter(matters);
-    let Some(late) = unusual.or_else(|| held_back(line, cycle)) else { return };
+    let unusual = unusual(model, cycle).filter(matters);
+    let Some(late) = unusual.or_else(|| held_back(model, cycle)) else { return };
     conditions.push(condition(view, &late, cycle, keeps_step));
 }
 
 /// Frames that were later than is usual here.
-fn unusual(line: &Line, cycle: Span) -> Option<Late> {
-    let trips = &line.trips;
-    let last = *trips.late.back()?;
+fn unusual(model: &NetworkModel, cycle: Span) -> Option<Late> {
+    let round_trips = &model.round_trips;
+    let last = *round_trips.late.back()?;
     let mut first = last;
-    for late in trips.late.iter().rev() {
+    for late in round_trips.late.iter().rev() {
         if first.sent.since(late.sent) > TOGETHER {
             break;
         }
         first = *late;
     }
-    let of_spell = || trips.late.iter().filter(|late| late.sent >= first.sent);
+    let of_spell = || round_trips.late.iter().filter(|late| late.sent >= first.sent);
     let worst = of_spell().map(|late| late.by).max().unwrap_or(Span::ZERO);
     let text = format!(
         "{} later than the line takes: by {:.3} ms at most, {} % of the cycle",
-        match trips.late_count {
+        match round_trips.late_count {
             1 => "one frame came back".to_owned(),
             late => format!(
                 "{late} of {} frames between the first late one and the last came back",
-                trips.compared
+                round_trips.compared
             ),
         },
         worst.as_secs_f64() * 1e3,
         percent(worst, cycle)
     );
-    Some(Late { first, last, worst, is_queue: trips.is_queue(), text })
+    Some(Late { first, last, worst, is_queue: round_trips.is_queue(), text })
 }
 
 /// Frames that were late by a part of the cycle that matters, all the time: who listens since then knows no better.
-fn held_back(line: &Line, cycle: Span) -> Option<Late> {
-    let held = line.trips.held_back(Span::ns(cycle.as_nanos() / HELD_BACK))?;
+fn held_back(model: &NetworkModel, cycle: Span) -> Option<Late> {
+    let held = model.round_trips.held_back(Span::ns(cycle.as_nanos() / HELD_BACK))?;
     if held.count < SEVERAL || held.count * 100 < held.compared * OFTEN_PERCENT {
         return None;
     }
@@ -131,14 +131,14 @@ fn percent(part: Span, whole: Span) -> u64 {
 }
 
 fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Condition {
-    let line = view.line;
+    let model = view.model;
     let Late { first, last, worst, .. } = late;
     let (cause, other) = if late.is_queue {
         (FaultName::LateFrames, FaultName::HostJitter)
     } else {
         (FaultName::HostJitter, FaultName::LateFrames)
     };
-    let is_recorded = !line.traffic.direction_known;
+    let is_recorded = !model.traffic.direction_known;
     let mut condition = Condition::new(&PAGE, Place::Host, cause, first.sent)
         .confidence(0.6)
         .or(other, 0.3)
@@ -149,7 +149,7 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
         .advise("Take switches and media converters out of the way between card and first SubDevice.");
     // Whoever joins late has not seen who was set up to keep step.
     let may_keep_step = |device: &&Device| device.sync_on.map_or(is_recorded, |on| on.value);
-    let in_step = line.devices.iter().filter(may_keep_step);
+    let in_step = model.devices.iter().filter(may_keep_step);
     let hurt: Vec<&Device> =
         in_step.filter(|device| device.lost_step_within(first.sent, last.sent + last.by)).collect();
     if hurt.is_empty() && is_recorded {
@@ -177,6 +177,6 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
 }
 
 /// The shortest cycle of process data.
-fn shortest_cycle(line: &Line) -> Option<Span> {
-    line.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min()
+fn shortest_cycle(model: &NetworkModel) -> Option<Span> {
+    model.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min()
 }

@@ -42,14 +42,14 @@ const SETTLED: Span = Span::s(1);
 const FLAPS: u64 = 3;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let track = &line.events.dl_status;
-    let (Some(first), Some(last)) = (track.first_came, line.changed_link()) else { return };
+    let model = view.model;
+    let track = &model.events.dl_status;
+    let (Some(first), Some(last)) = (track.first_came, model.changed_link()) else { return };
     let is_settled = view.has_ended || view.now.since(last.at) >= SETTLED;
     if !is_settled || is_told(conditions, last.at) {
         return;
     }
-    let network = Place::Network { network: line.network };
+    let network = Place::Network { network: model.network };
     let (cause, sure, other) = if track.times >= FLAPS {
         (FaultName::LinkFlapping, 0.5, FaultName::LinkOpen)
     } else {

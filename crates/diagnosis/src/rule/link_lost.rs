@@ -42,8 +42,8 @@ use linesman_proto::topology::{End, Tree};
 use super::wiring::entry;
 use super::{Rule, RulePage, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Line, Seen, search};
-use crate::locate::{Drop, Drops};
+use crate::locate::{LinkLoss, LinkLosses};
+use crate::model::{NetworkModel, Seen, search};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -71,19 +71,19 @@ const AGAIN: u64 = 2;
 const OFTEN: u64 = 3;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let Some(tree) = &view.line.tree else {
+    let Some(tree) = &view.model.tree else {
         conditions.extend(card::lost(view));
         return;
     };
-    let all = Drops::all(view.line);
+    let all = LinkLosses::all(view.model);
     for drops in &all {
         // Who answers though its entry has no link is plugged in the other way round.
         let ends = [tree.links()[drops.link].upstream, tree.links()[drops.link].downstream];
         let only_entry = drops.seen.iter().all(|drop| Some(drop.end) == ends.get(1).copied());
-        if drops.is_down && only_entry && entry::is_reversed(view.line, ends[1]) {
+        if drops.is_down && only_entry && entry::is_reversed(view.model, ends[1]) {
             continue;
         }
-        let mut condition = condition(view.line, tree, drops);
+        let mut condition = condition(view.model, tree, drops);
         if condition
             .alternatives
             .first()
@@ -92,10 +92,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             // What was never there is a matter of the device rather than of the link.
             lead_with_device(&mut condition);
         }
-        if let Some(node) = dead_on_ring(view.line, tree, &all, drops) {
-            blame(view.line, tree, node, &mut condition);
+        if let Some(node) = dead_on_ring(view.model, tree, &all, drops) {
+            blame(view.model, tree, node, &mut condition);
         } else if let Some(with) = share_supply(tree, &all, drops) {
-            blame_supply(view.line, tree, drops, &with, &mut condition);
+            blame_supply(view.model, tree, drops, &with, &mut condition);
         }
         conditions.push(condition);
     }
@@ -103,7 +103,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 
 /// The device of a ring that both its neighbours have lost at once, and that nobody reaches: two cuts
 /// beside it at one moment are far less likely.
-fn dead_on_ring(line: &Line, tree: &Tree, all: &[Drops], drops: &Drops) -> Option<usize> {
+fn dead_on_ring(
+    model: &NetworkModel,
+    tree: &Tree,
+    all: &[LinkLosses],
+    drops: &LinkLosses,
+) -> Option<usize> {
     if !drops.is_down || !tree.is_on_ring(drops.link) {
         return None;
     }
@@ -119,7 +124,7 @@ fn dead_on_ring(line: &Line, tree: &Tree, all: &[Drops], drops: &Drops) -> Optio
     };
     nodes(drops.link).find(|node| {
         let is_between = nodes(other.link).any(|one| one == *node);
-        let device = &line.devices[*node];
+        let device = &model.devices[*node];
         let has_answered = |at: Instant| at > drops.first.max(other.first) + ANSWERS_LATE;
         let is_reached = device.answered.is_some_and(|answered| has_answered(answered.at));
         is_between && (device.silent.is_some() || !is_reached)
@@ -127,14 +132,14 @@ fn dead_on_ring(line: &Line, tree: &Tree, all: &[Drops], drops: &Drops) -> Optio
 }
 
 /// Lays a lost link to the device behind it; the other link of the device follows from it.
-fn blame(line: &Line, tree: &Tree, node: usize, condition: &mut Condition) {
+fn blame(model: &NetworkModel, tree: &Tree, node: usize, condition: &mut Condition) {
     let id = DeviceId(node as u32);
     condition.alternatives = vec![Alternative {
         cause: FaultName::LinkOpen,
         place: Some(condition.place),
         confidence: 0.2,
     }];
-    condition.place = Place::device(line.network, id);
+    condition.place = Place::device(model.network, id);
     (condition.cause, condition.confidence) = (FaultName::DeviceOff, 0.7);
     for port in Port::ALL {
         condition.explains.push(Symptom::LinkDown(id, port));
@@ -153,9 +158,13 @@ fn blame(line: &Line, tree: &Tree, node: usize, condition: &mut Condition) {
 
 /// Links, side by side, that were lost at the same moment as this one, this one included, and are down since: two cables
 /// do not break at one moment, but what hangs on them may have one supply.
-fn share_supply<'a>(tree: &Tree, all: &'a [Drops], drops: &'a Drops) -> Option<Vec<&'a Drops>> {
+fn share_supply<'a>(
+    tree: &Tree,
+    all: &'a [LinkLosses],
+    drops: &'a LinkLosses,
+) -> Option<Vec<&'a LinkLosses>> {
     // What is behind another lost link went with it.
-    let is_one = |one: &&Drops| {
+    let is_one = |one: &&LinkLosses| {
         let way = |node: usize| tree.path_to(node).into_iter().filter(move |on| *on != node);
         let lost_above = |node: usize| {
             way(node)
@@ -169,35 +178,35 @@ fn share_supply<'a>(tree: &Tree, all: &'a [Drops], drops: &'a Drops) -> Option<V
             && one.falls_with(drops)
             && behind.is_some_and(|node| !lost_above(node))
     };
-    let with: Vec<&Drops> = all.iter().filter(is_one).collect();
+    let with: Vec<&LinkLosses> = all.iter().filter(is_one).collect();
     let is_among = with.iter().any(|one| one.link == drops.link);
     (is_among && with.len() > 1).then_some(with)
 }
 
 /// Lays a lost link to the supply of the device behind it; those that fell with it follow from the first.
 fn blame_supply(
-    line: &Line,
+    model: &NetworkModel,
     tree: &Tree,
-    drops: &Drops,
-    with: &[&Drops],
+    drops: &LinkLosses,
+    with: &[&LinkLosses],
     condition: &mut Condition,
 ) {
     let Some(node) = tree.links()[drops.link].downstream.node() else { return };
     let link = condition.place;
-    let place = Place::device(line.network, DeviceId(node as u32));
+    let place = Place::device(model.network, DeviceId(node as u32));
     condition.place = place;
     (condition.cause, condition.confidence) = (FaultName::SupplyOff, 0.6);
     let other = |cause, place, confidence| Alternative { cause, place, confidence };
     condition.alternatives =
         vec![other(FaultName::LinkOpen, Some(link), 0.15), other(FaultName::DeviceOff, None, 0.15)];
     if with.first().is_some_and(|first| first.link == drops.link) {
-        let follows = with.iter().flat_map(|one| follows(line, tree, one.link));
+        let follows = with.iter().flat_map(|one| follows(model, tree, one.link));
         condition.explains.extend(follows);
     }
     let names: Vec<String> = with
         .iter()
         .filter_map(|one| tree.links()[one.link].downstream.node())
-        .map(|node| line.label(DeviceId(node as u32)))
+        .map(|node| model.label(DeviceId(node as u32)))
         .collect();
     condition.actions.insert(
         0,
@@ -208,16 +217,16 @@ fn blame_supply(
     );
 }
 
-fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
+fn condition(model: &NetworkModel, tree: &Tree, drops: &LinkLosses) -> Condition {
     let link = tree.links()[drops.link];
     let named = link.map(|node| DeviceId(node as u32));
-    let place = Place::link(line.network, named, Some(LinkDirection::Both));
+    let place = Place::link(model.network, named, Some(LinkDirection::Both));
     let behind = link.downstream.node();
-    let (cause, confidence, others) = causes(line, tree, drops, behind);
+    let (cause, confidence, others) = causes(model, tree, drops, behind);
     let mut condition = Condition::new(&PAGE, place, cause, drops.first)
         .confidence(confidence)
         .confirmed(drops.first)
-        .about(ends(line, tree, drops.link).into_iter().map(|symptom| {
+        .about(ends(model, tree, drops.link).into_iter().map(|symptom| {
             if let Symptom::LinkDown(id, port) = symptom
                 && drops.seen.is_empty()
             {
@@ -225,21 +234,21 @@ fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
             }
             symptom
         }))
-        .explaining(follows(line, tree, drops.link));
+        .explaining(follows(model, tree, drops.link));
     for (cause, at, confidence) in others {
         condition = match at {
             Some(node) => {
-                let device = Place::device(line.network, DeviceId(node as u32));
+                let device = Place::device(model.network, DeviceId(node as u32));
                 condition.or_at(cause, device, confidence)
             }
             None => condition.or(cause, confidence),
         };
     }
     for drop in drops.seen.iter().rev().take(3) {
-        condition = condition.shown_by(status_evidence(line, drop));
+        condition = condition.shown_by(status_evidence(model, drop));
     }
     for end in [link.upstream, link.downstream] {
-        condition.evidence.extend(counter_evidence(line, end));
+        condition.evidence.extend(counter_evidence(model, end));
     }
     if let Some(ended) = drops.ended() {
         condition = condition.ended(ended);
@@ -248,13 +257,13 @@ fn condition(line: &Line, tree: &Tree, drops: &Drops) -> Condition {
         condition = condition.may_be_old();
     }
     let far = match link.downstream {
-        End::Controller(node, _) => line.label(DeviceId(node as u32)),
+        End::Controller(node, _) => model.label(DeviceId(node as u32)),
         End::MainDevice(_) => "the MainDevice's second card".to_owned(),
     };
     condition =
         condition.advise(format!("Look at {far}: if no lamp is lit, measure its supply first."));
     // Only a terminal says for sure that no cable leads to it; a coupler or junction may have either before it.
-    let is_terminal = behind.is_some_and(|node| is_on_terminal_bus(line, node));
+    let is_terminal = behind.is_some_and(|node| is_on_terminal_bus(model, node));
     if !is_terminal {
         let text = format!("Seat the plugs at both ends of {place}; then exchange the cable.");
         condition = condition.advise(text);
@@ -273,21 +282,21 @@ fn lead_with_device(condition: &mut Condition) {
 
 type Causes = (FaultName, f64, Vec<(FaultName, Option<usize>, f64)>);
 
-fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Causes {
+fn causes(model: &NetworkModel, tree: &Tree, drops: &LinkLosses, behind: Option<usize>) -> Causes {
     use FaultName::{
         BrownOut, CableDegraded, DeviceOff, FalseLink, LinkFlapping, LinkOpen, RingOpen, SupplyOff,
     };
-    if drops.count < OFTEN && is_one_sided(line, tree, drops) {
+    if drops.count < OFTEN && is_one_sided(model, tree, drops) {
         // Nothing that shows a link by itself can be between two terminals.
-        return match behind.is_some_and(|node| is_on_terminal_bus(line, node)) {
+        return match behind.is_some_and(|node| is_on_terminal_bus(model, node)) {
             true => (LinkOpen, 0.5, vec![(FalseLink, None, 0.35)]),
             false => (FalseLink, 0.5, vec![(LinkOpen, None, 0.35)]),
         };
     }
-    if let Some(near) = swallowed_half::near_end(line, tree, drops) {
+    if let Some(near) = swallowed_half::near_end(model, tree, drops) {
         return (FalseLink, 0.6, vec![(RingOpen, None, 0.2), (DeviceOff, Some(near), 0.1)]);
     }
-    if let Some(never) = never_seen::causes(line, tree, drops) {
+    if let Some(never) = never_seen::causes(model, tree, drops) {
         return never;
     }
     let is_repeated = drops.count >= AGAIN;
@@ -297,7 +306,7 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
             (RingOpen, 0.75, vec![(LinkFlapping, None, 0.15)])
         }
         None => {
-            let off = if behind.is_some_and(|node| is_on_terminal_bus(line, node)) {
+            let off = if behind.is_some_and(|node| is_on_terminal_bus(model, node)) {
                 (0.5, 0.35, 0.05)
             } else {
                 (0.6, 0.25, 0.1)
@@ -321,13 +330,13 @@ fn causes(line: &Line, tree: &Tree, drops: &Drops, behind: Option<usize>) -> Cau
 
 /// Whether one end has lost the link while the other one had it all the time: one pair of wires, or
 /// something between that shows a link by itself. Only where both were read afterwards.
-pub(super) fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
+pub(super) fn is_one_sided(model: &NetworkModel, tree: &Tree, drops: &LinkLosses) -> bool {
     let link = tree.links()[drops.link];
     let saw = |end: End| -> Option<bool> {
-        let seen = drops.is_shown_by(line, end);
+        let seen = drops.is_shown_by(model, end);
         match end {
             End::Controller(node, port) => {
-                let device = line.devices.get(node)?;
+                let device = model.devices.get(node)?;
                 let lost = device.counters.track(ErrorCounter::LostLink(port))?;
                 let has_risen = lost.rises.iter().any(|rise| rise.at >= drops.first);
                 let was_read = device.silent.is_none()
@@ -337,13 +346,13 @@ pub(super) fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
                 (seen || has_risen || was_read).then_some(seen || has_risen)
             }
             End::MainDevice(path) => {
-                let Some(carrier) = line.host.card(path).carrier else {
+                let Some(carrier) = model.host.card(path).carrier else {
                     let about = (drops.first.before(READ_WITHIN), drops.last);
-                    return search::began_at_once(line, about).then_some(false);
+                    return search::began_at_once(model, about).then_some(false);
                 };
                 let has_changed = !carrier.value || carrier.at >= drops.first.before(CARRIER_LATE);
-                (seen || drops.last + CARRIER_LATE < line.now)
-                    .then_some(seen || (has_changed && line.host.card(path).carrier_changes > 0))
+                (seen || drops.last + CARRIER_LATE < model.now)
+                    .then_some(seen || (has_changed && model.host.card(path).carrier_changes > 0))
             }
         }
     };
@@ -352,15 +361,15 @@ pub(super) fn is_one_sided(line: &Line, tree: &Tree, drops: &Drops) -> bool {
 
 /// Whether a device hangs on the terminal bus, as far as its EEPROM, its type and the one before it tell: there a contact and the device
 /// behind it fail alike.
-pub(super) fn is_on_terminal_bus(line: &Line, node: usize) -> bool {
-    let tree = line.tree.as_ref().filter(|tree| node < tree.len());
+pub(super) fn is_on_terminal_bus(model: &NetworkModel, node: usize) -> bool {
+    let tree = model.tree.as_ref().filter(|tree| node < tree.len());
     // What its EEPROM says of the port by which frames come in.
-    match tree.and_then(|tree| Some(line.devices[node].sii.power()?.ports[tree.entry(node)])) {
+    match tree.and_then(|tree| Some(model.devices[node].sii.power()?.ports[tree.entry(node)])) {
         Some(PortKind::EBus) => return true,
         Some(PortKind::Mii | PortKind::FastHotConnect) => return false,
         Some(PortKind::None | PortKind::Other(_)) | None => {}
     }
-    let type_of = |node: usize| line.devices[node].type_name.as_deref().unwrap_or_default();
+    let type_of = |node: usize| model.devices[node].type_name.as_deref().unwrap_or_default();
     let is_of = |node: usize, families: &[&str]| {
         families.iter().any(|family| type_of(node).starts_with(family))
     };
@@ -372,12 +381,12 @@ pub(super) fn is_on_terminal_bus(line: &Line, node: usize) -> bool {
 }
 
 /// What the loss is about: both ends, and the card's link if it is one of them.
-fn ends(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
+fn ends(model: &NetworkModel, tree: &Tree, link: usize) -> Vec<Symptom> {
     let ends = [tree.links()[link].upstream, tree.links()[link].downstream];
     let symptom = |end: End| match end {
         End::Controller(node, port) => Some(Symptom::LinkDown(DeviceId(node as u32), port)),
         End::MainDevice(path) => {
-            let carrier = line.host.card(path).carrier;
+            let carrier = model.host.card(path).carrier;
             carrier.is_some_and(|carrier| !carrier.value).then_some(Symptom::NoCarrier)
         }
     };
@@ -385,8 +394,8 @@ fn ends(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
 }
 
 /// What can follow from the loss.
-pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
-    let mut follows: BTreeSet<Symptom> = ends(line, tree, link).into_iter().collect();
+pub(super) fn follows(model: &NetworkModel, tree: &Tree, link: usize) -> Vec<Symptom> {
+    let mut follows: BTreeSet<Symptom> = ends(model, tree, link).into_iter().collect();
     for end in [tree.links()[link].upstream, tree.links()[link].downstream] {
         if let End::Controller(node, port) = end {
             follows.insert(Symptom::LinkCounted(DeviceId(node as u32), port));
@@ -400,7 +409,7 @@ pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
         }
     }
     if let End::Controller(node, _) = tree.links()[link].downstream {
-        follows.extend(lost_beyond(line, tree, link, node));
+        follows.extend(lost_beyond(model, tree, link, node));
         for &node in tree.subtree(node) {
             let id = DeviceId(node as u32);
             follows.extend([
@@ -418,14 +427,14 @@ pub(super) fn follows(line: &Line, tree: &Tree, link: usize) -> Vec<Symptom> {
 
 /// The links beyond the device behind a lost one, as far as they were lost with it: then it was without
 /// supply. Those that were lost more often, or before, have trouble of their own.
-fn lost_beyond(line: &Line, tree: &Tree, link: usize, behind: usize) -> Vec<Symptom> {
-    let all = Drops::all(line);
+fn lost_beyond(model: &NetworkModel, tree: &Tree, link: usize, behind: usize) -> Vec<Symptom> {
+    let all = LinkLosses::all(model);
     let of = |link: usize| all.iter().find(|drops| drops.link == link);
     let Some(own) = of(link) else { return Vec::new() };
     let mut lost = Vec::new();
     for (port, child) in tree.children(behind) {
         let beyond = tree.link_above(child).and_then(of);
-        let is_with = |beyond: &&Drops| {
+        let is_with = |beyond: &&LinkLosses| {
             beyond.count <= own.count && beyond.first >= own.first && !beyond.is_down
         };
         if beyond.filter(is_with).is_some() {
@@ -436,12 +445,12 @@ fn lost_beyond(line: &Line, tree: &Tree, link: usize, behind: usize) -> Vec<Symp
     lost
 }
 
-fn status_evidence(line: &Line, drop: &Drop) -> Evidence {
+fn status_evidence(model: &NetworkModel, drop: &LinkLoss) -> Evidence {
     let seen = Seen::new((), drop.at, drop.frame);
     match drop.end {
         End::Controller(node, port) => {
             let id = DeviceId(node as u32);
-            let label = line.label(id);
+            let label = model.label(id);
             let text = match drop.back {
                 Some(back) => {
                     format!("DL status of {label}: port {port} had no link until {back}")
@@ -458,14 +467,14 @@ fn status_evidence(line: &Line, drop: &Drop) -> Evidence {
     }
 }
 
-fn counter_evidence(line: &Line, end: End) -> Option<Evidence> {
+fn counter_evidence(model: &NetworkModel, end: End) -> Option<Evidence> {
     let End::Controller(node, port) = end else { return None };
     let counter = ErrorCounter::LostLink(port);
-    let track = line.devices[node].counters.track(counter)?;
+    let track = model.devices[node].counters.track(counter)?;
     let rise = track.last_rise()?;
     let id = DeviceId(node as u32);
     let count = track.total.rise();
     let often = if count == 1 { "once".to_owned() } else { format!("{count} times") };
-    let text = format!("{} lost the link of port {port} {often}", line.label(id));
+    let text = format!("{} lost the link of port {port} {often}", model.label(id));
     Some(Evidence::rise(id, counter.address(), Some(port), rise, text))
 }

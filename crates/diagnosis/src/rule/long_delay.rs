@@ -21,7 +21,7 @@ use linesman_proto::topology::Tree;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
-use crate::line::Line;
+use crate::model::NetworkModel;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -39,13 +39,13 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const LONGEST: Span = Span::ns(2_000);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let Some(tree) = line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) else {
+    let model = view.model;
+    let Some(tree) = model.tree.as_ref().filter(|tree| tree.len() <= model.devices.len()) else {
         return;
     };
     for node in 0..tree.len() {
         conditions
-            .extend(first_branch(tree, node).and_then(|child| condition(line, tree, node, child)));
+            .extend(first_branch(tree, node).and_then(|child| condition(model, tree, node, child)));
     }
 }
 
@@ -62,16 +62,16 @@ fn first_branch(tree: &Tree, node: usize) -> Option<usize> {
         .map(|(_, child)| child)
 }
 
-fn condition(line: &Line, tree: &Tree, node: usize, child: usize) -> Option<Condition> {
-    let (near, far) = (line.devices[node].delay?, line.devices[child].delay?);
+fn condition(model: &NetworkModel, tree: &Tree, node: usize, child: usize) -> Option<Condition> {
+    let (near, far) = (model.devices[node].delay?, model.devices[child].delay?);
     // Of whoever has no clock nobody measured it; the first one has none by itself.
     let is_first = tree.order().first() == Some(&node);
     if far == Span::ZERO || (near == Span::ZERO && !is_first) {
         return None;
     }
     let link = tree.links().get(tree.link_above(child)?)?;
-    let place = Place::link(line.network, link.map(|node| DeviceId(node as u32)), None);
-    let (here, there) = (line.label(DeviceId(node as u32)), line.label(DeviceId(child as u32)));
+    let place = Place::link(model.network, link.map(|node| DeviceId(node as u32)), None);
+    let (here, there) = (model.label(DeviceId(node as u32)), model.label(DeviceId(child as u32)));
     let (cause, text) = if far < near {
         let text =
             format!("the delay falls from SubDevice {here} ({near}) to {there} behind it ({far})");
@@ -82,10 +82,10 @@ fn condition(line: &Line, tree: &Tree, node: usize, child: usize) -> Option<Cond
     } else {
         return None;
     };
-    let condition = Condition::new(&PAGE, place, cause, line.now)
+    let condition = Condition::new(&PAGE, place, cause, model.now)
         .confidence(0.5)
         .or(FaultName::FalseLink, 0.1)
-        .confirmed(line.now)
+        .confirmed(model.now)
         .shown_by(Evidence::host(None, text))
         .advise(format!(
             "Look what lies between {here} and {there}: a converter, a switch, a long fibre?"

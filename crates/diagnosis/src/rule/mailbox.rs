@@ -25,8 +25,8 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::mailbox::{Refusal, SLOW as SLOW_ANSWER, STUCK};
-use crate::line::{Device, Line, Seen};
+use crate::model::mailbox::{MailboxRefusal, SLOW as SLOW_ANSWER, STUCK};
+use crate::model::{Device, NetworkModel, Seen};
 
 /// Requests are refused.
 pub const REFUSED: RulePage = RulePage {
@@ -72,41 +72,41 @@ const ASKING: [u32; 3] = [0x0602_0000, 0x0609_0011, 0x0601_0004];
 const FIRST_OF_MAKER: ObjectIndex = ObjectIndex(0x2000);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    for device in &view.line.devices {
-        conditions.extend(refused(view.line, device));
-        conditions.extend(slow(view.line, device));
+    for device in &view.model.devices {
+        conditions.extend(refused(view.model, device));
+        conditions.extend(slow(view.model, device));
         conditions.extend(stuck(view, device));
     }
 }
 
-fn refused(line: &Line, device: &Device) -> Option<Condition> {
+fn refused(model: &NetworkModel, device: &Device) -> Option<Condition> {
     // Whoever brings a SubDevice up tries to read objects at once, and does so entry by entry where that is refused.
-    let counts = |seen: &&Seen<Refusal>| {
-        !matches!(seen.value, Refusal::Abort { code, object, reads_whole }
+    let counts = |seen: &&Seen<MailboxRefusal>| {
+        !matches!(seen.value, MailboxRefusal::Abort { code, object, reads_whole }
             if ASKING.contains(&code) || (reads_whole && object.index < FIRST_OF_MAKER))
     };
     let all: Vec<_> = device.mailbox.refusals.iter().filter(counts).collect();
     let (first, last) = (all.first()?, all.last()?);
-    let mut condition = begin(line, device, &REFUSED, FaultName::MailboxError, first.at, last.at)
+    let mut condition = begin(model, device, &REFUSED, FaultName::MailboxError, first.at, last.at)
         .confidence(0.8)
         .or(FaultName::ConfigMismatch, 0.15);
-    if all.iter().all(|seen| matches!(seen.value, Refusal::Abort { .. })) {
+    if all.iter().all(|seen| matches!(seen.value, MailboxRefusal::Abort { .. })) {
         // The mailbox works; what was asked for did not suit.
         condition.severity = Severity::Info;
     }
-    let label = line.label(device.id);
+    let label = model.label(device.id);
     for seen in all.iter().rev().take(SHOWN) {
         let text = match seen.value {
-            Refusal::Abort { object, code, .. } => {
+            MailboxRefusal::Abort { object, code, .. } => {
                 format!("{label} aborts {object}: {}", SdoAbortCode(code))
             }
-            Refusal::Error(code) => {
+            MailboxRefusal::Error(code) => {
                 format!("the mailbox of {label} answers with error {code}")
             }
         };
         condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
     }
-    if let Some(Refusal::Abort { code, .. }) = all.last().map(|seen| seen.value) {
+    if let Some(MailboxRefusal::Abort { code, .. }) = all.last().map(|seen| seen.value) {
         condition = condition.advise(SdoAbortCode(code).explain().action);
     }
     Some(
@@ -115,11 +115,11 @@ fn refused(line: &Line, device: &Device) -> Option<Condition> {
     )
 }
 
-fn slow(line: &Line, device: &Device) -> Option<Condition> {
+fn slow(model: &NetworkModel, device: &Device) -> Option<Condition> {
     let all = &device.mailbox.slow;
     let (first, last) = (all.front()?, all.back()?);
     let since = first.value.asked;
-    let mut condition = begin(line, device, &SLOW, FaultName::MailboxSlow, since, last.at)
+    let mut condition = begin(model, device, &SLOW, FaultName::MailboxSlow, since, last.at)
         .confidence(0.7)
         .or(FaultName::FirmwareFault, 0.2)
         .about([Symptom::Mailbox(device.id)]);
@@ -130,7 +130,7 @@ fn slow(line: &Line, device: &Device) -> Option<Condition> {
     for seen in all.iter().rev().take(SHOWN) {
         let ms = seen.at.since(seen.value.asked).as_nanos() / 1_000_000;
         let what = seen.value.object.map_or_else(String::new, |object| format!(" to {object}"));
-        let text = format!("{} answers a request{what} after {ms} ms", line.label(device.id));
+        let text = format!("{} answers a request{what} after {ms} ms", model.label(device.id));
         condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
     }
     Some(
@@ -161,11 +161,11 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
         .filter(|(from, to, _)| to.since(*from) >= STUCK);
     let over = mailbox.stuck.back().map(|(from, to)| (*from, *to, None));
     let (since, until, frame) = full.or(waiting).or(unfetched).or(over)?;
-    if view.line.traffic.may_lack(since, until) {
+    if view.model.traffic.may_lack(since, until) {
         // The answer may have been fetched by a frame that is not in the recording.
         return None;
     }
-    let label = view.line.label(device.id);
+    let label = view.model.label(device.id);
     let ms = until.since(since).as_nanos() / 1_000_000;
     let text = if full.is_some() {
         format!("{label} takes no request out of its mailbox for {ms} ms")
@@ -176,8 +176,8 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
     } else {
         format!("{label} has not answered a request for {ms} ms; its controller answers")
     };
-    let place = Place::device(view.line.network, device.id);
-    let stopped = processor_stopped_about(view.line, since);
+    let place = Place::device(view.model.network, device.id);
+    let stopped = processor_stopped_about(view.model, since);
     let (cause, other) = match stopped {
         None => (FaultName::MailboxStuck, FaultName::FirmwareFault),
         Some(_) => (FaultName::FirmwareFault, FaultName::MailboxStuck),
@@ -204,21 +204,21 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
 }
 
 /// The event by which a SubDevice told, about when its mailbox got stuck, that its DL status has changed.
-fn processor_stopped_about(line: &Line, since: Instant) -> Option<Seen<()>> {
+fn processor_stopped_about(model: &NetworkModel, since: Instant) -> Option<Seen<()>> {
     let is_then =
         |came: &Seen<()>| came.at.since(since).max(since.since(came.at)) <= STOPPED_WITHIN;
-    line.changed_link().filter(is_then)
+    model.changed_link().filter(is_then)
 }
 
 fn begin(
-    line: &Line,
+    model: &NetworkModel,
     device: &Device,
     page: &'static RulePage,
     cause: FaultName,
     first: Instant,
     last: Instant,
 ) -> Condition {
-    let place = Place::device(line.network, device.id);
+    let place = Place::device(model.network, device.id);
     let condition = Condition::new(page, place, cause, first).confirmed(first);
-    if last + QUIET < line.now { condition.ended(last) } else { condition }
+    if last + QUIET < model.now { condition.ended(last) } else { condition }
 }

@@ -49,7 +49,7 @@ use linesman_config::fault::Class;
 use linesman_proto::time::Instant;
 
 use crate::finding::{Condition, Severity};
-use crate::line::Line;
+use crate::model::NetworkModel;
 
 /// What a rule is: shown by `linesman explain CODE`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -70,11 +70,11 @@ impl RulePage {
     /// The manual page: the doc comment at the head of the rule's file, in Markdown.
     #[must_use]
     pub fn manual(&self) -> String {
-        let doc = self.source.lines().take_while(|line| line.starts_with("//!"));
+        let doc = self.source.lines().take_while(|model| model.starts_with("//!"));
         let mut text = String::new();
-        for line in doc {
-            let line = line.trim_start_matches("//!");
-            text.push_str(line.strip_prefix(' ').unwrap_or(line));
+        for model in doc {
+            let model = model.trim_start_matches("//!");
+            text.push_str(model.strip_prefix(' ').unwrap_or(model));
             text.push('\n');
         }
         text
@@ -94,7 +94,7 @@ pub struct Rule {
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// What is known of the network.
-    pub line: &'a Line,
+    pub model: &'a NetworkModel,
     /// The time of the latest frame or observation.
     pub now: Instant,
     /// Whether the input is at its end: nothing more will come that could settle an open question.

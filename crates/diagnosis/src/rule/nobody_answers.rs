@@ -26,7 +26,7 @@
 //! **What to do.** Look at the LED of the card and of the IN port of the first SubDevice, then at
 //! supply, cable and the choice of the card, in this order.
 
-mod parted;
+mod outage_location;
 mod restarted;
 
 use linesman_config::fault::{Class, FaultName};
@@ -38,8 +38,8 @@ use linesman_proto::topology::End;
 use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, LinkEnd, Place, Severity, Symptom};
-use crate::line::{Line, Seen, Silence, search};
-use crate::locate::Survey;
+use crate::locate::LocateInput;
+use crate::model::{NetworkModel, Seen, Silence, search};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -74,8 +74,8 @@ const FEW: u64 = 3;
 const LINK_UP: Span = Span::us(330);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let traffic = &line.traffic;
+    let model = view.model;
+    let traffic = &model.traffic;
     conditions.extend(told(view));
     // Of frames that were cut off nobody knows whether they were answered.
     if traffic.is_one_sided() || traffic.datagrams_cut * 2 > traffic.frames {
@@ -90,7 +90,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         }
         // A few at the end, where a few were lost all along, are more of the same.
         None => {
-            let is_few = silence.frames >= FEW && view.has_ended && !is_among_others(line, silence);
+            let is_few =
+                silence.frames >= FEW && view.has_ended && !is_among_others(model, silence);
             silence.frames >= CERTAIN || is_few
         }
     };
@@ -98,10 +99,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let silence = traffic.silences.iter().rev().find(is_long);
     if let Some(silence) = silence.into_iter().chain(swallowed).max_by_key(|one| one.since.at) {
         let is_swallowed = swallowed.is_some_and(|one| one.since == silence.since);
-        let silence = &searched(line, silence);
+        let silence = &searched(model, silence);
         let is_hole = is_swallowed || nothing_was_cut(view, silence);
-        let was_searched = line.hole.is_some_and(|hole| hole.since == silence.since);
-        if is_hole && !was_searched && is_among_others(line, silence) {
+        let was_searched = model.hole.is_some_and(|hole| hole.since == silence.since);
+        if is_hole && !was_searched && is_among_others(model, silence) {
             // Frames are lost here and there: damage, which other rules place.
             return;
         }
@@ -113,23 +114,23 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 
 /// Another tool says that none of the SubDevices it knows answers.
 fn told(view: &View<'_>) -> Option<Condition> {
-    let line = view.line;
-    let silent = line.devices.iter().map(|device| device.silent);
+    let model = view.model;
+    let silent = model.devices.iter().map(|device| device.silent);
     let silent: Vec<Seen<()>> = silent.collect::<Option<_>>()?;
     // Frames tell it themselves; how many answer a broadcast is another rule's.
-    if line.traffic.frames > 0 || line.reported.answering.is_some() {
+    if model.traffic.frames > 0 || model.reported.answering.is_some() {
         return None;
     }
     let at = silent.iter().map(|seen| seen.at).min()?;
-    let carrier = line.host.card(Path::A).carrier.map(|carrier| carrier.value);
+    let carrier = model.host.card(Path::A).carrier.map(|carrier| carrier.value);
     let text = match silent.len() {
         1 => "the only SubDevice does not answer".to_owned(),
         count => format!("none of {count} SubDevices answers"),
     };
-    let devices = line.devices.iter().map(|device| device.id);
+    let devices = model.devices.iter().map(|device| device.id);
     let follows = devices
         .flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)]);
-    let condition = cut(line, at, carrier, false)
+    let condition = cut(model, at, carrier, false)
         .confirmed(at)
         .shown_by(Evidence::host(Some(at), text))
         .about([Symptom::NobodyAnswers])
@@ -140,9 +141,9 @@ fn told(view: &View<'_>) -> Option<Condition> {
 
 /// A silence as it is without the ports that were closed to find its place: frames that come back meanwhile
 /// do not end it.
-fn searched(line: &Line, silence: &Silence) -> Silence {
+fn searched(model: &NetworkModel, silence: &Silence) -> Silence {
     let mut whole = *silence;
-    if let Some(hole) = line.hole.filter(|hole| hole.since.at <= silence.since.at) {
+    if let Some(hole) = model.hole.filter(|hole| hole.since.at <= silence.since.at) {
         let is_one = hole.ended.is_none_or(|ended| silence.since.at <= ended + SAME_SILENCE);
         if is_one {
             whole.since = hole.since;
@@ -153,47 +154,47 @@ fn searched(line: &Line, silence: &Silence) -> Silence {
 }
 
 /// The link behind which frames vanish, if it was looked for in this silence and found.
-fn found_hole(line: &Line, silence: &Silence) -> Option<Seen<usize>> {
+fn found_hole(model: &NetworkModel, silence: &Silence) -> Option<Seen<usize>> {
     // Where nobody tells, frames that came back meanwhile have shown that the card has one.
-    let has_link = line.host.card(Path::A).carrier.is_none_or(|carrier| carrier.value);
-    line.hole.filter(|hole| hole.since == silence.since && has_link)?.found
+    let has_link = model.host.card(Path::A).carrier.is_none_or(|carrier| carrier.value);
+    model.hole.filter(|hole| hole.since == silence.since && has_link)?.found
 }
 
 /// Whether a silence is over, and neither a link nor the first SubDevice was lost meanwhile, as what was
 /// read of the first SubDevice since then shows.
 fn nothing_was_cut(view: &View<'_>, silence: &Silence) -> bool {
-    let line = view.line;
-    let (Some(ended), Some(survey)) = (silence.ended, Survey::of(line, view.has_ended)) else {
+    let model = view.model;
+    let (Some(ended), Some(input)) = (silence.ended, LocateInput::of(model, view.has_ended)) else {
         return false;
     };
-    let Some(End::Controller(first, port)) = first_end(line) else { return false };
-    let Some(device) = line.device(first) else { return false };
+    let Some(End::Controller(first, port)) = first_end(model) else { return false };
+    let Some(device) = model.device(first) else { return false };
     let lost = device.counters.track(ErrorCounter::LostLink(port));
     let was_read = lost.is_some_and(|track| track.last.at > ended);
-    let was_card_cut = line.host.card(Path::A).carrier.is_some_and(|carrier| {
+    let was_card_cut = model.host.card(Path::A).carrier.is_some_and(|carrier| {
         !carrier.value
-            || (carrier.at >= silence.since.at && line.host.card(Path::A).carrier_changes > 0)
+            || (carrier.at >= silence.since.at && model.host.card(Path::A).carrier_changes > 0)
     });
-    let has_fallen = line.devices.iter().any(|device| {
+    let has_fallen = model.devices.iter().any(|device| {
         device.al.changes.iter().any(|change| change.at >= silence.since.at && change.is_own_fall())
     });
-    was_read && !was_card_cut && !has_fallen && !survey.any_link_changed(silence.since.at, ended)
+    was_read && !was_card_cut && !has_fallen && !input.any_link_changed(silence.since.at, ended)
 }
 
 /// Whether other frames were lost than those of a silence, with others coming back between them.
-fn is_among_others(line: &Line, silence: &Silence) -> bool {
-    let lost = line.traffic.lost;
+fn is_among_others(model: &NetworkModel, silence: &Silence) -> bool {
+    let lost = model.traffic.lost;
     let share = lost.of_spell().saturating_sub(silence.frames);
     share >= FEW && share * 50 >= silence.frames
 }
 
 /// Nothing comes back.
 fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
-    let line = view.line;
-    let was_answered = line.traffic.answered > 0;
-    let carrier = carrier_during(line, silence);
+    let model = view.model;
+    let was_answered = model.traffic.answered > 0;
+    let carrier = carrier_during(model, silence);
     let since = silence.since;
-    let is_swallowed = line.traffic.swallowed.iter().any(|one| one.since == since);
+    let is_swallowed = model.traffic.swallowed.iter().any(|one| one.since == since);
     let text = if is_swallowed {
         format!(
             "from here on {} requests in a row came round as card B had sent them, and not as card A had",
@@ -204,23 +205,23 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
     } else {
         format!("first of {} requests; none came back", silence.frames)
     };
-    let spoiled = line.host.card(Path::A).crc;
+    let spoiled = model.host.card(Path::A).crc;
     let is_spoiled = spoiled.of_spell() > 0 && spoiled.last.is_some_and(|last| last >= since.at);
     let frame = since.frame.unwrap_or(0);
     let lasted = silence.last.at.since(silence.since.at);
-    let found = found_hole(line, silence);
-    let restarted = restarted::others_with(line, silence);
+    let found = found_hole(model, silence);
+    let restarted = restarted::others_with(model, silence);
     let mut condition = match (found, is_spoiled, is_hole) {
         _ if let Some((count, seen)) = restarted => {
-            restarted::without_supply(line, silence, count, seen)
+            restarted::without_supply(model, silence, count, seen)
         }
-        (Some(found), ..) => placed(line, since.at, found),
-        (None, true, _) => spoiling(line, since.at),
+        (Some(found), ..) => placed(model, since.at, found),
+        (None, true, _) => spoiling(model, since.at),
         (None, false, true) => hole(view, silence),
         (None, false, false) => {
             let carrier = carrier.filter(|_| lasted >= CARRIER_LATE);
             // A search that closed ports in vain leaves the first link.
-            cut(line, since.at, carrier, search::began(line, silence).is_some())
+            cut(model, since.at, carrier, search::began(model, silence).is_some())
         }
     };
     condition = condition.shown_by(Evidence::frame(since.at, frame, text));
@@ -232,7 +233,7 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         );
         condition = condition.shown_by(Evidence::host(spoiled.last, text));
     }
-    if was_answered && let Some(returned) = line.traffic.latest_returned {
+    if was_answered && let Some(returned) = model.traffic.latest_returned {
         let frame = returned.frame.unwrap_or(0);
         let text = "the last frame that came back".to_owned();
         if returned.at <= since.at {
@@ -240,16 +241,16 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         }
     }
     if let Some(carrier) = carrier {
-        let told = line.host.card(Path::A).carrier.map(|carrier| carrier.at);
+        let told = model.host.card(Path::A).carrier.map(|carrier| carrier.at);
         let text = match (carrier, told) {
             (true, Some(_)) => "card A has a link",
-            (true, None) if search::began(line, silence).is_some() => {
+            (true, None) if search::began(model, silence).is_some() => {
                 "ports were closed meanwhile to find the place: who does so has a link"
             }
             (true, None) => "frames went on leaving the card, and none leaves one without a link",
             (false, _) => "card A had no link meanwhile",
         };
-        let began = search::began(line, silence).map(|began| began.at);
+        let began = search::began(model, silence).map(|began| began.at);
         let at = told.or(began).or(Some(silence.last.at));
         condition = condition.shown_by(Evidence::host(at, text));
     }
@@ -263,7 +264,7 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
     let may_be_noise = was_answered && (silence.ended.is_some() || silence.frames < LONG);
     let symptom = if may_be_noise { Symptom::FramesLost } else { Symptom::NobodyAnswers };
     condition = condition.about([symptom]);
-    let devices = line.devices.iter().map(|device| device.id);
+    let devices = model.devices.iter().map(|device| device.id);
     let follows = devices.flat_map(|id| {
         [
             Symptom::Silent(id),
@@ -295,32 +296,32 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
 }
 
 /// Frames do not come back at all: the first hop, or what is behind it.
-fn cut(line: &Line, at: Instant, carrier: Option<bool>, was_searched: bool) -> Condition {
+fn cut(model: &NetworkModel, at: Instant, carrier: Option<bool>, was_searched: bool) -> Condition {
     // Without a carrier it is the first hop for sure; with one, something forwards nothing.
     let (open, off, dead_link) = match carrier {
         Some(false) => (0.6, 0.3, 0.0),
         // Nobody looks for the place, and each link of the line may be the one.
-        Some(true) if !line.sees_all_orders && !was_searched => {
-            let network = Place::Network { network: line.network };
+        Some(true) if !model.sees_all_orders && !was_searched => {
+            let network = Place::Network { network: model.network };
             return Condition::new(&PAGE, network, FaultName::FalseLink, at)
                 .confidence(0.5)
-                .or_at(FaultName::FalseLink, first_link(line), 0.2)
+                .or_at(FaultName::FalseLink, first_link(model), 0.2)
                 .or_at(FaultName::NicDamaged, Place::Host, CARD)
-                .or_at(FaultName::LinkOpen, first_link(line), 0.1);
+                .or_at(FaultName::LinkOpen, first_link(model), 0.1);
         }
         Some(true) => {
-            return Condition::new(&PAGE, first_link(line), FaultName::FalseLink, at)
+            return Condition::new(&PAGE, first_link(model), FaultName::FalseLink, at)
                 .confidence(0.5)
-                .or_at(FaultName::FalseLink, Place::Network { network: line.network }, 0.25)
+                .or_at(FaultName::FalseLink, Place::Network { network: model.network }, 0.25)
                 .or_at(FaultName::NicDamaged, Place::Host, CARD)
                 .or(FaultName::LinkOpen, 0.05);
         }
         None => (0.45, 0.3, 0.1),
     };
     let condition =
-        Condition::new(&PAGE, first_link(line), FaultName::LinkOpen, at).confidence(open);
-    let condition = match first_device(line) {
-        Some(id) => condition.or_at(FaultName::DeviceOff, Place::device(line.network, id), off),
+        Condition::new(&PAGE, first_link(model), FaultName::LinkOpen, at).confidence(open);
+    let condition = match first_device(model) {
+        Some(id) => condition.or_at(FaultName::DeviceOff, Place::device(model.network, id), off),
         None => condition.or(FaultName::DeviceOff, off),
     };
     let condition = match carrier {
@@ -329,26 +330,26 @@ fn cut(line: &Line, at: Instant, carrier: Option<bool>, was_searched: bool) -> C
     };
     let condition = condition.or_at(FaultName::NicDamaged, Place::Host, CARD);
     // Who was never seen may not be there at all.
-    match first_device(line).filter(|_| line.tree_is_planned && line.traffic.answered == 0) {
+    match first_device(model).filter(|_| model.tree_is_planned && model.traffic.answered == 0) {
         Some(id) => condition
-            .or_at(FaultName::DeviceMissing, Place::device(line.network, id), NEVER_SEEN)
-            .or_at(FaultName::SupplyOff, Place::device(line.network, id), NEVER_SEEN),
+            .or_at(FaultName::DeviceMissing, Place::device(model.network, id), NEVER_SEEN)
+            .or_at(FaultName::SupplyOff, Place::device(model.network, id), NEVER_SEEN),
         None => condition,
     }
 }
 
 /// Where frames vanish was found by closing ports.
-fn placed(line: &Line, at: Instant, found: Seen<usize>) -> Condition {
-    let place = match line.links().nth(found.value) {
-        Some(link) => Place::link(line.network, link, Some(LinkDirection::Both)),
-        None => Place::Network { network: line.network },
+fn placed(model: &NetworkModel, at: Instant, found: Seen<usize>) -> Condition {
+    let place = match model.links().nth(found.value) {
+        Some(link) => Place::link(model.network, link, Some(LinkDirection::Both)),
+        None => Place::Network { network: model.network },
     };
     let text = "with the port before this link closed for a moment frames came back, with any port behind \
                 it closed they did not";
-    let behind = line.links().nth(found.value).and_then(|link| link.downstream.node());
+    let behind = model.links().nth(found.value).and_then(|link| link.downstream.node());
     // Nothing that shows a link by itself can be between two terminals: one of two pairs of contacts is open.
     let (cause, sure, other, less) =
-        match behind.is_some_and(|id| is_on_terminal_bus(line, id.index())) {
+        match behind.is_some_and(|id| is_on_terminal_bus(model, id.index())) {
             true => (FaultName::LinkOpen, 0.6, FaultName::FalseLink, 0.3),
             false => (FaultName::FalseLink, 0.8, FaultName::LinkOpen, 0.1),
         };
@@ -364,9 +365,9 @@ fn placed(line: &Line, at: Instant, found: Seen<usize>) -> Condition {
 
 /// Nothing came back for a while, and nobody has lost a link: something took the frames that shows one.
 fn hole(view: &View<'_>, silence: &Silence) -> Condition {
-    let line = view.line;
-    let network = Place::Network { network: line.network };
-    let (place, confidence) = match parted::place(view, silence) {
+    let model = view.model;
+    let network = Place::Network { network: model.network };
+    let (place, confidence) = match outage_location::place(view, silence) {
         Some((link, sure)) => (link, sure),
         None => (network, 0.5),
     };
@@ -374,8 +375,8 @@ fn hole(view: &View<'_>, silence: &Silence) -> Condition {
         .confidence(confidence)
         .or_at(FaultName::NicDamaged, Place::Host, CARD)
         .or_at(FaultName::HostDrops, Place::Host, CARD)
-        .or_at(FaultName::CableDegraded, first_link(line), CARD);
-    if place != network || line.sees_all_orders {
+        .or_at(FaultName::CableDegraded, first_link(model), CARD);
+    if place != network || model.sees_all_orders {
         return condition;
     }
     // Nobody can be asked for counters: whatever spoils every frame looks so.
@@ -386,8 +387,8 @@ fn hole(view: &View<'_>, silence: &Silence) -> Condition {
 }
 
 /// Frames do come back, but damaged, and no counter can be asked where.
-fn spoiling(line: &Line, at: Instant) -> Condition {
-    let place = Place::Network { network: line.network };
+fn spoiling(model: &NetworkModel, at: Instant) -> Condition {
+    let place = Place::Network { network: model.network };
     Condition::new(&PAGE, place, FaultName::CableDegraded, at)
         .confidence(0.4)
         .or(FaultName::TransmitterDamaged, 0.15)
@@ -398,10 +399,10 @@ fn spoiling(line: &Line, at: Instant) -> Condition {
 
 /// Whether the card had a link during a silence; `None` when neither the host says so nor anybody who searched
 /// for the place, which nobody does without one, nor frames that went on leaving it.
-fn carrier_during(line: &Line, silence: &Silence) -> Option<bool> {
-    let card = line.host.card(Path::A);
+fn carrier_during(model: &NetworkModel, silence: &Silence) -> Option<bool> {
+    let card = model.host.card(Path::A);
     let Some(carrier) = card.carrier else {
-        return (search::began(line, silence).is_some() || went_on_leaving(line, silence))
+        return (search::began(model, silence).is_some() || went_on_leaving(model, silence))
             .then_some(true);
     };
     let came_back = carrier.value && card.carrier_changes > 0 && carrier.at >= silence.since.at;
@@ -410,14 +411,14 @@ fn carrier_during(line: &Line, silence: &Silence) -> Option<bool> {
 
 /// Whether frames were seen to leave the card itself for so long that it had a link: the system hands none to a card
 /// without one, once it knows.
-fn went_on_leaving(line: &Line, silence: &Silence) -> bool {
-    let is_host = line.traffic.senders.iter().any(|sender| sender.is_host);
+fn went_on_leaving(model: &NetworkModel, silence: &Silence) -> bool {
+    let is_host = model.traffic.senders.iter().any(|sender| sender.is_host);
     is_host && silence.last.at.since(silence.since.at) >= CARRIER_KNOWN
 }
 
 /// Frames come back as they went out.
 fn ignored(view: &View<'_>) -> Condition {
-    let traffic = &view.line.traffic;
+    let traffic = &view.model.traffic;
     let first = traffic.first_unanswered;
     let at = first.map_or(view.now, |first| first.at);
     let text = format!(
@@ -425,7 +426,7 @@ fn ignored(view: &View<'_>) -> Condition {
         traffic.returned, traffic.unanswered
     );
     let frame = first.and_then(|first| first.frame).unwrap_or(0);
-    Condition::new(&PAGE, first_link(view.line), FaultName::ForeignFrames, at)
+    Condition::new(&PAGE, first_link(view.model), FaultName::ForeignFrames, at)
         .confidence(0.4)
         .or(FaultName::FalseLink, 0.3)
         .confirmed(at)
@@ -459,17 +460,17 @@ fn advise(condition: Condition, carrier: Option<bool>) -> Condition {
 }
 
 /// The end of the first link at the first controller.
-fn first_end(line: &Line) -> Option<LinkEnd> {
-    let mut links = line.links();
+fn first_end(model: &NetworkModel) -> Option<LinkEnd> {
+    let mut links = model.links();
     links.find(|link| link.upstream == End::MainDevice(Path::A)).map(|link| link.downstream)
 }
 
 /// From the card to the first controller, whose end is not known before it was seen.
-fn first_link(line: &Line) -> Place {
+fn first_link(model: &NetworkModel) -> Place {
     let a: LinkEnd = End::MainDevice(Path::A);
-    Place::Link { network: line.network, a, b: first_end(line), direction: None }
+    Place::Link { network: model.network, a, b: first_end(model), direction: None }
 }
 
-fn first_device(line: &Line) -> Option<DeviceId> {
-    first_end(line).and_then(|end| end.node())
+fn first_device(model: &NetworkModel) -> Option<DeviceId> {
+    first_end(model).and_then(|end| end.node())
 }

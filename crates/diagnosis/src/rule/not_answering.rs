@@ -30,8 +30,8 @@ use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Absence, Device, Line};
-use crate::locate::{Drops, way};
+use crate::locate::{LinkLosses, cut_distance};
+use crate::model::{Absence, Device, NetworkModel};
 use branch::{Branch, absence, passed, silent_branches};
 
 /// The page.
@@ -54,15 +54,18 @@ const NAME_PROJECT: &str = "Name the project or ENI, `--project FILE`: it has th
 const AT_ONCE: Span = Span::ms(200);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let away = || line.devices.iter().filter_map(|device| Some((device, absence(view, device)?)));
+    let model = view.model;
+    let away = || model.devices.iter().filter_map(|device| Some((device, absence(view, device)?)));
     if away().next().is_none() {
         return;
     }
-    let down: Vec<usize> =
-        Drops::all(line).iter().filter(|drops| drops.is_down).map(|drops| drops.link).collect();
+    let down: Vec<usize> = LinkLosses::all(model)
+        .iter()
+        .filter(|drops| drops.is_down)
+        .map(|drops| drops.link)
+        .collect();
     let is_cut_off = |node: usize| {
-        line.tree.as_ref().filter(|tree| node < tree.len()).is_some_and(|tree| {
+        model.tree.as_ref().filter(|tree| node < tree.len()).is_some_and(|tree| {
             let mut way = tree.path_to(node).into_iter();
             way.any(|node| tree.link_above(node).is_some_and(|link| down.contains(&link)))
         })
@@ -72,13 +75,13 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let (restarted, branches): (Vec<Branch>, Vec<Branch>) = silent_branches(view)
         .into_iter()
         .filter(|branch| !branch.devices.iter().all(is_passed))
-        .partition(|branch| branch.was_without_supply(line));
-    conditions.extend(passed.iter().map(|branch| lost_addresses(line, branch)));
+        .partition(|branch| branch.was_without_supply(model));
+    conditions.extend(passed.iter().map(|branch| lost_addresses(model, branch)));
     let (together, apart): (Vec<&Branch>, Vec<&Branch>) =
         branches.iter().partition(|branch| fell_with_others(branch, &branches));
-    conditions.extend(several(line, &together));
-    conditions.extend(apart.iter().map(|branch| cut_off(line, branch)));
-    conditions.extend(restarted.iter().map(|branch| without_supply(line, branch)));
+    conditions.extend(several(model, &together));
+    conditions.extend(apart.iter().map(|branch| cut_off(model, branch)));
+    conditions.extend(restarted.iter().map(|branch| without_supply(model, branch)));
     for (device, absence) in away() {
         // The link says it all of one alone, and the first one without supply all of those behind it.
         let is_told = |branch: &Branch| branch.devices.contains(&device.id);
@@ -88,21 +91,21 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             continue;
         }
         let is_cut_off = is_cut_off(device.id.index()) || branches.iter().any(is_told);
-        conditions.push(alone(line, device, &absence, is_cut_off));
+        conditions.push(alone(model, device, &absence, is_cut_off));
     }
 }
 
 /// One that does not answer.
-fn alone(line: &Line, device: &Device, absence: &Absence, is_cut_off: bool) -> Condition {
+fn alone(model: &NetworkModel, device: &Device, absence: &Absence, is_cut_off: bool) -> Condition {
     let silent = absence.since;
-    let label = line.label(device.id);
+    let label = model.label(device.id);
     let text = match absence.ended {
         None => format!("{label} does not answer"),
         Some(ended) => {
             format!("{label} did not answer for {}, then again", ended.since(silent.at))
         }
     };
-    let mut condition = alone_causes(line, device, absence, is_cut_off)
+    let mut condition = alone_causes(model, device, absence, is_cut_off)
         .confirmed(silent.at)
         .about([Symptom::Silent(device.id)])
         .explaining([
@@ -115,15 +118,20 @@ fn alone(line: &Line, device: &Device, absence: &Absence, is_cut_off: bool) -> C
         condition = condition.ended(ended);
     }
     // Another tool's list says at once who is gone: those behind went with it.
-    if line.traffic.frames == 0 && !is_cut_off {
-        condition = condition.explaining(behind(line, device.id));
+    if model.traffic.frames == 0 && !is_cut_off {
+        condition = condition.explaining(behind(model, device.id));
     }
     condition
 }
 
-fn alone_causes(line: &Line, device: &Device, absence: &Absence, is_cut_off: bool) -> Condition {
-    let (silent, label) = (absence.since, line.label(device.id));
-    let place = Place::device(line.network, device.id);
+fn alone_causes(
+    model: &NetworkModel,
+    device: &Device,
+    absence: &Absence,
+    is_cut_off: bool,
+) -> Condition {
+    let (silent, label) = (absence.since, model.label(device.id));
+    let place = Place::device(model.network, device.id);
     let new = |cause| Condition::new(&PAGE, place, cause, silent.at);
     if is_cut_off {
         // Why is for the finding above.
@@ -153,16 +161,16 @@ fn look_at_supply(label: &str) -> String {
 }
 
 /// Some that do not answer to their addresses though frames go through the first of them.
-fn lost_addresses(line: &Line, branch: &Branch) -> Condition {
+fn lost_addresses(model: &NetworkModel, branch: &Branch) -> Condition {
     let since = branch.since;
     let first = branch.devices.first().copied().unwrap_or_default();
-    let label = line.label(first);
+    let label = model.label(first);
     let others = match branch.devices.len() {
         0 | 1 => String::new(),
         count => format!(" and {} that follow upon it", count - 1),
     };
     let to = branch.passed_to.map_or_else(String::new, |(id, seen)| {
-        format!(" to {}, which has answered since (at {})", line.label(id), seen.at)
+        format!(" to {}, which has answered since (at {})", model.label(id), seen.at)
     });
     let text = format!(
         "{label}{others} do not answer to their station addresses, and frames go through {label}{to}: it has supply, \
@@ -170,7 +178,7 @@ fn lost_addresses(line: &Line, branch: &Branch) -> Condition {
     );
     let all = branch.devices.iter().copied();
     let mut condition =
-        Condition::new(&PAGE, Place::device(line.network, first), FaultName::BrownOut, since.at)
+        Condition::new(&PAGE, Place::device(model.network, first), FaultName::BrownOut, since.at)
             .confidence(0.6)
             .or(FaultName::DeviceOff, 0.15)
             .or(FaultName::SupplyOff, 0.1)
@@ -196,10 +204,10 @@ fn follows_from_silence(id: DeviceId) -> [Symptom; 4] {
 }
 
 /// The first of some that fell silent together and have started anew.
-fn without_supply(line: &Line, branch: &Branch) -> Condition {
+fn without_supply(model: &NetworkModel, branch: &Branch) -> Condition {
     let since = branch.since;
     let first = branch.devices.first().copied().unwrap_or_default();
-    let label = line.label(first);
+    let label = model.label(first);
     let behind = match branch.devices.len() {
         0 | 1 => String::new(),
         count => format!(" and {} behind it", count - 1),
@@ -214,7 +222,7 @@ fn without_supply(line: &Line, branch: &Branch) -> Condition {
     );
     let all = branch.devices.iter().copied();
     let condition =
-        Condition::new(&PAGE, Place::device(line.network, first), FaultName::DeviceOff, since.at)
+        Condition::new(&PAGE, Place::device(model.network, first), FaultName::DeviceOff, since.at)
             .confidence(0.4)
             .or(FaultName::SupplyOff, 0.3)
             .or(FaultName::BrownOut, 0.2)
@@ -238,13 +246,13 @@ fn fell_with_others(branch: &Branch, all: &[Branch]) -> bool {
 }
 
 /// Several branches that fell silent at once, with others between them that answer: what they have in common is a supply.
-fn several(line: &Line, branches: &[&Branch]) -> Option<Condition> {
+fn several(model: &NetworkModel, branches: &[&Branch]) -> Option<Condition> {
     let first = branches.first()?;
-    let entry = place_of(line, first)?;
+    let entry = place_of(model, first)?;
     let since = branches.iter().map(|branch| branch.since).min_by_key(|seen| seen.at)?;
     let heads = || branches.iter().filter_map(|branch| branch.devices.first().copied());
     let head = heads().next()?;
-    let names: Vec<String> = heads().map(|id| line.label(id)).collect();
+    let names: Vec<String> = heads().map(|id| model.label(id)).collect();
     let text = format!(
         "SubDevices do not answer in {} places at once, from {} on, with others between them that do: one link cannot do \
          that",
@@ -252,7 +260,7 @@ fn several(line: &Line, branches: &[&Branch]) -> Option<Condition> {
         names.join(", ")
     );
     let all = || branches.iter().flat_map(|branch| branch.devices.iter().copied());
-    let place = Place::device(line.network, head);
+    let place = Place::device(model.network, head);
     let mut condition = Condition::new(&PAGE, place, FaultName::SupplyOff, since.at)
         .confidence(0.5)
         .or(FaultName::DeviceOff, 0.15)
@@ -262,7 +270,7 @@ fn several(line: &Line, branches: &[&Branch]) -> Option<Condition> {
         .explaining(all().flat_map(follows_from_silence))
         .shown_by(Evidence::register(head, table::AL_STATUS.address, &since, text));
     for other in heads().skip(1) {
-        condition = condition.or_at(FaultName::SupplyOff, Place::device(line.network, other), 0.1);
+        condition = condition.or_at(FaultName::SupplyOff, Place::device(model.network, other), 0.1);
     }
     condition = condition
         .advise(format!("Measure the supply that {} have in common.", names.join(", ")))
@@ -274,27 +282,27 @@ fn several(line: &Line, branches: &[&Branch]) -> Option<Condition> {
 }
 
 /// The link that a branch hangs behind, by the end that is known.
-fn place_of(line: &Line, branch: &Branch) -> Option<Place> {
+fn place_of(model: &NetworkModel, branch: &Branch) -> Option<Place> {
     let direction = Some(LinkDirection::Both);
     if let Some(link) = branch.link {
-        return Some(Place::link(line.network, link, direction));
+        return Some(Place::link(model.network, link, direction));
     }
     // Frames come in by port A.
     let a = End::Controller(*branch.devices.first()?, Port::A);
-    Some(Place::Link { network: line.network, a, b: None, direction })
+    Some(Place::Link { network: model.network, a, b: None, direction })
 }
 
 /// One link, and all behind it silent.
-fn cut_off(line: &Line, branch: &Branch) -> Condition {
+fn cut_off(model: &NetworkModel, branch: &Branch) -> Condition {
     let since = branch.since;
     let first = branch.devices.first().copied().unwrap_or_default();
-    let device = Place::device(line.network, first);
+    let device = Place::device(model.network, first);
     let direction = Some(LinkDirection::Both);
-    let place = place_of(line, branch).unwrap_or(device);
+    let place = place_of(model, branch).unwrap_or(device);
     // A link that comes and goes takes the same shares from process data, again and again.
-    let outages = line.cyclic.iter().map(|cyclic| cyclic.deficits.len()).max().unwrap_or(0);
+    let outages = model.cyclic.iter().map(|cyclic| cyclic.deficits.len()).max().unwrap_or(0);
     let flaps = outages >= FLAPS;
-    let mut text = silence_text(line, branch);
+    let mut text = silence_text(model, branch);
     if let Some(ended) = branch.ended {
         text = format!("{text}; for {}, then again", ended.since(since.at));
     }
@@ -323,11 +331,11 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
         Some(before) => {
             let a = End::Controller(before, Port::B);
             let b = Some(End::Controller(first, Port::A));
-            let link = Place::Link { network: line.network, a, b, direction };
+            let link = Place::Link { network: model.network, a, b, direction };
             causes.or_at(FaultName::LinkOpen, link, 0.15)
         }
     };
-    let label = line.label(first);
+    let label = model.label(first);
     let all = branch.devices.iter().copied();
     let condition = causes
         .confirmed(since.at)
@@ -347,15 +355,15 @@ fn cut_off(line: &Line, branch: &Branch) -> Condition {
         Some(ended) => condition.ended(ended),
         None => {
             let mut condition = condition;
-            condition.evidence.extend(way::evidence(line, since.at));
+            condition.evidence.extend(cut_distance::evidence(model, since.at));
             condition
         }
     }
 }
 
 /// Who does not answer, in words.
-fn silence_text(line: &Line, branch: &Branch) -> String {
-    let label = |id: Option<&DeviceId>| line.label(id.copied().unwrap_or_default());
+fn silence_text(model: &NetworkModel, branch: &Branch) -> String {
+    let label = |id: Option<&DeviceId>| model.label(id.copied().unwrap_or_default());
     let first = label(branch.devices.first());
     match (branch.devices.len(), branch.link) {
         (1, Some(_)) => format!("{first} does not answer, and whoever is before it does"),
@@ -375,12 +383,12 @@ fn silence_text(line: &Line, branch: &Branch) -> String {
 }
 
 /// What follows behind a silent SubDevice.
-fn behind(line: &Line, id: DeviceId) -> impl Iterator<Item = Symptom> {
+fn behind(model: &NetworkModel, id: DeviceId) -> impl Iterator<Item = Symptom> {
     let tree =
-        line.tree.as_ref().filter(|tree| tree.closes_at().is_none() && id.index() < tree.len());
+        model.tree.as_ref().filter(|tree| tree.closes_at().is_none() && id.index() < tree.len());
     let above = tree.and_then(|tree| tree.upstream(id.index())?.node());
     let is_head =
-        above.and_then(|node| line.devices.get(node)).is_some_and(|one| one.silent.is_none());
+        above.and_then(|node| model.devices.get(node)).is_some_and(|one| one.silent.is_none());
     let nodes = tree.filter(|_| is_head).map(|tree| tree.subtree(id.index())).unwrap_or_default();
     let others = nodes.iter().map(|node| DeviceId(*node as u32)).filter(move |other| *other != id);
     others.flat_map(|id| [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)])

@@ -32,7 +32,7 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const ENOUGH: u64 = 8;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let traffic = &view.line.traffic;
+    let traffic = &view.model.traffic;
     if !traffic.is_one_sided() || traffic.sent + traffic.returned < ENOUGH {
         return;
     }

@@ -33,7 +33,7 @@ use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{AlError, Beat, Device, HoleSearch, Line, Pause};
+use crate::model::{AlError, CycleTiming, Device, HoleSearch, NetworkModel, Pause};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -57,7 +57,7 @@ const NOTABLE: Span = Span::ms(100);
 const READ_WITHIN: Span = Span::ms(1500);
 
 /// A pause and whom it hit.
-struct Found<'a> {
+struct PauseFound<'a> {
     pause: Pause,
     /// Whether frames were made and the card did not take them.
     at_card: Option<Path>,
@@ -65,37 +65,41 @@ struct Found<'a> {
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let mut all: Vec<Found<'_>> = Vec::new();
-    for device in &line.devices {
+    let model = view.model;
+    let mut all: Vec<PauseFound<'_>> = Vec::new();
+    for device in &model.devices {
         let mut errors = device.al.errors.iter();
         let Some(error) = errors.rfind(|error| error.may_be_watchdog()) else { continue };
-        let Some((pause, at_card)) = pause_before(line, device, error) else { continue };
+        let Some((pause, at_card)) = pause_before(model, device, error) else { continue };
         match all.iter_mut().find(|found| found.pause.to == pause.to) {
             Some(found) => found.devices.push(device),
-            None => all.push(Found { pause, at_card, devices: vec![device] }),
+            None => all.push(PauseFound { pause, at_card, devices: vec![device] }),
         }
     }
     // One finding, however often it came: the latest pause is shown.
     let Some(latest) = all.iter().max_by_key(|found| found.pause.to) else {
-        conditions.extend(stalled(line).or_else(|| stood_still(line)));
+        conditions.extend(stalled(model).or_else(|| stood_still(model)));
         return;
     };
     let devices: Vec<DeviceId> =
         all.iter().flat_map(|found| found.devices.iter().map(|device| device.id)).collect();
-    conditions.push(condition(line, latest, &devices));
+    conditions.push(condition(model, latest, &devices));
 }
 
 /// The pause that let a watchdog expire.
-fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause, Option<Path>)> {
+fn pause_before(
+    model: &NetworkModel,
+    device: &Device,
+    error: &AlError,
+) -> Option<(Pause, Option<Path>)> {
     let watchdog = device.watchdog.span()?;
     // Where nobody saw whose process data they are, they may be its own.
-    let mine = line.cyclic.iter().filter(|cyclic| {
-        let mut owners = line.owners(cyclic).peekable();
+    let mine = model.cyclic.iter().filter(|cyclic| {
+        let mut owners = model.owners(cyclic).peekable();
         owners.peek().is_none() || owners.any(|owner| owner.device == device.id && owner.writes)
     });
     for cyclic in mine {
-        let of = |beat: &Beat| {
+        let of = |beat: &CycleTiming| {
             // Who had starved before anybody listened is starved by pauses that go on.
             let fits = |pause: &&Pause| {
                 let is_before = pause.from < error.status.at
@@ -106,7 +110,7 @@ fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause,
         };
         // Made, and not taken by the card: then nothing came back either.
         let refused = Path::ALL.into_iter().find(|path| {
-            let failures = &line.host.card(*path).send_failures;
+            let failures = &model.host.card(*path).send_failures;
             let since = error.status.at.before(watchdog + READ_WITHIN);
             failures.last.is_some_and(|last| last >= since)
                 && failures.first.is_some_and(|first| first <= error.status.at + READ_WITHIN)
@@ -114,19 +118,19 @@ fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause,
         if let Some(pause) = of(&cyclic.sent) {
             // With nobody there to answer, nothing is sent for them either: the line paused first.
             let is_ours = match refused {
-                Some(card) => !lost_its_link(line, card, pause),
-                None => !was_silent(line, pause),
-            } && kept_links(line, pause);
+                Some(card) => !lost_its_link(model, card, pause),
+                None => !was_silent(model, pause),
+            } && kept_links(model, pause);
             return is_ours.then_some((pause, None));
         }
-        if let (Some(card), Some(last)) = (refused, line.traffic.latest_returned) {
-            let silences = line.traffic.silences.iter().rev();
+        if let (Some(card), Some(last)) = (refused, model.traffic.latest_returned) {
+            let silences = model.traffic.silences.iter().rev();
             let mut silences = silences.filter(|silence| silence.since.at < error.status.at);
             let silence = silences.next()?;
             let to = silence.ended.unwrap_or(last.at.max(silence.last.at));
             let pause = Pause { from: silence.since.at, to };
             // A card without a link takes no frames, and is not to blame.
-            if lost_its_link(line, card, pause) {
+            if lost_its_link(model, card, pause) {
                 return None;
             }
             return (pause.span() + cyclic.sent.cycle().unwrap_or(Span::ZERO) >= watchdog)
@@ -137,22 +141,22 @@ fn pause_before(line: &Line, device: &Device, error: &AlError) -> Option<(Pause,
 }
 
 /// Whether the line had stopped to answer when a pause began, or while it lasted.
-fn was_silent(line: &Line, pause: Pause) -> bool {
-    line.traffic.silences.iter().any(|silence| {
+fn was_silent(model: &NetworkModel, pause: Pause) -> bool {
+    model.traffic.silences.iter().any(|silence| {
         let ended = silence.ended.unwrap_or(Instant::MAX);
         silence.since.at <= pause.to && ended >= pause.from
     })
 }
 
 /// Whether a card had no link for some of a pause.
-fn lost_its_link(line: &Line, card: Path, pause: Pause) -> bool {
-    let card = line.host.card(card);
+fn lost_its_link(model: &NetworkModel, card: Path, pause: Pause) -> bool {
+    let card = model.host.card(card);
     card.carrier.is_some_and(|carrier| {
         !carrier.value || card.carrier_changes > 0 && carrier.at >= pause.from
     })
 }
 
-fn condition(line: &Line, found: &Found<'_>, all: &[DeviceId]) -> Condition {
+fn condition(model: &NetworkModel, found: &PauseFound<'_>, all: &[DeviceId]) -> Condition {
     let ms = |span: Span| span.as_nanos() as f64 / 1e6;
     let Pause { from, to } = found.pause;
     let shortest = found.devices.iter().filter_map(|device| device.watchdog.span()).min();
@@ -163,7 +167,7 @@ fn condition(line: &Line, found: &Found<'_>, all: &[DeviceId]) -> Condition {
     let text = format!(
         "{what} for {:.1} ms; the watchdog of {} holds for {:.1} ms",
         ms(found.pause.span()),
-        found.devices.first().map(|device| line.label(device.id)).unwrap_or_default(),
+        found.devices.first().map(|device| model.label(device.id)).unwrap_or_default(),
         ms(shortest.unwrap_or(Span::ZERO))
     );
     let symptoms =
@@ -183,8 +187,8 @@ fn condition(line: &Line, found: &Found<'_>, all: &[DeviceId]) -> Condition {
 
 /// Everything stopped and went on, and no link was lost, nothing restarted, nothing was counted anywhere:
 /// the frames did not leave this computer, or did not come into it.
-fn stalled(line: &Line) -> Option<Condition> {
-    let over = line.traffic.silences.iter().rev().filter_map(|one| Some((one, one.ended?)));
+fn stalled(model: &NetworkModel) -> Option<Condition> {
+    let over = model.traffic.silences.iter().rev().filter_map(|one| Some((one, one.ended?)));
     let (silence, ended) = over
         .into_iter()
         .find(|(one, ended)| one.frames >= SEVERAL && ended.since(one.since.at) >= STALLED)?;
@@ -195,18 +199,18 @@ fn stalled(line: &Line) -> Option<Condition> {
         let is_hole = hole.has_helped || hole.found.is_some();
         is_hole && hole.since.at <= pause.to && pause.from <= until
     };
-    if line.hole.is_some_and(vanished) {
+    if model.hole.is_some_and(vanished) {
         return None;
     }
     // Only counters that were read since then can say that nothing was counted.
-    let were_read = line.devices.iter().any(|device| {
+    let were_read = model.devices.iter().any(|device| {
         let mut tracks = device.counters.tracks();
         tracks.any(|(counter, track)| {
             matches!(counter, ErrorCounter::LostLink(_)) && track.last.at > ended
         })
     });
-    let kept_carrier = Path::ALL.into_iter().all(|card| !lost_its_link(line, card, pause));
-    if !(were_read && kept_carrier && kept_links(line, pause)) {
+    let kept_carrier = Path::ALL.into_iter().all(|card| !lost_its_link(model, card, pause));
+    if !(were_read && kept_carrier && kept_links(model, pause)) {
         return None;
     }
     let ms = pause.span().as_secs_f64() * 1e3;
@@ -216,7 +220,7 @@ fn stalled(line: &Line) -> Option<Condition> {
         silence.frames
     );
     let refused = Path::ALL.into_iter().find(|card| {
-        let last = line.host.card(*card).send_failures.last;
+        let last = model.host.card(*card).send_failures.last;
         last.is_some_and(|last| last >= pause.from && last <= pause.to + READ_WITHIN)
     });
     // A frame that was seen and that no card refused has left, and vanished on the line.
@@ -232,7 +236,7 @@ fn stalled(line: &Line) -> Option<Condition> {
     condition.severity = Severity::Warning;
     let text = format!("card {card} had a link and took no frames meanwhile");
     condition = condition.shown_by(Evidence::host(Some(pause.from), text));
-    let follows = line.devices.iter().flat_map(|device| {
+    let follows = model.devices.iter().flat_map(|device| {
         let id = device.id;
         [
             Symptom::Silent(id),
@@ -252,23 +256,23 @@ fn stalled(line: &Line) -> Option<Condition> {
 
 /// Somebody else drives the line, and nothing was sent for a while, to anybody; then all went on as before. No watchdog
 /// expired: nobody was hurt. Frames that were not sent are not lost, and no link is open for that.
-fn stood_still(line: &Line) -> Option<Condition> {
+fn stood_still(model: &NetworkModel) -> Option<Condition> {
     let is_hurt = |device: &Device| device.al.errors.iter().any(AlError::may_be_watchdog);
-    if line.sees_all_orders || line.devices.iter().any(is_hurt) {
+    if model.sees_all_orders || model.devices.iter().any(is_hurt) {
         return None;
     }
     let went_on = |pause: &Pause| {
-        line.cyclic.iter().any(|cyclic| {
+        model.cyclic.iter().any(|cyclic| {
             let has_begun = cyclic.first.at <= pause.from;
             has_begun && cyclic.sent.last().is_some_and(|last| last > pause.to)
         })
     };
-    let pause = line.quiet().find(|pause| went_on(pause) && !was_silent(line, *pause))?;
-    let kept_carrier = Path::ALL.into_iter().all(|card| !lost_its_link(line, card, pause));
-    if !(kept_carrier && kept_links(line, pause)) {
+    let pause = model.quiet().find(|pause| went_on(pause) && !was_silent(model, *pause))?;
+    let kept_carrier = Path::ALL.into_iter().all(|card| !lost_its_link(model, card, pause));
+    if !(kept_carrier && kept_links(model, pause)) {
         return None;
     }
-    let were_read = line.devices.iter().any(|device| {
+    let were_read = model.devices.iter().any(|device| {
         let mut tracks = device.counters.tracks();
         tracks.any(|(counter, track)| {
             matches!(counter, ErrorCounter::LostLink(_)) && track.last.at > pause.to
@@ -286,7 +290,7 @@ fn stood_still(line: &Line) -> Option<Condition> {
         pause.span().as_secs_f64() * 1e3
     );
     let first_link = Place::Link {
-        network: line.network,
+        network: model.network,
         a: End::MainDevice(Path::A),
         b: None,
         direction: None,
@@ -301,7 +305,7 @@ fn stood_still(line: &Line) -> Option<Condition> {
             "Ask whether the program that sends was to pause: a change of its state, a debugger.",
         )
         .advise("Run `linesman host`: it tells what lets this computer stop a program.");
-    if !were_read && line.host.card(Path::A).carrier.is_none() {
+    if !were_read && model.host.card(Path::A).carrier.is_none() {
         // A card without a link takes no frames either.
         condition = condition.or_at(FaultName::LinkFlapping, first_link, 0.1);
     }
@@ -310,8 +314,8 @@ fn stood_still(line: &Line) -> Option<Condition> {
 }
 
 /// Whether no controller lost a link, found damage or started anew about a pause.
-fn kept_links(line: &Line, pause: Pause) -> bool {
-    line.devices.iter().all(|device| {
+fn kept_links(model: &NetworkModel, pause: Pause) -> bool {
+    model.devices.iter().all(|device| {
         let tracks = device.counters.tracks();
         let mut rises = tracks.flat_map(|(_, track)| &track.rises);
         let mut changes = device.dl.changes.iter().map(|change| change.at);
@@ -326,7 +330,7 @@ fn kept_links(line: &Line, pause: Pause) -> bool {
 }
 
 /// When the first of the watchdogs had expired.
-fn watchdog_expired(found: &Found<'_>, to: Instant) -> Instant {
+fn watchdog_expired(found: &PauseFound<'_>, to: Instant) -> Instant {
     let first = found.devices.iter().filter_map(|device| device.watchdog.span()).min();
     first.map_or(to, |span| (found.pause.from + span).min(to))
 }

@@ -21,7 +21,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, DlChange, Line, Seen};
+use crate::model::{Device, DlChange, NetworkModel, Seen};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -36,12 +36,12 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    for device in &view.line.devices {
+    for device in &view.model.devices {
         let changes = &device.dl.changes;
         let stopped = changes.iter().rposition(|change| has_stopped(device, change));
         if let Some((at, change)) = stopped.and_then(|at| Some((at, changes.get(at)?))) {
             let back = changes.iter().skip(at + 1).find(|later| later.to.pdi_watchdog_ok());
-            conditions.push(condition(view.line, device, change, back.map(|back| back.at)));
+            conditions.push(condition(view.model, device, change, back.map(|back| back.at)));
         }
     }
 }
@@ -69,36 +69,41 @@ fn has_stopped(device: &Device, change: &DlChange) -> bool {
 /// After an absence the first reading of DL status comes within this time.
 const NEAR: Span = Span::ms(500);
 
-fn condition(line: &Line, device: &Device, change: &DlChange, back: Option<Instant>) -> Condition {
+fn condition(
+    model: &NetworkModel,
+    device: &Device,
+    change: &DlChange,
+    back: Option<Instant>,
+) -> Condition {
     let id = device.id;
-    let label = line.label(id);
+    let label = model.label(id);
     let seen = Seen::new((), change.at, change.frame);
     let text = format!(
         "DL status of {label}: its processor does not serve the process data interface any more"
     );
-    let condition =
-        Condition::new(&PAGE, Place::device(line.network, id), FaultName::FirmwareFault, change.at)
-            .confidence(0.85)
-            .or(FaultName::BrownOut, 0.05)
-            .confirmed(change.at)
-            .shown_by(
-                Evidence::register(id, table::DL_STATUS.address, &seen, text).values(
-                    Some(u64::from(change.from.value())),
-                    Some(u64::from(change.to.value())),
-                ),
-            )
-            .explaining([
-                Symptom::Silent(id),
-                Symptom::StateLost(id),
-                Symptom::WorkingCounter(id),
-                Symptom::Emergency(id),
-                Symptom::InputsStill(id),
-            ])
-            .advise(format!("Take no input of {label} for fresh."))
-            .advise(
-                "Power it off and on; note its firmware version and ask its maker, with a capture.",
-            )
-            .advise("Read its diagnosis history (object 0x10F3) when it answers again.");
+    let condition = Condition::new(
+        &PAGE,
+        Place::device(model.network, id),
+        FaultName::FirmwareFault,
+        change.at,
+    )
+    .confidence(0.85)
+    .or(FaultName::BrownOut, 0.05)
+    .confirmed(change.at)
+    .shown_by(
+        Evidence::register(id, table::DL_STATUS.address, &seen, text)
+            .values(Some(u64::from(change.from.value())), Some(u64::from(change.to.value()))),
+    )
+    .explaining([
+        Symptom::Silent(id),
+        Symptom::StateLost(id),
+        Symptom::WorkingCounter(id),
+        Symptom::Emergency(id),
+        Symptom::InputsStill(id),
+    ])
+    .advise(format!("Take no input of {label} for fresh."))
+    .advise("Power it off and on; note its firmware version and ask its maker, with a capture.")
+    .advise("Read its diagnosis history (object 0x10F3) when it answers again.");
     match back {
         Some(at) => condition.ended(at),
         None => condition,

@@ -21,7 +21,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Line, Reference, Seen};
+use crate::model::{NetworkModel, Reference, Seen};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -40,21 +40,22 @@ const SYSTEM_TIME: RegisterAddress = RegisterAddress(0x0910);
 const AROUND: Span = Span::s(3);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    if view.line.traffic.datagrams_cut > 0 {
+    if view.model.traffic.datagrams_cut > 0 {
         // The time that a frame brings back may be among what was cut off.
         return;
     }
-    let lost = view.line.references.iter().filter_map(|reference| condition(view.line, reference));
+    let lost =
+        view.model.references.iter().filter_map(|reference| condition(view.model, reference));
     conditions.extend(lost);
 }
 
 /// Whether a reference clock of the line stands, or went backwards: then no other one can be judged by it.
 #[must_use]
-pub fn is_lost(line: &Line) -> bool {
-    line.references.iter().any(|one| one.stood.is_some() || one.went_back.is_some())
+pub fn is_lost(model: &NetworkModel) -> bool {
+    model.references.iter().any(|one| one.stood.is_some() || one.went_back.is_some())
 }
 
-fn condition(line: &Line, reference: &Reference) -> Option<Condition> {
+fn condition(model: &NetworkModel, reference: &Reference) -> Option<Condition> {
     let stood = reference.stood.map(|stood| stood.since.at);
     let back = reference.went_back.map(|back| back.at);
     let since = match (stood, back) {
@@ -62,12 +63,12 @@ fn condition(line: &Line, reference: &Reference) -> Option<Condition> {
         (stood, back) => stood.or(back)?,
     };
     let id = reference.device;
-    if has_restarted(line, reference, since) {
+    if has_restarted(model, reference, since) {
         return None;
     }
     let mut condition = Condition::new(
         &PAGE,
-        Place::device(line.network, id),
+        Place::device(model.network, id),
         FaultName::ReferenceClockLost,
         since,
     )
@@ -78,7 +79,7 @@ fn condition(line: &Line, reference: &Reference) -> Option<Condition> {
         let goes = if stood.is_over { "; it goes on since" } else { "" };
         let text = format!(
             "the time of reference clock {} was the same, {} ns, in all frames for {ms:.1} ms{goes}",
-            line.label(id),
+            model.label(id),
             stood.since.value
         );
         condition = condition.shown_by(Evidence::register(id, SYSTEM_TIME, &stood.since, text));
@@ -86,7 +87,7 @@ fn condition(line: &Line, reference: &Reference) -> Option<Condition> {
     if let Some(back) = reference.went_back {
         let text = format!(
             "the time of reference clock {} went back by {:.3} ms, and nobody had set it",
-            line.label(id),
+            model.label(id),
             back.value.unsigned_abs() as f64 / 1e6
         );
         let seen = Seen::new((), back.at, back.frame);
@@ -96,7 +97,7 @@ fn condition(line: &Line, reference: &Reference) -> Option<Condition> {
     if let Some(mended) = reference.mended {
         condition = condition.ended(mended);
     }
-    let follows = line.devices.iter().flat_map(|device| {
+    let follows = model.devices.iter().flat_map(|device| {
         let id = device.id;
         [Symptom::StateLost(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)]
     });
@@ -110,8 +111,8 @@ fn condition(line: &Line, reference: &Reference) -> Option<Condition> {
     )
 }
 
-fn has_restarted(line: &Line, reference: &Reference, since: Instant) -> bool {
-    let Some(device) = line.device(reference.device) else { return false };
+fn has_restarted(model: &NetworkModel, reference: &Reference, since: Instant) -> bool {
+    let Some(device) = model.device(reference.device) else { return false };
     let is_near = |at: Instant| at <= since + AROUND && at + AROUND >= since;
     let falls = device.al.changes.iter().filter(|change| change.is_own_fall());
     let mut to_init = falls.filter(|change| change.to.state().state() == Some(AlState::Init));

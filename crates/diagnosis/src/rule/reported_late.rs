@@ -18,7 +18,7 @@ use linesman_config::fault::{Class, FaultName};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::Tally;
+use crate::model::Tally;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -36,7 +36,7 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const FEW: u64 = 2;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let reported = &view.line.reported;
+    let reported = &view.model.reported;
     let told = [
         (reported.late, "frames came back after they were given up"),
         (reported.unmatched, "datagrams came back and nobody waited for them any more (UNMATCHED)"),
@@ -66,7 +66,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let mut condition = Condition::new(&PAGE, Place::Host, cause, first)
         .confidence(0.5)
         .or(other, 0.3)
-        .or_at(FaultName::SecondMainDevice, Place::Network { network: view.line.network }, 0.05)
+        .or_at(FaultName::SecondMainDevice, Place::Network { network: view.model.network }, 0.05)
         .confirmed(first)
         .about([symptom])
         .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
@@ -85,6 +85,6 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         condition =
             condition.advise("Lengthen the cycle, or spread the domains over several cycles.");
     }
-    let devices = view.line.devices.iter().map(|device| device.id);
+    let devices = view.model.devices.iter().map(|device| device.id);
     conditions.push(condition.explaining(devices.map(Symptom::StateLost).filter(|_| begins_late)));
 }

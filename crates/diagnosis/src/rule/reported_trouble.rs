@@ -22,7 +22,7 @@ use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Cyclic, Device, Line, ReportedTrouble, Seen};
+use crate::model::{Cyclic, Device, NetworkModel, ReportedTrouble, Seen};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -37,20 +37,24 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    for device in &line.devices {
+    let model = view.model;
+    for device in &model.devices {
         for trouble in &device.reported_trouble {
-            conditions.extend(of_device(line, device, *trouble));
+            conditions.extend(of_device(model, device, *trouble));
         }
     }
-    conditions.extend(mixed_states(line, conditions));
-    conditions.extend(ring_open(line));
-    conditions.extend(high_counters(line));
+    conditions.extend(mixed_states(model, conditions));
+    conditions.extend(ring_open(model));
+    conditions.extend(high_counters(model));
 }
 
-fn of_device(line: &Line, device: &Device, trouble: Seen<ReportedTrouble>) -> Option<Condition> {
-    let label = line.label(device.id);
-    let place = Place::device(line.network, device.id);
+fn of_device(
+    model: &NetworkModel,
+    device: &Device,
+    trouble: Seen<ReportedTrouble>,
+) -> Option<Condition> {
+    let label = model.label(device.id);
+    let place = Place::device(model.network, device.id);
     let new = |cause, confidence| {
         Condition::new(&PAGE, place, cause, trouble.at).confidence(confidence).confirmed(trouble.at)
     };
@@ -104,7 +108,7 @@ fn of_device(line: &Line, device: &Device, trouble: Seen<ReportedTrouble>) -> Op
         ReportedTrouble::MissingLink(port) => {
             let text = format!("port {port} of {label} has no link, and one is planned there");
             let end = End::Controller(device.id, port);
-            let place = Place::Link { network: line.network, a: end, b: None, direction: None };
+            let place = Place::Link { network: model.network, a: end, b: None, direction: None };
             let mut condition = new(FaultName::LinkOpen, 0.5)
                 .or(FaultName::DeviceOff, 0.3)
                 .or(FaultName::PortsSwapped, 0.1)
@@ -117,9 +121,9 @@ fn of_device(line: &Line, device: &Device, trouble: Seen<ReportedTrouble>) -> Op
         }
         ReportedTrouble::LinkError(port) => {
             let text = format!("port {port} of {label} has a link and no communication");
-            let behind = line.opposite(device.id, port).and_then(|end| end.node());
+            let behind = model.opposite(device.id, port).and_then(|end| end.node());
             let mut follows = vec![Symptom::LinkDown(device.id, port)];
-            follows.extend(behind.into_iter().flat_map(|id| subtree(line, id)).map(Symptom::Silent));
+            follows.extend(behind.into_iter().flat_map(|id| subtree(model, id)).map(Symptom::Silent));
             new(FaultName::FalseLink, 0.4)
                 .or(FaultName::DeviceOff, 0.2)
                 .or(FaultName::CableDegraded, 0.2)
@@ -134,16 +138,16 @@ fn of_device(line: &Line, device: &Device, trouble: Seen<ReportedTrouble>) -> Op
     Some(condition)
 }
 
-fn subtree(line: &Line, id: DeviceId) -> Vec<DeviceId> {
-    let tree = line.tree.as_ref().filter(|tree| id.index() < tree.len());
+fn subtree(model: &NetworkModel, id: DeviceId) -> Vec<DeviceId> {
+    let tree = model.tree.as_ref().filter(|tree| id.index() < tree.len());
     let nodes = tree.map(|tree| tree.subtree(id.index())).unwrap_or_default();
     nodes.iter().map(|node| DeviceId(*node as u32)).collect()
 }
 
 /// A ring that its MainDevice needs from both ends.
-fn ring_open(line: &Line) -> Option<Condition> {
-    let open = line.reported.ring_open.filter(|open| open.value)?;
-    let place = Place::Network { network: line.network };
+fn ring_open(model: &NetworkModel) -> Option<Condition> {
+    let open = model.reported.ring_open.filter(|open| open.value)?;
+    let place = Place::Network { network: model.network };
     let condition = Condition::new(&PAGE, place, FaultName::RingOpen, open.at)
         .confidence(0.7)
         .or(FaultName::LinkFlapping, 0.1)
@@ -159,19 +163,19 @@ fn ring_open(line: &Line) -> Option<Condition> {
 }
 
 /// Working counters that are higher than expected.
-fn high_counters(line: &Line) -> Option<Condition> {
+fn high_counters(model: &NetworkModel) -> Option<Condition> {
     let is_high = |cyclic: &&Cyclic| {
-        let told = line.reported.expected.get(&cyclic.label());
+        let told = model.reported.expected.get(&cyclic.label());
         told.is_some_and(|expected| cyclic.highest.value > *expected)
     };
-    let cyclic = line.cyclic.iter().find(is_high)?;
-    let expected = line.reported.expected.get(&cyclic.label())?;
+    let cyclic = model.cyclic.iter().find(is_high)?;
+    let expected = model.reported.expected.get(&cyclic.label())?;
     let text = format!(
         "{}: working counter {}, and {expected} is expected",
         cyclic.label(),
         cyclic.highest.value
     );
-    let place = Place::Network { network: line.network };
+    let place = Place::Network { network: model.network };
     let at = cyclic.highest.at;
     let condition = Condition::new(&PAGE, place, FaultName::ConfigMismatch, at)
         .confidence(0.5)
@@ -184,13 +188,13 @@ fn high_counters(line: &Line) -> Option<Condition> {
 }
 
 /// Several states at once, or the error bit, of nobody knows whom.
-fn mixed_states(line: &Line, conditions: &[Condition]) -> Option<Condition> {
-    let states = line.reported.states?;
+fn mixed_states(model: &NetworkModel, conditions: &[Condition]) -> Option<Condition> {
+    let states = model.reported.states?;
     let bits = states.value.0 & 0x0F;
     let is_told = conditions
         .iter()
         .any(|one| one.symptoms.iter().any(|symptom| matches!(symptom, Symptom::StateLost(_))));
-    let is_mixed = bits.count_ones() > 1 && line.devices.len() != 1;
+    let is_mixed = bits.count_ones() > 1 && model.devices.len() != 1;
     if is_told || !(is_mixed || states.value.error()) {
         return None;
     }
@@ -202,7 +206,7 @@ fn mixed_states(line: &Line, conditions: &[Condition]) -> Option<Condition> {
         .collect();
     let error = if states.value.error() { ", with the error bit" } else { "" };
     let text = format!("the SubDevices together are in {}{error}", seen.join(" and "));
-    let place = Place::Network { network: line.network };
+    let place = Place::Network { network: model.network };
     let mut condition = Condition::new(&PAGE, place, FaultName::InitRefused, states.at)
         .confidence(0.3)
         .or(FaultName::FirmwareFault, 0.2)

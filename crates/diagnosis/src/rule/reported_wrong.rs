@@ -23,8 +23,8 @@ use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Device, Line};
-use crate::locate::Drops;
+use crate::locate::LinkLosses;
+use crate::model::{Device, NetworkModel};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -39,9 +39,9 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let Some(tree) = line.tree.as_ref() else { return };
-    let device = |node: &usize| line.device(DeviceId(*node as u32));
+    let model = view.model;
+    let Some(tree) = model.tree.as_ref() else { return };
+    let device = |node: &usize| model.device(DeviceId(*node as u32));
     let is_wrong = |device: &&Device| device.reported_wrong.is_some();
     let wrong: Vec<&Device> = tree.order().iter().filter_map(device).filter(is_wrong).collect();
     let Some((first, seen)) = wrong.first().and_then(|one| Some((*one, one.reported_wrong?)))
@@ -49,7 +49,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         return;
     };
     let node = first.id.index();
-    let empty: Vec<(DeviceId, Port)> = Drops::all(line)
+    let empty: Vec<(DeviceId, Port)> = LinkLosses::all(model)
         .iter()
         .filter(|drops| drops.is_down)
         .filter_map(|drops| match tree.links().get(drops.link)?.upstream {
@@ -58,13 +58,13 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         })
         .collect();
     let silent: Vec<DeviceId> =
-        line.devices.iter().filter(|one| one.silent.is_some()).map(|one| one.id).collect();
+        model.devices.iter().filter(|one| one.silent.is_some()).map(|one| one.id).collect();
     let place = match tree.link_above(node).and_then(|link| tree.links().get(link)) {
         Some(link) => {
             let named = link.map(|node| DeviceId(node as u32));
-            Place::link(line.network, named, Some(LinkDirection::Both))
+            Place::link(model.network, named, Some(LinkDirection::Both))
         }
-        None => Place::device(line.network, first.id),
+        None => Place::device(model.network, first.id),
     };
     let mut condition = Condition::new(&PAGE, place, cause(&empty, &silent, &wrong), seen.at)
         .confidence(0.5)
@@ -77,12 +77,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             &seen,
             format!(
                 "{} is not the planned one, nor are {} others behind it",
-                line.label(first.id),
+                model.label(first.id),
                 wrong.len() - 1
             ),
         ));
     for (id, port) in &empty {
-        let label = line.label(*id);
+        let label = model.label(*id);
         let text = format!("port {port} of {label} has no link, and one belongs there");
         condition = condition
             .shown_by(Evidence::register(*id, table::DL_STATUS.address, &seen, text).port(*port))
@@ -91,11 +91,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             ));
     }
     condition = condition
-        .advise(format!("Look whether {} is the device at {place}.", line.label(first.id)))
+        .advise(format!("Look whether {} is the device at {place}.", model.label(first.id)))
         .advise(
             "Run `linesman scan WHERE --against PROJECT.toml`: it says which cable or device it is.",
         );
-    conditions.push(condition.explaining(explained(line, &wrong, &silent, &empty)));
+    conditions.push(condition.explaining(explained(model, &wrong, &silent, &empty)));
 }
 
 /// One wrong device is a wrong device; more are moved by one that is missing, or by a cable.
@@ -108,7 +108,7 @@ fn cause(empty: &[(DeviceId, Port)], silent: &[DeviceId], wrong: &[&Device]) -> 
 }
 
 fn explained(
-    line: &Line,
+    model: &NetworkModel,
     wrong: &[&Device],
     silent: &[DeviceId],
     empty: &[(DeviceId, Port)],
@@ -116,7 +116,7 @@ fn explained(
     let mut list: Vec<Symptom> = Vec::new();
     for (id, port) in empty {
         list.push(Symptom::LinkDown(*id, *port));
-        if let Some(End::Controller(far, entry)) = line.opposite(*id, *port) {
+        if let Some(End::Controller(far, entry)) = model.opposite(*id, *port) {
             list.push(Symptom::LinkDown(far, entry));
         }
     }

@@ -29,8 +29,8 @@ use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{AlChange, AlError, Device, Line, Seen};
-use crate::locate::Drops;
+use crate::locate::LinkLosses;
+use crate::model::{AlChange, AlError, Device, NetworkModel, Seen};
 
 /// Back in INIT.
 pub const RESTARTED: RulePage = RulePage {
@@ -91,15 +91,15 @@ impl Fall<'_> {
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
+    let model = view.model;
     let mut falls: Vec<Fall<'_>> = Vec::new();
-    for device in &line.devices {
+    for device in &model.devices {
         let mut own = device.al.changes.iter().filter(|change| change.is_own_fall());
         if let Some(change) = own.next_back() {
             // Who was gone and is seen on its way up again was in INIT in between, read or not.
-            let gone = outage(line, device, change);
-            let is_cut = line.traffic.datagrams_cut > 0;
-            if (is_cut || gone.is_none()) && line.traffic.may_lack(change.after, change.at) {
+            let gone = outage(model, device, change);
+            let is_cut = model.traffic.datagrams_cut > 0;
+            if (is_cut || gone.is_none()) && model.traffic.may_lack(change.after, change.at) {
                 // The order may have been given in a frame that is not in the recording.
                 continue;
             }
@@ -107,7 +107,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             falls.push(Fall { device, change, is_restart, gone });
         }
     }
-    conditions.extend(unseen::restarted(line));
+    conditions.extend(unseen::restarted(model));
     for fall in &falls {
         let together: Vec<_> = falls
             .iter()
@@ -115,9 +115,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             .copied()
             .collect();
         conditions.push(if fall.is_restart {
-            restarted(line, fall, &together)
+            restarted(model, fall, &together)
         } else {
-            fell(line, fall)
+            fell(model, fall)
         });
     }
 }
@@ -136,19 +136,19 @@ fn follows_from_restart(id: DeviceId) -> [Symptom; 5] {
 /// When the device was gone before it came back in INIT: as long as a neighbour had no link to it, the
 /// one before it first of all, or, where that is not known, as long as it did not answer. Neighbours
 /// behind it tell in a ring alone: elsewhere they are gone with it.
-fn outage(line: &Line, device: &Device, change: &AlChange) -> Option<(Instant, Instant)> {
+fn outage(model: &NetworkModel, device: &Device, change: &AlChange) -> Option<(Instant, Instant)> {
     let is_recent =
         |since: Instant, until: Instant| since <= change.at && until + BEFORE >= change.at;
-    let tree = line.tree.as_ref().filter(|tree| device.id.index() < tree.len());
+    let tree = model.tree.as_ref().filter(|tree| device.id.index() < tree.len());
     let neighbours = tree.into_iter().flat_map(|tree| {
         let node = device.id.index();
         let children = tree.children(node).map(|(port, _)| port);
         let ports: Vec<Port> = std::iter::once(tree.entry(node)).chain(children).collect();
-        ports.into_iter().filter_map(|port| line.opposite(device.id, port))
+        ports.into_iter().filter_map(|port| model.opposite(device.id, port))
     });
     for end in neighbours {
         let End::Controller(neighbour, port) = end else { continue };
-        let Some(neighbour) = line.device(neighbour) else { continue };
+        let Some(neighbour) = model.device(neighbour) else { continue };
         let mut down = None;
         let mut latest = None;
         for seen in &neighbour.dl.changes {
@@ -169,18 +169,18 @@ fn outage(line: &Line, device: &Device, change: &AlChange) -> Option<(Instant, I
     }
     // The first SubDevice has no neighbour before it: without it nothing at all comes back. It misses no
     // request of its own then, but those that it has no address for after its start.
-    let silences = line.traffic.silences.iter().rev();
+    let silences = model.traffic.silences.iter().rev();
     let silences = silences.map(|one| (one.since.at, one.ended.unwrap_or(change.at)));
     let absences = device.joined_absences().into_iter().rev();
     let absences = absences.map(|absence| (absence.since.at, absence.ended.unwrap_or(change.at)));
     // A recording has nothing of the time in which the card had no link.
-    let quiet = line.quiet().map(|pause| (pause.from, pause.to));
+    let quiet = model.quiet().map(|pause| (pause.from, pause.to));
     let latest = |(since, until): &(Instant, Instant)| is_recent(*since, *until);
     let mut all = quiet.chain(silences).chain(absences);
     all.find(latest)
 }
 
-fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
+fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
     let device = fall.device;
     let is_several = together.len() > 1;
     let is_first = together.iter().all(|other| device.id <= other.device.id);
@@ -196,7 +196,7 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
             (FaultName::BrownOut, [(FaultName::DeviceOff, 0.15), (FaultName::FirmwareFault, 0.1)])
         }
     };
-    let place = Place::device(line.network, device.id);
+    let place = Place::device(model.network, device.id);
     let mut condition = Condition::new(&RESTARTED, place, cause, fall.began())
         .confidence(0.7)
         .confirmed(fall.change.at)
@@ -204,14 +204,14 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
     for (cause, confidence) in others {
         condition = condition.or(cause, confidence);
     }
-    if link_lost::is_on_terminal_bus(line, device.id.index()) {
+    if link_lost::is_on_terminal_bus(model, device.id.index()) {
         // Terminals that lose the voltage of the E-bus start anew, whatever took it.
         condition = condition.or(FaultName::EbusOverload, 0.05);
     }
     if let Some((since, until)) = fall.gone {
         let text = format!(
             "{} was gone for {:.0} ms before that",
-            line.label(device.id),
+            model.label(device.id),
             until.since(since).as_secs_f64() * 1000.0
         );
         let seen = Seen::new((), since, None);
@@ -220,7 +220,7 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
     if is_first {
         let mut follows = BTreeSet::new();
         for other in together {
-            follows.extend(consequences(line, other));
+            follows.extend(consequences(model, other));
             if other.device.id != device.id {
                 follows.insert(Symptom::StateLost(other.device.id));
             }
@@ -228,7 +228,7 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
         condition = condition.explaining(follows);
     } else {
         condition =
-            condition.about([Symptom::StateLost(device.id)]).explaining(consequences(line, fall));
+            condition.about([Symptom::StateLost(device.id)]).explaining(consequences(model, fall));
     }
     if is_back(fall)
         && let Some(status) = device.al.status
@@ -247,13 +247,13 @@ fn restarted(line: &Line, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
 }
 
 /// All that a device without power brings about.
-fn consequences(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
+fn consequences(model: &NetworkModel, fall: &Fall<'_>) -> Vec<Symptom> {
     let id = fall.device.id;
-    let mut follows = links_lost_with(line, fall);
+    let mut follows = links_lost_with(model, fall);
     let own = [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)];
     follows.extend(own);
-    follows.extend(out_of_step(line, fall.device));
-    if let Some(tree) = line.tree.as_ref().filter(|tree| id.index() < tree.len()) {
+    follows.extend(out_of_step(model, fall.device));
+    if let Some(tree) = model.tree.as_ref().filter(|tree| id.index() < tree.len()) {
         for behind in tree.subtree(id.index()).iter().map(|node| DeviceId(*node as u32)) {
             if behind != id {
                 follows.extend([
@@ -277,8 +277,8 @@ fn consequences(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
 }
 
 /// Who lost step because the reference clock started anew: its time does, too.
-fn out_of_step(line: &Line, device: &Device) -> Vec<Symptom> {
-    if !line.references.iter().any(|reference| reference.device == device.id) {
+fn out_of_step(model: &NetworkModel, device: &Device) -> Vec<Symptom> {
+    if !model.references.iter().any(|reference| reference.device == device.id) {
         return Vec::new();
     }
     let falls = || device.al.changes.iter().filter(|change| change.is_own_fall());
@@ -289,7 +289,7 @@ fn out_of_step(line: &Line, device: &Device) -> Vec<Symptom> {
     let is_timing = |error: &AlError| {
         error.code.is_some_and(|code| code.value.explain().class == CodeClass::Timing)
     };
-    let lost = line.devices.iter().filter(|other| {
+    let lost = model.devices.iter().filter(|other| {
         let errors = &other.al.errors;
         other.id != device.id
             && !errors.is_empty()
@@ -301,8 +301,8 @@ fn out_of_step(line: &Line, device: &Device) -> Vec<Symptom> {
 /// What follows from a restart at the links of the device: without supply it has no link, so its
 /// neighbours lose theirs. Not so where a link was lost more often than the device restarted, at
 /// another time, or is down though the device is back.
-fn links_lost_with(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
-    let Some(tree) = &line.tree else { return Vec::new() };
+fn links_lost_with(model: &NetworkModel, fall: &Fall<'_>) -> Vec<Symptom> {
+    let Some(tree) = &model.tree else { return Vec::new() };
     let device = fall.device;
     let falls: Vec<_> = device.al.changes.iter().filter(|change| change.is_own_fall()).collect();
     let earliest = match falls.as_slice() {
@@ -310,7 +310,7 @@ fn links_lost_with(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
         [] | [_] => fall.began(),
     };
     let mut follows = Vec::new();
-    for drops in Drops::all(line) {
+    for drops in LinkLosses::all(model) {
         let link = tree.links()[drops.link];
         let ends = [link.upstream, link.downstream];
         let is_its = ends.iter().any(|end| end.node() == Some(device.id.index()));
@@ -323,7 +323,7 @@ fn links_lost_with(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
             || was_never_up
             || was_away_at_each(device, &drops, falls.len());
         if is_its && is_then && is_as_often {
-            follows.extend(link_lost::follows(line, tree, drops.link));
+            follows.extend(link_lost::follows(model, tree, drops.link));
         }
     }
     follows
@@ -331,7 +331,7 @@ fn links_lost_with(line: &Line, fall: &Fall<'_>) -> Vec<Symptom> {
 
 /// Whether each loss lies in one of the times in which the device was away, and it fell nearly each time: one
 /// that falls again before it answers was away for both.
-fn was_away_at_each(device: &Device, drops: &Drops, falls: usize) -> bool {
+fn was_away_at_each(device: &Device, drops: &LinkLosses, falls: usize) -> bool {
     let is_in = |at: Instant| {
         device.absences.iter().any(|absence| {
             absence.since.at.before(TOGETHER) <= at
@@ -351,9 +351,9 @@ fn stays_down(device: &Device, fall: &AlChange, until: Instant) -> bool {
     later.into_iter().all(|change| change.to.state().state() < before)
 }
 
-fn fell(line: &Line, fall: &Fall<'_>) -> Condition {
+fn fell(model: &NetworkModel, fall: &Fall<'_>) -> Condition {
     let id = fall.device.id;
-    let place = Place::device(line.network, id);
+    let place = Place::device(model.network, id);
     let condition = Condition::new(&FELL, place, FaultName::FirmwareFault, fall.change.at)
         .confidence(0.7)
         .or(FaultName::BrownOut, 0.1)

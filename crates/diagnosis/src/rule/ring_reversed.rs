@@ -1,4 +1,4 @@
-//! Who is plugged in the wrong way round within a closed ring (C304).
+//! SubDevice plugged in the wrong way round within a closed ring (C304).
 //!
 //! A controller processes what comes in at its port A. In a closed ring all do so with the frames of card A,
 //! and those of card B come round untouched. One whose IN and OUT are exchanged, and what hangs on it beside
@@ -15,7 +15,7 @@ use linesman_proto::topology::Tree;
 use super::wiring::{PLUGGED, displaced};
 use super::{Rule, View};
 use crate::finding::{Condition, Evidence, Place};
-use crate::line::{Device, Line, Seen};
+use crate::model::{Device, NetworkModel, Seen};
 
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[], judge };
@@ -28,52 +28,52 @@ struct Reversed {
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let Some(tree) = ring(line) else { return };
-    if let Some(exchanged) = exchanged(line, tree) {
-        conditions.push(cards_exchanged(line, tree, exchanged));
-    } else if let Some(split) = split(line, tree)
-        && let Some(reversed) = find(line, tree, split.value)
+    let model = view.model;
+    let Some(tree) = ring(model) else { return };
+    if let Some(exchanged) = exchanged(model, tree) {
+        conditions.push(cards_exchanged(model, tree, exchanged));
+    } else if let Some(split) = split(model, tree)
+        && let Some(reversed) = find(model, tree, split.value)
     {
-        conditions.push(condition(line, tree, &reversed, split));
+        conditions.push(condition(model, tree, &reversed, split));
     }
 }
 
 /// Whether somebody is plugged in the wrong way round, so that positions mean others than planned.
-pub(super) fn judges(line: &Line) -> bool {
-    let split = ring(line).and_then(|tree| Some((tree, split(line, tree)?)));
-    split.is_some_and(|(tree, split)| find(line, tree, split.value).is_some())
+pub(super) fn judges(model: &NetworkModel) -> bool {
+    let split = ring(model).and_then(|tree| Some((tree, split(model, tree)?)));
+    split.is_some_and(|(tree, split)| find(model, tree, split.value).is_some())
 }
 
 /// The planned ring.
-fn ring(line: &Line) -> Option<&Tree> {
-    line.tree.as_ref().filter(|tree| line.tree_is_planned && tree.closes_at().is_some())
+fn ring(model: &NetworkModel) -> Option<&Tree> {
+    model.tree.as_ref().filter(|tree| model.tree_is_planned && tree.closes_at().is_some())
 }
 
 /// How many have processed either copy of a broadcast, if both were processed although the ring is closed.
-fn split(line: &Line, tree: &Tree) -> Option<Seen<(u16, u16)>> {
+fn split(model: &NetworkModel, tree: &Tree) -> Option<Seen<(u16, u16)>> {
     // Not one that fewer, or more, have answered to since.
-    let changed = line.traffic.broadcast_now.map(|now| now.at);
-    let split = line.traffic.broadcast_split.filter(|split| changed <= Some(split.at))?;
+    let changed = model.traffic.broadcast_now.map(|now| now.at);
+    let split = model.traffic.broadcast_split.filter(|split| changed <= Some(split.at))?;
     let (one, other) = split.value;
     let is_whole = usize::from(one) + usize::from(other) == tree.len();
     // Nobody is turned round while a line runs.
-    (is_whole && !line.traffic.was_processed_by_one && !is_open(line, tree)).then_some(split)
+    (is_whole && !model.traffic.was_processed_by_one && !is_open(model, tree)).then_some(split)
 }
 
 /// The broadcast of which all have processed the copy of card B, and nobody that of card A, though that one
 /// went round, too.
-fn exchanged(line: &Line, tree: &Tree) -> Option<Seen<Path>> {
-    let is_whole = usize::from(line.traffic.broadcast_answers) == tree.len();
-    line.traffic.processed_alone.filter(|seen| seen.value == Path::B && is_whole)
+fn exchanged(model: &NetworkModel, tree: &Tree) -> Option<Seen<Path>> {
+    let is_whole = usize::from(model.traffic.broadcast_answers) == tree.len();
+    model.traffic.processed_alone.filter(|seen| seen.value == Path::B && is_whole)
 }
 
 /// Whether the ring is open somewhere: both its ends have a link less than planned. Whose answers are taken
 /// for whose is not certain here, so it is counted how many there are with so many links.
-fn is_open(line: &Line, tree: &Tree) -> bool {
+fn is_open(model: &NetworkModel, tree: &Tree) -> bool {
     let mut planned: Vec<usize> =
         (0..tree.len()).map(|node| tree.open_ports(node).count()).collect();
-    let shown = line.devices.iter().filter(|device| !is_silent(device));
+    let shown = model.devices.iter().filter(|device| !is_silent(device));
     let mut shown = shown.filter_map(|device| Some(device.dl.first?.value.active_ports().count()));
     !shown.all(|count| {
         let at = planned.iter().position(|known| *known == count);
@@ -94,7 +94,7 @@ fn block(tree: &Tree, ring: &[usize], at: usize) -> Vec<usize> {
 
 /// Whose share of the line is as large as that of one copy. Of several it is the one by which identities fit:
 /// those of card B have the last addresses. Then the one of which most do not answer to their address.
-fn find(line: &Line, tree: &Tree, split: (u16, u16)) -> Option<Reversed> {
+fn find(model: &NetworkModel, tree: &Tree, split: (u16, u16)) -> Option<Reversed> {
     let ring = tree.ring_nodes();
     let is_as_large = |at: &usize| {
         let len = block(tree, &ring, *at).len();
@@ -106,11 +106,11 @@ fn find(line: &Line, tree: &Tree, split: (u16, u16)) -> Option<Reversed> {
         let (behind, before): (Vec<usize>, Vec<usize>) =
             tree.order().iter().partition(|node| block.contains(node));
         let pairs = before.iter().chain(&behind).zip(tree.order());
-        pairs.filter(|(planned, found)| is_another(line, **planned, **found)).count()
+        pairs.filter(|(planned, found)| is_another(model, **planned, **found)).count()
     };
     let unanswered = |at: &usize| {
         let block = block(tree, &ring, *at);
-        let device = |node: &usize| line.devices.get(*node);
+        let device = |node: &usize| model.devices.get(*node);
         block.iter().filter_map(device).filter(|device| is_silent(device)).count()
     };
     let rank = |at: &usize| (misfits(at), std::cmp::Reverse(unanswered(at)));
@@ -122,21 +122,26 @@ fn find(line: &Line, tree: &Tree, split: (u16, u16)) -> Option<Reversed> {
 }
 
 /// Whether who answers to the address of `found` cannot be the one planned as `planned`.
-fn is_another(line: &Line, planned: usize, found: usize) -> bool {
-    let planned = line.devices.get(planned).and_then(|device| device.planned);
-    let found = line.devices.get(found).and_then(|device| device.identity.identity());
+fn is_another(model: &NetworkModel, planned: usize, found: usize) -> bool {
+    let planned = model.devices.get(planned).and_then(|device| device.planned);
+    let found = model.devices.get(found).and_then(|device| device.identity.identity());
     let pair = planned.and_then(|planned| Some((planned.identity?, planned.rule))).zip(found);
     pair.is_some_and(|((planned, rule), found)| mismatch(&planned, &found, rule).is_some())
 }
 
-fn condition(line: &Line, tree: &Tree, reversed: &Reversed, split: Seen<(u16, u16)>) -> Condition {
+fn condition(
+    model: &NetworkModel,
+    tree: &Tree,
+    reversed: &Reversed,
+    split: Seen<(u16, u16)>,
+) -> Condition {
     let id = |node: usize| DeviceId(node as u32);
-    let place = |node| Place::device(line.network, id(node));
+    let place = |node| Place::device(model.network, id(node));
     let cause_of = |node: usize| match tree.parent(node) {
         None => FaultName::MainDeviceWrongPort,
         Some(_) => FaultName::PortsSwapped,
     };
-    let label = line.label(id(reversed.node));
+    let label = model.label(id(reversed.node));
     let (one, other) = split.value;
     let text = format!(
         "the ring is closed, and both copies of a broadcast were processed, by {one} and by {other} \
@@ -155,24 +160,24 @@ fn condition(line: &Line, tree: &Tree, reversed: &Reversed, split: Seen<(u16, u1
         condition = condition.or_at(cause_of(*other), place(*other), sure);
     }
     // Positions mean others than planned, so whatever is said of single ones follows from this.
-    let follows = displaced(line.devices.iter().map(|device| device.id));
+    let follows = displaced(model.devices.iter().map(|device| device.id));
     condition
         .explaining(follows)
         .advise(format!("Exchange the cables at the IN and OUT ports of {label}."))
         .advise("In a ring frames of card A come in at IN (port A) of each SubDevice.")
 }
 
-fn cards_exchanged(line: &Line, tree: &Tree, seen: Seen<Path>) -> Condition {
+fn cards_exchanged(model: &NetworkModel, tree: &Tree, seen: Seen<Path>) -> Condition {
     let first =
         tree.ring_nodes().first().map_or(DeviceId::default(), |node| DeviceId(*node as u32));
-    let label = line.label(first);
+    let label = model.label(first);
     let text = format!(
         "the ring is closed, and all {} SubDevices process what card B sends, none what card A sends: \
          frames of card B come in at port A of {label}",
         tree.len()
     );
     let shown = Evidence::register(first, table::AL_STATUS.address, &seen, text);
-    let place = Place::device(line.network, first);
+    let place = Place::device(model.network, first);
     Condition::new(&PLUGGED, place, FaultName::MainDeviceWrongPort, seen.at)
         .confidence(0.9)
         .or(FaultName::PortsSwapped, 0.05)

@@ -42,8 +42,8 @@ const UNASKED: u64 = 4;
 const GONE: Span = Span::s(3);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let senders = &line.traffic.senders;
+    let model = view.model;
+    let senders = &model.traffic.senders;
     let has_host = senders.iter().any(|sender| sender.is_host);
     let is_one = |sender: &&Sender| {
         sender.own >= OWN
@@ -65,7 +65,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let names: Vec<_> = apart.iter().map(|sender| sender.mac.to_string()).collect();
     let text =
         format!("requests of their own come from {} addresses: {}", apart.len(), names.join(", "));
-    let place = Place::Network { network: line.network };
+    let place = Place::Network { network: model.network };
     let mut condition = Condition::new(&PAGE, place, FaultName::SecondMainDevice, shown.first.at)
         .confidence(0.85)
         .confirmed(shown.first.at)
@@ -92,7 +92,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         condition = condition.explaining([Symptom::CountersCleared]);
     }
     if orders > 0 || is_unknown {
-        condition = condition.explaining(line.devices.iter().flat_map(|device| {
+        condition = condition.explaining(model.devices.iter().flat_map(|device| {
             let id = device.id;
             // Who is ordered into INIT closes its mailbox: what was asked is never answered, and nothing
             // is taken until it is in PREOP again.

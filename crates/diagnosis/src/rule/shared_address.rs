@@ -23,7 +23,7 @@ use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, Line, Seen, SharedAddress, SharedBy};
+use crate::model::{Device, NetworkModel, Seen, SharedAddress, SharedBy};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -43,19 +43,19 @@ const AROUND: Span = Span::ms(500);
 const QUIET: Span = Span::s(1);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    for device in &view.line.devices {
+    for device in &view.model.devices {
         let shared = device.shared_address;
-        conditions.extend(shared.map(|shared| condition(view.line, device, &shared)));
+        conditions.extend(shared.map(|shared| condition(view.model, device, &shared)));
     }
 }
 
-fn condition(line: &Line, owner: &Device, shared: &SharedAddress) -> Condition {
+fn condition(model: &NetworkModel, owner: &Device, shared: &SharedAddress) -> Condition {
     let other = match shared.first.value {
-        SharedBy::Reading(id) => line.device(id),
-        SharedBy::WorkingCounter(_) => astray(line, owner, shared),
+        SharedBy::Reading(id) => model.device(id),
+        SharedBy::WorkingCounter(_) => astray(model, owner, shared),
     };
-    let place = Place::device(line.network, other.unwrap_or(owner).id);
-    let label = line.label(owner.id);
+    let place = Place::device(model.network, other.unwrap_or(owner).id);
+    let label = model.label(owner.id);
     let text = match shared.first.value {
         SharedBy::WorkingCounter(wkc) => format!(
             "working counter {wkc} where {label} alone answers to {}: another one answers, too",
@@ -63,7 +63,7 @@ fn condition(line: &Line, owner: &Device, shared: &SharedAddress) -> Condition {
         ),
         SharedBy::Reading(id) => format!(
             "{}, asked by its position, has station address {}: that of {label}",
-            line.label(id),
+            model.label(id),
             shared.station
         ),
     };
@@ -73,25 +73,29 @@ fn condition(line: &Line, owner: &Device, shared: &SharedAddress) -> Condition {
         .confidence(0.9)
         .confirmed(shared.first.at)
         .shown_by(Evidence::register(owner.id, address, &seen, text))
-        .explaining(follows(line, owner, other))
+        .explaining(follows(model, owner, other))
         .advise(
             "Look for another tool or MainDevice that gives addresses on this line, and end it.",
         )
         .advise("Scan the line anew: each SubDevice then gets an address of its own.");
     if other.is_some() {
-        let place = Place::device(line.network, owner.id);
+        let place = Place::device(model.network, owner.id);
         condition = condition.or_at(FaultName::DuplicateAddress, place, 0.05);
     }
-    if shared.last + QUIET < line.now {
+    if shared.last + QUIET < model.now {
         condition = condition.ended(shared.last);
     }
     condition
 }
 
 /// The only SubDevice that does not answer to its own address meanwhile.
-fn astray<'a>(line: &'a Line, owner: &Device, shared: &SharedAddress) -> Option<&'a Device> {
+fn astray<'a>(
+    model: &'a NetworkModel,
+    owner: &Device,
+    shared: &SharedAddress,
+) -> Option<&'a Device> {
     let (from, to) = (shared.first.at.before(AROUND), shared.last + AROUND);
-    let mut silent = line.devices.iter().filter(|device| {
+    let mut silent = model.devices.iter().filter(|device| {
         device.id != owner.id
             && device.absences.iter().any(|absence| {
                 absence.since.at <= to && absence.ended.is_none_or(|ended| ended >= from)
@@ -102,11 +106,11 @@ fn astray<'a>(line: &'a Line, owner: &Device, shared: &SharedAddress) -> Option<
 
 /// Both are asked in vain, and both get what is meant for one; where one is the reference clock, all that
 /// follow it get a mixed time.
-fn follows(line: &Line, owner: &Device, other: Option<&Device>) -> BTreeSet<Symptom> {
+fn follows(model: &NetworkModel, owner: &Device, other: Option<&Device>) -> BTreeSet<Symptom> {
     let both = || [Some(owner), other].into_iter().flatten();
     let is_clock =
-        both().any(|device| line.references.iter().any(|reference| reference.device == device.id));
-    let concerned = line.devices.iter().filter(|device| {
+        both().any(|device| model.references.iter().any(|reference| reference.device == device.id));
+    let concerned = model.devices.iter().filter(|device| {
         is_clock && device.sync_on.is_some_and(|on| on.value)
             || both().any(|one| one.id == device.id)
     });

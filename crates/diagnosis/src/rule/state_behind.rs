@@ -20,7 +20,7 @@ use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, Line};
+use crate::model::{Device, NetworkModel};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -38,12 +38,12 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 const LASTS: Span = Span::s(2);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
+    let model = view.model;
     // Whoever brings the line up here knows what it asked for.
-    if line.sees_all_orders || line.traffic.is_one_sided() {
+    if model.sees_all_orders || model.traffic.is_one_sided() {
         return;
     }
-    let present = || line.devices.iter().filter(|device| device.silent.is_none());
+    let present = || model.devices.iter().filter(|device| device.silent.is_none());
     let in_op = present().filter(|device| device.al.state() == Some(AlState::Op)).count();
     let behind: Vec<&Device> = present().filter(|device| is_behind(view, device)).collect();
     if behind.is_empty() || behind.len() > in_op {
@@ -51,8 +51,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
     let found: Vec<Condition> = behind
         .into_iter()
-        .filter(|device| !is_told(conditions, line, device))
-        .filter_map(|device| condition(line, device, in_op))
+        .filter(|device| !is_told(conditions, model, device))
+        .filter_map(|device| condition(model, device, in_op))
         .collect();
     conditions.extend(found);
 }
@@ -61,18 +61,18 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 fn is_behind(view: &View<'_>, device: &Device) -> bool {
     let Some(status) = device.al.status else { return false };
     let is_low = status.value.state().state().is_some_and(|state| state != AlState::Op);
-    let is_list = view.line.traffic.frames == 0;
+    let is_list = view.model.traffic.frames == 0;
     let lasts = is_list || view.has_ended || view.now.since(status.at) >= LASTS;
     // It may have gone on since, in frames that are not in the recording.
     let read = device.al.latest_reading.unwrap_or(status.at);
-    let is_fresh = || !view.line.traffic.may_lack(read, view.now);
+    let is_fresh = || !view.model.traffic.may_lack(read, view.now);
     is_low && lasts && (is_list || (device.al.requested.is_none() && is_fresh()))
 }
 
 /// Whether another finding tells of its state, or of the device itself.
-fn is_told(conditions: &[Condition], line: &Line, device: &Device) -> bool {
+fn is_told(conditions: &[Condition], model: &NetworkModel, device: &Device) -> bool {
     let lost = Symptom::StateLost(device.id);
-    let place = Place::device(line.network, device.id);
+    let place = Place::device(model.network, device.id);
     conditions.iter().any(|one| {
         one.explains.contains(&lost)
             || one.symptoms.contains(&lost)
@@ -80,13 +80,13 @@ fn is_told(conditions: &[Condition], line: &Line, device: &Device) -> bool {
     })
 }
 
-fn condition(line: &Line, device: &Device, in_op: usize) -> Option<Condition> {
+fn condition(model: &NetworkModel, device: &Device, in_op: usize) -> Option<Condition> {
     let status = device.al.status?;
     let state = status.value.state().state()?;
-    let label = line.label(device.id);
+    let label = model.label(device.id);
     let error = if status.value.error() { " with the error bit" } else { "" };
     let text = format!("AL status of {label}: {state}{error}, while {in_op} others are in OP");
-    let place = Place::device(line.network, device.id);
+    let place = Place::device(model.network, device.id);
     let causes = match state {
         AlState::Boot => [
             (FaultName::FirmwareFault, 0.4),
@@ -100,7 +100,7 @@ fn condition(line: &Line, device: &Device, in_op: usize) -> Option<Condition> {
         ],
     };
     let [(cause, sure), others @ ..] = causes;
-    let seen = crate::line::Seen::new((), status.at, status.frame);
+    let seen = crate::model::Seen::new((), status.at, status.frame);
     let mut condition = Condition::new(&PAGE, place, cause, status.at)
         .confidence(sure)
         .confirmed(status.at)

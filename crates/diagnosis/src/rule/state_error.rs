@@ -39,7 +39,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{AlError, Device, Line};
+use crate::model::{AlError, Device, NetworkModel};
 
 /// It refused a change.
 pub const REFUSED: RulePage = RulePage {
@@ -98,13 +98,13 @@ const SEVERAL: usize = 2;
 const NAMED: usize = 6;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let unseen = unseen::errors(view.line);
+    let unseen = unseen::errors(view.model);
     conditions.extend(unseen::condition(view, &unseen));
-    for device in &view.line.devices {
+    for device in &view.model.devices {
         // One finding for each kind of trouble, however often it came back: the latest is shown.
         let mut pages: Vec<(&'static RulePage, &AlError, u32)> = Vec::new();
         for error in &device.al.errors {
-            let page = page_of(view.line, error);
+            let page = page_of(view.model, error);
             match pages.iter_mut().find(|(known, ..)| known.code == page.code) {
                 Some((_, latest, times)) => {
                     *latest = error;
@@ -130,28 +130,28 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
     let is_new = view.now.since(error.status.at) < ACKNOWLEDGED_WITHIN && !view.has_ended;
     is_new
-        && view.line.traffic.frames > 0
-        && was_left_over(view.line, error)
+        && view.model.traffic.frames > 0
+        && was_left_over(view.model, error)
         && error.ended.is_none()
 }
 
 /// Whether an error is of a time before this run: where process data went on while it stood, it belongs to them.
-fn was_left_over(line: &Line, error: &AlError) -> bool {
+fn was_left_over(model: &NetworkModel, error: &AlError) -> bool {
     let ended = error.ended.unwrap_or(error.status.at);
-    let is_running = line.cyclic.iter().any(|cyclic| cyclic.first.at < ended);
+    let is_running = model.cyclic.iter().any(|cyclic| cyclic.first.at < ended);
     error.was_left_over() && !is_running
 }
 
 /// Watchdogs that expired in several SubDevices at about the same time, without anything that explains it of each:
 /// nobody has sent outputs.
 fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
-    let line = view.line;
+    let model = view.model;
     let is_explained =
         |id: DeviceId| conditions.iter().any(|one| one.explains.contains(&Symptom::StateLost(id)));
-    let starved = line.devices.iter().filter_map(|device| {
+    let starved = model.devices.iter().filter_map(|device| {
         let mut errors = device.al.errors.iter().rev();
         let error = errors.find(|error| {
-            let page = page_of(line, error);
+            let page = page_of(model, error);
             page.code == WATCHDOG.code || (page.code == LEFT.code && error.may_be_watchdog())
         })?;
         Some((device, error)).filter(|_| !is_explained(device.id))
@@ -165,7 +165,7 @@ fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Conditi
     }
     let since = together.iter().map(|(_, error)| error.status.at).min()?;
     let ids = || together.iter().map(|(device, _)| device.id);
-    let names: Vec<String> = ids().take(NAMED).map(|id| line.label(id)).collect();
+    let names: Vec<String> = ids().take(NAMED).map(|id| model.label(id)).collect();
     let more = match together.len().saturating_sub(NAMED) {
         0 => String::new(),
         more => format!(" and {more} others"),
@@ -179,7 +179,7 @@ fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Conditi
         ),
     };
     let text = format!("{what} at about the same time: {}{more}", names.join(", "));
-    let place = Place::Network { network: line.network };
+    let place = Place::Network { network: model.network };
     let mut condition = Condition::new(&WATCHDOG, place, FaultName::WatchdogStarved, since)
         .confidence(0.8)
         .or_at(FaultName::HostJitter, Place::Host, 0.1)
@@ -204,13 +204,13 @@ fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Conditi
     Some(condition)
 }
 
-fn page_of(line: &Line, error: &AlError) -> &'static RulePage {
+fn page_of(model: &NetworkModel, error: &AlError) -> &'static RulePage {
     // Who was higher before and was asked for nothing has left; a watchdog watches those that are in OP alone.
     let fell = error.from.is_some_and(|from| error.status.value.state().state() < Some(from));
     let watchdog = AlStatusCode::SYNC_MANAGER_WATCHDOG;
     let is_watchdog = error.code.is_some_and(|code| code.value == watchdog);
     // A MainDevice that is refused a state while it starts does not go on to exchange process data.
-    let is_unread = error.code.is_none() && error.from.is_none() && !line.cyclic.is_empty();
+    let is_unread = error.code.is_none() && error.from.is_none() && !model.cyclic.is_empty();
     let asked_for_nothing = error.requested.is_none() && (fell || is_watchdog || is_unread);
     if !error.had_arrived && !asked_for_nothing {
         return &REFUSED;
@@ -231,15 +231,15 @@ fn condition(
     error: &AlError,
     times: u32,
 ) -> Condition {
-    let line = view.line;
-    let place = Place::device(line.network, device.id);
+    let model = view.model;
+    let place = Place::device(model.network, device.id);
     let meaning = error.code.map(|code| code.value.explain());
     let cause = match page.code {
         // The code itself blames what was configured.
         "S200" if meaning.is_some_and(|meaning| meaning.class == CodeClass::Configuration) => {
             FaultName::ConfigMismatch
         }
-        "S200" if has_no_values(line, device, error) => FaultName::FirmwareFault,
+        "S200" if has_no_values(model, device, error) => FaultName::FirmwareFault,
         "S200" => FaultName::InitRefused,
         "S202" => FaultName::WatchdogStarved,
         "T400" => out_of_step(device, error),
@@ -295,7 +295,7 @@ fn condition(
     if let Some(ended) = over(view, device, error) {
         condition = condition.ended(ended);
     }
-    if was_left_over(line, error)
+    if was_left_over(model, error)
         && let Some(acknowledged) = error.ended
     {
         condition.severity = Severity::Info;
@@ -324,10 +324,10 @@ fn condition(
 }
 
 /// Whether a SubDevice refuses because its own application gives no values, or takes none though they are sent.
-fn has_no_values(line: &Line, device: &Device, error: &AlError) -> bool {
+fn has_no_values(model: &NetworkModel, device: &Device, error: &AlError) -> bool {
     let has_outputs = || {
-        line.cyclic.iter().any(|cyclic| {
-            let mut owners = line.owners(cyclic);
+        model.cyclic.iter().any(|cyclic| {
+            let mut owners = model.owners(cyclic);
             owners.any(|owner| owner.device == device.id && owner.writes)
         })
     };

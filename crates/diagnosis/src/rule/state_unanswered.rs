@@ -21,7 +21,7 @@ use linesman_proto::address::RegisterAddress;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Device, Line, StateRequest};
+use crate::model::{Device, NetworkModel, StateRequest};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -39,21 +39,21 @@ const AL_CONTROL: RegisterAddress = RegisterAddress(0x0120);
 const AL_STATUS: RegisterAddress = RegisterAddress(0x0130);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    for device in &view.line.devices {
+    for device in &view.model.devices {
         // A later order may be in a frame that is not in the recording.
         let is_seen = |request: &StateRequest| {
             let until = request.polled.map_or(request.asked.at, |polled| polled.at);
-            !view.line.traffic.may_lack(request.asked.at, until)
+            !view.model.traffic.may_lack(request.asked.at, until)
         };
         let overdue = device.al.requests.iter().rev();
         let overdue = overdue.filter(|one| one.is_overdue()).find(|one| is_seen(one));
-        conditions.extend(overdue.map(|request| condition(view.line, device, request)));
+        conditions.extend(overdue.map(|request| condition(view.model, device, request)));
     }
 }
 
-fn condition(line: &Line, device: &Device, request: &StateRequest) -> Condition {
+fn condition(model: &NetworkModel, device: &Device, request: &StateRequest) -> Condition {
     let id = device.id;
-    let label = line.label(id);
+    let label = model.label(id);
     let asked = &request.asked;
     let polled = request.polled.map_or(asked.at, |polled| polled.at);
     let again = match (request.times, request.asked.value.state() == Some(request.to)) {
@@ -73,7 +73,7 @@ fn condition(line: &Line, device: &Device, request: &StateRequest) -> Condition 
     let control = format!("AL control: {} asked for{again}{untaken}", asked.value);
     let state = Some(u64::from(from.bits()));
     let condition =
-        Condition::new(&PAGE, Place::device(line.network, id), FaultName::FirmwareFault, asked.at)
+        Condition::new(&PAGE, Place::device(model.network, id), FaultName::FirmwareFault, asked.at)
             .confidence(if request.untaken > 0 { 0.9 } else { 0.75 })
             .or(FaultName::CycleTooFast, 0.05)
             .confirmed(polled)

@@ -19,8 +19,8 @@ use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::device::WatchdogSetting;
-use crate::line::{Device, Line};
+use crate::model::device::WatchdogSetting;
+use crate::model::{Device, NetworkModel};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -39,10 +39,10 @@ const WATCHDOG_TIME: RegisterAddress = RegisterAddress(0x0420);
 const CYCLES: u64 = 4;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let line = view.line;
-    let cycles = || line.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle());
+    let model = view.model;
+    let cycles = || model.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle());
     let (Some(usual), Some(longest)) = (cycles().min(), cycles().max()) else { return };
-    for device in &line.devices {
+    for device in &model.devices {
         // Whose outputs come with which datagram takes long to find out: only where it matters.
         let settings = [device.watchdog.setting, device.watchdog.former];
         let is_held_long = settings
@@ -52,7 +52,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         if device.al.highest < Some(AlState::SafeOp) || is_held_long {
             continue;
         }
-        let cycle = own_cycle(line, device).unwrap_or(usual);
+        let cycle = own_cycle(model, device).unwrap_or(usual);
         let is_short =
             |setting: &WatchdogSetting| setting.span.is_some_and(|span| span < cycle * CYCLES);
         // The present one, else the one before: it is history then.
@@ -63,7 +63,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             (None, None) => continue,
         };
         let Some(span) = setting.span else { continue };
-        conditions.push(condition(line, device, &setting, (span, cycle)));
+        conditions.push(condition(model, device, &setting, (span, cycle)));
         if let (Some(ended), Some(condition)) = (ended, conditions.last_mut()) {
             condition.ended = Some(ended);
         }
@@ -71,15 +71,15 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 /// The cycle of the datagram that brings its outputs.
-fn own_cycle(line: &Line, device: &Device) -> Option<Span> {
-    let brings = line.cyclic.iter().filter(|cyclic| {
-        line.owners(cyclic).any(|owner| owner.device == device.id && owner.writes)
+fn own_cycle(model: &NetworkModel, device: &Device) -> Option<Span> {
+    let brings = model.cyclic.iter().filter(|cyclic| {
+        model.owners(cyclic).any(|owner| owner.device == device.id && owner.writes)
     });
     brings.filter_map(|cyclic| cyclic.sent.cycle()).min()
 }
 
 fn condition(
-    line: &Line,
+    model: &NetworkModel,
     device: &Device,
     setting: &WatchdogSetting,
     (span, cycle): (Span, Span),
@@ -87,11 +87,11 @@ fn condition(
     let ms = |span: Span| span.as_nanos() as f64 / 1e6;
     let text = format!(
         "the process data watchdog of {} holds for {:.3} ms, and a cycle takes {:.3} ms",
-        line.label(device.id),
+        model.label(device.id),
         ms(span),
         ms(cycle)
     );
-    let place = Place::device(line.network, device.id);
+    let place = Place::device(model.network, device.id);
     let at = setting.seen.at;
     let mut condition = Condition::new(&PAGE, place, FaultName::WatchdogStarved, at)
         .confidence(0.9)

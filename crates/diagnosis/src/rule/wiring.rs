@@ -41,7 +41,7 @@ use linesman_proto::topology::{End, Tree};
 use super::identity::{EXTRA, MISSING, WRONG};
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::line::{Line, Seen};
+use crate::model::{NetworkModel, Seen};
 
 /// Plugged otherwise.
 pub const PLUGGED: RulePage = RulePage {
@@ -65,8 +65,8 @@ pub const TWINS: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PLUGGED, TWINS], judge };
 
 /// What was found, as far as it is enough to be laid upon the plan.
-struct Found<'a> {
-    line: &'a Line,
+struct FoundWiring<'a> {
+    model: &'a NetworkModel,
     planned: &'a Tree,
     wanted: Vec<Wanted>,
     tree: Tree,
@@ -80,18 +80,18 @@ struct Found<'a> {
 }
 
 /// Whether the trees can be compared, so that this rule speaks of devices missing, extra and wrong, too.
-pub(super) fn judges(line: &Line) -> bool {
-    Found::of(line).is_some_and(|found| found.tells(&found.compare()))
+pub(super) fn judges(model: &NetworkModel) -> bool {
+    FoundWiring::of(model).is_some_and(|found| found.tells(&found.compare()))
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     compared(view, conditions);
-    let by_links = entry::conditions(view.line, conditions);
+    let by_links = entry::conditions(view.model, conditions);
     conditions.extend(by_links);
 }
 
 fn compared(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    let Some(found) = Found::of(view.line) else { return };
+    let Some(found) = FoundWiring::of(view.model) else { return };
     let comparison = found.compare();
     if !found.tells(&comparison) {
         return;
@@ -108,7 +108,7 @@ fn compared(view: &View<'_>, conditions: &mut Vec<Condition>) {
     }
 }
 
-impl<'a> Found<'a> {
+impl<'a> FoundWiring<'a> {
     fn condition(&self, difference: &Difference, pairs: &[Option<usize>]) -> Condition {
         match difference {
             Difference::Missing { planned, all } => self.missing(*planned, all.len()),
@@ -130,8 +130,11 @@ impl<'a> Found<'a> {
             1 => format!("{label} is not in the line; its neighbours are wired to each other"),
             _ => format!("{label}{} are not in the line", and_behind(count)),
         };
-        let equals =
-            if count == 1 { equals_in_a_row(self.line, self.planned, planned) } else { Vec::new() };
+        let equals = if count == 1 {
+            equals_in_a_row(self.model, self.planned, planned)
+        } else {
+            Vec::new()
+        };
         let sure = 0.85 / (1 + equals.len()) as f64;
         let mut condition =
             self.begin(&MISSING, self.place(planned), FaultName::DeviceMissing, sure, text);
@@ -164,12 +167,12 @@ impl<'a> Found<'a> {
         let text =
             format!("{what}{more} at {at} is in no plan; all behind are further on than planned");
         let id = self.ids.get(found).copied().unwrap_or_default();
-        let place = Place::device(self.line.network, id);
+        let place = Place::device(self.model.network, id);
         let equals = if count == 1 { self.equals_found(found, pairs) } else { Vec::new() };
         let sure = 0.85 / (1 + equals.len()) as f64;
         let mut condition = self.begin(&EXTRA, place, FaultName::DeviceExtra, sure, text);
         for equal in &equals {
-            let place = Place::device(self.line.network, *equal);
+            let place = Place::device(self.model.network, *equal);
             condition = condition.or_at(FaultName::DeviceExtra, place, sure);
         }
         if !equals.is_empty() {
@@ -278,7 +281,7 @@ impl<'a> Found<'a> {
             .advise(format!("Plug the cable to {label} into {right}; it is in {at} now."))
             .advise("If the wiring is as it is wanted, scan anew and save the project.");
         if let Some(id) = self.ids.get(found) {
-            let dl = self.line.device(*id).and_then(|device| device.dl.first);
+            let dl = self.model.device(*id).and_then(|device| device.dl.first);
             condition.evidence.extend(dl.map(|seen| {
                 let text = format!("open ports as found, at {at}: {}", ports(&self.tree, found));
                 Evidence::register(*id, table::DL_STATUS.address, &seen, text)
@@ -351,17 +354,17 @@ impl<'a> Found<'a> {
     }
 
     fn place(&self, planned: usize) -> Place {
-        Place::device(self.line.network, DeviceId(planned as u32))
+        Place::device(self.model.network, DeviceId(planned as u32))
     }
 
     fn label(&self, planned: usize) -> String {
-        self.line.label(DeviceId(planned as u32))
+        self.model.label(DeviceId(planned as u32))
     }
 
     /// What a found node is, as no name in the plan says.
     fn kind(&self, found: usize) -> String {
         let id = self.ids.get(found).copied().unwrap_or_default();
-        let sii = self.line.device(id).and_then(|device| device.sii.type_name());
+        let sii = self.model.device(id).and_then(|device| device.sii.type_name());
         sii.unwrap_or_else(|| format!("the SubDevice at position {found}"))
     }
 
@@ -381,7 +384,7 @@ impl<'a> Found<'a> {
 
     /// What the receive times say of a node.
     fn times(&self, found: usize) -> String {
-        let device = self.ids.get(found).and_then(|id| self.line.device(*id));
+        let device = self.ids.get(found).and_then(|id| self.model.device(*id));
         match (self.basis.get(found), device.and_then(|device| device.received)) {
             (Some(EntryBasis::ReceiveTimes), Some(times)) => {
                 let entry = self.tree.entry(found);
@@ -397,9 +400,9 @@ impl<'a> Found<'a> {
 }
 
 /// The planned ones in a row with one of them that nobody could tell from it.
-pub(super) fn equals_in_a_row(line: &Line, tree: &Tree, planned: usize) -> Vec<usize> {
+pub(super) fn equals_in_a_row(model: &NetworkModel, tree: &Tree, planned: usize) -> Vec<usize> {
     let alike = |other: usize| {
-        let [one, other] = [planned, other].map(|node| found::wanted(line.devices.get(node)));
+        let [one, other] = [planned, other].map(|node| found::wanted(model.devices.get(node)));
         let has_serial = one.identity.is_some_and(|identity| identity.serial_number != 0);
         one.identity.is_some() && one == other && one.alias.is_none() && !has_serial
     };

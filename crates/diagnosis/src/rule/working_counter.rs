@@ -27,8 +27,8 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View, processor_stopped};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
-use crate::line::{Cyclic, Deficit, Device, Line, Owner, Trouble};
-use crate::locate::{Drops, way};
+use crate::locate::{LinkLosses, cut_distance};
+use crate::model::{Cyclic, Deficit, Device, NetworkModel, Owner, Trouble};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -68,15 +68,15 @@ struct Suspects {
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     // Datagrams of one device fail together: one finding for each set of suspects.
     let mut groups: BTreeMap<Suspects, Vec<(&Cyclic, &Deficit)>> = BTreeMap::new();
-    if view.line.cyclic.iter().all(|cyclic| cyclic.deficits.is_empty()) {
+    if view.model.cyclic.iter().all(|cyclic| cyclic.deficits.is_empty()) {
         return;
     }
-    let lost = Drops::all(view.line);
-    for cyclic in &view.line.cyclic {
+    let lost = LinkLosses::all(view.model);
+    for cyclic in &view.model.cyclic {
         let is_history =
             |deficit: &&Deficit| deficit.ended.is_some_and(|ended| ended + JUDGED_FOR < view.now);
         let judged = |deficit: &&Deficit| {
-            !is_history(deficit) && !may_be_start_up(view.line, cyclic, deficit)
+            !is_history(deficit) && !may_be_start_up(view.model, cyclic, deficit)
         };
         for deficit in cyclic.deficits.iter().filter(judged) {
             let explained = explained(conditions, deficit);
@@ -91,15 +91,15 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 
 /// Tells whether a working counter that was low from the first frame on may have risen as a MainDevice brought the line
 /// up: a SubDevice was seen to go up, or nobody read a state.
-fn may_be_start_up(line: &Line, cyclic: &Cyclic, deficit: &Deficit) -> bool {
+fn may_be_start_up(model: &NetworkModel, cyclic: &Cyclic, deficit: &Deficit) -> bool {
     let went_up = |device: &Device| {
         device.al.changes.iter().any(|change| {
             change.from.state().state() < change.to.state().state() && !change.from.error()
         })
     };
     cyclic.low_before() == Some(deficit)
-        && (line.devices.iter().any(went_up)
-            || line.devices.iter().all(|device| device.al.status.is_none()))
+        && (model.devices.iter().any(went_up)
+            || model.devices.iter().all(|device| device.al.status.is_none()))
 }
 
 /// Whose share other findings of that time account for.
@@ -124,17 +124,17 @@ fn explained(conditions: &[Condition], deficit: &Deficit) -> Vec<DeviceId> {
 /// shares add up to just that, and as few as possible.
 fn suspects(
     view: &View<'_>,
-    lost: &[Drops],
+    lost: &[LinkLosses],
     cyclic: &Cyclic,
     deficit: &Deficit,
     explained: &[DeviceId],
 ) -> Suspects {
-    let line = view.line;
+    let model = view.model;
     let missing = deficit.expected - deficit.lowest;
-    let owners: Vec<_> = line.owners(cyclic).collect();
+    let owners: Vec<_> = model.owners(cyclic).collect();
     if owners.is_empty() {
         // The set-up was not seen: whoever is in trouble right then, above all who is away.
-        let troubled = line
+        let troubled = model
             .devices
             .iter()
             .filter_map(|device| Some((device.id, trouble(device, deficit, view.now)?)));
@@ -148,15 +148,20 @@ fn suspects(
     let shares: Vec<(DeviceId, Vec<u16>)> =
         owners.iter().map(|owner| (owner.device, shares(cyclic, owner))).collect();
     let certain = |devices| Suspects { is_certain: true, devices, links: Vec::new() };
-    let signs: Vec<Sign> =
+    let signs: Vec<OwnerEvidence> =
         owners.iter().map(|owner| sign(view, lost, owner.device, deficit)).collect();
-    for least in [Sign::Error, Sign::LinkLost, Sign::Absent, Sign::Stopped] {
+    for least in [
+        OwnerEvidence::Error,
+        OwnerEvidence::LinkLost,
+        OwnerEvidence::Absent,
+        OwnerEvidence::Stopped,
+    ] {
         let suspected = shares.iter().zip(&signs).filter(|(_, sign)| **sign >= least);
         let suspected: Vec<_> = suspected.map(|(share, _)| share.clone()).collect();
         // Who hangs behind a SubDevice that failed goes with it, and comes back at a time of its own: the
         // lowest working counter may lack any part of them.
         let whole: u16 = suspected.iter().filter_map(|(_, shares)| shares.first()).sum();
-        if least > Sign::Absent && whole >= missing && is_one_branch(line, &suspected) {
+        if least > OwnerEvidence::Absent && whole >= missing && is_one_branch(model, &suspected) {
             return certain(suspected.into_iter().map(|(device, _)| device).collect());
         }
         if let Some(devices) = fewest(&suspected, missing) {
@@ -164,12 +169,13 @@ fn suspects(
         }
     }
     let full = |(_, shares): &(DeviceId, Vec<u16>)| shares.first().copied().unwrap_or(0);
-    let in_trouble = || shares.iter().zip(&signs).filter(|(_, sign)| **sign >= Sign::Absent);
+    let in_trouble =
+        || shares.iter().zip(&signs).filter(|(_, sign)| **sign >= OwnerEvidence::Absent);
     if in_trouble().map(|(share, _)| full(share)).sum::<u16>() >= missing {
         return certain(in_trouble().map(|(share, _)| share.0).collect());
     }
-    if signs.iter().all(|sign| *sign == Sign::None)
-        && let Some(behind) = trailing::suspects(line, deficit)
+    if signs.iter().all(|sign| *sign == OwnerEvidence::None)
+        && let Some(behind) = trailing::suspects(model, deficit)
     {
         return behind;
     }
@@ -198,8 +204,8 @@ fn suspects(
 }
 
 /// Whether all hang behind the first of them.
-fn is_one_branch(line: &Line, suspected: &[(DeviceId, Vec<u16>)]) -> bool {
-    let (Some(tree), Some((first, _))) = (&line.tree, suspected.first()) else { return false };
+fn is_one_branch(model: &NetworkModel, suspected: &[(DeviceId, Vec<u16>)]) -> bool {
+    let (Some(tree), Some((first, _))) = (&model.tree, suspected.first()) else { return false };
     let branch = tree.subtree(first.index());
     suspected.iter().all(|(device, _)| branch.contains(&device.index()))
 }
@@ -247,7 +253,7 @@ fn fewest(shares: &[(DeviceId, Vec<u16>)], missing: u16) -> Option<Vec<DeviceId>
 
 /// What is known of an owner at the time of a deficit, the stronger the later.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Sign {
+enum OwnerEvidence {
     /// Nothing.
     None,
     /// Its processor has stopped: its share is missing where it held a buffer just then, which nobody gives back
@@ -261,27 +267,29 @@ enum Sign {
     Error,
 }
 
-fn sign(view: &View<'_>, lost: &[Drops], id: DeviceId, deficit: &Deficit) -> Sign {
-    let Some(device) = view.line.device(id) else { return Sign::None };
+fn sign(view: &View<'_>, lost: &[LinkLosses], id: DeviceId, deficit: &Deficit) -> OwnerEvidence {
+    let Some(device) = view.model.device(id) else { return OwnerEvidence::None };
     let trouble = trouble(device, deficit, view.now);
     if let Some(Trouble::Error(_) | Trouble::Fall(_)) = trouble {
-        return Sign::Error;
+        return OwnerEvidence::Error;
     }
     let (from, to) = around(deficit, view.now);
-    let is_behind = |drops: &Drops| {
-        let tree = view.line.tree.as_ref()?;
+    let is_behind = |drops: &LinkLosses| {
+        let tree = view.model.tree.as_ref()?;
         let behind = tree.links()[drops.link].downstream.node()?;
         Some(tree.subtree(behind).contains(&id.index()))
     };
-    let was_lost = |drops: &&Drops| {
+    let was_lost = |drops: &&LinkLosses| {
         drops.first <= to && (drops.is_down || drops.last.max(drops.first) >= from)
     };
     let mut then = lost.iter().filter(was_lost);
     match (then.any(|drops| is_behind(drops) == Some(true)), trouble) {
-        (true, _) => Sign::LinkLost,
-        (false, Some(_)) => Sign::Absent,
-        (false, None) if processor_stopped::stood_within(device, from, to) => Sign::Stopped,
-        (false, None) => Sign::None,
+        (true, _) => OwnerEvidence::LinkLost,
+        (false, Some(_)) => OwnerEvidence::Absent,
+        (false, None) if processor_stopped::stood_within(device, from, to) => {
+            OwnerEvidence::Stopped
+        }
+        (false, None) => OwnerEvidence::None,
     }
 }
 
@@ -296,25 +304,25 @@ fn trouble(device: &Device, deficit: &Deficit, now: Instant) -> Option<Trouble> 
 }
 
 fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Deficit)]) -> Condition {
-    let line = view.line;
+    let model = view.model;
     let since = deficits.iter().map(|(_, deficit)| deficit.first.at).min().unwrap_or_default();
     let total: u64 = deficits.iter().map(|(_, deficit)| deficit.count).sum();
     let lasts = deficits.iter().any(|(_, deficit)| deficit.ended.is_none());
     let ended = deficits.iter().filter_map(|(_, deficit)| deficit.ended).max();
-    let first_suspect = suspects.devices.first().and_then(|id| line.device(*id));
+    let first_suspect = suspects.devices.first().and_then(|id| model.device(*id));
     let named = |link: &usize| {
-        let link = line.tree.as_ref()?.links().get(*link)?.map(|node| DeviceId(node as u32));
-        Some(Place::link(line.network, link, Some(LinkDirection::Both)))
+        let link = model.tree.as_ref()?.links().get(*link)?.map(|node| DeviceId(node as u32));
+        Some(Place::link(model.network, link, Some(LinkDirection::Both)))
     };
     let links: Vec<Place> = suspects.links.iter().filter_map(named).collect();
     let place = match first_suspect {
         _ if !links.is_empty() => links[0],
-        Some(device) if suspects.is_certain => Place::device(line.network, device.id),
-        Some(_) | None => Place::Network { network: line.network },
+        Some(device) if suspects.is_certain => Place::device(model.network, device.id),
+        Some(_) | None => Place::Network { network: model.network },
     };
     let known = first_suspect
         .and_then(|device| deficits.iter().find_map(|(_, at)| trouble(device, at, view.now)));
-    let link_changed = line.changed_link().filter(|event| {
+    let link_changed = model.changed_link().filter(|event| {
         deficits.iter().any(|(_, deficit)| {
             let (from, to) = around(deficit, view.now);
             from <= event.at && event.at <= to
@@ -384,7 +392,7 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
         ));
     }
     for (cyclic, deficit) in deficits.iter().rev().take(3) {
-        condition = condition.shown_by(evidence(line, cyclic, deficit));
+        condition = condition.shown_by(evidence(model, cyclic, deficit));
     }
     if let Some(event) = link_changed {
         let text = "the frames tell that DL status of a SubDevice has changed then (event field, bit 2): a link came or \
@@ -392,7 +400,7 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
         condition = condition.shown_by(Evidence::frame(event.at, event.frame.unwrap_or(0), text));
     }
     if lasts && !links.is_empty() {
-        condition.evidence.extend(way::evidence(line, since));
+        condition.evidence.extend(cut_distance::evidence(model, since));
     }
     // Where one or some of them are it, or the set-up was not seen and they are all that are in trouble, what
     // explains it of each of them explains this, whoever it is.
@@ -407,7 +415,7 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
             condition.severity = Severity::Warning;
         }
     }
-    let names: Vec<_> = suspects.devices.iter().map(|id| line.label(*id)).collect();
+    let names: Vec<_> = suspects.devices.iter().map(|id| model.label(*id)).collect();
     condition = match (names.is_empty(), suspects.is_certain) {
         (true, _) => condition.advise(
             "Read AL status and DL status of all SubDevices: who is missing, or not in OP?",
@@ -421,8 +429,8 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
         .advise("Take no output of this datagram for written and no input for fresh meanwhile.")
 }
 
-fn evidence(line: &Line, cyclic: &Cyclic, deficit: &Deficit) -> Evidence {
-    let owners: Vec<_> = line.owners(cyclic).map(|owner| line.label(owner.device)).collect();
+fn evidence(model: &NetworkModel, cyclic: &Cyclic, deficit: &Deficit) -> Evidence {
+    let owners: Vec<_> = model.owners(cyclic).map(|owner| model.label(owner.device)).collect();
     let whose = if owners.is_empty() { String::new() } else { format!(" ({})", owners.join(", ")) };
     let until = match deficit.ended {
         Some(at) => format!("{} times until {} ns", deficit.count, at.as_nanos()),

@@ -350,7 +350,7 @@ impl Session {
         names: &Names,
         at: Instant,
     ) -> Result<(), Failure> {
-        let line = engine.line(Network(0));
+        let line = engine.model(Network(0));
         if let Some(path) = &self.html {
             let timed = diagnosis.clock != NO_CLOCK;
             let writer = Writer {
@@ -397,7 +397,7 @@ pub(super) fn print(diagnosis: &Diagnosis, names: &Names, output: &mut Output) {
 
 /// What the SubDevices are called: by the project, else by their types.
 fn names(engine: &Engine) -> Names {
-    let devices = engine.line(Network(0)).map(|line| line.devices.as_slice()).unwrap_or_default();
+    let devices = engine.model(Network(0)).map(|line| line.devices.as_slice()).unwrap_or_default();
     let known = |text: &Option<String>| text.clone().unwrap_or_default();
     Names::new(devices.iter().map(|device| (known(&device.name), known(&device.type_name))))
 }

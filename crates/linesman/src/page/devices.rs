@@ -1,6 +1,6 @@
 //! Table of the SubDevices: identities, states, counters.
 
-use linesman_diagnosis::line::{Device, Line};
+use linesman_diagnosis::model::{Device, NetworkModel};
 use linesman_diagnosis::report::DeviceReport;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
@@ -9,7 +9,7 @@ use maud::{Markup, html};
 use crate::text::devices::{number, state, station, vendor};
 
 /// A row for each SubDevice: who it is, and what it showed.
-pub(super) fn section(devices: &[DeviceReport], line: Option<&Line>) -> Markup {
+pub(super) fn section(devices: &[DeviceReport], line: Option<&NetworkModel>) -> Markup {
     html! {
         @if !devices.is_empty() {
             section {
@@ -32,7 +32,7 @@ pub(super) fn section(devices: &[DeviceReport], line: Option<&Line>) -> Markup {
     }
 }
 
-fn row(device: &DeviceReport, line: Option<&Line>) -> Markup {
+fn row(device: &DeviceReport, line: Option<&NetworkModel>) -> Markup {
     let seen = line.and_then(|line| line.devices.iter().find(|seen| seen.id.no() == device.no));
     let has_risen = |seen: &Device| Port::ALL.into_iter().any(|port| seen.counters.port_rose(port));
     let has_error = device.answers == Some(false) || device.al_status_code.is_some();

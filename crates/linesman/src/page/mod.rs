@@ -12,7 +12,7 @@ pub(crate) mod scene;
 mod timeline;
 mod wall_clock;
 
-use linesman_diagnosis::line::Line;
+use linesman_diagnosis::model::NetworkModel;
 use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_proto::time::Instant;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -41,7 +41,7 @@ pub(crate) struct Origin {
 /// The whole page. `at` is the end of the run.
 pub(crate) fn page(
     diagnosis: &Diagnosis,
-    line: Option<&Line>,
+    line: Option<&NetworkModel>,
     writer: &Writer<'_>,
     at: Instant,
     origin: &Origin,

@@ -2,7 +2,7 @@
 
 use linesman_config::fault::FaultName;
 use linesman_config::inventory::Inventory;
-use linesman_diagnosis::line::{Device, Line};
+use linesman_diagnosis::model::{Device, NetworkModel};
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, PlaceReport};
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
@@ -15,7 +15,7 @@ use crate::text::names::Names;
 
 /// The line as a diagnosis knows it, causes marked; `None` when its wiring is not known.
 pub(crate) fn of_diagnosis<'a>(
-    line: &'a Line,
+    line: &'a NetworkModel,
     diagnosis: &Diagnosis,
     names: &Names,
 ) -> Option<Scene<'a>> {

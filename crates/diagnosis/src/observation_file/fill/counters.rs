@@ -8,7 +8,7 @@ use linesman_proto::time::Instant;
 
 use super::super::{Count, EarlierPort, ObservedDevice, ObservedPort};
 use super::device::Values;
-use crate::line::Device;
+use crate::model::Device;
 
 /// Readings of some counters.
 type Counts = Vec<(ErrorCounter, u64)>;

@@ -1,4 +1,4 @@
-//! What was read of one SubDevice: identity, links, counters, trouble in words.
+//! Readings of one SubDevice: identity, links, counters, trouble in words.
 
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{DlStatus, PortState};
@@ -8,7 +8,7 @@ use linesman_proto::topology::Tree;
 
 use super::super::{Count, ObservedDevice, ObservedPort, ReadDevice, ReadPort, Word};
 use super::counters;
-use crate::line::{Device, ErrorSum, ReportedTrouble, Seen};
+use crate::model::{Device, ErrorSum, ReportedTrouble, Seen};
 
 /// What was read of a SubDevice at one time.
 #[derive(Clone, Default)]

@@ -1,21 +1,21 @@
-//! What the MainDevice counted, over all readings.
+//! Counts of the MainDevice over all readings.
 
 use linesman_proto::address::{Network, Path};
 use linesman_proto::register::AlStatus;
 use linesman_proto::time::{Instant, Span};
 
 use super::super::{Count, ObservedMainDevice};
-use super::Step;
-use crate::line::{Line, Seen, Tally};
+use super::TimedReading;
+use crate::model::{NetworkModel, Seen, Tally};
 use crate::observe::{HostEvent, HostObservation};
 
 /// Records links, counts and answers of each step.
-pub(super) fn teach(line: &mut Line, steps: &[Step<'_>]) {
+pub(super) fn teach(model: &mut NetworkModel, steps: &[TimedReading<'_>]) {
     let told: Vec<(Instant, &ObservedMainDevice)> =
         steps.iter().filter_map(|step| Some((step.at, step.main?))).collect();
     let mut observe = |at, what| {
         let (network, path) = (Network(0), Path::A);
-        line.host.record(&HostObservation { network, path, time: at, what });
+        model.host.record(&HostObservation { network, path, time: at, what });
     };
     for (at, main) in &told {
         if let Some(on) = main.link {
@@ -32,10 +32,10 @@ pub(super) fn teach(line: &mut Line, steps: &[Step<'_>]) {
     for (at, count) in rises(&told, |main| main.send_errors).into_iter().flatten() {
         observe(at, HostEvent::SendFailures(count));
     }
-    line.host.is_watched = crc.is_some();
+    model.host.is_watched = crc.is_some();
     let lost = tally(&told, |main| main.lost);
-    line.traffic.lost = lost.unwrap_or_default();
-    let reported = &mut line.reported;
+    model.traffic.lost = lost.unwrap_or_default();
+    let reported = &mut model.reported;
     reported.lost = lost;
     reported.late = tally(&told, |main| main.late);
     reported.late_cycles = tally(&told, |main| main.late_cycles);
@@ -62,16 +62,16 @@ pub(super) fn teach(line: &mut Line, steps: &[Step<'_>]) {
             reported.answering = Some(Seen::new(answering, at, None));
         }
     }
-    line.traffic.broadcast_answers = reported.answering_most;
-    line.traffic.broadcast_now = reported.answering;
-    silence_the_rest(line, steps);
+    model.traffic.broadcast_answers = reported.answering_most;
+    model.traffic.broadcast_now = reported.answering;
+    silence_the_rest(model, steps);
 }
 
 /// On a line without branches those answer that are nearest: the others do not, unless they were heard since.
-fn silence_the_rest(line: &mut Line, steps: &[Step<'_>]) {
-    let Some(answering) = line.reported.answering else { return };
+fn silence_the_rest(model: &mut NetworkModel, steps: &[TimedReading<'_>]) {
+    let Some(answering) = model.reported.answering else { return };
     let count = usize::from(answering.value);
-    let is_chain = line.tree.as_ref().is_some_and(|tree| {
+    let is_chain = model.tree.as_ref().is_some_and(|tree| {
         tree.closes_at().is_none() && (0..tree.len()).all(|node| tree.children(node).count() <= 1)
     });
     if !is_chain && count > 0 {
@@ -81,13 +81,13 @@ fn silence_the_rest(line: &mut Line, steps: &[Step<'_>]) {
         let since = steps.iter().filter(|step| step.at >= answering.at);
         since.flat_map(|step| &step.devices).any(|(one, read)| *one == index && read.is_heard())
     };
-    let order: Vec<usize> = match &line.tree {
+    let order: Vec<usize> = match &model.tree {
         Some(tree) => tree.order().to_vec(),
-        None => (0..line.devices.len()).collect(),
+        None => (0..model.devices.len()).collect(),
     };
     for index in order.into_iter().skip(count) {
         if !heard_since(index)
-            && let Some(device) = line.devices.get_mut(index)
+            && let Some(device) = model.devices.get_mut(index)
         {
             device.is_silent(answering.at, None);
         }

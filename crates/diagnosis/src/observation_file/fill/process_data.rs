@@ -6,8 +6,8 @@ use linesman_proto::address::{LogicalAddress, RegisterAddress};
 use linesman_proto::register::FmmuConfig;
 
 use super::super::{Address, Count, LogicalCommand, ObservationFile, ObservedWorkingCounter};
-use super::Step;
-use crate::line::{Cyclic, Line, Ordered, Seen};
+use super::TimedReading;
+use crate::model::{Cyclic, NetworkModel, Ordered, Seen};
 
 /// Logical addresses of datagrams of which none is given: nobody uses them.
 const NOWHERE: u32 = 0xF000_0000;
@@ -17,7 +17,7 @@ const APART: u32 = 0x1000;
 const FIRST_FMMU: usize = 128;
 
 /// Records the working counters of each step.
-pub(super) fn teach(file: &ObservationFile, line: &mut Line, steps: &[Step<'_>]) {
+pub(super) fn teach(file: &ObservationFile, model: &mut NetworkModel, steps: &[TimedReading<'_>]) {
     let mut known: BTreeMap<String, usize> = BTreeMap::new();
     // What any reading expects of a datagram; the file itself first.
     let mut expected: BTreeMap<String, u16> = BTreeMap::new();
@@ -34,7 +34,7 @@ pub(super) fn teach(file: &ObservationFile, line: &mut Line, steps: &[Step<'_>])
             let expected = expected.get(&key).copied().or_else(|| told.computed());
             let Some(first) = expected.or(told.received) else { continue };
             let at = *known.entry(key.clone()).or_insert_with(|| {
-                let number = line.cyclic.len();
+                let number = model.cyclic.len();
                 let start = match told.address {
                     Some(Address(address)) => LogicalAddress(address),
                     None => LogicalAddress(NOWHERE + APART * (number as u32 % 0xFFFF)),
@@ -43,13 +43,13 @@ pub(super) fn teach(file: &ObservationFile, line: &mut Line, steps: &[Step<'_>])
                 let len = told.length.unwrap_or(1);
                 let mut cyclic = Cyclic::new(told.command.command(), start, len, seen);
                 cyclic.name = told.address.is_none().then(|| key.clone()).or(told.name.clone());
-                line.cyclic.push(cyclic);
+                model.cyclic.push(cyclic);
                 number
             });
-            share(file, line, at, told);
-            let Some(cyclic) = line.cyclic.get_mut(at) else { continue };
+            share(file, model, at, told);
+            let Some(cyclic) = model.cyclic.get_mut(at) else { continue };
             if let Some(expected) = expected {
-                line.reported.expected.insert(cyclic.label(), expected);
+                model.reported.expected.insert(cyclic.label(), expected);
             }
             let Some(received) = told.received else { continue };
             cyclic.record(Seen::new(received, step.at, None), || Ordered::No);
@@ -62,8 +62,13 @@ pub(super) fn teach(file: &ObservationFile, line: &mut Line, steps: &[Step<'_>])
 }
 
 /// Notes who shares in a datagram, as its FMMUs would.
-fn share(file: &ObservationFile, line: &mut Line, at: usize, told: &ObservedWorkingCounter) {
-    let Some(cyclic) = line.cyclic.get(at) else { return };
+fn share(
+    file: &ObservationFile,
+    model: &mut NetworkModel,
+    at: usize,
+    told: &ObservedWorkingCounter,
+) {
+    let Some(cyclic) = model.cyclic.get(at) else { return };
     let (start, len) = (cyclic.start, cyclic.len);
     let Ok(number) = u8::try_from(FIRST_FMMU + at) else { return };
     let mut shares: BTreeMap<usize, (bool, bool)> = BTreeMap::new();
@@ -84,7 +89,7 @@ fn share(file: &ObservationFile, line: &mut Line, at: usize, told: &ObservedWork
     for (index, (reads, writes)) in shares {
         let whole = FmmuConfig::inputs(start, len, RegisterAddress(0));
         let fmmu = FmmuConfig { reads, writes, ..whole };
-        if let Some(device) = line.devices.get_mut(index) {
+        if let Some(device) = model.devices.get_mut(index) {
             device.fmmus.insert(number, fmmu);
         }
     }

@@ -4,9 +4,9 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::register::AlStatus;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 
-use super::Step;
+use super::TimedReading;
 use super::device::Values;
-use crate::line::{Line, Seen};
+use crate::model::{NetworkModel, Seen};
 
 /// AL status code of an expired watchdog.
 const WATCHDOG: u16 = 0x001B;
@@ -15,8 +15,8 @@ const WATCHDOG: u16 = 0x001B;
 ///
 /// A file does not say what was asked for. Who was in a state without an error was asked to be there; who is
 /// in a lower one later left it by itself, as long as somebody else is still there.
-pub(super) fn teach(line: &mut Line, steps: &[Step<'_>]) {
-    let mut now: Vec<Option<AlState>> = vec![None; line.devices.len()];
+pub(super) fn teach(model: &mut NetworkModel, steps: &[TimedReading<'_>]) {
+    let mut now: Vec<Option<AlState>> = vec![None; model.devices.len()];
     for (number, step) in steps.iter().enumerate() {
         let before = now.clone();
         for (index, read) in &step.devices {
@@ -27,7 +27,7 @@ pub(super) fn teach(line: &mut Line, steps: &[Step<'_>]) {
         }
         let is_last = number + 1 == steps.len();
         for (index, read) in &step.devices {
-            let Some(device) = line.device_mut(DeviceId(*index as u32)) else { continue };
+            let Some(device) = model.device_mut(DeviceId(*index as u32)) else { continue };
             if read.is_absent() {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! Which card of a ring has sent a frame that comes back.
+//! Card of a ring that has sent a frame, found from how it comes back.
 //!
 //! Where cards are told apart, their requests were seen to leave by them; else the second card is known as the
 //! one that sends what the first one has just sent. Controllers leave the source address as it was, but for

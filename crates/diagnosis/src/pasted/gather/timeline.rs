@@ -9,7 +9,7 @@ use jiff::SignedDuration;
 
 use super::super::fact::{Block, Format};
 use super::super::stamp::Stamp;
-use super::When;
+use super::ReadTime;
 use crate::observation_file::Date;
 
 /// Between the last line of a log and the end, in seconds.
@@ -86,7 +86,7 @@ impl Timeline {
         let mut longest: f64 = 0.0;
         for (index, block) in blocks.iter().enumerate() {
             for number in 0..block.facts.len() {
-                if let When::Before(seconds) = line.when(blocks, index, number) {
+                if let ReadTime::Before(seconds) = line.when(blocks, index, number) {
                     longest = longest.max(seconds);
                 }
             }
@@ -107,7 +107,7 @@ impl Timeline {
     }
 
     /// When a fact of a block was.
-    pub(super) fn when(&self, blocks: &[Block], index: usize, number: usize) -> When {
+    pub(super) fn when(&self, blocks: &[Block], index: usize, number: usize) -> ReadTime {
         let block = &blocks[index];
         if !block.format.is_log() {
             let later = blocks[index + 1..]
@@ -115,8 +115,8 @@ impl Timeline {
                 .filter(|other| is_same(other.format, block.format))
                 .count();
             return match later {
-                0 => When::Last,
-                later => When::Before(APART_S * later as f64),
+                0 => ReadTime::Last,
+                later => ReadTime::Before(APART_S * later as f64),
             };
         }
         let since_last = self.stamps[index][number].and_then(|stamp| {
@@ -127,7 +127,7 @@ impl Timeline {
             Some(seconds) => seconds.clamp(0.0, LONGEST_S),
             None => LINE_S * (block.facts.len() - 1 - number) as f64,
         };
-        When::Before(BEFORE_END_S + seconds)
+        ReadTime::Before(BEFORE_END_S + seconds)
     }
 
     /// Whether its times are made up: no line has one that says more than its distance from others.
@@ -136,10 +136,10 @@ impl Timeline {
     }
 
     /// The time as a file gives it.
-    pub(super) fn time(&self, when: When) -> (Option<Date>, Option<f64>) {
+    pub(super) fn time(&self, when: ReadTime) -> (Option<Date>, Option<f64>) {
         let before = match when {
-            When::Last => 0.0,
-            When::Before(seconds) => seconds,
+            ReadTime::Last => 0.0,
+            ReadTime::Before(seconds) => seconds,
         };
         match self.end {
             End::Seconds(end) => (None, Some((end - before).max(0.0))),
@@ -158,13 +158,13 @@ fn is_same(one: Format, other: Format) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::fact::What;
+    use super::super::super::fact::FactKind;
     use super::*;
 
     fn log(stamps: &[Option<Stamp>]) -> Block {
         let mut block = Block::new(Format::KernelLog);
         for stamp in stamps {
-            block.tell_at(*stamp, What::Added(Box::default()));
+            block.tell_at(*stamp, FactKind::Added(Box::default()));
         }
         block
     }
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn uptimes_stay_as_they_are_and_lists_come_after_logs() {
         let mut list = Block::new(Format::Online);
-        list.tell(What::Added(Box::default()));
+        list.tell(FactKind::Added(Box::default()));
         let blocks = [
             list.clone(),
             log(&[Some(Stamp::Uptime(100.5)), None, Some(Stamp::Uptime(200.0))]),

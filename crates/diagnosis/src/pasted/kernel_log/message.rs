@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::fact::{Fact, What};
+use super::super::fact::{Fact, FactKind};
 use super::super::igh_domains::working_counter;
 use super::super::stamp::Stamp;
 use super::super::state_word;
@@ -24,12 +24,12 @@ pub(super) enum Start {
 
 /// What a message of the master tells.
 #[derive(Default, Debug)]
-pub(super) struct Told {
+pub(super) struct LogEvent {
     pub(super) main: ObservedMainDevice,
     pub(super) start: Start,
 }
 
-impl Told {
+impl LogEvent {
     /// Whether it counts what happened since the last such message.
     pub(super) const fn is_count(&self) -> bool {
         self.main.timed_out.is_some()
@@ -78,8 +78,8 @@ pub(super) fn domain(text: &str) -> Option<(u64, Option<u16>, u16)> {
 }
 
 /// A message of the master itself.
-pub(super) fn of_master(text: &str) -> Option<Told> {
-    let mut told = Told::default();
+pub(super) fn of_master(text: &str) -> Option<LogEvent> {
+    let mut told = LogEvent::default();
     const STARTS: [&str; 9] = [
         "Scanning bus",
         "Bus scanning completed",
@@ -241,7 +241,7 @@ impl Domains {
                 let stamp = if is_last && whole.is_none() { end.or(*stamp) } else { *stamp };
                 facts.push(Fact {
                     stamp,
-                    what: What::WorkingCounter(Box::new(counter), Vec::new()),
+                    what: FactKind::WorkingCounter(Box::new(counter), Vec::new()),
                 });
             }
         }

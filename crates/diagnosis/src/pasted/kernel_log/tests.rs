@@ -6,13 +6,13 @@ use super::super::text::lines;
 use super::*;
 use crate::observation_file::Count;
 
-fn facts(text: &str) -> Vec<What> {
+fn facts(text: &str) -> Vec<FactKind> {
     take(&lines(text)).unwrap().facts.into_iter().map(|fact| fact.what).collect()
 }
 
 fn mains(text: &str) -> Vec<ObservedMainDevice> {
     let told = facts(text).into_iter().filter_map(|what| match what {
-        What::Main(main) | What::Added(main) => Some(*main),
+        FactKind::Main(main) | FactKind::Added(main) => Some(*main),
         _ => None,
     });
     told.filter(|main| *main != ObservedMainDevice::default()).collect()
@@ -21,14 +21,14 @@ fn mains(text: &str) -> Vec<ObservedMainDevice> {
 #[test]
 fn senders_of_all_versions_are_told() {
     for (text, expected) in [
-        ("EtherCAT 0: Scanning bus.", Some((From::Master(0), "Scanning bus."))),
+        ("EtherCAT 0: Scanning bus.", Some((MessageSource::Master(0), "Scanning bus."))),
         (
             "EtherCAT WARNING 0: 1 datagram TIMED OUT!",
-            Some((From::Master(0), "1 datagram TIMED OUT!")),
+            Some((MessageSource::Master(0), "1 datagram TIMED OUT!")),
         ),
-        ("EtherCAT ERROR 0-3: x", Some((From::Device(0, 3), "x"))),
-        ("EtherCAT ERROR 1-main-12: x", Some((From::Device(1, 12), "x"))),
-        ("EtherCAT: Master driver 1.5.2", Some((From::Module, "Master driver 1.5.2"))),
+        ("EtherCAT ERROR 0-3: x", Some((MessageSource::Device(0, 3), "x"))),
+        ("EtherCAT ERROR 1-main-12: x", Some((MessageSource::Device(1, 12), "x"))),
+        ("EtherCAT: Master driver 1.5.2", Some((MessageSource::Module, "Master driver 1.5.2"))),
         ("EtherCAT ERROR 0-99999: x", None),
         ("EtherCAT is a field bus: yes", None),
     ] {
@@ -76,7 +76,7 @@ EtherCAT 0-3: Opening ports.
     let read: Vec<_> = told
         .iter()
         .filter_map(|what| match what {
-            What::Read(Whom::Position(position), read) => {
+            FactKind::Read(SubDeviceRef::Position(position), read) => {
                 Some((*position, read.state.as_deref(), read.al_code.map(|code| code.0)))
             }
             _ => None,
@@ -94,7 +94,12 @@ EtherCAT 0-3: Opening ports.
     );
     assert!(told.iter().any(|what| matches!(
         what,
-        What::Abort { whom: Whom::Position(2), index: 0x1C12, subindex: 1, code: 0x0601_0002 }
+        FactKind::Abort {
+            whom: SubDeviceRef::Position(2),
+            index: 0x1C12,
+            subindex: 1,
+            code: 0x0601_0002
+        }
     )));
 }
 
@@ -102,7 +107,7 @@ EtherCAT 0-3: Opening ports.
 fn working_counters_count_from_when_they_were_first_complete() {
     let received = |text: &str| -> Vec<(Option<u16>, Option<u16>)> {
         let told = facts(text).into_iter().filter_map(|what| match what {
-            What::WorkingCounter(counter, _) => Some((counter.received, counter.expected)),
+            FactKind::WorkingCounter(counter, _) => Some((counter.received, counter.expected)),
             _ => None,
         });
         told.collect()

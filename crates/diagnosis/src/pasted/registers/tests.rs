@@ -6,8 +6,8 @@ use crate::observation_file::Count;
 use linesman_proto::port::Port;
 
 fn read(block: &Block, position: u16) -> &ReadDevice {
-    let is_it = |fact: &&super::super::fact::Fact| matches!(&fact.what, What::Read(Whom::Position(at), _) if *at == position);
-    let What::Read(_, read) = &block.facts.iter().find(is_it).unwrap().what else { panic!() };
+    let is_it = |fact: &&super::super::fact::Fact| matches!(&fact.what, FactKind::Read(SubDeviceRef::Position(at), _) if *at == position);
+    let FactKind::Read(_, read) = &block.facts.iter().find(is_it).unwrap().what else { panic!() };
     read
 }
 
@@ -24,23 +24,26 @@ fn commands_of_igh_are_read_as_they_were_typed() {
     let typed = command("user@host:~$ ethercat reg_read -p 3 0x0300 20");
     assert_eq!(
         (typed.asked, typed.start, typed.size),
-        (Asked::One(Of::Position(3)), 0x0300, Some(20))
+        (CommandTarget::One(ReadingSubject::Position(3)), 0x0300, Some(20))
     );
     let typed = command("# sudo ethercat -m 0 reg_read --position=2 -tuint16 0x110");
-    assert_eq!((typed.asked, typed.start), (Asked::One(Of::Position(2)), 0x0110));
+    assert_eq!(
+        (typed.asked, typed.start),
+        (CommandTarget::One(ReadingSubject::Position(2)), 0x0110)
+    );
     assert_eq!(typed.kind.as_deref(), Some("uint16"));
     let typed = command("$ ethercat reg_read -a 1001 768 0x14");
     assert_eq!(
         (typed.asked, typed.start, typed.size),
-        (Asked::One(Of::Alias(1001)), 768, Some(20))
+        (CommandTarget::One(ReadingSubject::Alias(1001)), 768, Some(20))
     );
     for (list, expected) in
         [("$(seq 0 2)", vec![0, 1, 2]), ("{1..2}", vec![1, 2]), ("0 4", vec![0, 4])]
     {
         let text = format!("$ for i in {list}; do ethercat reg_read -p $i 0x0300 20; done");
-        assert_eq!(command(&text).asked, Asked::Each(expected), "{text}");
+        assert_eq!(command(&text).asked, CommandTarget::Each(expected), "{text}");
     }
-    assert_eq!(command("$ ethercat reg_read -p $N 0x0300 20").asked, Asked::Counting);
+    assert_eq!(command("$ ethercat reg_read -p $N 0x0300 20").asked, CommandTarget::Counting);
     for text in ["reg_read", "ethercat reg_read 0x0300 20", "we ran reg_read -p 1", ""] {
         assert_eq!(super::command(text), None, "{text}");
     }
@@ -59,7 +62,9 @@ fn several_commands_are_one_round_until_one_is_repeated() {
     let ports = read(&block, 1).ports.all();
     let b = ports[Port::B].as_ref().unwrap();
     assert_eq!((b.physical, b.lost_link, b.link), (Some(Count(9)), Some(Count(2)), Some(true)));
-    let What::About(_, about) = &block.facts[2].what else { panic!("{:?}", block.facts) };
+    let FactKind::SubDeviceFact(_, about) = &block.facts[2].what else {
+        panic!("{:?}", block.facts)
+    };
     assert!(about.open.unwrap()[Port::A], "the wiring follows from the open ports");
     assert_eq!(block.kind, Some(MainDeviceKind::Igh));
     assert_eq!(take(&all[7..]).unwrap().lines, 2, "a minute later");
@@ -109,7 +114,10 @@ fn lines_of_programs_name_the_subdevice_and_the_register() {
         assert_eq!(block.kind, None);
     }
     let block = take(&lines(&format!("0x1002 0x0300: {bytes}"))).unwrap();
-    assert!(matches!(&block.facts[1].what, What::Read(Whom::Named(_, Some(0x1002)), _)));
+    assert!(matches!(
+        &block.facts[1].what,
+        FactKind::Read(SubDeviceRef::Named(_, Some(0x1002)), _)
+    ));
     let python = "slave 2 0x0300: b'\\x00\\x00\\x05\\t\\x00\\x00\\x00\\x00'";
     assert_eq!(frames(&take(&lines(python)).unwrap(), 1, Port::B), Some(5));
 }

@@ -5,17 +5,17 @@
 use super::super::text::lines;
 use super::*;
 
-fn read(block: &Block) -> Vec<(Whom, ReadDevice)> {
+fn read(block: &Block) -> Vec<(SubDeviceRef, ReadDevice)> {
     let read = block.facts.iter().filter_map(|fact| match &fact.what {
-        What::Read(whom, read) => Some((whom.clone(), (**read).clone())),
+        FactKind::Read(whom, read) => Some((whom.clone(), (**read).clone())),
         _ => None,
     });
     read.collect()
 }
 
-fn about(block: &Block) -> Vec<About> {
+fn about(block: &Block) -> Vec<SubDeviceFact> {
     let about = block.facts.iter().filter_map(|fact| match &fact.what {
-        What::About(_, about) => Some((**about).clone()),
+        FactKind::SubDeviceFact(_, about) => Some((**about).clone()),
         _ => None,
     });
     about.collect()
@@ -102,13 +102,13 @@ fn tables_of_registers_without_names_are_read() {
     let text = "\tReg: 0300\tReg: 0302\tReg: 0304\nslave 1\t✓ 0x0000\t0x0000\t0x0000\nslave 2\t0xA05\t0x0012\t0x0412\n";
     let block = take(&lines(text)).unwrap();
     let registers = read(&block);
-    assert_eq!(registers[1].0, Whom::Position(1));
+    assert_eq!(registers[1].0, SubDeviceRef::Position(1));
     assert_eq!(frames(&registers[1].1), [Some(5), Some(0x12), Some(0x12), None]);
     let ports = "\tCRC port 0\tCRC port 1\tCRC port 2\tCRC port 3\nslave 6\t0x00\t0x00\t0x13\t\n";
     let by_port = read(&take(&lines(ports)).unwrap());
     assert_eq!(
         (by_port[0].0.clone(), frames(&by_port[0].1)),
-        (Whom::Position(5), vec![Some(0), Some(0), Some(0x13), None])
+        (SubDeviceRef::Position(5), vec![Some(0), Some(0), Some(0x13), None])
     );
 }
 
@@ -125,7 +125,7 @@ fn frames_beneath_the_list_are_read_with_both_kinds() {
     let text = "Actual State:\tOP\nCounter\tCyclic\tQueued\nSend Frames\t19738\t+ 1272\nFrames / sec\t500\t+ 19\n\
         Lost Frames\t3 (9)\t+ 2\nTx/Rx Errors\t0\t/ 12\n";
     let block = take_frames(&lines(text)).unwrap();
-    let What::Main(main) = &block.facts[0].what else { panic!() };
+    let FactKind::Main(main) = &block.facts[0].what else { panic!() };
     assert_eq!((main.sent, main.lost), (Some(Count(21_010)), Some(Count(5))));
     assert_eq!((main.send_errors, main.crc), (Some(Count(0)), Some(Count(12))));
     assert_eq!(block.lines, 6);

@@ -11,19 +11,19 @@ use crate::finding::{Condition, Evidence, LinkDirection, Place, Symptom};
 /// The links of both cards, as far as they were lost.
 pub(super) fn lost<'v>(view: &'v View<'_>) -> impl Iterator<Item = Condition> + 'v {
     // Whoever drives the line says more of a link that it never had.
-    let paths = Path::ALL.into_iter().filter(|_| !view.line.sees_all_orders);
+    let paths = Path::ALL.into_iter().filter(|_| !view.model.sees_all_orders);
     paths.filter_map(|path| of(view, path))
 }
 
 fn of(view: &View<'_>, path: Path) -> Option<Condition> {
-    let line = view.line;
-    let card = line.host.card(path);
+    let model = view.model;
+    let card = model.host.card(path);
     let (since, carrier) = (card.carrier_lost?, card.carrier?);
     let back = carrier.value.then_some(carrier.at);
     // It went, and it came.
     let is_repeated = card.carrier_changes.div_ceil(2) >= AGAIN;
     let place = Place::Link {
-        network: line.network,
+        network: model.network,
         a: End::MainDevice(path),
         b: None,
         direction: Some(LinkDirection::Both),
@@ -45,7 +45,7 @@ fn of(view: &View<'_>, path: Path) -> Option<Condition> {
         .shown_by(Evidence::host(Some(since), text))
         .about([Symptom::NoCarrier])
         .explaining([Symptom::FramesLost, Symptom::CardErrors, Symptom::NobodyAnswers])
-        .explaining(line.devices.iter().flat_map(|device| {
+        .explaining(model.devices.iter().flat_map(|device| {
             let id = device.id;
             [
                 Symptom::Silent(id),

@@ -5,36 +5,36 @@ use linesman_proto::register::table;
 
 use super::{PAGE, first_device};
 use crate::finding::{Condition, Evidence, Place};
-use crate::line::{Device, Line, Seen, Silence};
+use crate::model::{Device, NetworkModel, Seen, Silence};
 
 /// How many SubDevices, the first of the line among them, were given their station addresses anew after a silence: they
 /// had lost them, and their supply.
-pub(super) fn others_with(line: &Line, silence: &Silence) -> Option<(usize, Seen<()>)> {
+pub(super) fn others_with(model: &NetworkModel, silence: &Silence) -> Option<(usize, Seen<()>)> {
     let ended = silence.ended?;
     let lost = |device: &Device| device.lost_address.filter(|seen| seen.at >= ended);
-    let first = first_device(line).unwrap_or_default();
-    let seen = line.device(first).and_then(lost)?;
-    Some((line.devices.iter().filter_map(lost).count(), seen))
+    let first = first_device(model).unwrap_or_default();
+    let seen = model.device(first).and_then(lost)?;
+    Some((model.devices.iter().filter_map(lost).count(), seen))
 }
 
 /// Nothing came back while the first SubDevice had no supply.
 pub(super) fn without_supply(
-    line: &Line,
+    model: &NetworkModel,
     silence: &Silence,
     count: usize,
     seen: Seen<()>,
 ) -> Condition {
-    let first = first_device(line).unwrap_or_default();
-    let place = Place::device(line.network, first);
+    let first = first_device(model).unwrap_or_default();
+    let place = Place::device(model.network, first);
     let text = format!(
         "{count} SubDevices, {} the first of them, were given their station addresses anew after it: they had started \
          anew",
-        line.label(first)
+        model.label(first)
     );
     Condition::new(&PAGE, place, FaultName::BrownOut, silence.since.at)
         .confidence(0.5)
         .or(FaultName::DeviceOff, 0.2)
         .or(FaultName::SupplyOff, 0.2)
         .shown_by(Evidence::register(first, table::STATION_ADDRESS.address, &seen, text))
-        .advise(format!("Measure the supply of {} under load.", line.label(first)))
+        .advise(format!("Measure the supply of {} under load.", model.label(first)))
 }

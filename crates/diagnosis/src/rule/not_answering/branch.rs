@@ -4,7 +4,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Link, Tree};
 
-use crate::line::{Absence, Device, Line, Seen};
+use crate::model::{Absence, Device, NetworkModel, Seen};
 use crate::rule::View;
 use crate::rule::link_lost::is_on_terminal_bus;
 
@@ -43,48 +43,48 @@ pub(super) struct Branch {
 
 /// All branches that are silent as a whole, or were a moment ago, while whoever is before them answers.
 pub(super) fn silent_branches(view: &View<'_>) -> Vec<Branch> {
-    let line = view.line;
+    let model = view.model;
     let away: Vec<Option<Absence>> =
-        line.devices.iter().map(|device| absence(view, device)).collect();
+        model.devices.iter().map(|device| absence(view, device)).collect();
     let is_silent = |id: &DeviceId| away.get(id.index()).is_some_and(Option::is_some);
     // How many answer says the same, and where.
-    if counts_all(line, &away) || line.reported.answering.is_some() {
+    if counts_all(model, &away) || model.reported.answering.is_some() {
         return Vec::new();
     }
-    let branches = match line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) {
-        Some(tree) => in_tree(line, tree, &is_silent, &away),
-        None => in_order(line, &is_silent, &away),
+    let branches = match model.tree.as_ref().filter(|tree| tree.len() <= model.devices.len()) {
+        Some(tree) => in_tree(model, tree, &is_silent, &away),
+        None => in_order(model, &is_silent, &away),
     };
-    branches.into_iter().filter(|branch| !is_up(line, branch)).collect()
+    branches.into_iter().filter(|branch| !is_up(model, branch)).collect()
 }
 
 impl Branch {
     /// Whether one of them has started anew since: it was without supply, and no link that opens does that.
-    pub(super) fn was_without_supply(&self, line: &Line) -> bool {
-        let has_restarted = |id: &DeviceId| line.device(*id).is_some_and(Device::has_restarted);
+    pub(super) fn was_without_supply(&self, model: &NetworkModel) -> bool {
+        let has_restarted = |id: &DeviceId| model.device(*id).is_some_and(Device::has_restarted);
         self.ended.is_some() && self.devices.iter().any(has_restarted)
     }
 }
 
 /// Whether broadcasts went on counting all: who still counts is there, and has lost its address.
-fn counts_all(line: &Line, away: &[Option<Absence>]) -> bool {
-    let traffic = &line.traffic;
+fn counts_all(model: &NetworkModel, away: &[Option<Absence>]) -> bool {
+    let traffic = &model.traffic;
     let (Some(now), Some(read)) = (traffic.broadcast_now, traffic.broadcast_read) else {
         return false;
     };
     let since = || away.iter().flatten().map(|absence| absence.since.at);
     // Who was not asked again since all were counted may have come back with them.
-    let lasts = away.iter().zip(&line.devices).any(|(absence, device)| {
+    let lasts = away.iter().zip(&model.devices).any(|(absence, device)| {
         absence.is_some_and(|absence| absence.ended.is_none())
             && device.last_unanswered.is_none_or(|last| last >= now.at)
     });
-    usize::from(now.value) >= line.devices.len()
+    usize::from(now.value) >= model.devices.len()
         && since().max().is_some_and(|latest| read >= latest)
         && (lasts || since().min().is_some_and(|first| now.at < first))
 }
 
 fn in_tree(
-    line: &Line,
+    model: &NetworkModel,
     tree: &Tree,
     is_silent: &dyn Fn(&DeviceId) -> bool,
     away: &[Option<Absence>],
@@ -104,7 +104,7 @@ fn in_tree(
         Some(Branch {
             link: Some(link),
             passed_to: None,
-            is_on_terminal_bus: is_on_terminal_bus(line, head),
+            is_on_terminal_bus: is_on_terminal_bus(model, head),
             since: since(away, &devices)?,
             ended: ended(away, &devices),
             devices,
@@ -116,14 +116,14 @@ fn in_tree(
 /// Where nobody has seen the wiring: those that follow upon one another in the order of positions, which is that in which
 /// frames reach them, so that all behind a link do. Somebody before them answers.
 fn in_order(
-    line: &Line,
+    model: &NetworkModel,
     is_silent: &dyn Fn(&DeviceId) -> bool,
     away: &[Option<Absence>],
 ) -> Vec<Branch> {
     let is_away = |device: &Device| is_silent(&device.id);
     // Of whom nothing was heard and who was not asked nobody knows.
     let is_known = |device: &&Device| is_away(device) || device.answered.is_some();
-    let known: Vec<&Device> = line.devices.iter().filter(is_known).collect();
+    let known: Vec<&Device> = model.devices.iter().filter(is_known).collect();
     let runs = known.chunk_by(|one, next| is_away(one) == is_away(next));
     let silent = runs.skip(1).filter(|run| run.first().is_some_and(|first| is_away(first)));
     let branch = |run: &[&Device]| {
@@ -143,9 +143,9 @@ fn in_order(
 /// Those that stay silent though frames go through the first of them, to others that have answered since: they have their
 /// supply, and not their station addresses.
 pub(super) fn passed(view: &View<'_>) -> Vec<Branch> {
-    let line = view.line;
+    let model = view.model;
     let lasting = |device: &Device| absence(view, device).filter(|one| one.ended.is_none());
-    let away: Vec<Option<Absence>> = line.devices.iter().map(lasting).collect();
+    let away: Vec<Option<Absence>> = model.devices.iter().map(lasting).collect();
     let is_silent = |id: DeviceId| away.get(id.index()).is_some_and(Option::is_some);
     let group = |head: DeviceId, behind: &mut dyn Iterator<Item = DeviceId>| {
         let head_since = away.get(head.index()).copied().flatten()?.since;
@@ -155,7 +155,7 @@ pub(super) fn passed(view: &View<'_>) -> Vec<Branch> {
                 devices.push(id);
                 continue;
             }
-            let answered = line.device(id).and_then(|device| device.answered);
+            let answered = model.device(id).and_then(|device| device.answered);
             let later = answered.filter(|seen| seen.at > head_since.at + ANSWERS_LATE);
             passed_to = passed_to.or(later.map(|seen| (id, seen)));
         }
@@ -165,7 +165,7 @@ pub(super) fn passed(view: &View<'_>) -> Vec<Branch> {
         Some(Branch { link, passed_to, is_on_terminal_bus, devices, since, ended })
     };
     let id = |node: usize| DeviceId(node as u32);
-    match line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len()) {
+    match model.tree.as_ref().filter(|tree| tree.len() <= model.devices.len()) {
         Some(tree) if tree.closes_at().is_some() => Vec::new(),
         Some(tree) => {
             let is_head = |node: &usize| {
@@ -179,9 +179,9 @@ pub(super) fn passed(view: &View<'_>) -> Vec<Branch> {
         // Whatever hangs on what, frames go through the first one to all others: of those that follow upon it and are
         // silent with it nobody knows more.
         None => {
-            let all = line.devices.iter().map(|device| device.id);
-            let mut all =
-                all.skip_while(|id| !is_silent(*id) && line.devices[id.index()].answered.is_none());
+            let all = model.devices.iter().map(|device| device.id);
+            let mut all = all
+                .skip_while(|id| !is_silent(*id) && model.devices[id.index()].answered.is_none());
             let head = all.next().filter(|head| is_silent(*head));
             head.and_then(|head| group(head, &mut all)).into_iter().collect()
         }
@@ -202,9 +202,9 @@ fn ended(away: &[Option<Absence>], devices: &[DeviceId]) -> Option<Instant> {
 
 /// Whether the near end says, after all fell silent, that the link is there, or that it is not: then another rule
 /// tells of it.
-fn is_up(line: &Line, branch: &Branch) -> bool {
+fn is_up(model: &NetworkModel, branch: &Branch) -> bool {
     let Some(End::Controller(id, _)) = branch.link.map(|link| link.upstream) else { return false };
-    let dl = line.device(id).map(|device| &device.dl).filter(|dl| !dl.is_assumed);
+    let dl = model.device(id).map(|device| &device.dl).filter(|dl| !dl.is_assumed);
     let read = dl.and_then(|dl| dl.latest_reading);
     read.is_some_and(|read| read >= branch.since.at)
 }

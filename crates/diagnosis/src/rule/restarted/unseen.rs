@@ -9,24 +9,24 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{RESTARTED, TOGETHER, follows_from_restart};
 use crate::finding::{Condition, Evidence, Place, Symptom};
-use crate::line::{AlChange, Device, Line, Seen};
+use crate::model::{AlChange, Device, NetworkModel, Seen};
 
 /// An absence that is heard for so long is more than a dip of a supply.
 const LONG_HEARD: Span = Span::s(1);
 
 /// One finding for all that have lost their addresses at about the same time.
-pub(super) fn restarted(line: &Line) -> Option<Condition> {
+pub(super) fn restarted(model: &NetworkModel) -> Option<Condition> {
     let has_no_fall = |device: &Device| !device.al.changes.iter().any(AlChange::is_own_fall);
     let unseen = |device: &Device| {
         let seen = device.lost_address.filter(|_| has_no_fall(device))?;
         Some((device.id, seen))
     };
-    let all: Vec<(DeviceId, Seen<()>)> = line.devices.iter().filter_map(unseen).collect();
+    let all: Vec<(DeviceId, Seen<()>)> = model.devices.iter().filter_map(unseen).collect();
     let latest = all.iter().map(|(_, seen)| seen.at).max()?;
     let together: Vec<(DeviceId, Seen<()>)> =
         all.into_iter().filter(|(_, seen)| seen.at + TOGETHER >= latest).collect();
     let (first, seen) = *together.first()?;
-    let label = line.label(first);
+    let label = model.label(first);
     let others = match together.len() {
         1 => String::new(),
         count => format!(" and {} others", count - 1),
@@ -35,9 +35,9 @@ pub(super) fn restarted(line: &Line) -> Option<Condition> {
         "{label}{others} had no station address while others exchanged process data, and was given one anew: it has \
          started anew, and an open link does not do that"
     );
-    let silent = line.device(first).and_then(|device| device.absences.back());
+    let silent = model.device(first).and_then(|device| device.absences.back());
     let heard_since = silent.map_or(seen.at, |absence| absence.since.at.min(seen.at));
-    let since = uncounted(line, together.len(), seen.at).unwrap_or(heard_since).min(heard_since);
+    let since = uncounted(model, together.len(), seen.at).unwrap_or(heard_since).min(heard_since);
     // Who joined late has seen the last of it: it may have lasted longer.
     let was_long = seen.at.since(since) >= LONG_HEARD;
     let (cause, others) = match (was_long, together.len() > 1) {
@@ -54,7 +54,7 @@ pub(super) fn restarted(line: &Line) -> Option<Condition> {
             (FaultName::BrownOut, [(FaultName::DeviceOff, 0.2), (FaultName::SupplyOff, 0.1)])
         }
     };
-    let place = Place::device(line.network, first);
+    let place = Place::device(model.network, first);
     let ids = || together.iter().map(|(id, _)| *id);
     let mut condition = Condition::new(&RESTARTED, place, cause, since)
         .confidence(0.45)
@@ -67,15 +67,15 @@ pub(super) fn restarted(line: &Line) -> Option<Condition> {
         .advise("Measure the supply of this SubDevice under load, at its terminals.")
         .advise("Check plug and clamp of the supply; move them while watching the line.")
         .advise("Look what is switched on at the moments of the restarts.");
-    if let Some(ended) = ended(line, ids()) {
+    if let Some(ended) = ended(model, ids()) {
         condition = condition.ended(ended);
     }
     Some(condition)
 }
 
 /// The time since which `count` SubDevices that came back at `back` were missing when SubDevices were counted.
-fn uncounted(line: &Line, count: usize, back: Instant) -> Option<Instant> {
-    let rise = line.traffic.broadcast_rose?;
+fn uncounted(model: &NetworkModel, count: usize, back: Instant) -> Option<Instant> {
+    let rise = model.traffic.broadcast_rose?;
     let is_same = usize::from(rise.more.value - rise.fewer.value) == count
         && rise.more.at.before(TOGETHER) <= back
         && back <= rise.more.at + TOGETHER;
@@ -83,9 +83,9 @@ fn uncounted(line: &Line, count: usize, back: Instant) -> Option<Instant> {
 }
 
 /// The time when the last of them was seen in OP again.
-fn ended(line: &Line, ids: impl Iterator<Item = DeviceId>) -> Option<Instant> {
+fn ended(model: &NetworkModel, ids: impl Iterator<Item = DeviceId>) -> Option<Instant> {
     let back = ids.map(|id| {
-        let device = line.device(id)?;
+        let device = model.device(id)?;
         let is_back = device.silent.is_none()
             && !device.al.has_error()
             && device.al.state() == Some(AlState::Op);

@@ -6,22 +6,22 @@ use linesman_proto::time::Instant;
 
 use super::{AL_STATUS_CODE, NAMED, SYNC, WATCHDOG, over};
 use crate::finding::{Condition, Evidence, Place, Symptom};
-use crate::line::{AlError, Device, Line};
+use crate::model::{AlError, Device, NetworkModel};
 use crate::rule::View;
 
 /// The errors that stood so, with whom they belong to; none where such errors come while it is listened, which may be
 /// explained by what is heard.
-pub(super) fn errors(line: &Line) -> Vec<(&Device, &AlError)> {
+pub(super) fn errors(model: &NetworkModel) -> Vec<(&Device, &AlError)> {
     let comes_of_absence = |error: &&AlError| {
         // Without its code an error may be of any kind.
         error.code.is_some_and(|code| {
             error.may_be_watchdog() || code.value.explain().class == Class::Timing
         })
     };
-    let is_running = |at: Instant| line.cyclic.iter().any(|cyclic| cyclic.first.at < at);
+    let is_running = |at: Instant| model.cyclic.iter().any(|cyclic| cyclic.first.at < at);
     let is_unseen = |error: &AlError| error.was_left_over() && is_running(error.status.at);
     let mut unseen = Vec::new();
-    for device in &line.devices {
+    for device in &model.devices {
         for error in device.al.errors.iter().filter(comes_of_absence) {
             if !is_unseen(error) {
                 return Vec::new();
@@ -63,7 +63,7 @@ fn missed_frames(condition: Condition) -> Condition {
 
 /// The finding: that it happened, to whom, and what it may have been.
 pub(super) fn condition(view: &View<'_>, unseen: &[(&Device, &AlError)]) -> Option<Condition> {
-    let line = view.line;
+    let model = view.model;
     let since = unseen.iter().map(|(_, error)| error.status.at).min()?;
     let ids = || unseen.iter().map(|(device, _)| device.id);
     let expired = unseen.iter().any(|(_, error)| error.may_be_watchdog());
@@ -71,7 +71,7 @@ pub(super) fn condition(view: &View<'_>, unseen: &[(&Device, &AlError)]) -> Opti
         true => (&WATCHDOG, FaultName::WatchdogStarved),
         false => (&SYNC, FaultName::SyncLost),
     };
-    let names: Vec<String> = ids().take(NAMED).map(|id| line.label(id)).collect();
+    let names: Vec<String> = ids().take(NAMED).map(|id| model.label(id)).collect();
     let more = match unseen.len().saturating_sub(NAMED) {
         0 => String::new(),
         more => format!(" and {more} others"),
@@ -86,7 +86,7 @@ pub(super) fn condition(view: &View<'_>, unseen: &[(&Device, &AlError)]) -> Opti
          was seen, or not seen in the frames",
         names.join(", ")
     );
-    let place = Place::Network { network: line.network };
+    let place = Place::Network { network: model.network };
     let condition = Condition::new(page, place, first, since).confidence(0.3);
     let mut condition = if expired { outage(condition) } else { missed_frames(condition) }
         .confirmed(since)
@@ -106,7 +106,7 @@ pub(super) fn condition(view: &View<'_>, unseen: &[(&Device, &AlError)]) -> Opti
         )
         .advise("Listen from before it happens again: then the frames tell where.");
     if let [(device, _)] = unseen {
-        let place = Place::device(line.network, device.id);
+        let place = Place::device(model.network, device.id);
         condition = condition.or_at(FaultName::SyncLost, place, 0.05);
     }
     condition.evidence.extend(unseen.iter().take(NAMED).filter_map(|(device, error)| {

@@ -8,13 +8,13 @@ use linesman_proto::topology::End;
 
 use super::PLUGGED;
 use crate::finding::{Condition, Evidence, Place, Symptom};
-use crate::line::{Device, Line, Seen};
+use crate::model::{Device, NetworkModel, Seen};
 
 /// The port by which frames come in, where it is not the one that should be: that has no link, another one has, and
 /// the SubDevice answers. Not in a ring, whose SubDevices are reached from both sides.
-pub(in crate::rule) fn entered_otherwise(line: &Line, device: &Device) -> Option<Port> {
-    let tree = line.tree.as_ref();
-    let traffic = &line.traffic;
+pub(in crate::rule) fn entered_otherwise(model: &NetworkModel, device: &Device) -> Option<Port> {
+    let tree = model.tree.as_ref();
+    let traffic = &model.traffic;
     let is_ring = tree
         .is_some_and(|tree| tree.closes_at().is_some() || tree.first(Path::B).is_some())
         || traffic.was_processed_by_one
@@ -22,58 +22,58 @@ pub(in crate::rule) fn entered_otherwise(line: &Line, device: &Device) -> Option
     let status = device.dl.last?;
     // It was asked by the frame that showed its links; a list tells both at the same time.
     let is_there = device.answered.is_some() && device.silent.is_none();
-    let wanted = wanted(line, device);
+    let wanted = wanted(model, device);
     // Where positions may have moved, a plan with another entry is for the comparison with it.
     if is_ring || !is_there || (wanted != Port::A && traffic.frames > 0) {
         return None;
     }
     let has_link = |port: Port| status.value.port_state(port).link;
     let mut others = Port::ALL.into_iter().filter(|port| *port != wanted && has_link(*port));
-    let is_known = |port: &Port| is_free(line, device, *port);
+    let is_known = |port: &Port| is_free(model, device, *port);
     let first = others.clone().next()?;
     (!has_link(wanted)).then(|| others.find(is_known).unwrap_or(first))
 }
 
 /// The port by which it should be entered.
-fn wanted(line: &Line, device: &Device) -> Port {
+fn wanted(model: &NetworkModel, device: &Device) -> Port {
     let tree =
-        line.tree.as_ref().filter(|tree| line.tree_is_planned && device.id.index() < tree.len());
+        model.tree.as_ref().filter(|tree| model.tree_is_planned && device.id.index() < tree.len());
     tree.map_or(Port::A, |tree| tree.entry(device.id.index()))
 }
 
 /// Whether nothing is planned at a port.
-fn is_free(line: &Line, device: &Device, port: Port) -> bool {
-    line.opposite(device.id, port).is_none()
+fn is_free(model: &NetworkModel, device: &Device, port: Port) -> bool {
+    model.opposite(device.id, port).is_none()
 }
 
 /// SubDevices that are plugged in the wrong way round, as their links tell.
-pub(super) fn conditions(line: &Line, known: &[Condition]) -> Vec<Condition> {
-    let reversed = line.devices.iter().filter_map(|device| {
-        let entry = entered_otherwise(line, device)?;
-        let place = Place::device(line.network, device.id);
+pub(super) fn conditions(model: &NetworkModel, known: &[Condition]) -> Vec<Condition> {
+    let reversed = model.devices.iter().filter_map(|device| {
+        let entry = entered_otherwise(model, device)?;
+        let place = Place::device(model.network, device.id);
         let is_told = known.iter().any(|one| one.page.code == PLUGGED.code && one.place == place);
-        (!is_told).then(|| condition(line, device, entry, place))
+        (!is_told).then(|| condition(model, device, entry, place))
     });
     reversed.collect()
 }
 
-fn condition(line: &Line, device: &Device, entry: Port, place: Place) -> Condition {
-    let (id, label, wanted) = (device.id, line.label(device.id), wanted(line, device));
-    let above = line.opposite(id, wanted);
+fn condition(model: &NetworkModel, device: &Device, entry: Port, place: Place) -> Condition {
+    let (id, label, wanted) = (device.id, model.label(device.id), wanted(model, device));
+    let above = model.opposite(id, wanted);
     let is_first = matches!(above, Some(End::MainDevice(_)));
     let (cause, other) = if is_first {
         (FaultName::MainDeviceWrongPort, FaultName::PortsSwapped)
     } else {
         (FaultName::PortsSwapped, FaultName::DevicesSwapped)
     };
-    let at = device.dl.last.map_or(line.now, |status| status.at);
+    let at = device.dl.last.map_or(model.now, |status| status.at);
     let frame = device.dl.last.and_then(|status| status.frame);
     let text =
         format!("{label} answers though port {wanted} has no link: frames come in by port {entry}");
     let seen = Seen::new((), at, frame);
     let shown = Evidence::register(id, table::DL_STATUS.address, &seen, text).port(wanted);
     let ports = [Some(End::Controller(id, wanted)), Some(End::Controller(id, entry)), above];
-    let ends = ports.into_iter().flatten().chain(line.opposite(id, entry));
+    let ends = ports.into_iter().flatten().chain(model.opposite(id, entry));
     let follows = ends.flat_map(|end| match end {
         End::Controller(id, port) => {
             vec![Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)]
@@ -93,8 +93,9 @@ fn condition(line: &Line, device: &Device, entry: Port, place: Place) -> Conditi
 
 /// Whether the device at an end of a link is plugged in the other way round, so that this end says nothing of the
 /// link.
-pub(in crate::rule) fn is_reversed(line: &Line, end: End) -> bool {
+pub(in crate::rule) fn is_reversed(model: &NetworkModel, end: End) -> bool {
     let End::Controller(node, _) = end else { return false };
-    line.device(DeviceId(node as u32))
-        .is_some_and(|device| entered_otherwise(line, device).is_some())
+    model
+        .device(DeviceId(node as u32))
+        .is_some_and(|device| entered_otherwise(model, device).is_some())
 }

@@ -1,4 +1,4 @@
-//! What was found of a line, and whether a comparison with the plan says anything.
+//! Wiring that was found, and whether a comparison with the plan says anything.
 
 use linesman_config::compare::{Comparison, Difference, Side, There, Wanted, compare, unlike};
 use linesman_proto::address::{DeviceId, Path, Position};
@@ -7,32 +7,32 @@ use linesman_proto::time::Instant;
 use linesman_proto::topology::derive::EntryBasis;
 use linesman_proto::topology::{Reconstruction, SeenController};
 
-use super::Found;
-use crate::line::{Device, Line};
+use super::FoundWiring;
+use crate::model::{Device, NetworkModel};
 
-impl<'a> Found<'a> {
-    pub(super) fn of(line: &'a Line) -> Option<Self> {
-        let planned = line.tree.as_ref().filter(|_| line.tree_is_planned)?;
+impl<'a> FoundWiring<'a> {
+    pub(super) fn of(model: &'a NetworkModel) -> Option<Self> {
+        let planned = model.tree.as_ref().filter(|_| model.tree_is_planned)?;
         let is_ring = planned.closes_at().is_some();
-        if !line.devices.iter().any(is_known_to_plan) || (is_ring && !is_closed(line)) {
+        if !model.devices.iter().any(is_known_to_plan) || (is_ring && !is_closed(model)) {
             return None;
         }
         let mut ids: Vec<DeviceId> =
             planned.order().iter().map(|node| DeviceId(*node as u32)).collect();
         ids.extend(
-            line.devices.iter().map(|device| device.id).filter(|id| id.index() >= planned.len()),
+            model.devices.iter().map(|device| device.id).filter(|id| id.index() >= planned.len()),
         );
-        let count = usize::from(line.traffic.positions_seen);
+        let count = usize::from(model.traffic.positions_seen);
         if count == 0 || count > ids.len() {
             return None;
         }
         ids.truncate(count);
         // Where positions have moved, their station addresses tell whose answers they are taken for.
-        let placed = (0..line.traffic.positions_seen).map(|at| line.by_position(Position(at)));
+        let placed = (0..model.traffic.positions_seen).map(|at| model.by_position(Position(at)));
         if let Some(placed) = placed.collect::<Option<Vec<DeviceId>>>() {
             ids = placed;
         }
-        let devices: Vec<&Device> = ids.iter().filter_map(|id| line.device(*id)).collect();
+        let devices: Vec<&Device> = ids.iter().filter_map(|id| model.device(*id)).collect();
         let is_whole = devices.len() == count
             && devices
                 .iter()
@@ -46,7 +46,7 @@ impl<'a> Found<'a> {
         if !errors.is_empty() || tree.detached().next().is_some() {
             return None;
         }
-        let wanted = (0..planned.len()).map(|node| wanted(line.devices.get(node))).collect();
+        let wanted = (0..planned.len()).map(|node| wanted(model.devices.get(node))).collect();
         let there = devices.iter().map(|device| There {
             identity: device.identity.identity(),
             alias: device.alias.map(|alias| alias.value()),
@@ -54,7 +54,7 @@ impl<'a> Found<'a> {
         let latest = devices.iter().filter_map(|device| device.identity.product_code);
         let latest = latest.max_by_key(|seen| seen.at);
         Some(Self {
-            line,
+            model,
             planned,
             wanted,
             there: there.collect(),
@@ -116,9 +116,9 @@ impl<'a> Found<'a> {
 
 /// Whether the ring was seen closed, with everybody in it plugged in the right way round: frames of card A are
 /// processed by all of them, and those of card B by nobody.
-fn is_closed(line: &Line) -> bool {
-    let by = line.traffic.processed_alone.map(|seen| seen.value);
-    line.traffic.was_processed_by_one && by != Some(Path::B)
+fn is_closed(model: &NetworkModel) -> bool {
+    let by = model.traffic.processed_alone.map(|seen| seen.value);
+    model.traffic.was_processed_by_one && by != Some(Path::B)
 }
 
 /// The closed ring that these controllers form. All on its way are entered at port A, since they process the

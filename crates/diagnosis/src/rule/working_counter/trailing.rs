@@ -1,13 +1,13 @@
-//! What is missing, where it is just the share of all behind one link: then the link is open, though nobody polls
-//! links or states.
+//! Deficit of a working counter that equals the share of all behind one link: the link is open, though nobody polls links
+//! or states.
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
 use super::{Suspects, shares};
-use crate::line::{Cyclic, Deficit, Line};
-use crate::locate::way;
+use crate::locate::cut_distance;
+use crate::model::{Cyclic, Deficit, NetworkModel};
 use crate::rule::link_lost::is_on_terminal_bus;
 
 /// Datagrams of one cycle, and of slower ones, lose their shares so soon after each other.
@@ -18,15 +18,15 @@ const ANSWERS_LATE: Span = Span::ms(100);
 const SEVERAL: usize = 2;
 
 /// Links behind which all shares that a deficit lacks belong, most likely first.
-pub(super) fn suspects(line: &Line, deficit: &Deficit) -> Option<Suspects> {
-    let tree = line.tree.as_ref().filter(|tree| tree.len() <= line.devices.len())?;
+pub(super) fn suspects(model: &NetworkModel, deficit: &Deficit) -> Option<Suspects> {
+    let tree = model.tree.as_ref().filter(|tree| tree.len() <= model.devices.len())?;
     let since = deficit.first.at;
-    let until = deficit.ended.unwrap_or(line.now);
+    let until = deficit.ended.unwrap_or(model.now);
     // What was short in several ways was not cut off at one place.
     if deficit.ended.is_some() && deficit.first.value != deficit.lowest {
         return None;
     }
-    let traffic = &line.traffic;
+    let traffic = &model.traffic;
     let counts_all = traffic
         .broadcast_now
         .is_some_and(|now| now.value >= traffic.broadcast_answers)
@@ -39,24 +39,24 @@ pub(super) fn suspects(line: &Line, deficit: &Deficit) -> Option<Suspects> {
     let fits = |node: &usize| {
         let behind = tree.subtree(*node);
         is_between(tree, *node)
-            && !behind.iter().any(|node| is_heard(line, *node, deficit))
-            && !is_link_read(line, tree, *node, (since, until))
-            && (owners(line, behind) >= SEVERAL || gone == Some(behind.len()))
-            && line.cyclic.iter().all(|cyclic| lacks(line, cyclic, behind, since))
+            && !behind.iter().any(|node| is_heard(model, *node, deficit))
+            && !is_link_read(model, tree, *node, (since, until))
+            && (owners(model, behind) >= SEVERAL || gone == Some(behind.len()))
+            && model.cyclic.iter().all(|cyclic| lacks(model, cyclic, behind, since))
     };
     let mut heads: Vec<usize> = tree.order().iter().copied().filter(fits).collect();
     heads.sort_by_key(|node| {
         (
             gone.is_some_and(|gone| gone != tree.subtree(*node).len()),
-            is_on_terminal_bus(line, *node),
+            is_on_terminal_bus(model, *node),
         )
     });
-    way::keep_fitting(line, tree, &mut heads, since);
+    cut_distance::keep_fitting(model, tree, &mut heads, since);
     let links: Vec<usize> = heads.iter().filter_map(|node| tree.link_above(*node)).collect();
     let behind = tree.subtree(*heads.first()?);
     let devices = behind.iter().map(|node| DeviceId(*node as u32));
     let devices = devices
-        .filter(|id| line.cyclic.iter().any(|one| line.owners(one).any(|own| own.device == *id)));
+        .filter(|id| model.cyclic.iter().any(|one| model.owners(one).any(|own| own.device == *id)));
     Some(Suspects { is_certain: true, devices: devices.collect(), links })
 }
 
@@ -67,8 +67,8 @@ fn is_between(tree: &Tree, node: usize) -> bool {
 }
 
 /// Whether a SubDevice answered in the time of a deficit.
-fn is_heard(line: &Line, node: usize, deficit: &Deficit) -> bool {
-    let (device, from) = (&line.devices[node], deficit.first.at + ANSWERS_LATE);
+fn is_heard(model: &NetworkModel, node: usize, deficit: &Deficit) -> bool {
+    let (device, from) = (&model.devices[node], deficit.first.at + ANSWERS_LATE);
     match deficit.ended {
         None => device.answered.is_some_and(|answered| answered.at > from),
         Some(ended) => device.heard_short.is_some_and(|heard| from < heard && heard <= ended),
@@ -76,23 +76,28 @@ fn is_heard(line: &Line, node: usize, deficit: &Deficit) -> bool {
 }
 
 /// Whether the near end told of its link since: then that is known, and other rules tell.
-fn is_link_read(line: &Line, tree: &Tree, node: usize, (since, until): (Instant, Instant)) -> bool {
+fn is_link_read(
+    model: &NetworkModel,
+    tree: &Tree,
+    node: usize,
+    (since, until): (Instant, Instant),
+) -> bool {
     let Some(End::Controller(near, _)) = tree.upstream(node) else { return false };
-    let dl = &line.devices[near].dl;
+    let dl = &model.devices[near].dl;
     !dl.is_assumed && dl.latest_reading.is_some_and(|read| since <= read && read <= until)
 }
 
-fn owners(line: &Line, behind: &[usize]) -> usize {
+fn owners(model: &NetworkModel, behind: &[usize]) -> usize {
     let is_owner = |node: &&usize| {
-        let mut owned = line.cyclic.iter().flat_map(|cyclic| line.owners(cyclic));
+        let mut owned = model.cyclic.iter().flat_map(|cyclic| model.owners(cyclic));
         owned.any(|owner| owner.device.index() == **node)
     };
     behind.iter().filter(is_owner).count()
 }
 
 /// Whether a datagram lacks just the shares of all that is behind, or nothing where they have none in it.
-fn lacks(line: &Line, cyclic: &Cyclic, behind: &[usize], since: Instant) -> bool {
-    let own = line.owners(cyclic).filter(|owner| behind.contains(&owner.device.index()));
+fn lacks(model: &NetworkModel, cyclic: &Cyclic, behind: &[usize], since: Instant) -> bool {
+    let own = model.owners(cyclic).filter(|owner| behind.contains(&owner.device.index()));
     let share: u16 = own.filter_map(|owner| shares(cyclic, &owner).first().copied()).sum();
     let then = cyclic.deficits.iter().rev().find(|deficit| {
         let at = deficit.first.at;

@@ -1,7 +1,7 @@
 //! Questions beside another MainDevice: refused before anything is sent where that may do harm, and told of.
 
 use linesman_diagnosis::Engine;
-use linesman_diagnosis::ask::{AskSetup, News, Over, Refusal};
+use linesman_diagnosis::ask::{AskRefusal, AskSetup, EndReason, News};
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
 use linesman_runtime::asking::Asking;
@@ -16,7 +16,7 @@ pub(super) const PER_S: u64 = 20;
 pub(super) fn open(names: &[String], clock: HostClock, setup: AskSetup) -> Result<Asking, Failure> {
     match names {
         [name] => Ok(Asking::open(name, clock, setup)?),
-        _ => Err(refused(names, Refusal::Ring)),
+        _ => Err(refused(names, AskRefusal::Ring)),
     }
 }
 
@@ -37,8 +37,8 @@ pub(super) fn turn(
                  once it has run steadily for a while"
             ));
         }
-        Some(News::Over(Over::Refused(refusal))) => return Ok(Some(refused(names, refusal))),
-        Some(News::Over(over)) => {
+        Some(News::Ended(EndReason::Refused(refusal))) => return Ok(Some(refused(names, refusal))),
+        Some(News::Ended(over)) => {
             output.warn(&format!(
                 "listen:{name}: nothing is asked any more: {}; listening goes on",
                 over.reason()
@@ -48,7 +48,7 @@ pub(super) fn turn(
     Ok(None)
 }
 
-fn refused(names: &[String], refusal: Refusal) -> Failure {
+fn refused(names: &[String], refusal: AskRefusal) -> Failure {
     let name = names.join("+");
     let reason = format!("listen:{name}: nothing is asked: {refusal}");
     Failure::new(reason, refusal.next_step())

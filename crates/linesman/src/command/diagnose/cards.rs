@@ -117,7 +117,7 @@ impl Audience for Looking<'_> {
         self.session.follow(&mut self.engine, self.output);
         self.session.look_at_recording(self.recorder.as_ref(), self.output);
         while let Some(probe) = self.engine.poll_probe() {
-            let line = self.engine.line(probe.network);
+            let line = self.engine.model(probe.network);
             let station = line.and_then(|line| line.device(probe.device)?.station);
             // Who has no address yet cannot be asked.
             let Some(station) = station else { continue };

@@ -39,7 +39,7 @@ pub(super) fn judge(input: Input, session: &mut Session) -> Result<Judged, Failu
     setup.input = InputKind::Typed;
     let engine = file.judged(setup.clone());
     let names = super::names(&engine);
-    let line = engine.line(Network(0)).filter(|_| file.has_times());
+    let line = engine.model(Network(0)).filter(|_| file.has_times());
     let at = line.map_or(Instant::ZERO, |line| line.now);
     Ok(Judged { engine, names, at })
 }

@@ -1,0 +1,164 @@
+//! Mailbox traffic of one controller, as far as it tells of trouble.
+
+use std::collections::VecDeque;
+
+use linesman_proto::mailbox::coe::ObjectAddress;
+use linesman_proto::mailbox::coe::diagnosis::Severity;
+use linesman_proto::mailbox::error_reply::ErrorReplyCode;
+use linesman_proto::time::{Instant, Span};
+
+use super::{Seen, push_kept};
+
+/// From so long on an answer is worth a word. SubDevices answer within some ms.
+pub const NOTABLE: Span = Span::ms(100);
+/// From so long on an answer is slow; MainDevices wait some seconds.
+pub const SLOW: Span = Span::ms(300);
+
+/// A mailbox over time.
+#[derive(Clone, Default, Debug)]
+pub struct MailboxHistory {
+    /// The request that was taken and is not answered yet, by its object, where it names one.
+    pub waiting: Option<Seen<Option<ObjectAddress>>>,
+    /// Whether the latest request that was taken reads all entries of an object at once (complete access).
+    pub reads_whole: bool,
+    /// When somebody last looked for an answer.
+    pub polled: Option<Instant>,
+    /// Since when, and until when, requests are not taken; `None` when the latest one was.
+    pub full: Option<(Seen<()>, Instant)>,
+    /// Since when, and until when, the mailbox for requests was read full (SyncManager 0, 0x0805): nobody fetches what is
+    /// in it. `None` when it was last read empty, or took a request since.
+    pub unfetched: Option<(Seen<()>, Instant)>,
+    /// Stretches of time without an answer, or without a request being taken, that are over: from, to.
+    pub stuck: VecDeque<(Instant, Instant)>,
+    /// Requests that were refused, oldest first.
+    pub refusals: VecDeque<Seen<MailboxRefusal>>,
+    /// Answers that took [`NOTABLE`] or longer, oldest first.
+    pub slow: VecDeque<Seen<SlowAnswer>>,
+    /// Messages of the diagnosis history (object 0x10F3) in the order in which they were read.
+    pub messages: VecDeque<Seen<HistoryMessage>>,
+}
+
+/// A request that a SubDevice refused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum MailboxRefusal {
+    /// An SDO was aborted.
+    Abort {
+        /// Of this object.
+        object: ObjectAddress,
+        /// With this code.
+        code: u32,
+        /// Whether all its entries were to be read at once, as far as the request was seen.
+        reads_whole: bool,
+    },
+    /// The mailbox itself answered with an error.
+    Error(ErrorReplyCode),
+}
+
+/// An answer that came late.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SlowAnswer {
+    /// What was asked for, where the request names an object.
+    pub object: Option<ObjectAddress>,
+    /// When it was asked.
+    pub asked: Instant,
+}
+
+/// A message of a diagnosis history.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct HistoryMessage {
+    /// The code.
+    pub code: u32,
+    /// How serious the SubDevice takes it.
+    pub severity: Severity,
+    /// Number of the text in its description.
+    pub text: u16,
+    /// When it happened by the SubDevice's clock, in ns; 0 when it has none.
+    pub time_ns: u64,
+    /// The parameters as they were sent.
+    pub parameters: Vec<u8>,
+}
+
+impl MailboxHistory {
+    /// A request was taken; one that reads all entries of an object at once, or another one.
+    pub fn asked(
+        &mut self,
+        object: Option<ObjectAddress>,
+        reads_whole: bool,
+        at: Instant,
+        frame: u64,
+    ) {
+        self.reads_whole = reads_whole;
+        if let Some((since, until)) = self.full.take() {
+            self.note_stuck(since.at, until.max(at));
+        }
+        self.fetched();
+        if let Some(waiting) = self.waiting.replace(Seen::new(object, at, Some(frame))) {
+            self.note_stuck(waiting.at, at);
+        }
+    }
+
+    /// A request was not taken: the one before is still in the mailbox.
+    pub fn not_taken(&mut self, at: Instant, frame: u64) {
+        match &mut self.full {
+            Some((_, until)) => *until = at,
+            None => self.full = Some((Seen::new((), at, Some(frame)), at)),
+        }
+    }
+
+    /// The mailbox for requests was read, full or not. Says whether time alone may show that it is stuck.
+    pub fn read_status(&mut self, is_full: bool, at: Instant, frame: u64) -> bool {
+        if !is_full {
+            self.fetched();
+            return false;
+        }
+        let since = self.unfetched.map_or(Seen::new((), at, Some(frame)), |(since, _)| since);
+        self.unfetched = Some((since, at));
+        at.since(since.at) >= STUCK
+    }
+
+    fn fetched(&mut self) {
+        if let Some((since, until)) = self.unfetched.take() {
+            self.note_stuck(since.at, until);
+        }
+    }
+
+    /// An answer came. Says whether it took long enough to be worth a word.
+    pub fn answered(&mut self, at: Instant, frame: u64) -> bool {
+        let Some(waiting) = self.waiting.take() else { return false };
+        if at.since(waiting.at) < NOTABLE {
+            return false;
+        }
+        let slow = SlowAnswer { object: waiting.value, asked: waiting.at };
+        push_kept(&mut self.slow, Seen::new(slow, at, Some(frame)));
+        true
+    }
+
+    /// Whether time alone may show that it is stuck.
+    #[must_use]
+    pub const fn is_open(&self) -> bool {
+        self.waiting.is_some() || self.full.is_some() || self.unfetched.is_some()
+    }
+
+    /// A request was refused.
+    pub fn refused(&mut self, refusal: MailboxRefusal, at: Instant, frame: u64) {
+        push_kept(&mut self.refusals, Seen::new(refusal, at, Some(frame)));
+    }
+
+    /// A message of the diagnosis history was read. Says whether it is new.
+    pub fn note(&mut self, message: HistoryMessage, at: Instant, frame: u64) -> bool {
+        if self.messages.iter().any(|known| known.value == message) {
+            return false;
+        }
+        push_kept(&mut self.messages, Seen::new(message, at, Some(frame)));
+        true
+    }
+
+    fn note_stuck(&mut self, from: Instant, to: Instant) {
+        if to.since(from) >= STUCK {
+            push_kept(&mut self.stuck, (from, to));
+        }
+    }
+}
+
+/// A request that is not taken, or not answered, for so long: the mailbox is stuck.
+pub const STUCK: Span = Span::ms(900);
