@@ -2,7 +2,7 @@
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::topology::End;
-use linesman_sim::device::Trouble;
+use linesman_sim::device::SoftwareFault;
 use linesman_sim::truth::{Effect, Entry, FaultRecord, Place};
 
 use crate::lab::Lab;
@@ -50,7 +50,9 @@ fn is_traceless(lab: &Lab, record: &FaultRecord) -> bool {
             (Effect::SymbolError, Place::Direction(_, End::MainDevice(_))) => true,
             (
                 Effect::Misbehaves(
-                    Trouble::Mismatch(_) | Trouble::FrozenApplication | Trouble::DeafToRequests,
+                    SoftwareFault::Mismatch(_)
+                    | SoftwareFault::FrozenApplication
+                    | SoftwareFault::DeafToRequests,
                 ),
                 Place::Device(id),
             ) => record.is_active() && is_up(*id),

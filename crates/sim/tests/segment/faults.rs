@@ -1,4 +1,4 @@
-//! What each fault does to frames and counters.
+//! Effects of each fault on frames and counters.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{Path, RegisterAddress};

@@ -1,4 +1,5 @@
-//! A controller seen from outside its wires: what the segment, faults and tests ask it and do to it.
+//! Inspection of a controller from outside its wires: what the segment, faults and tests read and
+//! set.
 
 use linesman_proto::address::{DeviceId, RegisterAddress, StationAddress};
 use linesman_proto::mailbox::coe::Emergency;
@@ -11,7 +12,7 @@ use super::esc::Controller;
 use super::memory::at;
 use super::pdi::Pdi;
 use super::watchdog::WatchdogExpiry;
-use crate::device::{Firmware, Refusal, Signals, Trouble};
+use crate::device::{Firmware, Refusal, Signals, SoftwareFault};
 use crate::hardware::Hardware;
 
 impl Controller {
@@ -96,8 +97,8 @@ impl Controller {
     }
 
     /// The software of the device misbehaves from `at` on, or no longer.
-    pub fn trouble(&mut self, at: Instant, trouble: Trouble, begins: bool) {
-        self.firmware.trouble(trouble, begins);
+    pub fn software_fault(&mut self, at: Instant, software_fault: SoftwareFault, begins: bool) {
+        self.firmware.software_fault(software_fault, begins);
         self.core.call_firmware(at);
         self.reschedule();
     }

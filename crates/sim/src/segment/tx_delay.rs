@@ -1,4 +1,4 @@
-//! Frames that a card sends later than it was told to: a busy host, a queue.
+//! Delay of transmitted frames: a busy host, a queue.
 //!
 //! A host keeps back a single frame now and then, before it comes to the card; or the card keeps back all of
 //! them by so much for a while. Either way those behind it wait with it, and it goes on its way when it leaves. A card
@@ -22,7 +22,7 @@ const GAP: usize = 12;
 
 /// How late a card is.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Lateness {
+pub(super) struct TxDelay {
     /// From when on all frames by how much, in the order of time, and whose doing it is.
     all: Vec<(Instant, Span, FaultId)>,
     /// Single frames: the next from an instant on, by how much, and whose doing it is.
@@ -33,7 +33,7 @@ pub(super) struct Lateness {
     held_until: Instant,
 }
 
-impl Lateness {
+impl TxDelay {
     /// A frame leaves at `leaves`, and takes so long: the next one follows after the gap.
     #[inline]
     pub(super) fn sends(&mut self, leaves: Instant, duration: Span) {
@@ -44,73 +44,73 @@ impl Lateness {
 
 /// Frames that wait in the cards, by the time at which they leave.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Waiting(VecDeque<Kept>);
+pub(super) struct DelayedFrames(VecDeque<DelayedFrame>);
 
 /// A frame that waits.
 #[derive(Clone, Debug)]
-struct Kept {
+struct DelayedFrame {
     leaves: Instant,
     path: Path,
     /// Whether who listens was shown it: it has come to the card.
-    was_shown: bool,
+    was_captured: bool,
     bytes: Vec<u8>,
 }
 
 impl Card {
     /// From `at` on frames leave later.
     pub(crate) fn make_late(&mut self, at: Instant, by: Span, fault: FaultId) {
-        self.lateness.all.push((at, by, fault));
+        self.tx_delay.all.push((at, by, fault));
     }
 
     /// The next frame from `at` on leaves later.
     pub(crate) fn delay_next(&mut self, at: Instant, by: Span, fault: FaultId) {
-        self.lateness.single.push_back((at, by, fault));
+        self.tx_delay.single.push_back((at, by, fault));
     }
 
     /// A fault is over: frames leave in time again.
     pub(crate) fn be_in_time(&mut self, at: Instant, fault: FaultId) {
-        if self.lateness.all.last().is_some_and(|(_, _, by)| *by == fault) {
-            self.lateness.all.push((at, Span::ZERO, fault));
+        if self.tx_delay.all.last().is_some_and(|(_, _, by)| *by == fault) {
+            self.tx_delay.all.push((at, Span::ZERO, fault));
         }
     }
 
     /// A fault is healed: what still waits for a frame goes with it.
     pub(super) fn delay_no_more(&mut self, fault: FaultId) {
-        self.lateness.single.retain(|(.., by)| *by != fault);
+        self.tx_delay.single.retain(|(.., by)| *by != fault);
     }
 
     /// Whether a frame that is sent at `now` may have to wait.
     #[inline]
     fn is_late(&self, now: Instant) -> bool {
-        let Lateness { all, single, busy_until, .. } = &self.lateness;
+        let TxDelay { all, single, busy_until, .. } = &self.tx_delay;
         !all.is_empty() || !single.is_empty() || *busy_until > now
     }
 
     /// Whether a frame that is sent at `now` waits in the computer for another one that is kept back there.
     fn is_held_by_host(&self, now: Instant) -> bool {
-        self.lateness.held_until > now
+        self.tx_delay.held_until > now
     }
 
     /// When a frame leaves that is sent at `now`, if not at once, and who keeps it back, unless it
     /// only waits for the one before it. None overtakes another.
     fn keeps_back(&mut self, now: Instant, bytes: usize) -> Option<(Instant, Option<FaultId>)> {
-        let lateness = &mut self.lateness;
-        let passed = lateness.all.partition_point(|(from, ..)| *from <= now);
-        lateness.all.drain(..passed.saturating_sub(1));
-        let all = lateness.all.first().copied();
-        let single = lateness.single.pop_front_if(|(from, ..)| *from <= now);
+        let tx_delay = &mut self.tx_delay;
+        let passed = tx_delay.all.partition_point(|(from, ..)| *from <= now);
+        tx_delay.all.drain(..passed.saturating_sub(1));
+        let all = tx_delay.all.first().copied();
+        let single = tx_delay.single.pop_front_if(|(from, ..)| *from <= now);
         let late =
             all.into_iter().chain(single).filter(|(from, by, _)| *from <= now && *by > Span::ZERO);
         let most = late.max_by_key(|(_, by, _)| *by);
         if let Some((_, by, _)) = single {
-            lateness.held_until = lateness.held_until.max(now + by);
+            tx_delay.held_until = tx_delay.held_until.max(now + by);
         }
-        let leaves = most.map_or(now, |(_, by, _)| now + by).max(lateness.busy_until);
+        let leaves = most.map_or(now, |(_, by, _)| now + by).max(tx_delay.busy_until);
         if leaves <= now {
             return None;
         }
         let len = PREAMBLE_LEN + bytes.max(MIN_LEN) + FCS_LEN;
-        lateness.sends(leaves, Span::ns(len as u64 * BYTE_NS));
+        tx_delay.sends(leaves, Span::ns(len as u64 * BYTE_NS));
         Some((leaves, most.map(|(.., fault)| fault)))
     }
 }
@@ -135,13 +135,13 @@ impl Segment {
             self.world.truth.effect(now, fault, Place::Host(path), effect);
         }
         let is_in_card = !self.world.cards[path.index()].is_held_by_host(now);
-        let was_shown = is_in_card && self.show(now, path, frame);
+        let was_captured = is_in_card && self.capture(now, path, frame);
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
         bytes.extend_from_slice(frame);
         let waiting = &mut self.waiting.0;
         let before = waiting.iter().take_while(|other| other.leaves <= leaves).count();
-        waiting.insert(before, Kept { leaves, path, was_shown, bytes });
+        waiting.insert(before, DelayedFrame { leaves, path, was_captured, bytes });
         true
     }
 
@@ -149,8 +149,10 @@ impl Segment {
     #[inline]
     pub(super) fn send_kept_back(&mut self, now: Instant) {
         while self.waiting.0.front().is_some_and(|kept| kept.leaves <= now) {
-            if let Some(Kept { leaves, path, was_shown, bytes }) = self.waiting.0.pop_front() {
-                self.send(leaves, path, &bytes, was_shown);
+            if let Some(DelayedFrame { leaves, path, was_captured, bytes }) =
+                self.waiting.0.pop_front()
+            {
+                self.send(leaves, path, &bytes, was_captured);
                 self.recycle(bytes);
             }
         }

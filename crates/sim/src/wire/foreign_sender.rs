@@ -1,4 +1,4 @@
-//! Frames that others send: another MainDevice, or computers that know nothing of EtherCAT.
+//! Frames of foreign senders: another MainDevice, or computers that know nothing of EtherCAT.
 //!
 //! They come in through a switch at the begin of a line, wait there while a frame of the card is on
 //! it, and then go the way of all frames: controllers execute a second MainDevice's datagrams, and
@@ -15,15 +15,15 @@ use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::register as r;
 use linesman_proto::time::Instant;
 
-use super::change::Line;
-use super::walk::{Outcome, Traveller};
+use super::change::DirectedLink;
+use super::walk::{FrameInTransit, Outcome};
 use super::world::World;
 use crate::frame::{Damage, WireFrame};
 use crate::truth::{Effect, FaultId};
 
-/// What a stranger sends.
+/// What a foreign sender sends.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Stranger {
+pub enum ForeignSender {
     /// Another MainDevice looks who is there, and reads their states: `nth` of its frames.
     Scan {
         /// Which of its frames, from 0.
@@ -49,7 +49,7 @@ pub enum Stranger {
     Lldp,
 }
 
-impl Stranger {
+impl ForeignSender {
     /// The sender's address: a locally administered one would already have the bit that the first
     /// controller sets.
     const MAC: MacAddress = MacAddress([0x00, 0x1B, 0x21, 0x5E, 0xA0, 0x02]);
@@ -82,7 +82,7 @@ impl Stranger {
 
 fn ethercat(command: Command, address: DatagramAddress, data: &[u8], nth: u32) -> Vec<u8> {
     let mut bytes = vec![0; MIN_LEN];
-    let mut builder = FrameBuilder::new(&mut bytes, Stranger::MAC);
+    let mut builder = FrameBuilder::new(&mut bytes, ForeignSender::MAC);
     // A handful of bytes always fits.
     if let Ok(slot) = builder.push(command, nth as u8, address, data.len()) {
         slot.copy_from_slice(data);
@@ -110,28 +110,34 @@ const LLDP: [u8; 23] = [
 
 fn foreign(ethertype: u16, payload: &[u8]) -> Vec<u8> {
     let mut bytes = vec![0xFF; 6];
-    bytes.extend_from_slice(&Stranger::MAC.0);
+    bytes.extend_from_slice(&ForeignSender::MAC.0);
     bytes.extend_from_slice(&ethertype.to_be_bytes());
     bytes.extend_from_slice(payload);
     bytes.resize(bytes.len().max(MIN_LEN), 0);
     bytes
 }
 
-/// Frames of strangers: those that are to be sent, and those that came back.
+/// Frames of foreign senders: those that are to be sent, and those that came back.
 #[derive(Clone, Default, Debug)]
-pub(crate) struct Strangers {
+pub(crate) struct ForeignSenders {
     /// By time, then in the order in which they were scheduled.
-    waiting: BTreeMap<(Instant, u64), (FaultId, Line, Stranger)>,
+    waiting: BTreeMap<(Instant, u64), (FaultId, DirectedLink, ForeignSender)>,
     count: u64,
     /// Until when the last one is on its line.
-    until: Option<(Line, Instant)>,
+    until: Option<(DirectedLink, Instant)>,
     back: Vec<(Instant, Path, WireFrame)>,
 }
 
-impl Strangers {
-    pub(super) fn push(&mut self, at: Instant, fault: FaultId, line: Line, what: Stranger) {
+impl ForeignSenders {
+    pub(super) fn push(
+        &mut self,
+        at: Instant,
+        fault: FaultId,
+        direction: DirectedLink,
+        what: ForeignSender,
+    ) {
         self.count += 1;
-        self.waiting.insert((at, self.count), (fault, line, what));
+        self.waiting.insert((at, self.count), (fault, direction, what));
     }
 
     #[inline]
@@ -145,63 +151,69 @@ impl Strangers {
 }
 
 impl World {
-    /// Strangers send what is due by `now`. Frames that are on the way together are carried in the
+    /// Foreign senders send what is due by `now`. Frames that are on the way together are carried in the
     /// order in which they were sent.
-    pub(super) fn let_strangers_send(&mut self, now: Instant) {
-        while self.strangers.next_at().is_some_and(|at| at <= now) {
-            let Some(((at, _), (fault, line, what))) = self.strangers.waiting.pop_first() else {
+    pub(super) fn send_foreign_frames(&mut self, now: Instant) {
+        while self.foreign_senders.next_at().is_some_and(|at| at <= now) {
+            let Some(((at, _), (fault, direction, what))) =
+                self.foreign_senders.waiting.pop_first()
+            else {
                 return;
             };
             self.note_entries();
             self.frames += 1;
             let number = self.frames;
             let frame = WireFrame { bytes: what.bytes(), damage: Damage::default(), number };
-            let at = self.free_at(line, at);
-            self.strangers.until = Some((line, at + frame.duration()));
+            let at = self.free_at(direction, at);
+            self.foreign_senders.until = Some((direction, at + frame.duration()));
             let effect = Effect::StrangerSent { frame: number };
-            self.truth.effect(at, Some(fault), self.line_place(line), effect);
-            let mut traveller = Traveller::of(frame, fault);
-            if let Outcome::Arrived(path, at) = self.walk_from(line, at, &mut traveller) {
-                self.strangers.back.push((at, path, traveller.frame));
+            self.truth.effect(at, Some(fault), self.direction_place(direction), effect);
+            let mut in_transit = FrameInTransit::of(frame, fault);
+            if let Outcome::Arrived(path, at) = self.walk_from(direction, at, &mut in_transit) {
+                self.foreign_senders.back.push((at, path, in_transit.frame));
             }
         }
     }
 
     /// When a line is free of the frame that its card has sent last.
-    fn free_at(&self, line: Line, at: Instant) -> Instant {
+    fn free_at(&self, direction: DirectedLink, at: Instant) -> Instant {
         let cards = self.leaving.iter().zip(&self.cards);
-        let busy = cards.filter(|(leaving, _)| **leaving == Some(line));
+        let busy = cards.filter(|(leaving, _)| **leaving == Some(direction));
         busy.map(|(_, card)| card.sent_until).fold(at, Instant::max)
     }
 
-    /// When a frame that a card sends at `at` gets onto its line, past a stranger's.
+    /// When a frame that a card sends at `at` gets onto its line, past a foreign one.
     #[inline]
-    pub(crate) fn behind_strangers(&self, card: Path, at: Instant) -> Instant {
-        match self.strangers.until {
-            Some((line, until)) if self.leaving[card.index()] == Some(line) => at.max(until),
+    pub(crate) fn behind_foreign_frames(&self, card: Path, at: Instant) -> Instant {
+        match self.foreign_senders.until {
+            Some((direction, until)) if self.leaving[card.index()] == Some(direction) => {
+                at.max(until)
+            }
             Some(_) | None => at,
         }
     }
 
-    /// Whether frames of strangers came to a card.
+    /// Whether frames of foreign senders came to a card.
     #[inline]
-    pub(crate) fn strangers_came_back(&self) -> bool {
-        !self.strangers.back.is_empty()
+    pub(crate) fn foreign_frames_came_back(&self) -> bool {
+        !self.foreign_senders.back.is_empty()
     }
 
-    /// Frames of strangers that came back to a card.
-    pub(crate) fn take_strangers(&mut self) -> impl Iterator<Item = (Instant, Path, WireFrame)> {
-        self.strangers.back.drain(..)
+    /// Frames of foreign senders that came back to a card.
+    pub(crate) fn take_foreign_frames(
+        &mut self,
+    ) -> impl Iterator<Item = (Instant, Path, WireFrame)> {
+        self.foreign_senders.back.drain(..)
     }
 
-    /// When a stranger sends next, as far as is known.
+    /// When a foreign sender sends next, as far as is known.
     #[inline]
-    pub(crate) fn next_stranger(&self) -> Option<Instant> {
-        if self.running.is_empty() && self.strangers.waiting.is_empty() {
+    pub(crate) fn next_foreign_frame(&self) -> Option<Instant> {
+        if self.running.is_empty() && self.foreign_senders.waiting.is_empty() {
             return None;
         }
-        let running = self.running.iter().filter_map(crate::fault::Running::next_stranger);
-        running.chain(self.strangers.next_at()).min()
+        let running = self.running.iter().filter_map(crate::fault::Running::next_foreign_frame);
+        running.chain(self.foreign_senders.next_at()).min()
     }
 }
 
@@ -212,20 +224,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strangers_send_frames_that_are_what_they_say() {
+    fn foreign_frames_have_the_declared_ether_types() {
         let all = [
-            Stranger::Scan { nth: 0 },
-            Stranger::Scan { nth: 3 },
-            Stranger::State { control: 1, nth: 7 },
-            Stranger::ClearCounters { nth: 1 },
+            ForeignSender::Scan { nth: 0 },
+            ForeignSender::Scan { nth: 3 },
+            ForeignSender::State { control: 1, nth: 7 },
+            ForeignSender::ClearCounters { nth: 1 },
         ];
         for what in all {
             let bytes = what.bytes();
             let view = FrameView::parse(&bytes).unwrap();
-            assert_eq!(view.source(), Stranger::MAC);
+            assert_eq!(view.source(), ForeignSender::MAC);
             assert_eq!(view.datagrams().filter_map(Result::ok).count(), 1, "{what:?}");
         }
-        for what in [Stranger::Arp, Stranger::Ipv4, Stranger::Lldp] {
+        for what in [ForeignSender::Arp, ForeignSender::Ipv4, ForeignSender::Lldp] {
             let bytes = what.bytes();
             assert!(FrameView::parse(&bytes).is_err(), "{what:?}");
             assert!(bytes.len() >= MIN_LEN && bytes[6] & 2 == 0);

@@ -1,20 +1,20 @@
-//! Links notice what has become of their signal: detection times, loss, link up.
+//! Link events: detection times, loss of signal, link up.
 
 use std::collections::BTreeMap;
 
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
-use super::change::Line;
+use super::change::DirectedLink;
 use super::link::{EndState, Medium};
 use super::world::World;
-use crate::controller::{PhyAct, PortEvent};
+use crate::controller::{PhyAction, PortEvent};
 use crate::hardware::PortKind;
 use crate::truth::{Effect, FaultId, Place};
 
 /// What was scheduled for a link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Due {
+pub(super) enum LinkEvent {
     /// An end finds its signal gone.
     Lost { link: usize, end: usize, epoch: u64 },
     /// Both ends have a link.
@@ -22,22 +22,22 @@ pub(super) enum Due {
     /// One end has a link.
     EndUp { link: usize, end: usize, epoch: u64 },
     /// A symbol is destroyed as a link comes up.
-    Noise { line: Line, flip: u8, fault: FaultId },
+    Noise { direction: DirectedLink, flip: u8, fault: FaultId },
     /// A link that was up too early carries frames.
     Carries { link: usize, fault: FaultId },
     /// A PHY does something to its link.
-    Phy { link: usize, end: usize, act: PhyAct },
+    Phy { link: usize, end: usize, act: PhyAction },
 }
 
 /// What is due, by time; of the same instant in the order in which it was scheduled.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Agenda {
-    due: BTreeMap<(Instant, u64), Due>,
+pub(super) struct LinkEvents {
+    due: BTreeMap<(Instant, u64), LinkEvent>,
     next: u64,
 }
 
-impl Agenda {
-    pub(super) fn push(&mut self, at: Instant, due: Due) {
+impl LinkEvents {
+    pub(super) fn push(&mut self, at: Instant, due: LinkEvent) {
         self.due.insert((at, self.next), due);
         self.next += 1;
     }
@@ -51,7 +51,7 @@ impl Agenda {
         self.due.first_key_value().map(|((at, _), _)| *at)
     }
 
-    pub(super) fn pop(&mut self) -> Option<(Instant, Due)> {
+    pub(super) fn pop(&mut self) -> Option<(Instant, LinkEvent)> {
         self.due.pop_first().map(|((at, _), due)| (at, due))
     }
 }
@@ -131,7 +131,7 @@ impl World {
             let place = self.links[index].both_ends()[end];
             let detection = self.loss_detection(index, place);
             let epoch = self.links[index].epochs[end];
-            self.agenda.push(at + detection, Due::Lost { link: index, end, epoch });
+            self.link_events.push(at + detection, LinkEvent::Lost { link: index, end, epoch });
         }
     }
 
@@ -149,7 +149,7 @@ impl World {
             }
         }
         let epochs = self.links[index].epochs;
-        self.agenda.push(at + self.link_up_time(index), Due::Up { link: index, epochs });
+        self.link_events.push(at + self.link_up_time(index), LinkEvent::Up { link: index, epochs });
     }
 
     fn receives_again(&mut self, index: usize, end: usize, at: Instant) {
@@ -158,15 +158,15 @@ impl World {
             EndState::Down => {
                 let epoch = self.links[index].epochs[end];
                 let up = at + self.link_up_time(index);
-                self.agenda.push(up, Due::EndUp { link: index, end, epoch });
+                self.link_events.push(up, LinkEvent::EndUp { link: index, end, epoch });
             }
             EndState::Up => {}
         }
     }
 
-    pub(super) fn serve(&mut self, at: Instant, due: Due) {
+    pub(super) fn serve(&mut self, at: Instant, due: LinkEvent) {
         match due {
-            Due::Lost { link, end, epoch } => {
+            LinkEvent::Lost { link, end, epoch } => {
                 let state = self.links[link].ends[end];
                 if self.links[link].epochs[end] == epoch && state == EndState::Losing {
                     self.end_lost(link, end, at);
@@ -176,24 +176,24 @@ impl World {
                     }
                 }
             }
-            Due::Phy { link, end, act } => self.phy_acts(link, end, act, at),
-            Due::Up { link, epochs } => {
+            LinkEvent::Phy { link, end, act } => self.phy_action(link, end, act, at),
+            LinkEvent::Up { link, epochs } => {
                 if self.links[link].epochs == epochs {
                     self.link_up(link, at);
                 }
             }
-            Due::EndUp { link, end, epoch } => {
+            LinkEvent::EndUp { link, end, epoch } => {
                 let waits = self.links[link].ends[end] == EndState::Down;
                 if waits && self.links[link].epochs[end] == epoch {
                     self.end_up(link, end, at);
                     self.comes_up(link, at);
                 }
             }
-            Due::Noise { line, flip, fault } => self.hit(at, fault, line, flip),
-            Due::Carries { link, fault } => {
+            LinkEvent::Noise { direction, flip, fault } => self.hit(at, fault, direction, flip),
+            LinkEvent::Carries { link, fault } => {
                 self.way_changes(at);
-                for line in Line::both(link) {
-                    self.links[link].passage[usize::from(line.downstream)].mend_at(at, fault);
+                for direction in DirectedLink::both(link) {
+                    self.links[link].passage[usize::from(direction.downstream)].mend_at(at, fault);
                 }
             }
         }
@@ -243,11 +243,11 @@ impl World {
             for passage in &mut self.links[index].passage {
                 passage.break_at(at, fault);
             }
-            self.agenda.push(at + blind, Due::Carries { link: index, fault });
+            self.link_events.push(at + blind, LinkEvent::Carries { link: index, fault });
         }
         if let Some(fault) = self.blame(index, at) {
-            for (line, after, flip) in self.plug_noise.draw(index) {
-                self.agenda.push(at + after, Due::Noise { line, flip, fault });
+            for (direction, after, flip) in self.plug_noise.draw(index) {
+                self.link_events.push(at + after, LinkEvent::Noise { direction, flip, fault });
             }
         }
     }

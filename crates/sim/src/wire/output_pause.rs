@@ -1,10 +1,10 @@
-//! Outputs that do not come, or not often enough: cards that are silent, watchdogs that are short.
+//! Missing outputs: cards that are silent, watchdogs that are short.
 
 use linesman_proto::address::Path;
 use linesman_proto::register::WatchdogTime;
 use linesman_proto::time::{Instant, Span};
 
-use super::node::Act;
+use super::node::NodeAction;
 use super::world::World;
 use crate::controller::WatchdogExpiry;
 use crate::truth::{AuditedCounter, Cause, Effect, FaultId, Place};
@@ -12,7 +12,7 @@ use crate::truth::{AuditedCounter, Cause, Effect, FaultId, Place};
 impl World {
     /// A card sends nothing for a while.
     pub(super) fn silence(&mut self, at: Instant, fault: FaultId, path: Path, until: Instant) {
-        self.cards[path.index()].hush(at, until, fault);
+        self.cards[path.index()].mute(at, until, fault);
         self.truth.effect(at, Some(fault), Place::Host(path), Effect::CardSilent);
     }
 
@@ -25,7 +25,7 @@ impl World {
         time: Option<WatchdogTime>,
     ) {
         self.nodes[node].watchdog_by = time.map(|_| fault);
-        self.nodes[node].act_at(at, Act::Watchdog(time));
+        self.nodes[node].act_at(at, NodeAction::Watchdog(time));
         let place = Place::Device(self.id(node));
         self.truth.effect(at, Some(fault), place, Effect::WatchdogSet { time });
     }
@@ -56,7 +56,7 @@ impl World {
     /// A fault is over: cards send again, watchdogs have their time again.
     pub(super) fn release_starved(&mut self, at: Instant, fault: FaultId) {
         for card in &mut self.cards {
-            card.speak(at, fault);
+            card.unmute(at, fault);
         }
         for node in 0..self.nodes.len() {
             if self.nodes[node].watchdog_by == Some(fault) {

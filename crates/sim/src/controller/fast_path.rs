@@ -1,7 +1,7 @@
-//! The controller for a wire that knows beforehand which datagrams of a frame concern it.
+//! Interface of a controller to the fast path of the wire: which datagrams of a frame concern it.
 //!
 //! On a line where nothing else happens the wire need not carry a frame past every controller: it
-//! does at each only what leaves a trace there. [`Manner`] is what it must know of a controller to
+//! does at each only what leaves a trace there. [`FastPathInfo`] is what it must know of a controller to
 //! do so; the rest is the pieces of [`Controller::process`], one by one.
 
 use linesman_proto::port::Port;
@@ -19,12 +19,12 @@ const REGISTERS_END: u16 = r::DIGITAL_OUTPUT.address.0;
 
 /// What a controller does with frames that are not for it, and by which names it is called.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub(crate) struct Manner {
+pub(crate) struct FastPathInfo {
     /// Its open ports, one bit each; none without power.
     pub(crate) open: u8,
     /// It acts on frames of no concern to it: a port waits for one, or it marks those that come
     /// round; or an FMMU lets process data write registers.
-    pub(crate) meddles: bool,
+    pub(crate) acts_on_all_frames: bool,
     /// It sets the bit in the source address.
     pub(crate) marks_source: bool,
     /// The device behind it samples inputs when a frame begins.
@@ -58,18 +58,18 @@ impl Sampling {
 
 impl Controller {
     /// What the wire must know.
-    pub(crate) fn manner(&self) -> Manner {
+    pub(crate) fn fast_path_info(&self) -> FastPathInfo {
         let core = &self.core;
         let control = DlControl(core.memory.u32(&r::DL_CONTROL));
         let writes_registers =
             |config: &FmmuConfig| config.writes && config.physical_start.0 < REGISTERS_END;
         let waits_for_time =
             |port: Port| core.latch_waits[port].is_some() && core.loops.is_open(port);
-        Manner {
+        FastPathInfo {
             open: if self.powered { core.loops.open_bits() } else { 0 },
-            meddles: core.loops.port_zero_closes_ring()
+            acts_on_all_frames: core.loops.port_zero_closes_ring()
                 || core.loops.waits_for_any_frame()
-                || core.phys.has_acts()
+                || core.phys.has_actions()
                 || Port::ALL.into_iter().any(waits_for_time)
                 || core.fmmus.active().any(writes_registers),
             marks_source: control.destroys_foreign_frames(),

@@ -1,4 +1,4 @@
-//! What can be wrong with the software of a device, while its controller works: faults.
+//! Faults of the software of a device whose controller works.
 
 use linesman_proto::mailbox::ErrorReplyCode;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
@@ -9,7 +9,7 @@ use crate::seed::{Seed, Stream};
 
 /// How a device misbehaves.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Trouble {
+pub enum SoftwareFault {
     /// It refuses SDO requests that it could serve.
     RefusesSdo(SdoRefusals),
     /// It answers mailbox messages later than usual.
@@ -69,68 +69,68 @@ pub enum RefusedWith {
 
 /// All that is wrong with a device at present.
 #[derive(Clone, Default, Debug)]
-pub struct Troubles(Vec<(Trouble, Stream)>);
+pub struct SoftwareFaults(Vec<(SoftwareFault, Stream)>);
 
-impl Troubles {
+impl SoftwareFaults {
     /// Something goes wrong from now on.
-    pub fn begin(&mut self, trouble: Trouble) {
-        let seed = match trouble {
-            Trouble::RefusesSdo(refusals) => refusals.seed,
-            Trouble::SlowMailbox { .. }
-            | Trouble::MailboxNotRead
-            | Trouble::MailboxNotFilled
-            | Trouble::FrozenApplication
-            | Trouble::DeafToRequests
-            | Trouble::LockedBuffers
-            | Trouble::Mismatch(_) => Seed::default(),
+    pub fn begin(&mut self, software_fault: SoftwareFault) {
+        let seed = match software_fault {
+            SoftwareFault::RefusesSdo(refusals) => refusals.seed,
+            SoftwareFault::SlowMailbox { .. }
+            | SoftwareFault::MailboxNotRead
+            | SoftwareFault::MailboxNotFilled
+            | SoftwareFault::FrozenApplication
+            | SoftwareFault::DeafToRequests
+            | SoftwareFault::LockedBuffers
+            | SoftwareFault::Mismatch(_) => Seed::default(),
         };
-        self.0.push((trouble, seed.stream("trouble")));
+        self.0.push((software_fault, seed.stream("trouble")));
     }
 
     /// It does so no longer. Of two that are alike one stays.
-    pub fn end(&mut self, trouble: Trouble) {
-        if let Some(at) = self.0.iter().position(|(known, _)| *known == trouble) {
+    pub fn end(&mut self, software_fault: SoftwareFault) {
+        if let Some(at) = self.0.iter().position(|(known, _)| *known == software_fault) {
             self.0.remove(at);
         }
     }
 
     /// Whether this is wrong.
     #[must_use]
-    pub fn has(&self, trouble: Trouble) -> bool {
-        self.0.iter().any(|(known, _)| *known == trouble)
+    pub fn has(&self, software_fault: SoftwareFault) -> bool {
+        self.0.iter().any(|(known, _)| *known == software_fault)
     }
 
     /// How much later than usual answers come.
     #[must_use]
     pub fn mailbox_delay(&self) -> Span {
-        self.0.iter().fold(Span::ZERO, |sum, (trouble, _)| match trouble {
-            Trouble::SlowMailbox { by } => sum + *by,
-            Trouble::RefusesSdo(_)
-            | Trouble::MailboxNotRead
-            | Trouble::MailboxNotFilled
-            | Trouble::FrozenApplication
-            | Trouble::DeafToRequests
-            | Trouble::LockedBuffers
-            | Trouble::Mismatch(_) => sum,
+        self.0.iter().fold(Span::ZERO, |sum, (software_fault, _)| match software_fault {
+            SoftwareFault::SlowMailbox { by } => sum + *by,
+            SoftwareFault::RefusesSdo(_)
+            | SoftwareFault::MailboxNotRead
+            | SoftwareFault::MailboxNotFilled
+            | SoftwareFault::FrozenApplication
+            | SoftwareFault::DeafToRequests
+            | SoftwareFault::LockedBuffers
+            | SoftwareFault::Mismatch(_) => sum,
         })
     }
 
     /// Whether a request for an object is refused, and with what. Each call is one request: chance
     /// is drawn anew.
     pub fn refuses_sdo(&mut self, index: ObjectIndex) -> Option<RefusedWith> {
-        self.0.iter_mut().find_map(|(trouble, stream)| match trouble {
-            Trouble::RefusesSdo(refusals) => {
+        self.0.iter_mut().find_map(|(software_fault, stream)| match software_fault {
+            SoftwareFault::RefusesSdo(refusals) => {
                 let hit = (refusals.first..=refusals.last).contains(&index)
                     && stream.below(1_000_000) < u64::from(refusals.share_ppm);
                 hit.then_some(refusals.answer)
             }
-            Trouble::SlowMailbox { .. }
-            | Trouble::MailboxNotRead
-            | Trouble::MailboxNotFilled
-            | Trouble::FrozenApplication
-            | Trouble::DeafToRequests
-            | Trouble::LockedBuffers
-            | Trouble::Mismatch(_) => None,
+            SoftwareFault::SlowMailbox { .. }
+            | SoftwareFault::MailboxNotRead
+            | SoftwareFault::MailboxNotFilled
+            | SoftwareFault::FrozenApplication
+            | SoftwareFault::DeafToRequests
+            | SoftwareFault::LockedBuffers
+            | SoftwareFault::Mismatch(_) => None,
         })
     }
 }
@@ -139,8 +139,8 @@ impl Troubles {
 mod tests {
     use super::*;
 
-    fn refusals(share_ppm: u32) -> Trouble {
-        Trouble::RefusesSdo(SdoRefusals {
+    fn refusals(share_ppm: u32) -> SoftwareFault {
+        SoftwareFault::RefusesSdo(SdoRefusals {
             answer: RefusedWith::Abort(SdoAbortCode::GENERAL_ERROR),
             first: ObjectIndex(0x8000),
             last: ObjectIndex(0x8FFF),
@@ -152,11 +152,13 @@ mod tests {
     #[test]
     fn a_share_of_some_objects_is_refused() {
         let refused = |share| {
-            let mut troubles = Troubles::default();
-            troubles.begin(refusals(share));
-            assert_eq!(troubles.refuses_sdo(ObjectIndex(0x7FFF)), None);
-            assert_eq!(troubles.refuses_sdo(ObjectIndex(0x9000)), None);
-            (0..1_000).filter(|_| troubles.refuses_sdo(ObjectIndex(0x8010)).is_some()).count()
+            let mut software_faults = SoftwareFaults::default();
+            software_faults.begin(refusals(share));
+            assert_eq!(software_faults.refuses_sdo(ObjectIndex(0x7FFF)), None);
+            assert_eq!(software_faults.refuses_sdo(ObjectIndex(0x9000)), None);
+            (0..1_000)
+                .filter(|_| software_faults.refuses_sdo(ObjectIndex(0x8010)).is_some())
+                .count()
         };
         assert_eq!((refused(0), refused(1_000_000)), (0, 1_000));
         let half = refused(500_000);
@@ -166,15 +168,15 @@ mod tests {
 
     #[test]
     fn delays_add_up_and_end_one_by_one() {
-        let mut troubles = Troubles::default();
-        let slow = Trouble::SlowMailbox { by: Span::ms(5) };
-        troubles.begin(slow);
-        troubles.begin(slow);
-        troubles.begin(Trouble::MailboxNotRead);
-        assert_eq!(troubles.mailbox_delay(), Span::ms(10));
-        troubles.end(slow);
-        assert_eq!(troubles.mailbox_delay(), Span::ms(5));
-        troubles.end(Trouble::DeafToRequests);
-        assert!(troubles.has(Trouble::MailboxNotRead));
+        let mut software_faults = SoftwareFaults::default();
+        let slow = SoftwareFault::SlowMailbox { by: Span::ms(5) };
+        software_faults.begin(slow);
+        software_faults.begin(slow);
+        software_faults.begin(SoftwareFault::MailboxNotRead);
+        assert_eq!(software_faults.mailbox_delay(), Span::ms(10));
+        software_faults.end(slow);
+        assert_eq!(software_faults.mailbox_delay(), Span::ms(5));
+        software_faults.end(SoftwareFault::DeafToRequests);
+        assert!(software_faults.has(SoftwareFault::MailboxNotRead));
     }
 }

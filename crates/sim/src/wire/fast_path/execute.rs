@@ -1,18 +1,18 @@
-//! The datagrams of a frame that needs no walk, each at everybody it is for.
+//! Execution of the datagrams of a frame on the fast path, each at all controllers that it is for.
 
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, WKC_LEN};
 
-use super::Journey;
+use super::FastTransit;
 use crate::controller::{Answer, Header, PlainRead};
-use crate::wire::kept::{Asked, Question};
+use crate::wire::address_cache::{AddressKind, AddressQuery};
 use crate::wire::world::World;
 
 impl World {
     #[inline]
-    pub(super) fn execute_all(&mut self, journey: &Journey<'_>, bytes: &mut [u8]) {
-        let interrupting = self.nodes.directory.interrupting();
-        let irq = if interrupting.is_empty() { 0 } else { self.irq(journey, interrupting) };
+    pub(super) fn execute_all(&mut self, transit: &FastTransit<'_>, bytes: &mut [u8]) {
+        let interrupting = self.nodes.address_directory.interrupting();
+        let irq = if interrupting.is_empty() { 0 } else { self.irq(transit, interrupting) };
         let mut rest = bytes;
         while let Some((header, body)) = rest.split_first_chunk_mut::<DATAGRAM_HEADER_LEN>() {
             let read = Header::read(header);
@@ -24,10 +24,10 @@ impl World {
             let Some((counter, next)) = behind.split_first_chunk_mut::<WKC_LEN>() else { return };
             if let Some(command) = read.command {
                 if command.increments_position() {
-                    let passed = read.adp.wrapping_add(journey.route.visits.len() as u16);
+                    let passed = read.adp.wrapping_add(transit.route.visits.len() as u16);
                     header[2..4].copy_from_slice(&passed.to_le_bytes());
                 }
-                let increment = self.execute(journey, command, read, data);
+                let increment = self.execute(transit, command, read, data);
                 *counter = u16::from_le_bytes(*counter).wrapping_add(increment).to_le_bytes();
             }
             if !read.more {
@@ -38,15 +38,15 @@ impl World {
     }
 
     /// What controllers on the way add to the event field.
-    fn irq(&self, journey: &Journey<'_>, interrupting: &[u32]) -> u16 {
-        let here = interrupting.iter().filter(|node| journey.route.place(**node).is_some());
+    fn irq(&self, transit: &FastTransit<'_>, interrupting: &[u32]) -> u16 {
+        let here = interrupting.iter().filter(|node| transit.route.place(**node).is_some());
         here.fold(0, |irq, node| irq | self.nodes[*node as usize].controller.irq())
     }
 
     /// Executes a datagram at everybody it is for, and says what to add to its working counter.
     fn execute(
         &mut self,
-        journey: &Journey<'_>,
+        transit: &FastTransit<'_>,
         command: Command,
         header: Header,
         data: &mut [u8],
@@ -59,23 +59,23 @@ impl World {
         };
         let addressing = command.addressing();
         if effect.multiple_write {
-            return self.execute_everywhere(journey, addressing, header, data);
+            return self.execute_everywhere(transit, addressing, header, data);
         }
         let ors = effect.ors;
         match addressing {
             Addressing::None => 0,
             Addressing::Broadcast => match plain {
-                Some(read) => self.broadcast(journey, &read, header, data),
-                None => self.execute_everywhere(journey, addressing, header, data),
+                Some(read) => self.broadcast(transit, &read, header, data),
+                None => self.execute_everywhere(transit, addressing, header, data),
             },
             Addressing::Position => {
                 let first = usize::from(0_u16.wrapping_sub(header.adp));
                 let header = Header { adp: 0, ..header };
                 let mut sum = 0_u16;
-                for place in (first..journey.route.visits.len()).step_by(1 << 16) {
+                for place in (first..transit.route.visits.len()).step_by(1 << 16) {
                     let place = place as u32;
                     sum = sum.wrapping_add(self.one(
-                        journey,
+                        transit,
                         place,
                         plain.as_ref(),
                         ors,
@@ -86,14 +86,14 @@ impl World {
                 sum
             }
             Addressing::Station => {
-                let question = Question::station(journey.card, header.adp);
-                self.each(journey, question, |world, place| {
-                    world.one(journey, place, plain.as_ref(), ors, header, data)
+                let query = AddressQuery::station(transit.card, header.adp);
+                self.each(transit, query, |world, place| {
+                    world.one(transit, place, plain.as_ref(), ors, header, data)
                 })
             }
             Addressing::Logical => {
-                let question = Question::logical(journey.card, header.logical(), header.len);
-                self.each(journey, question, |world, place| world.at(journey, place, header, data))
+                let query = AddressQuery::logical(transit.card, header.logical(), header.len);
+                self.each(transit, query, |world, place| world.at(transit, place, header, data))
             }
         }
     }
@@ -102,20 +102,22 @@ impl World {
     #[inline]
     fn each(
         &mut self,
-        journey: &Journey<'_>,
-        question: Question,
+        transit: &FastTransit<'_>,
+        query: AddressQuery,
         mut one: impl FnMut(&mut Self, u32) -> u16,
     ) -> u16 {
-        let edition = self.direct.edition + self.nodes.directory.names();
-        let places = match self.direct.kept.take(question, edition) {
+        let edition = self.fast_path.edition + self.nodes.address_directory.names();
+        let places = match self.fast_path.address_cache.take(query, edition) {
             Ok(places) => places,
             Err(mut places) => {
-                let directory = &self.nodes.directory;
-                let mut answer = |node| places.extend(journey.route.place(node));
-                match question.asked() {
-                    Asked::Station(address) => directory.stations(address).for_each(&mut answer),
-                    Asked::Logical(start, len) => {
-                        directory.mapping(start, len).for_each(&mut answer);
+                let address_directory = &self.nodes.address_directory;
+                let mut answer = |node| places.extend(transit.route.place(node));
+                match query.asked() {
+                    AddressKind::Station(address) => {
+                        address_directory.stations(address).for_each(&mut answer)
+                    }
+                    AddressKind::Logical(start, len) => {
+                        address_directory.mapping(start, len).for_each(&mut answer);
                     }
                 }
                 places.sort_unstable();
@@ -127,21 +129,21 @@ impl World {
         for place in &places {
             sum = sum.wrapping_add(one(self, *place));
         }
-        self.direct.kept.keep(question, edition, places);
+        self.fast_path.address_cache.keep(query, edition, places);
         sum
     }
 
     /// Reads registers of all controllers into one.
     fn broadcast(
         &mut self,
-        journey: &Journey<'_>,
+        transit: &FastTransit<'_>,
         read: &PlainRead,
         header: Header,
         data: &mut [u8],
     ) -> u16 {
         let mut sum = 0_u16;
         let mut gathered = 0_u64;
-        for (place, visit) in (0_u32..).zip(&journey.route.visits) {
+        for (place, visit) in (0_u32..).zip(&transit.route.visits) {
             let controller = &self.nodes[visit.node as usize].controller;
             let answer = if read.is_short() {
                 controller.peek(read, &mut gathered)
@@ -152,7 +154,7 @@ impl World {
                 Answer::Nothing => {}
                 Answer::Read => sum = sum.wrapping_add(1),
                 Answer::Effect => {
-                    sum = sum.wrapping_add(self.at(journey, place, header, data));
+                    sum = sum.wrapping_add(self.at(transit, place, header, data));
                 }
             }
         }
@@ -165,16 +167,16 @@ impl World {
     /// Goes past all controllers, as auto-increment and multiple-write commands need it.
     fn execute_everywhere(
         &mut self,
-        journey: &Journey<'_>,
+        transit: &FastTransit<'_>,
         addressing: Addressing,
         header: Header,
         data: &mut [u8],
     ) -> u16 {
         let counts = addressing == Addressing::Position;
         let mut sum = 0_u16;
-        for place in 0..journey.route.visits.len() as u32 {
+        for place in 0..transit.route.visits.len() as u32 {
             let adp = if counts { header.adp.wrapping_add(place as u16) } else { header.adp };
-            sum = sum.wrapping_add(self.at(journey, place, Header { adp, ..header }, data));
+            sum = sum.wrapping_add(self.at(transit, place, Header { adp, ..header }, data));
         }
         sum
     }
@@ -183,7 +185,7 @@ impl World {
     #[inline]
     fn one(
         &mut self,
-        journey: &Journey<'_>,
+        transit: &FastTransit<'_>,
         place: u32,
         plain: Option<&PlainRead>,
         ors: bool,
@@ -191,41 +193,47 @@ impl World {
         data: &mut [u8],
     ) -> u16 {
         if let Some(read) = plain {
-            let node = journey.route.visits[place as usize].node as usize;
+            let node = transit.route.visits[place as usize].node as usize;
             match self.nodes[node].controller.read_plainly(read, data, ors) {
                 Answer::Nothing => return 0,
                 Answer::Read => return 1,
                 Answer::Effect => {}
             }
         }
-        self.at(journey, place, header, data)
+        self.at(transit, place, header, data)
     }
 
     /// Executes a datagram at one controller.
     #[inline]
-    fn at(&mut self, journey: &Journey<'_>, place: u32, header: Header, data: &mut [u8]) -> u16 {
-        let (index, at) = journey.at_place(place);
+    fn at(
+        &mut self,
+        transit: &FastTransit<'_>,
+        place: u32,
+        header: Header,
+        data: &mut [u8],
+    ) -> u16 {
+        let (index, at) = transit.at_place(place);
         let node = self.nodes.quietly(index);
-        if node.last_frame != journey.number {
-            node.last_frame = journey.number;
-            node.controller.begin(at, journey.number);
-            self.direct.touched.push(place);
+        if node.last_frame != transit.number {
+            node.last_frame = transit.number;
+            node.controller.begin(at, transit.number);
+            self.fast_path.touched.push(place);
         }
         node.controller.execute(&header, data)
     }
 
     /// The frame has passed all.
-    pub(super) fn end_all(&mut self, journey: &Journey<'_>) {
-        let mut touched = std::mem::take(&mut self.direct.touched);
+    pub(super) fn end_all(&mut self, transit: &FastTransit<'_>) {
+        let mut touched = std::mem::take(&mut self.fast_path.touched);
         for place in touched.drain(..) {
-            let (index, at) = journey.at_place(place);
-            let changed = self.nodes.quietly(index).controller.end(at + journey.duration);
+            let (index, at) = transit.at_place(place);
+            let changed = self.nodes.quietly(index).controller.end(at + transit.duration);
             if changed {
                 self.nodes.wake(index);
             } else {
                 self.nodes.reschedule(index);
             }
         }
-        self.direct.touched = touched;
+        self.fast_path.touched = touched;
     }
 }

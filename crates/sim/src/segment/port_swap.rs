@@ -1,4 +1,4 @@
-//! A device that is plugged in the wrong way round.
+//! Device that is plugged in the wrong way round.
 
 use linesman_config::attachment::Attachment;
 use linesman_config::project::Ring;
@@ -6,17 +6,17 @@ use linesman_proto::address::Path;
 use linesman_proto::topology::wiring::ports_after;
 
 use super::build::{BuildError, Placed};
-use crate::fault::{FaultError, Turned};
+use crate::fault::{FaultError, SwappedPorts};
 use crate::hardware::PortKind;
 
 /// Plugs the incoming cable of a device into another port, and what was there into the first.
-pub(super) fn turn(
+pub(super) fn swap_ports(
     label: &str,
     placed: &mut [Placed],
-    turned: &Turned,
+    swapped_ports: &SwappedPorts,
     ring: &mut Option<Ring>,
 ) -> Result<(), BuildError> {
-    let is_meant = |one: &Placed| match &turned.device {
+    let is_meant = |one: &Placed| match &swapped_ports.device {
         Some(name) => one.planned.name == *name,
         None => one.planned.on == Attachment::MainDevice(Path::A),
     };
@@ -27,7 +27,7 @@ pub(super) fn turn(
     let wrong = |what: String| {
         BuildError::Fault(FaultError::Combination {
             entry: label.to_owned(),
-            kind: turned.kind,
+            kind: swapped_ports.kind,
             what,
         })
     };
@@ -46,7 +46,7 @@ pub(super) fn turn(
             || ring.as_ref().is_some_and(|ring| ring.closes_at == here)
     };
     let ways = || ports_after(entry).into_iter().filter(fits);
-    let chosen = match turned.port {
+    let chosen = match swapped_ports.port {
         Some(port) => ways().find(|way| *way == port),
         None => ways().find(leads_on).or_else(|| ways().next()),
     };

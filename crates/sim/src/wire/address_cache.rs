@@ -1,4 +1,4 @@
-//! Answers to "who is meant by this address", kept as long as nobody changes its name.
+//! Cache of address lookups, valid as long as no controller changes its addresses.
 
 use linesman_proto::address::{LogicalAddress, Path};
 
@@ -7,18 +7,18 @@ const SLOTS: usize = 1_024;
 
 /// What a datagram asks for: who is meant, on the way from a card.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub(super) struct Question(u64);
+pub(super) struct AddressQuery(u64);
 
 /// The two kinds of questions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Asked {
+pub(super) enum AddressKind {
     /// Who has this station address or alias?
     Station(u16),
     /// Who maps any of so many logical bytes?
     Logical(LogicalAddress, usize),
 }
 
-impl Question {
+impl AddressQuery {
     const STATION: u64 = 1 << 63;
 
     pub(super) fn station(card: Path, address: u16) -> Self {
@@ -30,11 +30,11 @@ impl Question {
     }
 
     /// What is asked.
-    pub(super) fn asked(self) -> Asked {
+    pub(super) fn asked(self) -> AddressKind {
         if self.0 & Self::STATION != 0 {
-            Asked::Station(self.0 as u16)
+            AddressKind::Station(self.0 as u16)
         } else {
-            Asked::Logical(LogicalAddress(self.0 as u32), (self.0 >> 32) as usize & 0x7FF)
+            AddressKind::Logical(LogicalAddress(self.0 as u32), (self.0 >> 32) as usize & 0x7FF)
         }
     }
 
@@ -46,8 +46,8 @@ impl Question {
 
 /// Places on the way of a frame that answer a question.
 #[derive(Clone, Default, Debug)]
-struct Answer {
-    question: Question,
+struct CachedPlaces {
+    query: AddressQuery,
     /// Of which book it is; 0 for none yet.
     edition: u64,
     places: Vec<u32>,
@@ -55,18 +55,18 @@ struct Answer {
 
 /// The answers.
 #[derive(Default, Debug)]
-pub(super) struct Kept(Vec<Answer>);
+pub(super) struct AddressCache(Vec<CachedPlaces>);
 
-impl Kept {
+impl AddressCache {
     /// Takes an answer out; to be given back. `Err` has an empty one, whose memory is kept.
     #[inline]
-    pub(super) fn take(&mut self, question: Question, edition: u64) -> Result<Vec<u32>, Vec<u32>> {
+    pub(super) fn take(&mut self, query: AddressQuery, edition: u64) -> Result<Vec<u32>, Vec<u32>> {
         if self.0.is_empty() {
-            self.0.resize(SLOTS, Answer::default());
+            self.0.resize(SLOTS, CachedPlaces::default());
         }
-        let answer = &mut self.0[question.slot()];
+        let answer = &mut self.0[query.slot()];
         let mut places = std::mem::take(&mut answer.places);
-        if answer.question == question && answer.edition == edition {
+        if answer.query == query && answer.edition == edition {
             return Ok(places);
         }
         places.clear();
@@ -75,9 +75,9 @@ impl Kept {
 
     /// Gives an answer back.
     #[inline]
-    pub(super) fn keep(&mut self, question: Question, edition: u64, places: Vec<u32>) {
-        let answer = &mut self.0[question.slot()];
-        (answer.question, answer.edition, answer.places) = (question, edition, places);
+    pub(super) fn keep(&mut self, query: AddressQuery, edition: u64, places: Vec<u32>) {
+        let answer = &mut self.0[query.slot()];
+        (answer.query, answer.edition, answer.places) = (query, edition, places);
     }
 }
 
@@ -87,20 +87,20 @@ mod tests {
 
     #[test]
     fn an_answer_holds_for_one_question_and_one_edition() {
-        let mut kept = Kept::default();
-        let station = Question::station(Path::A, 0x1001);
-        assert_eq!(kept.take(station, 1), Err(vec![]));
-        kept.keep(station, 1, vec![4, 7]);
-        assert_eq!(kept.take(station, 1), Ok(vec![4, 7]));
-        kept.keep(station, 1, vec![4, 7]);
-        assert_eq!(kept.take(station, 2), Err(vec![]), "somebody has changed its name");
+        let mut address_cache = AddressCache::default();
+        let station = AddressQuery::station(Path::A, 0x1001);
+        assert_eq!(address_cache.take(station, 1), Err(vec![]));
+        address_cache.keep(station, 1, vec![4, 7]);
+        assert_eq!(address_cache.take(station, 1), Ok(vec![4, 7]));
+        address_cache.keep(station, 1, vec![4, 7]);
+        assert_eq!(address_cache.take(station, 2), Err(vec![]), "somebody has changed its name");
         for other in [
-            Question::station(Path::B, 0x1001),
-            Question::station(Path::A, 0x1002),
-            Question::logical(Path::A, LogicalAddress(0x1001), 1),
+            AddressQuery::station(Path::B, 0x1001),
+            AddressQuery::station(Path::A, 0x1002),
+            AddressQuery::logical(Path::A, LogicalAddress(0x1001), 1),
         ] {
-            kept.keep(station, 3, vec![1]);
-            assert_eq!(kept.take(other, 3).unwrap_or_default(), [0u32; 0], "{other:?}");
+            address_cache.keep(station, 3, vec![1]);
+            assert_eq!(address_cache.take(other, 3).unwrap_or_default(), [0u32; 0], "{other:?}");
         }
     }
 }

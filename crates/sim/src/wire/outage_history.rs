@@ -1,4 +1,4 @@
-//! Something that is whole or broken over time, and by whose doing.
+//! History of a contact or supply: whole or broken over time, and by which fault.
 
 use linesman_proto::time::Instant;
 
@@ -10,14 +10,14 @@ const KEPT: usize = 64;
 
 /// The history of a contact or a supply: whole unless at least one fault holds it broken.
 #[derive(Clone, Default, Debug)]
-pub struct History {
+pub struct OutageHistory {
     /// Who broke it, from an instant on; `None` for whole. In the order of time.
     changes: Vec<(Instant, Option<FaultId>)>,
     /// Who holds it broken at present.
     holders: Vec<FaultId>,
 }
 
-impl History {
+impl OutageHistory {
     /// A fault breaks it. Not before any earlier call.
     pub fn break_at(&mut self, at: Instant, fault: FaultId) {
         self.holders.push(fault);
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn it_is_broken_while_anyone_holds_it() {
-        let mut history = History::default();
+        let mut history = OutageHistory::default();
         history.break_at(at(10), ONE);
         history.break_at(at(20), TWO);
         history.mend_at(at(30), TWO);
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn the_first_break_in_a_span_is_found() {
-        let mut history = History::default();
+        let mut history = OutageHistory::default();
         assert_eq!(history.first_break(at(0), at(100)), None);
         history.break_at(at(10), ONE);
         history.mend_at(at(20), ONE);
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn old_changes_are_forgotten() {
-        let mut history = History::default();
+        let mut history = OutageHistory::default();
         for round in 0..1_000 {
             history.break_at(at(round * 10), ONE);
             history.mend_at(at(round * 10 + 5), ONE);

@@ -1,5 +1,5 @@
-//! A frame that meets nothing but controllers at rest needs no walk: its way is known, and each
-//! datagram is executed where it is for somebody.
+//! Fast path for undisturbed frames: route and addresses are known, so that each datagram is
+//! executed only at the controllers that it is for.
 //!
 //! What comes of it is the same to the last bit; [`World::walk`] is what it is held against. So it
 //! must be sure beforehand that the frame meets no destroyed symbol, no open contact, no failing
@@ -21,30 +21,30 @@ use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, FrameType,
 use linesman_proto::register as r;
 use linesman_proto::time::{Instant, Span};
 
-use super::change::Line;
-use super::kept::Kept;
+use super::address_cache::AddressCache;
+use super::change::DirectedLink;
 use super::route::Route;
-use super::walk::{Outcome, Traveller};
+use super::walk::{FrameInTransit, Outcome};
 use super::world::World;
 use crate::controller::Header;
 
 /// What is kept from frame to frame.
 #[derive(Default, Debug)]
-pub(crate) struct Direct {
+pub(crate) struct FastPath {
     /// All frames are to walk.
     pub(crate) forbidden: bool,
     /// Frames that needed no walk.
     pub(crate) frames: u64,
     /// The way from each card.
-    known: [Known; 2],
+    routes: [CachedRoute; 2],
     /// By card: the last frame that did not walk, if controllers do not know yet where it came in.
-    last: [Option<Passed>; 2],
+    last: [Option<FastFrame>; 2],
     /// Changes whenever ways are forgotten.
     edition: u64,
-    /// [`Directory::ways`](super::directory::Directory::ways) when the ways were found.
+    /// [`AddressDirectory::ways`](super::address_directory::AddressDirectory::ways) when the ways were found.
     ways: u64,
     /// Who answers to what, on which way.
-    kept: Kept,
+    address_cache: AddressCache,
     /// Nodes at which something is due: kept for its memory, as are those below.
     due: Vec<u32>,
     /// Places at which something is to be done before the datagrams, the last first.
@@ -55,7 +55,7 @@ pub(crate) struct Direct {
 
 /// What is known of the way from a card.
 #[derive(Default, Debug)]
-enum Known {
+enum CachedRoute {
     #[default]
     Nothing,
     /// There is none without a walk.
@@ -65,14 +65,14 @@ enum Known {
 
 /// A frame that did not walk.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct Passed {
+pub(super) struct FastFrame {
     pub(super) number: u64,
     pub(super) at: Instant,
     pub(super) duration: Span,
 }
 
 /// A frame on its way.
-struct Journey<'a> {
+struct FastTransit<'a> {
     route: &'a Route,
     card: Path,
     at: Instant,
@@ -80,7 +80,7 @@ struct Journey<'a> {
     number: u64,
 }
 
-impl Journey<'_> {
+impl FastTransit<'_> {
     #[inline]
     fn at_place(&self, place: u32) -> (usize, Instant) {
         let visit = self.route.visits[place as usize];
@@ -91,15 +91,20 @@ impl Journey<'_> {
 impl World {
     /// Sends a frame off by a card at `at`: past everybody at once if that comes to the same, else
     /// step by step.
-    pub(crate) fn carry(&mut self, card: Path, at: Instant, traveller: &mut Traveller) -> Outcome {
-        match self.go_directly(card, at, traveller) {
+    pub(crate) fn carry(
+        &mut self,
+        card: Path,
+        at: Instant,
+        in_transit: &mut FrameInTransit,
+    ) -> Outcome {
+        match self.go_directly(card, at, in_transit) {
             Some(outcome) => {
-                self.direct.frames += 1;
+                self.fast_path.frames += 1;
                 outcome
             }
             None => {
                 self.note_entries();
-                self.walk(card, at, traveller)
+                self.walk(card, at, in_transit)
             }
         }
     }
@@ -107,9 +112,9 @@ impl World {
     /// Controllers learn when frames came in at their ports that did not walk: some of them latch
     /// the time of a frame other than the one that asks for it.
     pub(super) fn note_entries(&mut self) {
-        for card in self.direct.by_age() {
-            if let Some(passed) = self.direct.last[card].take()
-                && let Known::Way(route) = &self.direct.known[card]
+        for card in self.fast_path.by_age() {
+            if let Some(passed) = self.fast_path.last[card].take()
+                && let CachedRoute::Way(route) = &self.fast_path.routes[card]
             {
                 self.nodes.note_entries(route.entries(), passed);
             }
@@ -118,19 +123,19 @@ impl World {
 
     /// Before ports of these nodes count anything: when the last frame came in there may tell what
     /// they count. The way of a frame that is being sent is `leaving`.
-    fn note_entries_for(&mut self, due: &[u32], leaving: Option<&Journey<'_>>) {
+    fn note_entries_for(&mut self, due: &[u32], leaving: Option<&FastTransit<'_>>) {
         for node in due.iter().copied() {
             if !self.nodes[node as usize].controller.has_port_events() {
                 continue;
             }
-            for card in self.direct.by_age() {
-                let leaving = leaving.filter(|journey| journey.card.index() == card);
-                let route = match (leaving, &self.direct.known[card]) {
-                    (Some(journey), _) => journey.route,
-                    (None, Known::Way(route)) => route,
-                    (None, Known::Nothing | Known::NoWay) => continue,
+            for card in self.fast_path.by_age() {
+                let leaving = leaving.filter(|transit| transit.card.index() == card);
+                let route = match (leaving, &self.fast_path.routes[card]) {
+                    (Some(transit), _) => transit.route,
+                    (None, CachedRoute::Way(route)) => route,
+                    (None, CachedRoute::Nothing | CachedRoute::NoWay) => continue,
                 };
-                if let Some(passed) = self.direct.last[card] {
+                if let Some(passed) = self.fast_path.last[card] {
                     self.nodes.note_entries(route.entries_of(node), passed);
                 }
             }
@@ -140,8 +145,8 @@ impl World {
     /// Links, loops or supplies have changed.
     pub(super) fn forget_ways(&mut self) {
         self.note_entries();
-        self.direct.known = [Known::Nothing, Known::Nothing];
-        self.direct.edition += 1;
+        self.fast_path.routes = [CachedRoute::Nothing, CachedRoute::Nothing];
+        self.fast_path.edition += 1;
         self.nodes.forget_departures();
     }
 
@@ -154,7 +159,7 @@ impl World {
     }
 
     fn touch_all_due(&mut self, now: Instant) {
-        let mut due = std::mem::take(&mut self.direct.due);
+        let mut due = std::mem::take(&mut self.fast_path.due);
         self.nodes.due_until(now, &mut due);
         if !due.is_empty() {
             self.note_entries_for(&due, None);
@@ -164,42 +169,43 @@ impl World {
                 self.nodes[node as usize].touch(now, &mut self.signals);
             }
         }
-        self.direct.due = due;
+        self.fast_path.due = due;
     }
 
     fn go_directly(
         &mut self,
         card: Path,
         at: Instant,
-        traveller: &mut Traveller,
+        in_transit: &mut FrameInTransit,
     ) -> Option<Outcome> {
-        if self.direct.forbidden || self.changed_at >= at || !traveller.frame.damage.is_intact() {
+        if self.fast_path.forbidden || self.changed_at >= at || !in_transit.frame.damage.is_intact()
+        {
             return None;
         }
-        let first = datagrams(&traveller.frame.bytes)?;
+        let first = datagrams(&in_transit.frame.bytes)?;
         if self.signals.has_fresh() {
             self.hear_signals(None);
         }
         self.nodes.settle();
         let route = self.take_way(card)?;
-        let edition = self.direct.edition;
-        let (duration, number) = (traveller.frame.duration(), traveller.frame.number);
-        let journey = Journey { route: &route, card, at, duration, number };
-        let outcome = self.is_calm(&journey).then(|| {
-            self.prepare(&journey);
-            let bytes = &mut traveller.frame.bytes;
+        let edition = self.fast_path.edition;
+        let (duration, number) = (in_transit.frame.duration(), in_transit.frame.number);
+        let transit = FastTransit { route: &route, card, at, duration, number };
+        let outcome = self.is_calm(&transit).then(|| {
+            self.prepare(&transit);
+            let bytes = &mut in_transit.frame.bytes;
             if route.marks_source {
                 bytes[6] |= SOURCE_MARK;
             }
-            self.execute_all(&journey, &mut bytes[first..]);
-            if !self.direct.touched.is_empty() {
-                self.end_all(&journey);
+            self.execute_all(&transit, &mut bytes[first..]);
+            if !self.fast_path.touched.is_empty() {
+                self.end_all(&transit);
             }
-            self.direct.last[card.index()] = Some(Passed { number, at, duration });
+            self.fast_path.last[card.index()] = Some(FastFrame { number, at, duration });
             Outcome::Arrived(route.arrives_at, at + route.takes + duration)
         });
-        self.direct.known[card.index()] = Known::Way(route);
-        if self.direct.edition != edition {
+        self.fast_path.routes[card.index()] = CachedRoute::Way(route);
+        if self.fast_path.edition != edition {
             self.forget_ways();
         }
         outcome
@@ -208,16 +214,16 @@ impl World {
     /// The way from a card, to be put back.
     #[inline]
     fn take_way(&mut self, card: Path) -> Option<Box<Route>> {
-        let ways = self.nodes.directory.ways();
-        if self.direct.ways != ways {
+        let ways = self.nodes.address_directory.ways();
+        if self.fast_path.ways != ways {
             self.forget_ways();
-            self.direct.ways = ways;
+            self.fast_path.ways = ways;
         }
-        match std::mem::take(&mut self.direct.known[card.index()]) {
-            Known::Way(route) => Some(route),
-            Known::Nothing => self.find_way(card),
-            Known::NoWay => {
-                self.direct.known[card.index()] = Known::NoWay;
+        match std::mem::take(&mut self.fast_path.routes[card.index()]) {
+            CachedRoute::Way(route) => Some(route),
+            CachedRoute::Nothing => self.find_way(card),
+            CachedRoute::NoWay => {
+                self.fast_path.routes[card.index()] = CachedRoute::NoWay;
                 None
             }
         }
@@ -225,7 +231,7 @@ impl World {
 
     fn find_way(&mut self, card: Path) -> Option<Box<Route>> {
         let Some(route) = self.find_route(card) else {
-            self.direct.known[card.index()] = Known::NoWay;
+            self.fast_path.routes[card.index()] = CachedRoute::NoWay;
             return None;
         };
         let visits = route.visits.iter().map(|visit| (visit.node, visit.after));
@@ -235,12 +241,12 @@ impl World {
 
     /// Whether nothing on the way happens to a frame.
     #[inline]
-    fn is_calm(&mut self, journey: &Journey<'_>) -> bool {
-        let Journey { route, at, duration, .. } = *journey;
+    fn is_calm(&mut self, transit: &FastTransit<'_>) -> bool {
+        let FastTransit { route, at, duration, .. } = *transit;
         for link in &self.noisy {
-            for line in Line::both(*link) {
-                let noise = &self.links[*link].noise[usize::from(line.downstream)];
-                let Some(after) = route.crossing(line) else { continue };
+            for direction in DirectedLink::both(*link) {
+                let noise = &self.links[*link].noise[usize::from(direction.downstream)];
+                let Some(after) = route.crossing(direction) else { continue };
                 if noise.strikes(at + after, at + after + duration) {
                     return false;
                 }
@@ -251,41 +257,41 @@ impl World {
 
     /// What is due on the way is done, and inputs are sampled, as the frame comes by.
     #[inline]
-    fn prepare(&mut self, journey: &Journey<'_>) {
-        if self.nodes.may_meet(journey.card, journey.at) {
-            self.meet(journey);
+    fn prepare(&mut self, transit: &FastTransit<'_>) {
+        if self.nodes.may_meet(transit.card, transit.at) {
+            self.meet(transit);
         }
     }
 
-    fn meet(&mut self, journey: &Journey<'_>) {
-        let mut due = std::mem::take(&mut self.direct.due);
-        self.nodes.met_by(journey.card, journey.at, &mut due);
+    fn meet(&mut self, transit: &FastTransit<'_>) {
+        let mut due = std::mem::take(&mut self.fast_path.due);
+        self.nodes.met_by(transit.card, transit.at, &mut due);
         if !due.is_empty() {
-            self.take_turns(journey, &due);
+            self.take_turns(transit, &due);
             due.clear();
         }
-        self.direct.due = due;
+        self.fast_path.due = due;
     }
 
-    fn take_turns(&mut self, journey: &Journey<'_>, met: &[u32]) {
-        self.note_entries_for(met, Some(journey));
-        self.direct.turns.clear();
-        let places = met.iter().filter_map(|node| journey.route.place(*node));
-        self.direct.turns.extend(places);
-        self.direct.turns.sort_unstable_by_key(|place| std::cmp::Reverse(*place));
-        while let Some(place) = self.direct.turns.pop() {
-            let (node, at) = journey.at_place(place);
+    fn take_turns(&mut self, transit: &FastTransit<'_>, met: &[u32]) {
+        self.note_entries_for(met, Some(transit));
+        self.fast_path.turns.clear();
+        let places = met.iter().filter_map(|node| transit.route.place(*node));
+        self.fast_path.turns.extend(places);
+        self.fast_path.turns.sort_unstable_by_key(|place| std::cmp::Reverse(*place));
+        while let Some(place) = self.fast_path.turns.pop() {
+            let (node, at) = transit.at_place(place);
             self.nodes[node].touch(at, &mut self.signals);
-            if self.nodes[node].controller.has_phy_acts() {
-                self.take_phy_acts(node);
+            if self.nodes[node].controller.has_phy_actions() {
+                self.take_phy_actions(node);
             }
-            self.hear_signals(Some((journey.route, place)));
+            self.hear_signals(Some((transit.route, place)));
             if self.nodes[node].next_sample() <= at {
                 let controller = &mut self.nodes[node].controller;
                 controller.sample(at, &mut self.signals);
-                controller.begin(at, journey.number);
-                let _ = controller.end(at + journey.duration);
-                self.hear_signals(Some((journey.route, place)));
+                controller.begin(at, transit.number);
+                let _ = controller.end(at + transit.duration);
+                self.hear_signals(Some((transit.route, place)));
             }
         }
         self.nodes.settle();
@@ -303,7 +309,7 @@ impl World {
                 self.nodes[node as usize].controller.hear();
                 let Some((route, here)) = behind else { continue };
                 if let Some(place) = route.place(node).filter(|place| *place > here) {
-                    let turns = &mut self.direct.turns;
+                    let turns = &mut self.fast_path.turns;
                     let at = turns.partition_point(|other| *other > place);
                     if turns.get(at) != Some(&place) {
                         turns.insert(at, place);
@@ -314,7 +320,7 @@ impl World {
     }
 }
 
-impl Direct {
+impl FastPath {
     /// The cards, that whose last frame came earlier first.
     fn by_age(&self) -> [usize; 2] {
         if self.last[0] <= self.last[1] { [0, 1] } else { [1, 0] }

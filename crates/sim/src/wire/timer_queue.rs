@@ -1,5 +1,5 @@
-//! When something is due at each of many: who comes first is found at once, and moving one costs
-//! what the depth of a heap costs, however many there are.
+//! Timer queue: an instant for each of many nodes, in a heap. The earliest is found at once; moving
+//! one costs the depth of the heap.
 
 use linesman_proto::time::Instant;
 
@@ -9,14 +9,14 @@ const NOWHERE: u32 = u32::MAX;
 /// One instant for each of so many, or none. What is noted may be earlier than the truth, never
 /// later: whoever takes the first asks it anew.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Calendar {
+pub(super) struct TimerQueue {
     /// A heap: each is not before the one at half its place.
     heap: Vec<(Instant, u32)>,
     /// Where each is in the heap.
     places: Vec<u32>,
 }
 
-impl Calendar {
+impl TimerQueue {
     /// An empty one for `count` of them.
     pub(super) fn new(count: usize) -> Self {
         Self { heap: Vec::new(), places: vec![NOWHERE; count] }
@@ -106,37 +106,37 @@ mod tests {
     #[test]
     fn the_earliest_comes_first_and_of_two_the_lower() {
         let at = Instant::from_nanos;
-        let mut calendar = Calendar::new(4);
-        assert_eq!(calendar.first_until(Instant::MAX), None);
-        calendar.bring_forward(3, at(5));
-        calendar.bring_forward(1, at(5));
-        calendar.bring_forward(2, at(9));
-        calendar.bring_forward(2, at(20));
-        assert_eq!(calendar.first_until(at(4)), None);
-        assert_eq!(calendar.first_until(at(5)), Some(1));
-        calendar.put_off(1, at(30));
-        calendar.put_off(3, Instant::MAX);
-        assert_eq!(calendar.first_until(at(8)), None);
-        assert_eq!(calendar.first_until(at(9)), Some(2));
+        let mut timer_queue = TimerQueue::new(4);
+        assert_eq!(timer_queue.first_until(Instant::MAX), None);
+        timer_queue.bring_forward(3, at(5));
+        timer_queue.bring_forward(1, at(5));
+        timer_queue.bring_forward(2, at(9));
+        timer_queue.bring_forward(2, at(20));
+        assert_eq!(timer_queue.first_until(at(4)), None);
+        assert_eq!(timer_queue.first_until(at(5)), Some(1));
+        timer_queue.put_off(1, at(30));
+        timer_queue.put_off(3, Instant::MAX);
+        assert_eq!(timer_queue.first_until(at(8)), None);
+        assert_eq!(timer_queue.first_until(at(9)), Some(2));
     }
 
     proptest! {
         /// It is a list of instants from which the least is taken.
         #[test]
         fn it_is_as_good_as_a_list(steps in prop::collection::vec((0..12u32, 0..40u64, any::<bool>()), 1..200)) {
-            let mut calendar = Calendar::new(12);
+            let mut timer_queue = TimerQueue::new(12);
             let mut list = [Instant::MAX; 12];
             for (index, at, forward) in steps {
                 let at = if at == 0 { Instant::MAX } else { Instant::from_nanos(at) };
                 if forward {
-                    calendar.bring_forward(index, at);
+                    timer_queue.bring_forward(index, at);
                     list[index as usize] = list[index as usize].min(at);
                 } else {
-                    calendar.put_off(index, at);
+                    timer_queue.put_off(index, at);
                     list[index as usize] = at;
                 }
                 let first = list.iter().zip(0..).min().filter(|(at, _)| **at != Instant::MAX);
-                let found = calendar.first_until(Instant::from_nanos(u64::MAX - 1));
+                let found = timer_queue.first_until(Instant::from_nanos(u64::MAX - 1));
                 prop_assert_eq!(found, first.map(|(_, index)| index));
             }
         }

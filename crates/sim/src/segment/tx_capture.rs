@@ -1,5 +1,4 @@
-//! What is shown of the frames that go out to who listens on the interface with a packet socket, as a capture
-//! tool does.
+//! Transmitted frames as a capture tool sees them with a packet socket on the interface.
 //!
 //! The kernel shows a frame right before it hands it to the driver of the card, and at that time
 //! (`net/core/dev.c` of Linux, `xmit_one`). So nobody is shown what never came that far: a frame whose card has
@@ -29,8 +28,8 @@ pub struct Outgoing {
 
 /// Frames that go out, for who listens.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Shown {
-    is_listened_to: bool,
+pub(super) struct TxCapture {
+    is_active: bool,
     frames: VecDeque<(Outgoing, Vec<u8>)>,
 }
 
@@ -38,13 +37,13 @@ impl Segment {
     /// Somebody listens on the cards, or nobody does any more: frames that go out are kept for
     /// [`Segment::poll_outgoing`].
     pub fn listen(&mut self, listens: bool) {
-        self.shown.is_listened_to = listens;
-        self.shown.frames.clear();
+        self.tx_capture.is_active = listens;
+        self.tx_capture.frames.clear();
     }
 
     /// The next frame that was handed to the driver of a card; its bytes replace those in `buffer`.
     pub fn poll_outgoing(&mut self, buffer: &mut Vec<u8>) -> Option<Outgoing> {
-        let (outgoing, mut bytes) = self.shown.frames.pop_front()?;
+        let (outgoing, mut bytes) = self.tx_capture.frames.pop_front()?;
         std::mem::swap(buffer, &mut bytes);
         self.recycle(bytes);
         Some(outgoing)
@@ -52,18 +51,18 @@ impl Segment {
 
     /// Hands a frame to the driver, in front of everyone who listens; false if it takes none.
     #[inline]
-    pub(super) fn show(&mut self, at: Instant, path: Path, frame: &[u8]) -> bool {
-        self.shown.is_listened_to && self.show_to_listener(at, path, frame)
+    pub(super) fn capture(&mut self, at: Instant, path: Path, frame: &[u8]) -> bool {
+        self.tx_capture.is_active && self.store_capture(at, path, frame)
     }
 
-    fn show_to_listener(&mut self, at: Instant, path: Path, frame: &[u8]) -> bool {
+    fn store_capture(&mut self, at: Instant, path: Path, frame: &[u8]) -> bool {
         if !self.world.cards[path.index()].takes_frames(at) {
             return false;
         }
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
         bytes.extend_from_slice(frame);
-        self.shown.frames.push_back((Outgoing { at, path }, bytes));
+        self.tx_capture.frames.push_back((Outgoing { at, path }, bytes));
         true
     }
 }

@@ -1,5 +1,5 @@
-//! What is built into a segment otherwise than planned: devices too many, devices in each other's
-//! place, aliases that two have.
+//! Deviations from the plan that are built into a segment: extra devices, swapped devices, aliases
+//! that two share.
 
 use std::collections::BTreeMap;
 

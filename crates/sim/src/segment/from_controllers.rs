@@ -1,4 +1,4 @@
-//! A segment of controllers that were made elsewhere.
+//! Construction of a segment from controllers that were made elsewhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,8 +7,8 @@ use linesman_proto::time::Instant;
 use linesman_proto::topology::Tree;
 
 use super::arrivals::Arrivals;
-use super::late::Waiting;
-use super::shown::Shown;
+use super::tx_capture::TxCapture;
+use super::tx_delay::DelayedFrames;
 use super::{DeviceInfo, FrameTally, Segment};
 use crate::controller::Controller;
 use crate::device::Signals;
@@ -62,8 +62,8 @@ impl Segment {
             unplugged: BTreeMap::new(),
             strange: BTreeSet::new(),
             spare: Vec::new(),
-            waiting: Waiting::default(),
-            shown: Shown::default(),
+            waiting: DelayedFrames::default(),
+            tx_capture: TxCapture::default(),
             tally: FrameTally::default(),
         }
     }

@@ -1,4 +1,4 @@
-//! Who answers to what: station addresses, logical addresses, and a count of changes to the ways
+//! Directory of addresses: station addresses, logical addresses, and a count of changes to the ways
 //! that frames take.
 
 use std::collections::BTreeSet;
@@ -6,11 +6,11 @@ use std::collections::BTreeSet;
 use linesman_proto::address::LogicalAddress;
 
 use super::node::Node;
-use crate::controller::Manner;
+use crate::controller::FastPathInfo;
 
 /// Names of all controllers, kept as they change.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Directory {
+pub(super) struct AddressDirectory {
     /// Station address or alias, and node.
     stations: BTreeSet<(u16, u32)>,
     /// First logical byte of an FMMU, the first behind, and its node.
@@ -23,7 +23,7 @@ pub(super) struct Directory {
     names: u64,
 }
 
-impl Directory {
+impl AddressDirectory {
     /// Changes with everything that leads frames another way.
     #[inline]
     pub(super) fn ways(&self) -> u64 {
@@ -60,25 +60,27 @@ impl Directory {
         around.filter(move |(_, behind, _)| *behind > start).map(|(_, _, node)| *node)
     }
 
-    /// A node has another manner than before.
-    pub(super) fn change(&mut self, index: usize, node: &mut Node, manner: Manner) {
-        let before = std::mem::replace(&mut node.entry.manner, manner);
+    /// The fast-path information of a node has changed.
+    pub(super) fn change(&mut self, index: usize, node: &mut Node, fast_path_info: FastPathInfo) {
+        let before = std::mem::replace(&mut node.entry.fast_path_info, fast_path_info);
         let index = index as u32;
-        let way = |manner: &Manner| (manner.open, manner.meddles, manner.marks_source);
-        if way(&before) != way(&manner) {
+        let way = |fast_path_info: &FastPathInfo| {
+            (fast_path_info.open, fast_path_info.acts_on_all_frames, fast_path_info.marks_source)
+        };
+        if way(&before) != way(&fast_path_info) {
             self.ways += 1;
         }
-        if (before.station, before.alias) != (manner.station, manner.alias) {
+        if (before.station, before.alias) != (fast_path_info.station, fast_path_info.alias) {
             self.names += 1;
             for address in [Some(before.station), before.alias].into_iter().flatten() {
                 self.stations.remove(&(address, index));
             }
-            let new = [Some(manner.station), manner.alias].into_iter().flatten();
+            let new = [Some(fast_path_info.station), fast_path_info.alias].into_iter().flatten();
             self.stations.extend(new.map(|address| (address, index)));
         }
         // A node is entered here before it is ever asked for: station 0 is a name as any other.
-        self.names += u64::from(self.stations.insert((manner.station, index)));
-        if before.interrupts != manner.interrupts {
+        self.names += u64::from(self.stations.insert((fast_path_info.station, index)));
+        if before.interrupts != fast_path_info.interrupts {
             match self.interrupting.binary_search(&index) {
                 Ok(at) => {
                     self.interrupting.remove(at);
@@ -86,7 +88,7 @@ impl Directory {
                 Err(at) => self.interrupting.insert(at, index),
             }
         }
-        if before.fmmus != manner.fmmus {
+        if before.fmmus != fast_path_info.fmmus {
             self.names += 1;
             for (start, behind) in node.entry.mapped.drain(..) {
                 self.mapped.remove(&(start, behind, index));
