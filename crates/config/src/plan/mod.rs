@@ -1,5 +1,5 @@
-//! What follows from what was wanted and what is there: addresses, SyncManagers, FMMUs, frames, and
-//! which working counter each datagram must come back with.
+//! Plan, made from project and inventory: addresses, SyncManagers, FMMUs, frames, and the working
+//! counter that each datagram must come back with.
 //!
 //! A plan is of one network. Tasks have sync units; a task's frames carry datagrams; every byte of
 //! a logical datagram is owned by one SubDevice and direction ([`Ownership`]), so that a missing

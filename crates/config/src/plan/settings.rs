@@ -1,5 +1,5 @@
-//! What a user chooses for one SubDevice: how it is addressed, guarded, clocked, and what becomes of
-//! its inputs when a working counter is wrong.
+//! Settings that a user chooses for one SubDevice: how it is addressed, guarded, clocked, and what
+//! becomes of its inputs when a working counter is wrong.
 //!
 //! The defaults are what the MainDevice does when nothing is said.
 

@@ -1,4 +1,4 @@
-//! From a project to what the planner needs: each device with what its description says and what the
+//! Resolution of a project for the planner: each device with what its description says and what the
 //! user chose, in processing order.
 
 use linesman_proto::address::{RegisterAddress, StationAlias};

@@ -1,4 +1,4 @@
-//! What runs beneath the kernel: a hypervisor or a container, and the time it takes away.
+//! Machine beneath the kernel: a hypervisor or a container, and the time it takes away.
 
 use super::{Area, Check, Files, Outcome};
 

@@ -1,4 +1,5 @@
-//! The host as a suspect: what of this computer makes frames late, lost or impossible, and how to mend it.
+//! Checks of this host's real-time set-up: what makes frames late, lost or impossible, with the
+//! commands that fix it.
 //!
 //! Everything is read from `/sys` and `/proc`, below a folder that is `/` unless said, so that a copy of
 //! another computer's files can be judged, too; what only a driver knows comes in as [`DriverSettings`].

@@ -1,4 +1,4 @@
-//! What this process may do: raw sockets, real-time priority, memory that stays.
+//! Privileges of this process: raw sockets, real-time priority, locked memory.
 
 use super::{Area, Check, Files, Outcome};
 use crate::error::this_program;
