@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use linesman_maindevice::mailbox::{Errand, MailboxFailure, Step, Why};
+use linesman_maindevice::mailbox::{MailboxFailure, MailboxOperation, Step, Why};
 use linesman_maindevice::{Event, ExchangeError, ProbeRequest, Request};
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
@@ -98,7 +98,7 @@ impl Orders {
         };
         let failure = || MailboxFailure {
             id,
-            errand: Errand::Read { object, complete: false },
+            operation: MailboxOperation::Read { object, complete: false },
             step: Step::Request,
             why: Why::NoAnswer { patience: PATIENCE, rubbish: None },
         };

@@ -1,4 +1,4 @@
-//! Whether the application keeps up: outputs that it has not given anew are not sent as fresh ones.
+//! Supervision of the application: outputs that it has not given anew are not sent as fresh ones.
 //!
 //! A SubDevice's watchdog guards the way from the MainDevice; it cannot know that the program behind
 //! the MainDevice hangs while its frames go on. So when the application is late too often, datagrams

@@ -1,4 +1,4 @@
-//! Runs of bytes between a frame and the process image: neighbours are copied together.
+//! Byte ranges copied between a frame and the process image: neighbours are copied together.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use linesman_config::plan::Ownership;
 
 /// Bytes that lie side by side in a frame and in the process image.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-struct Run {
+struct CopyRange {
     /// Offset in the frame.
     frame_at: u32,
     /// Offset in the outputs or inputs of the process image.
@@ -16,7 +16,7 @@ struct Run {
     mask: u8,
 }
 
-impl Run {
+impl CopyRange {
     const WHOLE: u8 = 0xFF;
 
     #[inline]
@@ -34,19 +34,19 @@ impl Run {
 
 /// The runs of a frame or a datagram. Most have one, of whole bytes: it lies apart.
 #[derive(Debug, Default)]
-pub(super) struct Runs {
-    first: Run,
-    others: Vec<Run>,
+pub(super) struct CopyRanges {
+    first: CopyRange,
+    others: Vec<CopyRange>,
 }
 
-impl Runs {
+impl CopyRanges {
     /// None yet, and room for so many.
     pub(super) fn with_room(runs: usize) -> Self {
-        Self { first: Run::default(), others: Vec::with_capacity(runs) }
+        Self { first: CopyRange::default(), others: Vec::with_capacity(runs) }
     }
 
     pub(super) fn clear(&mut self) {
-        self.first = Run::default();
+        self.first = CopyRange::default();
         self.others.clear();
     }
 
@@ -54,7 +54,7 @@ impl Runs {
     pub(super) fn push(&mut self, owned: &Ownership, data_at: usize) {
         let len = owned.range.len();
         let mut add = |at: usize, len: usize, mask: u8| {
-            self.add(Run {
+            self.add(CopyRange {
                 frame_at: (data_at + owned.range.start + at) as u32,
                 image_at: (owned.image_at + at) as u32,
                 len: len as u32,
@@ -62,7 +62,7 @@ impl Runs {
             });
         };
         if owned.is_bytewise() {
-            add(0, len, Run::WHOLE);
+            add(0, len, CopyRange::WHOLE);
             return;
         }
         for at in 0..len {
@@ -70,8 +70,8 @@ impl Runs {
         }
     }
 
-    fn add(&mut self, run: Run) {
-        let is_first = self.others.is_empty() && run.mask == Run::WHOLE;
+    fn add(&mut self, run: CopyRange) {
+        let is_first = self.others.is_empty() && run.mask == CopyRange::WHOLE;
         let last = match self.others.last_mut() {
             Some(last) => last,
             None if is_first && self.first.len == 0 => {
@@ -81,7 +81,7 @@ impl Runs {
             None => &mut self.first,
         };
         if last.mask == run.mask
-            && run.mask == Run::WHOLE
+            && run.mask == CopyRange::WHOLE
             && last.frame().end == run.frame().start
             && last.image().end == run.image().start
         {
@@ -158,7 +158,7 @@ impl Runs {
         }
     }
 
-    fn all(&self) -> impl Iterator<Item = &Run> {
+    fn all(&self) -> impl Iterator<Item = &CopyRange> {
         std::iter::once(&self.first).chain(&self.others)
     }
 }
@@ -172,7 +172,7 @@ fn copy_whole(from: &[u8], to: &mut [u8]) {
 
 #[inline]
 fn copy(from: &[u8], to: &mut [u8], mask: u8) {
-    if mask == Run::WHOLE {
+    if mask == CopyRange::WHOLE {
         copy_whole(from, to);
     } else if let ([from], [to]) = (from, to) {
         *to = (*to & !mask) | (from & mask);
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn neighbours_are_one_run_and_bits_leave_the_others_alone() {
-        let mut runs = Runs::with_room(4);
+        let mut runs = CopyRanges::with_room(4);
         runs.push(&owned(0..2, 0, Ownership::WHOLE), 26);
         runs.push(&owned(2..5, 2, Ownership::WHOLE), 26);
         assert_eq!((runs.first.len, runs.others.len()), (5, 0));
@@ -208,7 +208,7 @@ mod tests {
     }
     #[test]
     fn outputs_that_the_image_has_not_are_sent_as_zero() {
-        let mut runs = Runs::with_room(1);
+        let mut runs = CopyRanges::with_room(1);
         runs.push(&owned(0..2, 0, Ownership::WHOLE), 0);
         runs.push(&owned(3..5, 4, Ownership::WHOLE), 0);
         let mut frame = [0xEE; 6];
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn bits_that_come_first_are_no_run_of_whole_bytes() {
-        let mut runs = Runs::with_room(3);
+        let mut runs = CopyRanges::with_room(3);
         runs.push(&owned(0..1, 0, [0x03, 0x03]), 0);
         runs.push(&owned(1..3, 1, Ownership::WHOLE), 0);
         let mut image = [0xF0; 3];

@@ -1,7 +1,8 @@
-//! Keeping the cycle in step with the reference clock: the MainDevice is one of the clocks that follow.
+//! Servo that keeps the cycle in step with the reference clock: the MainDevice is one of the clocks
+//! that follow.
 //!
-//! The datagram that spreads the reference's time brings that time back: it says when, by the reference
-//! clock, the frame was there. The next departures are moved so that the frame is there when a cycle
+//! The datagram that distributes the system time brings that time back: it says when, by the reference
+//! clock, the frame was there. The next batches are moved so that the frame is there when a cycle
 //! begins, that is at a multiple of the cycle time (SYN-09; SYNC0 falls its shift later). A
 //! proportional and an integral part follow a quartz that is off and drifts.
 
@@ -18,7 +19,7 @@ const JUMP: i64 = 10;
 
 /// The controller. Without a reference clock that was set it does nothing.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Steer {
+pub(super) struct DcServo {
     /// How often the reference was set, and the system time at the start of the run.
     base: Option<(u32, DcTime)>,
     /// The reference's time in the last frame that brought it, of which frames bring the low half only, and
@@ -28,7 +29,7 @@ pub(super) struct Steer {
     speed: i64,
 }
 
-impl Steer {
+impl DcServo {
     /// The reference was set, for the how-maniest time, to a time that was `epoch` when the run began.
     pub(super) fn set_base(&mut self, base: Option<(u32, DcTime)>) {
         if self.base != base {
@@ -36,7 +37,7 @@ impl Steer {
         }
     }
 
-    /// By how many ns the next departures are to be moved, from the low half of the reference's time
+    /// By how many ns the next batches are to be moved, from the low half of the reference's time
     /// in the data of a datagram that came back at `now`.
     pub(super) fn correction(&mut self, now: Instant, data: &[u8], cycle: Span) -> i64 {
         let (Some((_, epoch)), Some(low)) = (self.base, data.first_chunk()) else { return 0 };
@@ -74,7 +75,7 @@ mod tests {
     #[test]
     fn the_cycle_follows_the_reference_clock() {
         let cycle = Span::ms(1);
-        let mut steer = Steer::default();
+        let mut steer = DcServo::default();
         assert_eq!(
             steer.correction(Instant::ZERO, &[0x40, 0xE2, 0x01, 0x00], cycle),
             0,

@@ -1,4 +1,4 @@
-//! Frames of a task that leave together, and whether they are back.
+//! Batch of frames of a task that leave together, and whether they are back.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ pub(super) const LOST_IS_NEWS: u64 = 3;
 
 /// Frames of a task that leave together.
 #[derive(Debug)]
-pub(super) struct Departure {
+pub(super) struct FrameBatch {
     pub(super) next_at: Instant,
     pub(super) cycle: Span,
     /// Their places among all frames.
@@ -28,10 +28,10 @@ pub(super) struct Departure {
     pub(super) application: Application,
 }
 
-/// A frame in the order of departures.
+/// A frame in the order of batches.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Departing {
-    pub(super) departure: usize,
+pub(super) struct BatchFrame {
+    pub(super) batch: usize,
     pub(super) task: usize,
     /// Its number within the task, and among those of all tasks.
     pub(super) number: usize,
@@ -39,21 +39,21 @@ pub(super) struct Departing {
 }
 
 /// Which frames of a plan leave together when it begins at `now`, and all of them in that order.
-pub(super) fn departing(
+pub(super) fn frame_batches(
     plan: &Plan,
     application: Application,
     now: Instant,
-) -> (Vec<Departure>, Vec<Departing>) {
-    let (mut departures, mut order) = (Vec::<Departure>::new(), Vec::new());
+) -> (Vec<FrameBatch>, Vec<BatchFrame>) {
+    let (mut batches, mut order) = (Vec::<FrameBatch>::new(), Vec::new());
     let mut planned = 0;
     for (task, one) in plan.tasks.iter().enumerate() {
         let first = one.frames.iter().map(|frame| frame.ahead).max().unwrap_or_default();
         let last = one.frames.iter().map(|frame| frame.ahead).min().unwrap_or_default();
         for (number, frame) in one.frames.iter().enumerate() {
             let next_at = now + first.saturating_sub(frame.ahead);
-            let same = |one: &Departure| one.task == task && one.next_at == next_at;
-            let departure = departures.iter().position(same).unwrap_or_else(|| {
-                departures.push(Departure {
+            let same = |one: &FrameBatch| one.task == task && one.next_at == next_at;
+            let batch = batches.iter().position(same).unwrap_or_else(|| {
+                batches.push(FrameBatch {
                     next_at,
                     cycle: one.cycle.max(Span::ns(1)),
                     frames: 0..0,
@@ -63,29 +63,29 @@ pub(super) fn departing(
                     task,
                     application,
                 });
-                departures.len() - 1
+                batches.len() - 1
             });
-            order.push(Departing { departure, task, number, planned });
+            order.push(BatchFrame { batch, task, number, planned });
             planned += 1;
         }
     }
-    order.sort_by_key(|one| one.departure);
+    order.sort_by_key(|one| one.batch);
     for (at, one) in order.iter().enumerate() {
-        let Range { start, end } = &mut departures[one.departure].frames;
+        let Range { start, end } = &mut batches[one.batch].frames;
         if start == end {
             *start = at;
         }
         *end = at + 1;
     }
-    (departures, order)
+    (batches, order)
 }
 
 /// When the first of them is due; [`Instant::MAX`]: there is none.
-pub(super) fn earliest(departures: &[Departure]) -> Instant {
-    departures.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX)
+pub(super) fn earliest(batches: &[FrameBatch]) -> Instant {
+    batches.iter().map(|one| one.next_at).min().unwrap_or(Instant::MAX)
 }
 
-impl Departure {
+impl FrameBatch {
     /// It is due at `now`: its frames leave, and again a cycle later. Cycles that were slept through are
     /// left out, not caught up: the grid stays. Gives how many.
     #[inline]

@@ -1,4 +1,5 @@
-//! The time of the reference clock in the frames: handed round only while the reference itself gives it.
+//! Distribution of the system time by the cyclic frames: written to the SubDevices only while the
+//! reference clock gives it.
 //!
 //! ARMW and FRMW at 0x0910 have the reference put its time into the datagram, and all behind it take what is
 //! there (S1 9.1.3). They take it just as well when the reference has put nothing in: a controller does not
@@ -137,7 +138,7 @@ pub(super) enum Brought {
 
 /// The time that is handed round.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Spread {
+pub(super) struct SystemTimeDistribution {
     known: ReferenceClock,
     state: State,
     sent: [Sent; KEPT],
@@ -148,7 +149,7 @@ pub(super) struct Spread {
     usual: Option<WorkingCounter>,
 }
 
-impl Spread {
+impl SystemTimeDistribution {
     /// Takes over what is known of the reference.
     pub(super) fn learn(&mut self, known: ReferenceClock) {
         let before = std::mem::replace(&mut self.known, known);
@@ -254,15 +255,15 @@ mod tests {
     const ALL_BUT_ONE: WorkingCounter = WorkingCounter(3);
 
     /// A cycle of 1 ms, in which the reference answers or does not.
-    struct Line {
+    struct TestLine {
         datagram: ClockDatagram,
-        spread: Spread,
+        distribution: SystemTimeDistribution,
         cycle: u64,
         len: usize,
         known: ReferenceClock,
     }
 
-    impl Line {
+    impl TestLine {
         fn new(command: Command, len: usize) -> Self {
             let address = DatagramAddress::Physical(0x1001, SYSTEM_TIME.address);
             let role = Role::ReferenceClock;
@@ -270,14 +271,14 @@ mod tests {
             let planned = DatagramPlan { command, address, len, role, sync_unit, ownership };
             let datagram = ClockDatagram::new(&planned, DATA_AT).unwrap();
             let known = ReferenceClock { base: Some((1, DcTime(EPOCH))), stands: true };
-            let mut spread = Spread::default();
-            spread.learn(known);
-            Self { datagram, spread, cycle: 0, len, known }
+            let mut distribution = SystemTimeDistribution::default();
+            distribution.learn(known);
+            Self { datagram, distribution, cycle: 0, len, known }
         }
 
         fn learn(&mut self, change: impl FnOnce(&mut ReferenceClock)) {
             change(&mut self.known);
-            self.spread.learn(self.known);
+            self.distribution.learn(self.known);
         }
 
         /// What the reference shows if nothing happens to it: it is 20 ppm fast.
@@ -293,7 +294,7 @@ mod tests {
             frame[COMMAND_AT] = Command::Frmw.code();
             let departed = Instant::from_nanos(self.cycle * 1_000_000);
             let index = self.cycle as u8;
-            self.spread.write(&self.datagram, index, departed, &mut frame);
+            self.distribution.write(&self.datagram, index, departed, &mut frame);
             let (command, sent) = (frame[COMMAND_AT], self.datagram.time(&frame));
             if let Some(time) = shows {
                 self.datagram.put(time, &mut frame);
@@ -303,7 +304,7 @@ mod tests {
                 (Some(Command::Frmw), None) => ALL_BUT_ONE,
                 (_, shows) => WorkingCounter(shows.is_some().into()),
             };
-            let brought = self.spread.read(&self.datagram, index, wkc, &frame);
+            let brought = self.distribution.read(&self.datagram, index, wkc, &frame);
             (command, sent, brought)
         }
 
@@ -313,15 +314,15 @@ mod tests {
         }
     }
 
-    fn lines() -> [Line; 2] {
-        let mut lines = [4, 8].map(|len| Line::new(Command::Frmw, len));
-        for line in &mut lines {
+    fn test_lines() -> [TestLine; 2] {
+        let mut test_lines = [4, 8].map(|len| TestLine::new(Command::Frmw, len));
+        for test_line in &mut test_lines {
             for _ in 0..5 {
-                let (command, _, brought) = line.pass_well();
+                let (command, _, brought) = test_line.pass_well();
                 assert_eq!((command, brought), (Command::Frmw.code(), Brought::Time));
             }
         }
-        lines
+        test_lines
     }
 
     const FRMW: u8 = Command::Frmw.code();
@@ -329,58 +330,58 @@ mod tests {
 
     #[test]
     fn the_frame_that_finds_nobody_carries_the_time_and_the_next_ones_write_nothing() {
-        for mut line in lines() {
-            let (command, sent, brought) = line.pass(None);
+        for mut test_line in test_lines() {
+            let (command, sent, brought) = test_line.pass(None);
             assert_eq!((command, brought), (FRMW, Brought::Nothing));
-            let expected = line.datagram.cut(line.shown());
+            let expected = test_line.datagram.cut(test_line.shown());
             assert!(expected.abs_diff(sent) <= 20, "{sent}, but it would have shown {expected}");
             for _ in 0..3 {
-                assert_eq!(line.pass(None), (FPRD, 0, Brought::Nothing));
+                assert_eq!(test_line.pass(None), (FPRD, 0, Brought::Nothing));
             }
             // It answers again, and is believed by what it shows.
-            assert_eq!(line.pass_well(), (FPRD, 0, Brought::Time));
-            assert_eq!(line.pass_well().0, FRMW);
+            assert_eq!(test_line.pass_well(), (FPRD, 0, Brought::Time));
+            assert_eq!(test_line.pass_well().0, FRMW);
         }
     }
 
     #[test]
     fn a_reference_that_has_started_anew_is_not_handed_round_until_it_is_set() {
-        for mut line in lines() {
-            line.pass(None);
+        for mut test_line in test_lines() {
+            test_line.pass(None);
             for ms in 1..500 {
                 let started = 7_000 + ms * 1_000_020;
-                assert_eq!(line.pass(Some(started)), (FPRD, 0, Brought::Nothing));
+                assert_eq!(test_line.pass(Some(started)), (FPRD, 0, Brought::Nothing));
             }
-            line.learn(|known| known.stands = false);
+            test_line.learn(|known| known.stands = false);
             for ms in 500..3_000 {
                 let started = 7_000 + ms * 1_000_020;
-                let brought = line.pass(Some(started));
+                let brought = test_line.pass(Some(started));
                 assert_eq!(brought, (FPRD, 0, Brought::Nothing), "nobody has set it");
             }
-            line.learn(|known| {
+            test_line.learn(|known| {
                 known.stands = true;
                 known.base = Some((2, DcTime(EPOCH)));
             });
-            assert_eq!(line.pass_well().0, FRMW);
+            assert_eq!(test_line.pass_well().0, FRMW);
         }
     }
 
     #[test]
     fn somebody_else_in_the_place_of_a_lost_reference_takes_over_if_it_shows_the_time() {
-        for mut line in lines() {
-            line.learn(|known| known.stands = false);
+        for mut test_line in test_lines() {
+            test_line.learn(|known| known.stands = false);
             for _ in 0..5 {
-                let (command, _, brought) = line.pass_well();
+                let (command, _, brought) = test_line.pass_well();
                 assert_eq!((command, brought), (FRMW, Brought::Time));
             }
             // A clock that nobody has set comes between.
-            let (command, _, brought) = line.pass(Some(5_000_000));
+            let (command, _, brought) = test_line.pass(Some(5_000_000));
             assert_eq!((command, brought), (FRMW, Brought::Nothing));
             for _ in 0..2_000 {
-                assert_eq!(line.pass(Some(5_000_000)), (FPRD, 0, Brought::Nothing));
+                assert_eq!(test_line.pass(Some(5_000_000)), (FPRD, 0, Brought::Nothing));
             }
-            line.learn(|known| known.stands = true);
-            let (command, _, brought) = line.pass_well();
+            test_line.learn(|known| known.stands = true);
+            let (command, _, brought) = test_line.pass_well();
             assert_eq!((command, brought), (FRMW, Brought::Time));
         }
     }
@@ -388,21 +389,23 @@ mod tests {
     /// A clock that was wrong before it was away for a moment is so after it, too: that is told by others.
     #[test]
     fn who_answers_for_a_second_is_believed() {
-        for mut line in lines() {
-            line.pass(None);
-            let shows = |line: &Line| Some(line.shown() + 5_000_000);
-            let asked = (0..2_000).take_while(|_| line.pass(shows(&line)).0 == FPRD).count();
+        for mut test_line in test_lines() {
+            test_line.pass(None);
+            let shows = |test_line: &TestLine| Some(test_line.shown() + 5_000_000);
+            let asked =
+                (0..2_000).take_while(|_| test_line.pass(shows(&test_line)).0 == FPRD).count();
             assert!((1_000..1_010).contains(&asked), "{asked}");
         }
     }
 
     #[test]
     fn a_reference_that_shows_just_what_was_expected_has_answered() {
-        for mut line in lines() {
+        for mut test_line in test_lines() {
             for _ in 0..10 {
-                let expected =
-                    line.spread.expected(Instant::from_nanos((line.cycle + 1) * 1_000_000));
-                let (command, _, brought) = line.pass(expected);
+                let expected = test_line
+                    .distribution
+                    .expected(Instant::from_nanos((test_line.cycle + 1) * 1_000_000));
+                let (command, _, brought) = test_line.pass(expected);
                 assert_eq!((command, brought), (FRMW, Brought::Time));
             }
         }
@@ -411,26 +414,27 @@ mod tests {
     /// Frames have room for 64 bits, and the upper half comes back as zeros.
     #[test]
     fn a_reference_of_32_bits_that_comes_round_while_it_is_away_is_known_again() {
-        let mut line = Line::new(Command::Frmw, 8);
-        let low = |line: &Line| Some((EPOCH + (line.cycle + 1) * 1_000_020) & 0xFFFF_FFFF);
+        let mut test_line = TestLine::new(Command::Frmw, 8);
+        let low =
+            |test_line: &TestLine| Some((EPOCH + (test_line.cycle + 1) * 1_000_020) & 0xFFFF_FFFF);
         for _ in 0..5_000 {
-            assert_eq!(line.pass(low(&line)).2, Brought::Time);
+            assert_eq!(test_line.pass(low(&test_line)).2, Brought::Time);
         }
         for _ in 0..4_000 {
-            line.pass(None);
+            test_line.pass(None);
         }
-        assert_eq!(line.pass(low(&line)), (FPRD, 0, Brought::Time));
+        assert_eq!(test_line.pass(low(&test_line)), (FPRD, 0, Brought::Time));
     }
 
     #[test]
     fn before_clocks_are_set_whatever_the_reference_shows_is_handed_round() {
-        let mut line = Line::new(Command::Armw, 4);
-        line.spread = Spread::default();
-        assert_eq!(line.pass(None), (FRMW, 0, Brought::Nothing));
+        let mut test_line = TestLine::new(Command::Armw, 4);
+        test_line.distribution = SystemTimeDistribution::default();
+        assert_eq!(test_line.pass(None), (FRMW, 0, Brought::Nothing));
         let aprd = Command::Aprd.code();
-        assert_eq!(line.pass(None), (aprd, 0, Brought::Nothing));
-        let (command, sent, brought) = line.pass(Some(123));
+        assert_eq!(test_line.pass(None), (aprd, 0, Brought::Nothing));
+        let (command, sent, brought) = test_line.pass(Some(123));
         assert_eq!((command, sent, brought), (aprd, 0, Brought::Time));
-        assert_eq!(line.pass(Some(1_000_123)).0, FRMW);
+        assert_eq!(test_line.pass(Some(1_000_123)).0, FRMW);
     }
 }

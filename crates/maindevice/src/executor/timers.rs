@@ -1,5 +1,5 @@
-//! Who sleeps until when. Whoever no longer sleeps leaves at once; its time stays in the heap until it
-//! comes up, or until most of the heap is of that kind.
+//! Timers of sleeping tasks. A cancelled timer stays in the heap until it comes up, or until most
+//! of the heap is of that kind.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,4 +1,4 @@
-//! What can be asked of a SubDevice through its mailbox, and how messages name it.
+//! Requests to a SubDevice through its mailbox, and the names that messages give them.
 
 use std::fmt;
 
@@ -85,28 +85,32 @@ pub enum MailboxRequest {
 impl MailboxRequest {
     /// What is to be done, without data and password.
     #[must_use]
-    pub fn errand(&self) -> Errand {
+    pub fn operation(&self) -> MailboxOperation {
         match self {
             Self::Upload { object, complete } => {
-                Errand::Read { object: *object, complete: *complete }
+                MailboxOperation::Read { object: *object, complete: *complete }
             }
             Self::Download { object, complete, .. } => {
-                Errand::Write { object: *object, complete: *complete }
+                MailboxOperation::Write { object: *object, complete: *complete }
             }
-            Self::ObjectList { list } => Errand::List { list: *list },
-            Self::DescribeObject { index } => Errand::DescribeObject { index: *index },
-            Self::DescribeEntry { object, .. } => Errand::DescribeEntry { object: *object },
-            Self::SetAddresses { port, .. } => Errand::SetAddresses { port: *port },
-            Self::WriteIdn { drive, idn, .. } => Errand::WriteIdn { drive: *drive, idn: *idn },
-            Self::ReadFile { name, .. } => Errand::ReadFile { name: name.clone() },
-            Self::WriteFile { name, .. } => Errand::WriteFile { name: name.clone() },
+            Self::ObjectList { list } => MailboxOperation::List { list: *list },
+            Self::DescribeObject { index } => MailboxOperation::DescribeObject { index: *index },
+            Self::DescribeEntry { object, .. } => {
+                MailboxOperation::DescribeEntry { object: *object }
+            }
+            Self::SetAddresses { port, .. } => MailboxOperation::SetAddresses { port: *port },
+            Self::WriteIdn { drive, idn, .. } => {
+                MailboxOperation::WriteIdn { drive: *drive, idn: *idn }
+            }
+            Self::ReadFile { name, .. } => MailboxOperation::ReadFile { name: name.clone() },
+            Self::WriteFile { name, .. } => MailboxOperation::WriteFile { name: name.clone() },
         }
     }
 }
 
 /// What is to be done, as messages name it: "reading object 0x1018:01".
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Errand {
+pub enum MailboxOperation {
     /// Fetching an object.
     Read {
         /// Which.
@@ -160,7 +164,7 @@ pub enum Errand {
     },
 }
 
-impl Errand {
+impl MailboxOperation {
     /// The protocol it takes.
     #[must_use]
     pub const fn protocol(&self) -> MailboxType {
@@ -177,7 +181,7 @@ impl Errand {
     }
 }
 
-impl fmt::Display for Errand {
+impl fmt::Display for MailboxOperation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let whole = |complete: &bool| if *complete { " with complete access" } else { "" };
         match self {

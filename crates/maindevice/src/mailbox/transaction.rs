@@ -1,19 +1,19 @@
-//! One errand through a mailbox: messages said and heard, until it is done.
+//! One transaction through a mailbox: requests and answers, until it is done.
 
 use linesman_proto::mailbox::{BufferTooSmall, MailboxType};
 use linesman_proto::time::{Instant, Span};
 
-use super::errand::MailboxRequest;
 use super::failure::{MailboxFailure, Step, Why};
 use super::multiplexer::Multiplexer;
+use super::request::MailboxRequest;
 use super::{coe, foe, information, settings};
 
 /// A SubDevice that writes what it got into its flash memory answers late: a file takes more patience
 /// than an object.
 const FILE_PATIENCE: Span = Span::s(10);
 
-/// An errand under way.
-pub(crate) struct Dialogue<'a> {
+/// An operation under way.
+pub(crate) struct MailboxTransaction<'a> {
     pub(crate) multiplexer: &'a mut Multiplexer,
     /// How far it has come.
     pub(crate) step: Step,
@@ -22,15 +22,15 @@ pub(crate) struct Dialogue<'a> {
     until: Instant,
 }
 
-/// Does an errand from its first message to its last.
+/// Does an operation from its first message to its last.
 pub(crate) async fn perform(
     multiplexer: &mut Multiplexer,
     request: &MailboxRequest,
     patience: Span,
 ) -> Result<Vec<u8>, MailboxFailure> {
-    let errand = request.errand();
+    let operation = request.operation();
     let id = multiplexer.id();
-    let (mut step, protocol) = (Step::Before, errand.protocol());
+    let (mut step, protocol) = (Step::Before, operation.protocol());
     let result = if multiplexer.speaks(protocol) {
         multiplexer.begin().await;
         let until = multiplexer.now();
@@ -44,20 +44,20 @@ pub(crate) async fn perform(
             | MailboxType::Voe
             | MailboxType::Reserved(_) => patience,
         };
-        let mut dialogue = Dialogue { multiplexer, step, patience, until };
-        let result = dialogue.go(request).await;
-        step = dialogue.step;
+        let mut transaction = MailboxTransaction { multiplexer, step, patience, until };
+        let result = transaction.go(request).await;
+        step = transaction.step;
         result
     } else {
         Err(Why::NotSpoken { protocol })
     };
     result.map_err(|why| {
         multiplexer.failed(&why);
-        MailboxFailure { id, errand, step, why }
+        MailboxFailure { id, operation, step, why }
     })
 }
 
-impl Dialogue<'_> {
+impl MailboxTransaction<'_> {
     async fn go(&mut self, request: &MailboxRequest) -> Result<Vec<u8>, Why> {
         match request {
             MailboxRequest::Upload { object, complete } => {
@@ -123,7 +123,7 @@ impl Dialogue<'_> {
         write: impl FnOnce(&mut [u8]) -> Result<usize, BufferTooSmall>,
     ) {
         let now = self.multiplexer.now();
-        // Who does not take it has forgotten the errand anyway, or will be asked anew.
+        // Who does not take it has forgotten the operation anyway, or will be asked anew.
         let _ = self.multiplexer.send(kind, write, now).await;
     }
 }

@@ -1,5 +1,4 @@
-//! Frames that come back otherwise than cyclic ones nearly always do: those of procedures, copies of
-//! a ring, late ones, strays.
+//! Acyclic receive path: frames of procedures, copies of a ring, late ones, strays.
 
 use linesman_proto::address::Path;
 use linesman_proto::time::Instant;

@@ -1,4 +1,4 @@
-//! Looking at a line without touching it: nothing but reads.
+//! Read-only scan of a line: nothing is written.
 //!
 //! A broadcast read counts who is there; then each SubDevice is read by its position, since station
 //! addresses may be missing or doubled. Reading AL status and DL status clears their event request
@@ -16,7 +16,7 @@ use crate::executor::Wire;
 
 /// What a look at a line has shown.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Look {
+pub struct ReadOnlyScan {
     /// Which network.
     pub network: Network,
     /// When it was done.
@@ -24,12 +24,12 @@ pub struct Look {
     /// States of all, ORed together as the broadcast read brings them.
     pub states: OredStates,
     /// Who is there, in the order of processing.
-    pub devices: Vec<LookedDevice>,
+    pub devices: Vec<DeviceReading>,
 }
 
 /// One SubDevice as it was read. What it did not answer is `None`.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct LookedDevice {
+pub struct DeviceReading {
     /// Its place in the order of processing; in a broken ring those of card B follow those of card A.
     pub position: Position,
     /// How it was addressed.
@@ -52,7 +52,7 @@ pub struct LookedDevice {
 
 /// Nothing to look at.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum LookError {
+pub enum ReadOnlyScanError {
     /// No frame came back.
     #[error("the line does not answer: {0}")]
     Silent(ExchangeError),
@@ -87,13 +87,15 @@ pub(crate) fn counters_of(reply: &Reply, information: Option<EscInformation>) ->
 /// How many SubDevices process frames, and their states.
 ///
 /// # Errors
-/// [`LookError`] when there are none.
-pub async fn count(wire: &Wire, network: Network) -> Result<(u16, OredStates), LookError> {
+/// [`ReadOnlyScanError`] when there are none.
+pub async fn count(wire: &Wire, network: Network) -> Result<(u16, OredStates), ReadOnlyScanError> {
     let status = register::AL_STATUS;
-    let reply =
-        wire.read(Target::All, status.address, status.len).await.map_err(LookError::Silent)?;
+    let reply = wire
+        .read(Target::All, status.address, status.len)
+        .await
+        .map_err(ReadOnlyScanError::Silent)?;
     match reply.wkc.0 {
-        0 => Err(LookError::Nobody { network }),
+        0 => Err(ReadOnlyScanError::Nobody { network }),
         count => Ok((count, linesman_proto::state::AlState::from_or(reply.bytes::<1>(0)[0]))),
     }
 }
@@ -101,8 +103,11 @@ pub async fn count(wire: &Wire, network: Network) -> Result<(u16, OredStates), L
 /// How each SubDevice is reached by position, in the order of processing.
 ///
 /// # Errors
-/// [`LookError`] when there are none.
-pub async fn places(wire: &Wire, network: Network) -> Result<(Vec<Target>, OredStates), LookError> {
+/// [`ReadOnlyScanError`] when there are none.
+pub async fn places(
+    wire: &Wire,
+    network: Network,
+) -> Result<(Vec<Target>, OredStates), ReadOnlyScanError> {
     let (count, states) = self::count(wire, network).await?;
     if wire.ring_intact().is_none() {
         let places = (0..count).map(|position| Target::Position(Position(position)));
@@ -114,7 +119,7 @@ pub async fn places(wire: &Wire, network: Network) -> Result<(Vec<Target>, OredS
     for card in Path::ALL {
         let status = register::AL_STATUS;
         let half = Request::read(Target::All, status.address, status.len).by_card(card);
-        let reply = wire.ask(half).await.map_err(LookError::Silent)?;
+        let reply = wire.ask(half).await.map_err(ReadOnlyScanError::Silent)?;
         places.extend((0..reply.wkc.0).map(|position| match card {
             Path::A => Target::Position(Position(position)),
             Path::B => Target::PositionOnB(Position(position)),
@@ -126,10 +131,14 @@ pub async fn places(wire: &Wire, network: Network) -> Result<(Vec<Target>, OredS
 /// Looks at a line, with or without error counters.
 ///
 /// # Errors
-/// [`LookError`] when nobody is there. A single SubDevice that does not answer is no error.
-pub async fn look(wire: Wire, network: Network, counters: bool) -> Result<Look, LookError> {
+/// [`ReadOnlyScanError`] when nobody is there. A single SubDevice that does not answer is no error.
+pub async fn scan(
+    wire: Wire,
+    network: Network,
+    counters: bool,
+) -> Result<ReadOnlyScan, ReadOnlyScanError> {
     let (places, states) = patient_places(&wire, network).await?;
-    let read = |target, position| look_at(wire.clone(), target, Position(position), counters);
+    let read = |target, position| read_device(wire.clone(), target, Position(position), counters);
     let reading: Vec<_> = (places.into_iter().zip(0..))
         .map(|(target, position)| wire.spawn(read(target, position)))
         .collect();
@@ -137,7 +146,7 @@ pub async fn look(wire: Wire, network: Network, counters: bool) -> Result<Look, 
     for device in reading {
         devices.push(device.await);
     }
-    Ok(Look { network, at: wire.now(), states, devices })
+    Ok(ReadOnlyScan { network, at: wire.now(), states, devices })
 }
 
 /// [`places`], asked for a few times: a host that is busy with something else may be silent for longer
@@ -145,19 +154,24 @@ pub async fn look(wire: Wire, network: Network, counters: bool) -> Result<Look, 
 async fn patient_places(
     wire: &Wire,
     network: Network,
-) -> Result<(Vec<Target>, OredStates), LookError> {
+) -> Result<(Vec<Target>, OredStates), ReadOnlyScanError> {
     const LOOKS: u32 = 3;
-    const LOOK_AGAIN_AFTER: Span = Span::ms(100);
+    const RETRY_AFTER: Span = Span::ms(100);
     for _ in 1..LOOKS {
         match places(wire, network).await {
-            Err(LookError::Silent(_)) => wire.sleep(LOOK_AGAIN_AFTER).await,
-            seen @ (Ok(_) | Err(LookError::Nobody { .. })) => return seen,
+            Err(ReadOnlyScanError::Silent(_)) => wire.sleep(RETRY_AFTER).await,
+            seen @ (Ok(_) | Err(ReadOnlyScanError::Nobody { .. })) => return seen,
         }
     }
     places(wire, network).await
 }
 
-async fn look_at(wire: Wire, target: Target, position: Position, counters: bool) -> LookedDevice {
+async fn read_device(
+    wire: Wire,
+    target: Target,
+    position: Position,
+    counters: bool,
+) -> DeviceReading {
     // All at once, so that they share frames; what was not answered is asked for again.
     let asked = [
         (register::ESC_TYPE.address, EscInformation::LEN as u16),
@@ -180,7 +194,7 @@ async fn look_at(wire: Wire, target: Target, position: Position, counters: bool)
     let dl_status = next().map(|reply| DlStatus(reply.word(0)));
     let al = next().map(|reply| al_of(&reply));
     let counters = next().map(|reply| counters_of(&reply, information));
-    LookedDevice {
+    DeviceReading {
         position,
         target,
         information,

@@ -1,4 +1,4 @@
-//! One SubDevice: driven to its target, watched, driven again.
+//! Supervisor of one SubDevice: drives it to its target, watches it, drives it again.
 
 use std::sync::atomic::Ordering;
 
@@ -8,21 +8,21 @@ use linesman_proto::register::{self, AlStatus, DlStatus, ErrorCounters, EscInfor
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::{Instant, Span};
 
-use super::drive::Failed;
-use super::gates::Gates;
+use super::loop_control::LoopControl;
+use super::state_change::Failed;
 use super::times::Phase;
 use super::watched_clock::WatchedClock;
-use super::{CALM, Context, Found, lose};
+use super::{CALM, Context, Reachability, lose};
 use crate::event::Event;
 use crate::exchange::{Reply, Target};
 use crate::executor::lock;
 use crate::options::Polling;
-use crate::procedure::look::{AL_LEN, al_of, counters_of};
+use crate::procedure::read_only_scan::{AL_LEN, al_of, counters_of};
 use crate::procedure::state::StepError;
 
 /// What is known of the SubDevice, so that only changes are told.
 #[derive(Default)]
-pub(super) struct Known {
+pub(super) struct ReportedState {
     al: Option<(AlStatus, AlStatusCode)>,
     dl: Option<DlStatus>,
     counters: Option<ErrorCounters>,
@@ -33,7 +33,7 @@ pub(super) struct Known {
 }
 
 /// Why the SubDevice has to be driven again.
-enum Trouble {
+enum SupervisionEnd {
     Lost,
     Fell,
     /// Another state is wanted than before.
@@ -49,12 +49,12 @@ const UNWATCHED: Span = Span::s(3_600);
 /// A SubDevice that stayed well for so long starts with short waits again.
 const FORGIVEN_AFTER: Span = Span::s(10);
 
-pub(super) struct Keeper<'a> {
+pub(super) struct SubDeviceSupervisor<'a> {
     pub(super) context: &'a Context,
     pub(super) device: &'a DevicePlan,
-    known: Known,
+    known: ReportedState,
     clock: WatchedClock,
-    gates: Gates,
+    loop_control: LoopControl,
     backoff: Span,
     /// How often a state had been asked for when it was lost.
     requests_at_loss: u32,
@@ -63,61 +63,61 @@ pub(super) struct Keeper<'a> {
 }
 
 /// Keeps one SubDevice at its target; never ends.
-pub(crate) async fn keep(context: Context, id: DeviceId) {
+pub(crate) async fn supervise_device(context: Context, id: DeviceId) {
     let plan = std::sync::Arc::clone(&context.plan);
     let Some(device) = plan.device(id) else { return };
-    let mut keeper = Keeper {
+    let mut supervisor = SubDeviceSupervisor {
         context: &context,
         device,
-        known: Known::default(),
+        known: ReportedState::default(),
         clock: WatchedClock::default(),
-        gates: Gates::new(&context, device),
+        loop_control: LoopControl::new(&context, device),
         backoff: Span::ZERO,
         requests_at_loss: 0,
         round: 0,
     };
     loop {
-        let restarted = keeper.until_found().await;
-        keeper.gates.forget();
-        keeper.while_there(restarted).await;
-        keeper.requests_at_loss = lock(&context.line).requests(id);
+        let restarted = supervisor.until_found().await;
+        supervisor.loop_control.forget();
+        supervisor.while_there(restarted).await;
+        supervisor.requests_at_loss = lock(&context.device_table).requests(id);
         lose(&context, id);
     }
 }
 
-impl Keeper<'_> {
+impl SubDeviceSupervisor<'_> {
     pub(super) fn target(&self) -> Target {
         Target::Station(self.device.station)
     }
 
     /// The state in which it shall be now.
     pub(super) fn wanted(&self) -> AlState {
-        lock(&self.context.line).wanted(self.device.id)
+        lock(&self.context.device_table).wanted(self.device.id)
     }
 
     /// Notes how long a phase took that began then.
     pub(super) fn note(&self, phase: Phase, began: Instant) {
         let took = self.context.wire.now().since(began);
-        lock(&self.context.line).note_time(self.device.id, phase, took);
+        lock(&self.context.device_table).note_time(self.device.id, phase, took);
     }
 
     async fn until_found(&self) -> bool {
         loop {
             let seen = self.context.alerts();
-            let found = lock(&self.context.line).found(self.device.id);
+            let found = lock(&self.context.device_table).found(self.device.id);
             match found {
-                Found::There { restarted } if self.may_be_set_up() => return restarted,
-                Found::There { .. } | Found::Lost | Found::Unknown => {}
+                Reachability::There { restarted } if self.may_be_set_up() => return restarted,
+                Reachability::There { .. } | Reachability::Lost | Reachability::Unknown => {}
             }
-            self.context.nap(seen, Span::s(1)).await;
+            self.context.sleep_until_alert(seen, Span::s(1)).await;
         }
     }
 
     /// Whether it may be brought up: for the first time always, later unless that is left to the user.
     fn may_be_set_up(&self) -> bool {
-        let line = lock(&self.context.line);
-        let lost_before = line.losses(self.device.id) > 0;
-        let asked = line.requests(self.device.id) > self.requests_at_loss;
+        let device_table = lock(&self.context.device_table);
+        let lost_before = device_table.losses(self.device.id) > 0;
+        let asked = device_table.requests(self.device.id) > self.requests_at_loss;
         let may = self.context.options.reinitialise && self.device.settings.keeping.reinitialise;
         !lost_before || asked || may
     }
@@ -140,14 +140,14 @@ impl Keeper<'_> {
                 }
             };
             let is_running = reached >= AlState::SafeOp;
-            self.gates.set(self.context, self.device, is_running).await;
+            self.loop_control.set(self.context, self.device, is_running).await;
             match self.watch(reached).await {
-                Trouble::Lost => return,
-                Trouble::Redirected => {
-                    lock(&self.context.line).set_moving(self.device.id, None);
+                SupervisionEnd::Lost => return,
+                SupervisionEnd::Redirected => {
+                    lock(&self.context.device_table).set_moving(self.device.id, None);
                     continue;
                 }
-                Trouble::Fell => {
+                SupervisionEnd::Fell => {
                     let Some((status, code)) = self.known.al else { return };
                     let (id, from) = (self.device.id, reached);
                     self.context.wire.emit(Event::AbnormalState { id, from, status, code });
@@ -158,7 +158,7 @@ impl Keeper<'_> {
                     }
                 }
             }
-            lock(&self.context.line).set_moving(self.device.id, None);
+            lock(&self.context.device_table).set_moving(self.device.id, None);
             let well_for = self.context.wire.now().since(began);
             if well_for >= FORGIVEN_AFTER {
                 self.backoff = Span::ZERO;
@@ -220,11 +220,11 @@ impl Keeper<'_> {
     /// for. False when it got lost.
     async fn wait_for_request(&mut self) -> bool {
         let status = self.known.al.map_or(AlStatus::default(), |(status, _)| status);
-        lock(&self.context.line).set_moving(self.device.id, status.state().state());
-        let before = lock(&self.context.line).requests(self.device.id);
-        while lock(&self.context.line).requests(self.device.id) == before {
+        lock(&self.context.device_table).set_moving(self.device.id, status.state().state());
+        let before = lock(&self.context.device_table).requests(self.device.id);
+        while lock(&self.context.device_table).requests(self.device.id) == before {
             let seen = self.context.alerts();
-            self.context.nap(seen, self.context.options.watch_interval).await;
+            self.context.sleep_until_alert(seen, self.context.options.watch_interval).await;
             if !self.read().await {
                 return false;
             }
@@ -238,12 +238,12 @@ impl Keeper<'_> {
         let [first, longest] = self.context.options.retry_after;
         let wait = self.backoff.max(first);
         self.backoff = (wait * 2).min(longest);
-        lock(&self.context.line).set_moving(self.device.id, status.state().state());
+        lock(&self.context.device_table).set_moving(self.device.id, status.state().state());
         let until = self.context.wire.now() + wait;
-        let before = lock(&self.context.line).requests(self.device.id);
+        let before = lock(&self.context.device_table).requests(self.device.id);
         // Whoever asks for a state now does not want to wait.
         while self.context.wire.now() < until
-            && lock(&self.context.line).requests(self.device.id) == before
+            && lock(&self.context.device_table).requests(self.device.id) == before
         {
             self.context.wire.sleep(self.context.options.watch_interval.min(wait)).await;
             if !self.read().await {
@@ -255,11 +255,12 @@ impl Keeper<'_> {
 
     fn reached(&mut self) -> AlState {
         let id = self.device.id;
-        let mut line = lock(&self.context.line);
-        let state = line.wanted(id);
-        line.set_reached(id, state);
-        let all = line.have_all_reached() && line.set_all_reached(self.context.wire.now());
-        drop(line);
+        let mut device_table = lock(&self.context.device_table);
+        let state = device_table.wanted(id);
+        device_table.set_reached(id, state);
+        let all = device_table.have_all_reached()
+            && device_table.set_all_reached(self.context.wire.now());
+        drop(device_table);
         self.context.wire.emit(Event::TargetReached { id, state });
         if all {
             self.context.wire.emit(Event::AllReached);
@@ -272,7 +273,7 @@ impl Keeper<'_> {
     async fn until_look(&mut self, reached: AlState) {
         if self.context.options.polling == Polling::EachDevice {
             let seen = self.context.alerts();
-            return self.context.nap(seen, self.context.options.watch_interval).await;
+            return self.context.sleep_until_alert(seen, self.context.options.watch_interval).await;
         }
         loop {
             let (seen, round, is_other) = self.reasons(reached);
@@ -280,34 +281,37 @@ impl Keeper<'_> {
                 self.round = round;
                 return;
             }
-            self.context.nap(seen, UNWATCHED).await;
+            self.context.sleep_until_alert(seen, UNWATCHED).await;
         }
     }
 
     /// Alerts and bad rounds so far, and whether it is lost or wanted in another state.
     fn reasons(&self, reached: AlState) -> (u64, u64, bool) {
-        let (id, line) = (self.device.id, lock(&self.context.line));
-        let is_other = line.found(id) == Found::Lost || line.wanted(id) != reached;
-        (line.alerts(), self.context.bad_rounds.load(Ordering::Relaxed), is_other)
+        let (id, device_table) = (self.device.id, lock(&self.context.device_table));
+        let is_other =
+            device_table.found(id) == Reachability::Lost || device_table.wanted(id) != reached;
+        (device_table.alerts(), self.context.bad_rounds.load(Ordering::Relaxed), is_other)
     }
 
     /// Reads when it is time, until something is wrong.
-    async fn watch(&mut self, reached: AlState) -> Trouble {
+    async fn watch(&mut self, reached: AlState) -> SupervisionEnd {
         let id = self.device.id;
         loop {
             self.until_look(reached).await;
-            if lock(&self.context.line).found(id) == Found::Lost || !self.read().await {
-                return Trouble::Lost;
+            if lock(&self.context.device_table).found(id) == Reachability::Lost
+                || !self.read().await
+            {
+                return SupervisionEnd::Lost;
             }
             let status = self.known.al.map(|(status, _)| status);
             if reached != self.wanted() {
-                return Trouble::Redirected;
+                return SupervisionEnd::Redirected;
             }
             let at_target = status.is_some_and(|status| {
                 status.state() == StateValue::Known(reached) && !status.error()
             });
             if !at_target {
-                return Trouble::Fell;
+                return SupervisionEnd::Fell;
             }
             // One look serves all alerts of that time.
             self.context.wire.sleep(CALM).await;
@@ -325,7 +329,7 @@ impl Keeper<'_> {
     /// Reads state, and ports where these are watched.
     async fn read_states(&mut self) -> bool {
         let (wire, target) = (&self.context.wire, self.target());
-        let links = self.context.options.polling.reads_links() || self.gates.are_set();
+        let links = self.context.options.polling.reads_links() || self.loop_control.are_set();
         let (address, len) = (register::DL_STATUS.address, register::DL_STATUS.len);
         let dl = links.then(|| wire.read(target, address, len));
         let Ok(al) = wire.read_one(target, register::AL_STATUS.address, AL_LEN).await else {
@@ -351,7 +355,7 @@ impl Keeper<'_> {
             let reply = reply.filter(Reply::answered);
             self.known.information = reply.map(|reply| EscInformation::from_bytes(reply.bytes(0)));
         }
-        let clears = lock(&self.context.line).clears(id);
+        let clears = lock(&self.context.device_table).clears(id);
         let al = wire.read(target, register::AL_STATUS.address, AL_LEN);
         let dl = wire.read(target, register::DL_STATUS.address, register::DL_STATUS.len);
         let counters = wire.read(target, ErrorCounters::START, ErrorCounters::LEN as u16);
@@ -376,7 +380,7 @@ impl Keeper<'_> {
         if let Some(reply) = dl {
             self.learn_links(DlStatus(reply.word(0))).await;
         }
-        let cleared = lock(&self.context.line).clears(id) != clears;
+        let cleared = lock(&self.context.device_table).clears(id) != clears;
         if let Some(reply) = counters.filter(|_| !cleared) {
             let counters = counters_of(&reply, self.known.information);
             if self.known.counters.replace(counters) != Some(counters) {
@@ -396,9 +400,9 @@ impl Keeper<'_> {
             self.known.vain_clears = 0;
         } else if self.known.vain_clears < MOST_VAIN_CLEARS {
             self.known.vain_clears += 1;
-            let Context { wire, line, .. } = self.context;
+            let Context { wire, device_table, .. } = self.context;
             // It fails or not: the next reading tells.
-            let _ = super::counters::clear(wire, line, self.device.id, self.target()).await;
+            let _ = super::counters::clear(wire, device_table, self.device.id, self.target()).await;
             self.known.counters = None;
         }
     }
@@ -408,7 +412,7 @@ impl Keeper<'_> {
         if self.known.dl.replace(status) != Some(status) {
             self.context.wire.emit(Event::Links { id, status });
         }
-        self.gates.tend(self.context, self.device, status).await;
+        self.loop_control.tend(self.context, self.device, status).await;
     }
 
     pub(super) fn learn_state(&mut self, status: AlStatus, code: AlStatusCode) {

@@ -1,5 +1,5 @@
-//! What is known of each SubDevice right now: shared by the cyclic exchange, which judges by it, and
-//! by the keepers, which find it out.
+//! Table of the SubDevices as they are now: shared by the cyclic exchange, which judges by it, and
+//! by the supervisors, which fill it.
 
 use std::collections::BTreeSet;
 use std::future::Future;
@@ -22,7 +22,7 @@ use crate::executor::wire::Sleep;
 
 /// Whether and how a SubDevice can be reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(crate) enum Found {
+pub(crate) enum Reachability {
     /// It has not been looked for yet.
     #[default]
     Unknown,
@@ -36,8 +36,8 @@ pub(crate) enum Found {
 }
 
 #[derive(Clone, Copy, Default, Debug)]
-struct Live {
-    found: Found,
+struct DeviceEntry {
+    found: Reachability,
     served: bool,
     /// What it serves is known. It is not while it is on its way, or stuck with an error: its
     /// SyncManagers may take data or deny them.
@@ -78,14 +78,14 @@ impl Default for ReferenceClock {
 
 /// The SubDevices of a network as they are.
 #[derive(Debug, Default)]
-pub(crate) struct Line {
-    devices: Vec<Live>,
+pub(crate) struct DeviceTable {
+    devices: Vec<DeviceEntry>,
     /// Shared, so that the cycle sees without a lock whether anything has changed.
     version: Arc<AtomicU64>,
     alerts: u64,
-    /// Naps that an alert ends, in the order in which they began.
+    /// Sleeps that an alert ends, in the order in which they began.
     waiting: Waitlist<Waker>,
-    /// Devices whose presence has changed since [`Line::take_changes`].
+    /// Devices whose presence has changed since [`DeviceTable::take_changes`].
     changed: Vec<DeviceId>,
     /// How many are at their targets.
     reached: usize,
@@ -104,11 +104,14 @@ pub(crate) struct Line {
     reference: Option<(StationAddress, Option<DeviceId>)>,
 }
 
-impl Line {
+impl DeviceTable {
     pub(crate) fn new(plan: &Plan) -> Self {
         let count = plan.devices.len();
         let changed = (0..count as u32).map(DeviceId).collect();
-        let live = |device: &DevicePlan| Live { target: Some(device.target), ..Live::default() };
+        let live = |device: &DevicePlan| DeviceEntry {
+            target: Some(device.target),
+            ..DeviceEntry::default()
+        };
         let devices = plan.devices.iter().map(live).collect();
         let times = Some(BringUpTimes::new(count));
         Self { devices, changed, times, ..Self::default() }
@@ -137,43 +140,46 @@ impl Line {
             };
             let (surely, perhaps) = match live.found {
                 // It may still be running as an earlier plan left it.
-                Found::Unknown => (false, true),
-                Found::Lost => (false, false),
-                Found::There { .. } => (live.served && live.settled, live.served || !live.settled),
+                Reachability::Unknown => (false, true),
+                Reachability::Lost => (false, false),
+                Reachability::There { .. } => {
+                    (live.served && live.settled, live.served || !live.settled)
+                }
             };
             least.set(id, serves(surely));
             most.set(id, serves(perhaps));
         }
     }
 
-    fn live(&mut self, id: DeviceId) -> Option<&mut Live> {
+    fn live(&mut self, id: DeviceId) -> Option<&mut DeviceEntry> {
         self.devices.get_mut(id.index())
     }
 
-    pub(crate) fn found(&self, id: DeviceId) -> Found {
-        self.devices.get(id.index()).map_or(Found::Unknown, |live| live.found)
+    pub(crate) fn found(&self, id: DeviceId) -> Reachability {
+        self.devices.get(id.index()).map_or(Reachability::Unknown, |live| live.found)
     }
 
     /// Whether every SubDevice is where it can be reached.
     pub(crate) fn are_all_there(&self) -> bool {
-        self.devices.iter().all(|live| matches!(live.found, Found::There { .. }))
+        self.devices.iter().all(|live| matches!(live.found, Reachability::There { .. }))
     }
 
     /// Notes where a SubDevice is; returns where it was.
-    pub(crate) fn set_found(&mut self, id: DeviceId, found: Found) -> Found {
+    pub(crate) fn set_found(&mut self, id: DeviceId, found: Reachability) -> Reachability {
         self.changes(id);
-        let Some(live) = self.live(id) else { return Found::Unknown };
+        let Some(live) = self.live(id) else { return Reachability::Unknown };
         let before = std::mem::replace(&mut live.found, found);
         // Whoever is lost serves nothing, and that is known; whoever comes is on its way.
         let settled = match found {
-            Found::Lost => true,
-            Found::There { .. } | Found::Unknown => false,
+            Reachability::Lost => true,
+            Reachability::There { .. } | Reachability::Unknown => false,
         };
-        let losses = live.losses + u32::from(found == Found::Lost && before != Found::Lost);
+        let losses =
+            live.losses + u32::from(found == Reachability::Lost && before != Reachability::Lost);
         // What was seen and asked for outlives a loss; what it serves does not.
-        let Live { openings, reached, target, requests, clock_set, .. } = *live;
-        let clock_set = clock_set && found != Found::There { restarted: true };
-        let new = Live {
+        let DeviceEntry { openings, reached, target, requests, clock_set, .. } = *live;
+        let clock_set = clock_set && found != Reachability::There { restarted: true };
+        let new = DeviceEntry {
             found,
             settled,
             openings,
@@ -182,7 +188,7 @@ impl Line {
             requests,
             losses,
             clock_set,
-            ..Live::default()
+            ..DeviceEntry::default()
         };
         *live = new;
         self.set_at_target(id, false);
@@ -283,7 +289,7 @@ impl Line {
     pub(crate) fn clock(&self) -> ReferenceClock {
         let reference = self.reference.and_then(|(_, id)| self.devices.get(id?.index()));
         let stands = reference
-            .is_none_or(|live| live.clock_set && matches!(live.found, Found::There { .. }));
+            .is_none_or(|live| live.clock_set && matches!(live.found, Reachability::There { .. }));
         ReferenceClock { base: self.clock_base, stands }
     }
 
@@ -423,7 +429,7 @@ impl Line {
         self.responding
     }
 
-    /// Something is not as it was: all keepers shall look at once.
+    /// Something is not as it was: all supervisors shall look at once.
     pub(crate) fn alert(&mut self) {
         self.alerts += 1;
         for waker in self.waiting.take_all() {
@@ -437,8 +443,8 @@ impl Line {
 }
 
 /// Sleeps, but no longer than until the next alert.
-pub(crate) struct Nap {
-    pub(crate) line: Arc<Mutex<Line>>,
+pub(crate) struct AlertSleep {
+    pub(crate) device_table: Arc<Mutex<DeviceTable>>,
     /// The last alert that was acted upon.
     pub(crate) seen: u64,
     pub(crate) sleep: Sleep,
@@ -446,29 +452,29 @@ pub(crate) struct Nap {
     pub(crate) place: Option<u64>,
 }
 
-impl Future for Nap {
+impl Future for AlertSleep {
     type Output = ();
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
-        let mut line = lock(&self.line);
-        if line.alerts != self.seen {
+        let mut device_table = lock(&self.device_table);
+        if device_table.alerts != self.seen {
             return Poll::Ready(());
         }
         if self.place.is_none() {
-            let place = line.waiting.insert(context.waker().clone());
-            drop(line);
+            let place = device_table.waiting.insert(context.waker().clone());
+            drop(device_table);
             self.place = Some(place);
         } else {
-            drop(line);
+            drop(device_table);
         }
         Pin::new(&mut self.sleep).poll(context)
     }
 }
 
-impl Drop for Nap {
+impl Drop for AlertSleep {
     fn drop(&mut self) {
         if let Some(place) = self.place {
-            lock(&self.line).waiting.remove(place);
+            lock(&self.device_table).waiting.remove(place);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Ports that open by order (JCT-12, ESC-06).
+//! Loop control: ports that open only when the MainDevice orders it (JCT-12, ESC-06).
 //!
 //! A controller closes the loop of a port within microseconds when its link is lost, and by itself opens it as
 //! soon as the link is back, ready or not: what comes up too early, or flaps, costs all frames each time. In
@@ -19,7 +19,7 @@ use linesman_proto::register::{self, DlControl, DlStatus, EcatEvents, LoopMode};
 use linesman_proto::time::Span;
 use linesman_proto::topology::{End, Tree};
 
-use super::{Context, Found};
+use super::{Context, Reachability};
 use crate::event::Event;
 use crate::exchange::{Reply, Target};
 use crate::executor::{Wire, lock};
@@ -33,13 +33,13 @@ const LOOK: Span = Span::ms(10);
 const LOOPS: RegisterAddress = RegisterAddress(register::DL_CONTROL.address.0 + 1);
 
 /// The ports of one SubDevice that open by order.
-pub(super) struct Gates {
+pub(super) struct LoopControl {
     /// Those with a planned SubDevice behind.
     ports: Vec<Port>,
     is_set: bool,
 }
 
-impl Gates {
+impl LoopControl {
     pub(super) fn new(context: &Context, device: &DevicePlan) -> Self {
         let is_wanted = context.plan.ports_open_by_order;
         let ports = if is_wanted { towards(&context.plan.tree, device) } else { Vec::new() };
@@ -159,6 +159,6 @@ fn is_prepared(context: &Context, device: &DevicePlan, port: Port) -> bool {
     };
     let is_behind = |node: usize| node == first || tree.is_downstream_of(node, first);
     let mut section = context.plan.devices.iter().filter(|other| is_behind(other.id.index()));
-    let line = lock(&context.line);
-    section.all(|other| line.found(other.id) == Found::Lost)
+    let device_table = lock(&context.device_table);
+    section.all(|other| device_table.found(other.id) == Reachability::Lost)
 }

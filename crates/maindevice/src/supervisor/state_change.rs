@@ -1,4 +1,4 @@
-//! The way of one SubDevice from wherever it is to where it shall be.
+//! State changes of one SubDevice, from wherever it is to its target.
 
 use linesman_config::start_up::Transition;
 use linesman_proto::register::AlStatus;
@@ -6,7 +6,7 @@ use linesman_proto::state::transition::next_step;
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 
 use super::clocks;
-use super::keeper::Keeper;
+use super::device_supervisor::SubDeviceSupervisor;
 use super::modules;
 use super::shortest_cycle;
 use super::start_up::{Moment, execute};
@@ -24,7 +24,7 @@ pub(super) struct Failed {
     pub(super) error: StepError,
 }
 
-impl Keeper<'_> {
+impl SubDeviceSupervisor<'_> {
     /// Goes from wherever the SubDevice is to its target.
     pub(super) async fn drive(&mut self, anew: bool) -> Result<(), Failed> {
         let at_begin = |error| Failed { from: None, to: AlState::Init, error };
@@ -45,10 +45,10 @@ impl Keeper<'_> {
             StateValue::Known(state) => Some(state).filter(|_| !anew),
         };
         if anew {
-            lock(&context.line).forget_times(device.id);
+            lock(&context.device_table).forget_times(device.id);
         }
         loop {
-            lock(&context.line).set_moving(device.id, current);
+            lock(&context.device_table).set_moving(device.id, current);
             let next = match current {
                 None => AlState::Init,
                 Some(current) => match next_step(current, self.wanted()) {
@@ -123,7 +123,7 @@ impl Keeper<'_> {
             set_up::after_process_data(wire, device).await?;
         }
         self.learn_state(AlStatus::new(next), AlStatusCode::NO_ERROR);
-        lock(&context.line).set_moving(device.id, Some(next));
+        lock(&context.device_table).set_moving(device.id, Some(next));
         self.commands(current, next, Moment::After).await
     }
 

@@ -1,8 +1,8 @@
-//! How a network stands: what is known of each SubDevice, and the network's state word.
+//! Status of a network: each SubDevice, and the network's state word.
 //!
-//! [`Standing`] is fed with the [`Event`]s of a MainDevice and words nothing. A MainDevice that runs a
+//! [`NetworkStatus`] is fed with the [`Event`]s of a MainDevice and words nothing. A MainDevice that runs a
 //! plan keeps one, so that an application sees the state words in its cycle
-//! ([`MainDevice::standing`](crate::MainDevice::standing)); [`Watch`](super::Watch) keeps one for people.
+//! ([`MainDevice::network_status`](crate::MainDevice::network_status)); [`Watch`](super::Watch) keeps one for people.
 
 use linesman_config::plan::Plan;
 use linesman_proto::address::{DeviceId, WorkingCounter};
@@ -15,7 +15,7 @@ use crate::event::Event;
 
 /// How the network of a plan stands.
 #[derive(Clone, Debug)]
-pub struct Standing {
+pub struct NetworkStatus {
     devices: Vec<WatchedDevice>,
     /// Bits that do not follow from the SubDevices.
     own: NetworkState,
@@ -24,7 +24,7 @@ pub struct Standing {
     network_time: Option<(DeviceId, i64)>,
 }
 
-impl Standing {
+impl NetworkStatus {
     /// The SubDevices of a plan, of which nothing is known yet.
     #[must_use]
     pub fn new(plan: &Plan) -> Self {

@@ -70,9 +70,9 @@ fn a_look_writes_nothing_and_reads_the_counters() {
     let mut bench = Bench::new(PLANT);
     let device = bench.id("T2");
     bench.segment.set_counter(device, ErrorCounter::InvalidFrame(Port::A), 17);
-    bench.device.look(bench.now);
-    assert!(bench.run_until(Span::s(1), |event| matches!(event, Event::Looked(_))));
-    let Some((_, Event::Looked(look))) = bench.events.pop() else { panic!() };
+    bench.device.read_only_scan(bench.now);
+    assert!(bench.run_until(Span::s(1), |event| matches!(event, Event::ReadOnlyScanned(_))));
+    let Some((_, Event::ReadOnlyScanned(look))) = bench.events.pop() else { panic!() };
     assert_eq!(look.devices.len(), 6);
     let counters = look.devices[2].counters.unwrap();
     assert_eq!(counters.value(ErrorCounter::InvalidFrame(Port::A)), Some(17));

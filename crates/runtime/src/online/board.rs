@@ -125,7 +125,7 @@ impl Board {
             inner.watch.iter_mut().for_each(|watch| watch.handle_send_failure(false));
         }
         let watch = inner.watch.as_ref()?;
-        let mut report = build::driven(watch.plan(), watch.standing(), snapshot, &inner.base);
+        let mut report = build::driven(watch.plan(), watch.network_status(), snapshot, &inner.base);
         report.on.clone_from(&inner.on);
         report.cards.clone_from(&inner.cards);
         Some(report)
@@ -135,7 +135,7 @@ impl Board {
     #[must_use]
     pub fn error_sums(&self) -> Option<Vec<u64>> {
         let inner = self.lock();
-        Some(inner.watch.as_ref()?.standing().error_sums().collect())
+        Some(inner.watch.as_ref()?.network_status().error_sums().collect())
     }
 }
 

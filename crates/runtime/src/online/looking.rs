@@ -2,8 +2,8 @@
 
 use linesman_config::plan::{DevicePlan, Plan};
 use linesman_diagnosis::{FrameSeen, HostObservation};
-use linesman_maindevice::procedure::{Look, LookedDevice};
-use linesman_maindevice::watch::Standing;
+use linesman_maindevice::procedure::{DeviceReading, ReadOnlyScan};
+use linesman_maindevice::watch::NetworkStatus;
 use linesman_maindevice::{Event, MainDevice, Statistics};
 use linesman_proto::address::{DeviceId, Path, StationAddress, WorkingCounter};
 use linesman_proto::port::Port;
@@ -24,7 +24,7 @@ pub struct Looker {
     on: String,
     names: Vec<String>,
     next: Option<Instant>,
-    known: Option<(Plan, Standing)>,
+    known: Option<(Plan, NetworkStatus)>,
     failure: Option<String>,
     /// What the MainDevice has counted so far.
     statistics: Statistics,
@@ -62,8 +62,8 @@ impl Looker {
     /// The line as it was seen last; `None` before it was.
     #[must_use]
     pub fn report(&self, now: Instant) -> Option<OnlineReport> {
-        let (plan, standing) = self.known.as_ref()?;
-        let mut report = build::known(plan, standing, now);
+        let (plan, network_status) = self.known.as_ref()?;
+        let mut report = build::known(plan, network_status, now);
         report.on.clone_from(&self.on);
         let queued = self.rates.last().map(|[_, queued]| queued);
         report.queued = build::queued_frames(&self.statistics, &self.base, queued);
@@ -80,21 +80,21 @@ impl Looker {
     /// All counters begin at 0 again; no register is touched.
     pub fn clear(&mut self) {
         self.base = self.statistics;
-        if let Some((_, standing)) = &mut self.known {
-            standing.clear();
+        if let Some((_, network_status)) = &mut self.known {
+            network_status.clear();
         }
     }
 
-    fn looked(&mut self, look: &Look) {
+    fn looked(&mut self, look: &ReadOnlyScan) {
         let at = look.at;
-        let (plan, standing) = self.known.get_or_insert_with(|| {
+        let (plan, network_status) = self.known.get_or_insert_with(|| {
             let plan = seen(look, &self.names);
-            let standing = Standing::new(&plan);
-            (plan, standing)
+            let network_status = NetworkStatus::new(&plan);
+            (plan, network_status)
         });
         let count = WorkingCounter(look.devices.len() as u16);
-        if let Some(before) = standing.responding().or(Some(count)) {
-            standing.handle_event(at, &Event::Responding { before, now: count });
+        if let Some(before) = network_status.responding().or(Some(count)) {
+            network_status.handle_event(at, &Event::Responding { before, now: count });
         }
         let mut seen = vec![false; plan.devices.len()];
         for (place, device) in look.devices.iter().enumerate() {
@@ -102,19 +102,20 @@ impl Looker {
             if let Some(seen) = seen.get_mut(id.index()) {
                 *seen = true;
             }
-            tell(standing, at, id, device);
+            tell(network_status, at, id, device);
         }
         for (id, seen) in (0..).map(DeviceId).zip(seen) {
-            let there = standing.device(id).is_some_and(|known| known.is_present() != Some(false));
+            let there =
+                network_status.device(id).is_some_and(|known| known.is_present() != Some(false));
             if !seen && there {
-                standing.handle_event(at, &Event::DeviceLost { id });
+                network_status.handle_event(at, &Event::DeviceLost { id });
             }
         }
     }
 
     /// Nobody answers.
     fn silent(&mut self, at: Instant) {
-        let nobody = Look {
+        let nobody = ReadOnlyScan {
             network: linesman_proto::address::Network::default(),
             at,
             states: AlState::from_or(0),
@@ -127,7 +128,7 @@ impl Looker {
 }
 
 /// Whom a look has met: by station address where it has one of the first look, else by its place.
-fn who(plan: &Plan, place: usize, device: &LookedDevice) -> Option<DeviceId> {
+fn who(plan: &Plan, place: usize, device: &DeviceReading) -> Option<DeviceId> {
     let station = device.station.filter(|station| station.0 != 0);
     let by_station = |station: StationAddress| {
         let mut same = plan.devices.iter().filter(|device| device.station == station);
@@ -140,38 +141,44 @@ fn who(plan: &Plan, place: usize, device: &LookedDevice) -> Option<DeviceId> {
     plan.devices.get(place).map(|device| device.id)
 }
 
-fn tell(standing: &mut Standing, at: Instant, id: DeviceId, device: &LookedDevice) {
-    if standing.device(id).is_some_and(|known| known.is_present() == Some(false)) {
-        standing.handle_event(at, &Event::DeviceBack { id, restarted: false });
+fn tell(network_status: &mut NetworkStatus, at: Instant, id: DeviceId, device: &DeviceReading) {
+    if network_status.device(id).is_some_and(|known| known.is_present() == Some(false)) {
+        network_status.handle_event(at, &Event::DeviceBack { id, restarted: false });
     }
     if let Some(status) = device.al_status {
         let code =
             if status.error() { device.al_code.unwrap_or_default() } else { AlStatusCode(0) };
-        fell(standing, at, id, status, code);
-        standing.handle_event(at, &Event::DeviceState { id, status, code });
+        fell(network_status, at, id, status, code);
+        network_status.handle_event(at, &Event::DeviceState { id, status, code });
     }
     if let Some(status) = device.dl_status {
-        standing.handle_event(at, &Event::Links { id, status });
+        network_status.handle_event(at, &Event::Links { id, status });
     }
     if let Some(counters) = device.counters {
-        standing.handle_event(at, &Event::Counters { id, counters });
+        network_status.handle_event(at, &Event::Counters { id, counters });
     }
 }
 
 /// A state that is left with an error while nobody drives the line is left by itself.
-fn fell(standing: &mut Standing, at: Instant, id: DeviceId, status: AlStatus, code: AlStatusCode) {
-    let before = standing.device(id).and_then(|known| known.al_status());
+fn fell(
+    network_status: &mut NetworkStatus,
+    at: Instant,
+    id: DeviceId,
+    status: AlStatus,
+    code: AlStatusCode,
+) {
+    let before = network_status.device(id).and_then(|known| known.al_status());
     let Some(before) = before.filter(|before| status.error() && before.state() != status.state())
     else {
         return;
     };
     if let Some(from) = before.state().state() {
-        standing.handle_event(at, &Event::AbnormalState { id, from, status, code });
+        network_status.handle_event(at, &Event::AbnormalState { id, from, status, code });
     }
 }
 
 /// What was seen first, as a plan that nobody runs.
-fn seen(look: &Look, names: &[String]) -> Plan {
+fn seen(look: &ReadOnlyScan, names: &[String]) -> Plan {
     let controllers: Vec<SeenController> = (look.devices.iter())
         .map(|device| {
             let open = |port: &Port| {
@@ -200,10 +207,10 @@ impl Audience for Looker {
     fn host(&mut self, _: &HostObservation) {}
 
     fn event(&mut self, now: Instant, event: Event, _: &mut MainDevice) {
-        if let Event::Looked(look) = event {
+        if let Event::ReadOnlyScanned(look) = event {
             self.failure = None;
             self.looked(&look);
-        } else if let Event::LookFailed(error) = event {
+        } else if let Event::ReadOnlyScanFailed(error) = event {
             self.failure = Some(error.to_string());
             self.silent(now);
         } else {
@@ -221,7 +228,7 @@ impl Audience for Looker {
         }
         if self.next.is_some_and(|next| next <= now) {
             self.next = None;
-            main.look(now);
+            main.read_only_scan(now);
         }
         true
     }

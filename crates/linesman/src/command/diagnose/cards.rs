@@ -105,7 +105,10 @@ impl Audience for Looking<'_> {
     fn event(&mut self, now: Instant, event: Event, _: &mut MainDevice) {
         let is_done = matches!(
             event,
-            Event::Looked(_) | Event::LookFailed(_) | Event::Scanned(_) | Event::ScanFailed(_)
+            Event::ReadOnlyScanned(_)
+                | Event::ReadOnlyScanFailed(_)
+                | Event::Scanned(_)
+                | Event::ScanFailed(_)
         );
         if is_done {
             self.next = Next::LookAt(now + LOOK_EVERY);
@@ -139,7 +142,7 @@ impl Audience for Looking<'_> {
             }
             Next::LookAt(at) if at <= now => {
                 self.next = Next::Wait;
-                main.look(now);
+                main.read_only_scan(now);
             }
             Next::LookAt(_) | Next::Wait => {}
         }
