@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use linesman_link::input::is_capture_name;
-use linesman_runtime::line::{Pace, VirtualLine};
-use linesman_runtime::listen::{Driven, is_driven};
+use linesman_runtime::listen::{ObservedTraffic, is_driven};
 use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
+use linesman_runtime::transport::{Pace, SegmentTransport};
 use linesman_runtime::wiring::Wiring;
 
 use crate::failure::Failure;
@@ -18,7 +18,7 @@ pub(crate) fn refuse(names: &[String]) -> Result<(), Failure> {
     let name = names.join("+");
     match is_driven(names)? {
         None => Ok(()),
-        Some(Driven { frames, within, source }) => {
+        Some(ObservedTraffic { frames, within, source }) => {
             let from = source.map(|source| format!(" from {source}")).unwrap_or_default();
             let reason = format!(
                 "{name}: another MainDevice drives this line: {}{from} in {}",
@@ -81,19 +81,19 @@ pub(crate) fn nobody_since(why: &str) -> Failure {
 }
 
 /// The virtual segment of a file.
-pub(crate) fn virtual_line(path: &Path, pace: Pace) -> Result<VirtualLine, Failure> {
+pub(crate) fn virtual_line(path: &Path, pace: Pace) -> Result<SegmentTransport, Failure> {
     let ring = files::segment_file(path)?.ring.is_some();
     let plant = files::Plant::open(path)?;
     let wiring = Wiring::of(&plant.segment, &plant.project);
-    VirtualLine::new(plant.segment, wiring, ring, pace).map_err(no_bell)
+    SegmentTransport::new(plant.segment, wiring, ring, pace).map_err(no_wake_handle)
 }
 
 /// The wish to stop.
 pub(crate) fn stop() -> Result<Stop, Failure> {
-    Stop::on_signals().map_err(no_bell)
+    Stop::on_signals().map_err(no_wake_handle)
 }
 
 /// There is no way to be woken.
-pub(crate) fn no_bell(error: std::io::Error) -> Failure {
+pub(crate) fn no_wake_handle(error: std::io::Error) -> Failure {
     Failure::new(format!("listening for Ctrl-C: {error}"), "")
 }

@@ -10,10 +10,10 @@ use linesman_config::inventory::Inventory;
 use linesman_config::project::Project;
 use linesman_link::clock::HostClock;
 use linesman_proto::time::Span;
-use linesman_runtime::line::{Cards, Pace};
 use linesman_runtime::run as running;
 use linesman_runtime::run::scan::PATIENCE;
 use linesman_runtime::selector::Selector;
+use linesman_runtime::transport::{Cards, Pace};
 
 use super::driven;
 use crate::drawing;

@@ -1,4 +1,4 @@
-//! What the application sees of a cycle, and does in it.
+//! Interface of the application to a cycle.
 
 use linesman_config::plan::Plan;
 use linesman_maindevice::watch::NetworkStatus;

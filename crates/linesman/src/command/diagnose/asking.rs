@@ -4,7 +4,7 @@ use linesman_diagnosis::Engine;
 use linesman_diagnosis::ask::{AskSetup, News, Over, Refusal};
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
-use linesman_runtime::asking::Asking;
+use linesman_runtime::question_socket::QuestionSocket;
 
 use crate::failure::Failure;
 use crate::output::Output;
@@ -13,16 +13,20 @@ use crate::output::Output;
 pub(super) const PER_S: u64 = 20;
 
 /// Makes ready to ask on the one card that is listened on.
-pub(super) fn open(names: &[String], clock: HostClock, setup: AskSetup) -> Result<Asking, Failure> {
+pub(super) fn open(
+    names: &[String],
+    clock: HostClock,
+    setup: AskSetup,
+) -> Result<QuestionSocket, Failure> {
     match names {
-        [name] => Ok(Asking::open(name, clock, setup)?),
+        [name] => Ok(QuestionSocket::open(name, clock, setup)?),
         _ => Err(refused(names, Refusal::Ring)),
     }
 }
 
 /// Sends what is due, and tells what there is to tell. A refusal ends the command.
 pub(super) fn turn(
-    asking: &mut Asking,
+    asking: &mut QuestionSocket,
     engine: &mut Engine,
     names: &[String],
     output: &Output,

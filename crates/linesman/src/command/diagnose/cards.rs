@@ -4,7 +4,7 @@ use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, InputKind, S
 use linesman_link::clock::HostClock;
 use linesman_maindevice::{Event, MainDevice, ProbeRequest, Target};
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Audience, Driver};
+use linesman_runtime::drive::{Driver, DriverHooks};
 use linesman_runtime::record::Recorder;
 
 use super::Session;
@@ -89,7 +89,7 @@ enum Next {
     Wait,
 }
 
-impl Audience for Looking<'_> {
+impl DriverHooks for Looking<'_> {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.frames += 1;
         if let Some(recorder) = &mut self.recorder {

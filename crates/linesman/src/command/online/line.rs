@@ -8,10 +8,10 @@ use linesman_maindevice::procedure::counters::read_and_clear;
 use linesman_maindevice::{Event, MainDevice, Target};
 use linesman_proto::address::Position;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Audience, Driver};
-use linesman_runtime::line::{Cards, Line, Pace as VirtualPace};
-use linesman_runtime::online::Looker;
+use linesman_runtime::drive::{Driver, DriverHooks};
+use linesman_runtime::online::ReadOnlyPoller;
 use linesman_runtime::online::report::OnlineReport;
+use linesman_runtime::transport::{Cards, Pace as VirtualPace, Transport};
 
 use super::live::{Live, Pace};
 use super::{Arguments, interval, lasts};
@@ -31,7 +31,7 @@ pub(super) fn cards(
 ) -> Result<OnlineReport, Failure> {
     driven::refuse(names)?;
     let line = Cards::open(names, HostClock::start())?;
-    look(line, Looker::new(place, Vec::new()), place, arguments, output)
+    look(line, ReadOnlyPoller::new(place, Vec::new()), place, arguments, output)
 }
 
 /// Looks at the segment of a file; nobody brings it up.
@@ -45,12 +45,12 @@ pub(super) fn segment(
     let line = driven::virtual_line(path, pace)?;
     let segment = line.segment();
     let names = segment.devices().map(|id| segment.name(id).to_owned()).collect();
-    look(line, Looker::new(place, names), place, arguments, output)
+    look(line, ReadOnlyPoller::new(place, names), place, arguments, output)
 }
 
-fn look<L: Line>(
+fn look<L: Transport>(
     line: L,
-    looker: Looker,
+    poller: ReadOnlyPoller,
     place: &str,
     arguments: &Arguments,
     output: &mut Output,
@@ -60,7 +60,7 @@ fn look<L: Line>(
     let mut driver = Driver::new(line, options);
     let lasts = lasts(arguments);
     let span = lasts.map(|lasts| Span::ns(lasts.as_nanos() as u64));
-    let looker = if arguments.live || lasts.is_some() { looker } else { looker.once() };
+    let poller = if arguments.live || lasts.is_some() { poller } else { poller.once() };
     let until = match (span, arguments.live) {
         (Some(span), _) => driver.now() + span,
         (None, true) => Instant::MAX,
@@ -76,24 +76,24 @@ fn look<L: Line>(
     };
     let clears = arguments.clear.is_some_and(super::What::errors);
     let mut looking =
-        Looking { looker, live, output, clears, show_at: Instant::ZERO, failure: None };
+        Looking { poller, live, output, clears, show_at: Instant::ZERO, failure: None };
     let result = driver.run(until, &stop, &mut looking);
-    let Looking { looker, live, failure, .. } = looking;
+    let Looking { poller, live, failure, .. } = looking;
     // The terminal is given back before anything else is told.
     drop(live);
     result?;
     if let Some(failure) = failure {
         return Err(failure);
     }
-    looker.report(driver.now()).ok_or_else(|| {
-        let why = looker.failure().unwrap_or("nobody has answered yet");
+    poller.report(driver.now()).ok_or_else(|| {
+        let why = poller.failure().unwrap_or("nobody has answered yet");
         driven::nobody_since(why).at(place)
     })
 }
 
 /// Looks, and shows what was seen.
 struct Looking<'a> {
-    looker: Looker,
+    poller: ReadOnlyPoller,
     live: Option<Live>,
     output: &'a mut Output,
     /// The registers are to be cleared, once it is known who is there.
@@ -108,29 +108,29 @@ impl Looking<'_> {
         if now < self.show_at {
             return Ok(true);
         }
-        let Some(report) = self.looker.report(now) else { return Ok(true) };
+        let Some(report) = self.poller.report(now) else { return Ok(true) };
         self.show_at = now + Span::ns(live.interval().as_nanos() as u64);
         live.show(&report, self.output)?;
         live.goes_on(self.output)
     }
 }
 
-impl Audience for Looking<'_> {
+impl DriverHooks for Looking<'_> {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
-        self.looker.frame(frame);
+        self.poller.frame(frame);
     }
 
     fn host(&mut self, observation: &HostObservation) {
-        self.looker.host(observation);
+        self.poller.host(observation);
     }
 
     fn event(&mut self, now: Instant, event: Event, main: &mut MainDevice) {
-        self.looker.event(now, event, main);
+        self.poller.event(now, event, main);
     }
 
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
         if self.clears
-            && let Some(report) = self.looker.report(now)
+            && let Some(report) = self.poller.report(now)
         {
             self.clears = false;
             for place in 0..report.planned as u16 {
@@ -139,7 +139,7 @@ impl Audience for Looking<'_> {
                 drop(main.perform(now, |wire| async move { read_and_clear(&wire, target).await }));
             }
         }
-        let goes_on = self.looker.turn(now, main);
+        let goes_on = self.poller.turn(now, main);
         match self.show(now) {
             Ok(shown) => goes_on && shown && !self.output.is_closed(),
             Err(failure) => {
@@ -151,6 +151,6 @@ impl Audience for Looking<'_> {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let show = self.live.is_some().then_some(self.show_at).filter(|at| *at > Instant::ZERO);
-        [self.looker.poll_timeout(), show].into_iter().flatten().min()
+        [self.poller.poll_timeout(), show].into_iter().flatten().min()
     }
 }

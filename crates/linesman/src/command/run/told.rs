@@ -10,7 +10,7 @@ use linesman_maindevice::watch::{EntryKind, LogEntry, Severity as EntrySeverity}
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::event_log::{EventLogWriter, LoggedFinding, WriterReport};
-use linesman_runtime::online::Board;
+use linesman_runtime::online::OnlineState;
 use linesman_runtime::part::PartFailure;
 use linesman_runtime::run::Note;
 use linesman_runtime::run::bring_up::BringUpReport;
@@ -29,7 +29,7 @@ pub(super) struct Teller {
     json: bool,
     names: Names,
     follower: Follower,
-    board: Board,
+    online: OnlineState,
     /// When the run began, by the wall clock.
     began: UnixTime,
     logs: Logs,
@@ -63,10 +63,10 @@ pub(super) struct Logs {
 }
 
 impl Teller {
-    pub(super) fn new(json: bool, began: UnixTime, logs: Logs, board: Board) -> Self {
+    pub(super) fn new(json: bool, began: UnixTime, logs: Logs, online: OnlineState) -> Self {
         let follower = Follower::new(false);
         let (counted, failures) = (HashMap::new(), Vec::new());
-        Self { json, names: Names::default(), follower, board, began, logs, counted, failures }
+        Self { json, names: Names::default(), follower, online, began, logs, counted, failures }
     }
 
     /// What the SubDevices are called.
@@ -91,7 +91,7 @@ impl Teller {
         match note {
             Note::Scanned(_) => {}
             Note::Planned(plan) => {
-                self.board.begin(Arc::clone(plan));
+                self.online.begin(Arc::clone(plan));
                 self.names = Names::new(
                     plan.devices.iter().map(|one| (one.name.clone(), one.type_name.clone())),
                 );
@@ -103,11 +103,11 @@ impl Teller {
             }
             Note::Event(at, event) => {
                 self.follower.tell_until(*at, &self.names, output);
-                let entries = self.board.event(*at, event);
+                let entries = self.online.event(*at, event);
                 self.entries(entries, output);
             }
             Note::Host(observation) => {
-                let entries = self.board.host(observation);
+                let entries = self.online.host(observation);
                 self.entries(entries, output);
             }
             Note::Finding(event) => self.finding(event, output),
@@ -153,7 +153,7 @@ impl Teller {
     /// Nothing has come for a while, or nothing more will: what was waited with is told.
     pub(super) fn flush(&mut self, output: &mut Output) {
         self.follower.flush(&self.names, output);
-        let entries = self.board.flush();
+        let entries = self.online.flush();
         self.entries(entries, output);
     }
 

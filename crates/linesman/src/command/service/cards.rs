@@ -9,7 +9,7 @@ use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, Servi
 use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Audience, Driver};
+use linesman_runtime::drive::{Driver, DriverHooks};
 use linesman_runtime::stop::Stop;
 
 use super::{Line, NotDone};
@@ -133,7 +133,7 @@ impl Asking {
     }
 }
 
-impl Audience for Asking {
+impl DriverHooks for Asking {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.engine.handle_frame(frame);
     }

@@ -1,4 +1,4 @@
-//! Who runs a machine: finds the line, makes the plan, starts, calls the application, stops.
+//! Session of a run: finds the line, makes the plan, starts, calls the application, stops.
 
 mod ending;
 
@@ -14,25 +14,25 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
 use super::bring_up::BringUpReport;
+use super::diagnosis_thread::{DiagnosisObserver, DiagnosisOutput, judge};
 use super::io::{Application, Io, Next};
-use super::judge::{LineObserver, Told, judge};
 use super::note::{Note, RunError};
-use super::real_time::{Granted, RealTime};
+use super::real_time::{GrantedRealTime, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
 use super::scan;
-use super::tap::{Passed, Tap, tap};
-use crate::drive::{Audience, Driver};
-use crate::line::Line;
+use super::tap::{FrameSummary, Tap, tap};
+use crate::drive::{Driver, DriverHooks};
 use crate::part::PartFailure;
 use crate::serve::lateness::Lateness;
-use crate::service::ServiceDesk;
+use crate::service::ServiceSocket;
 use crate::stop::Stop;
+use crate::transport::Transport;
 
 /// That the diagnosis does not keep up is told no more often than this.
 const MISSED_EVERY: Span = Span::s(10);
 
 /// What is to be run.
-pub enum Wanted {
+pub enum PlanSource {
     /// A plan that is made already.
     Plan(Box<Plan>),
     /// One that is made of what a scan finds; or why it cannot be made.
@@ -44,7 +44,7 @@ pub type MakePlan = Box<dyn FnOnce(&Inventory) -> Result<Plan, String> + Send>;
 
 /// How it is to be run.
 #[derive(Clone, Debug)]
-pub struct RunOptions {
+pub struct SessionOptions {
     /// What the report calls the line.
     pub on: String,
     /// The state in which SubDevices are left at the end.
@@ -68,9 +68,9 @@ const PROBES: usize = 64;
 /// Room for notes that are on their way to whoever listens.
 pub const NOTES: usize = 65_536;
 
-/// A MainDevice's operator. It is the [`Audience`] of a [`Driver`].
-pub struct Operator<A> {
-    wanted: Option<Wanted>,
+/// A session of a MainDevice. It is the [`DriverHooks`] of a [`Driver`].
+pub struct RunSession<A> {
+    wanted: Option<PlanSource>,
     application: A,
     io_at: IoAt,
     notes: SyncSender<Note>,
@@ -89,17 +89,17 @@ pub struct Operator<A> {
     /// SubDevices wait in PREOP for the first outputs.
     held: bool,
     scan_until: Instant,
-    desk: Option<ServiceDesk>,
+    socket: Option<ServiceSocket>,
     /// Notes for which there was no room.
     untold: Arc<AtomicU64>,
     /// Left-out frames that were told, and nothing of more before that time.
     missed_told: (u64, Instant),
     begun_at: Instant,
-    granted: Granted,
+    granted: GrantedRealTime,
     on: String,
 }
 
-impl<A: Application> Operator<A> {
+impl<A: Application> RunSession<A> {
     fn start(&mut self, now: Instant, plan: Plan, main: &mut MainDevice) {
         if let Err(why) = self.application.begin(&plan) {
             self.failure = Some(RunError::Plan(why));
@@ -131,7 +131,7 @@ impl<A: Application> Operator<A> {
 
     fn scanned(&mut self, now: Instant, inventory: &Inventory, main: &mut MainDevice) {
         self.note(Note::Scanned(Box::new(inventory.clone())));
-        let Some(Wanted::Found(make)) = self.wanted.take() else { return };
+        let Some(PlanSource::Found(make)) = self.wanted.take() else { return };
         match make(inventory) {
             Ok(plan) => self.start(now, plan, main),
             Err(why) => self.failure = Some(RunError::Plan(why)),
@@ -170,9 +170,9 @@ impl<A: Application> Operator<A> {
 
     /// Takes what is asked for through the socket.
     fn attend(&mut self, now: Instant, main: &mut MainDevice) {
-        let Some(mut desk) = self.desk.take() else { return };
-        desk.turn(now, main, |main| self.report(now, main));
-        self.desk = Some(desk);
+        let Some(mut socket) = self.socket.take() else { return };
+        socket.turn(now, main, |main| self.report(now, main));
+        self.socket = Some(socket);
     }
 
     /// Has read what the diagnosis would like to know; it sees the frames.
@@ -230,7 +230,7 @@ impl<A: Application> Operator<A> {
     }
 }
 
-impl<A: Application> Audience for Operator<A> {
+impl<A: Application> DriverHooks for RunSession<A> {
     #[inline]
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         if let Some(tap) = &mut self.tap {
@@ -244,7 +244,7 @@ impl<A: Application> Audience for Operator<A> {
     }
 
     #[inline]
-    fn keep(&mut self, sent: &Passed, len: usize) {
+    fn keep(&mut self, sent: &FrameSummary, len: usize) {
         if let Some(tap) = &mut self.tap {
             tap.keep(sent, len);
         }
@@ -269,8 +269,8 @@ impl<A: Application> Audience for Operator<A> {
             Event::OutputsResumed { .. } => self.withheld = false,
             Event::Stopped => self.ended = true,
             Event::Served { ticket, result, .. } => {
-                if let Some(desk) = &mut self.desk {
-                    desk.served(*ticket, result);
+                if let Some(socket) = &mut self.socket {
+                    socket.served(*ticket, result);
                 }
                 return;
             }
@@ -291,7 +291,7 @@ impl<A: Application> Audience for Operator<A> {
             self.begun = true;
             self.scan_until = now + scan::PATIENCE;
             match self.wanted.take() {
-                Some(Wanted::Plan(plan)) => self.start(now, *plan, main),
+                Some(PlanSource::Plan(plan)) => self.start(now, *plan, main),
                 other => {
                     self.wanted = other;
                     main.scan(now);
@@ -324,7 +324,7 @@ impl<A: Application> Audience for Operator<A> {
 }
 
 /// A run that has ended.
-pub struct Ended {
+pub struct RunOutcome {
     /// How it went.
     pub report: RunReport,
     /// What ended it, if it was not the time, a wish, or the application.
@@ -334,14 +334,14 @@ pub struct Ended {
 }
 
 /// Who has a say in a run, and who is told.
-pub struct Beside<'a> {
+pub struct RunControls<'a> {
     /// The wish to stop.
     pub stop: &'a Stop,
     /// What happens.
     /// What does not fit there is not told, and counted: nobody waits for a slow listener.
     pub notes: SyncSender<Note>,
     /// Services for single SubDevices, asked for through a socket.
-    pub desk: Option<ServiceDesk>,
+    pub socket: Option<ServiceSocket>,
 }
 
 /// Runs a line until its time is over, `stop`, or the application has enough; then stops it: outputs
@@ -349,30 +349,30 @@ pub struct Beside<'a> {
 ///
 /// # Errors
 /// When nothing could be run: the line does not answer, or is not what was wanted.
-pub fn run<L: Line, A: Application>(
+pub fn run<L: Transport, A: Application>(
     line: L,
-    wanted: Wanted,
+    wanted: PlanSource,
     application: A,
-    options: &RunOptions,
-    beside: Beside<'_>,
-) -> Result<Ended, RunError> {
-    let observer = |setup| Box::new(Engine::new(setup)) as Box<dyn LineObserver>;
+    options: &SessionOptions,
+    beside: RunControls<'_>,
+) -> Result<RunOutcome, RunError> {
+    let observer = |setup| Box::new(Engine::new(setup)) as Box<dyn DiagnosisObserver>;
     run_observed(line, wanted, application, options, beside, observer)
 }
 
-/// The same with a diagnosis of one's own, made of [`RunOptions::diagnose`].
+/// The same with a diagnosis of one's own, made of [`SessionOptions::diagnose`].
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_observed<L: Line, A: Application>(
+pub fn run_observed<L: Transport, A: Application>(
     line: L,
-    wanted: Wanted,
+    wanted: PlanSource,
     application: A,
-    options: &RunOptions,
-    beside: Beside<'_>,
-    observer: impl FnOnce(Setup) -> Box<dyn LineObserver>,
-) -> Result<Ended, RunError> {
-    let Beside { stop, notes, desk } = beside;
+    options: &SessionOptions,
+    beside: RunControls<'_>,
+    observer: impl FnOnce(Setup) -> Box<dyn DiagnosisObserver>,
+) -> Result<RunOutcome, RunError> {
+    let RunControls { stop, notes, socket } = beside;
     let is_virtual = options.real_time.is_none();
     let (ask, probes) = sync_channel(PROBES);
     let untold = Arc::<AtomicU64>::default();
@@ -383,7 +383,7 @@ pub fn run_observed<L: Line, A: Application>(
             // In virtual time the judge has no time of its own: when it asked would be chance.
             let setup = Setup { probes: !is_virtual, ..setup.clone() };
             let (notes, untold) = (notes.clone(), Arc::clone(&untold));
-            let told = Told { notes, untold, probes: ask };
+            let told = DiagnosisOutput { notes, untold, probes: ask };
             let thread = judge(observer(setup), listener, told).map_err(RunError::Thread)?;
             (Some(tap), Some(thread))
         }
@@ -395,7 +395,7 @@ pub fn run_observed<L: Line, A: Application>(
     let settings = Options { allowed_misses, hold_at, ..line.options() };
     let mut driver = Driver::new(line, settings);
     let begun = driver.now();
-    let mut operator = Operator {
+    let mut operator = RunSession {
         wanted: Some(wanted),
         application,
         io_at: IoAt::default(),
@@ -412,7 +412,7 @@ pub fn run_observed<L: Line, A: Application>(
         withheld: false,
         held: options.hold,
         scan_until: Instant::MAX,
-        desk,
+        socket,
         untold,
         missed_told: (0, Instant::ZERO),
         begun_at: begun,
@@ -450,6 +450,6 @@ pub fn run_observed<L: Line, A: Application>(
     report.failed.extend(failed.iter().map(PartFailure::to_string));
     match error {
         Some(error) if !planned => Err(error),
-        error => Ok(Ended { report, error, failed }),
+        error => Ok(RunOutcome { report, error, failed }),
     }
 }

@@ -5,13 +5,13 @@ use linesman_link::clock::{HostClock, tighten_timers};
 use linesman_link::error::LinkError;
 use linesman_link::interface::CardLock;
 use linesman_link::socket::{
-    Bell, RawSocket, Ready, SocketOptions, Waitable, Waker, wait_any, wait_for,
+    RawSocket, Ready, SocketOptions, Waitable, WakeHandle, Waker, wait_any, wait_for,
 };
 use linesman_maindevice::Options;
 use linesman_proto::address::Path;
 use linesman_proto::time::{DcTime, Instant, Span};
 
-use super::{Arrived, Intake, Line};
+use super::{FrameSink, RxFrame, Transport};
 use crate::host_watch::HostWatch;
 
 /// Most frames fetched in one go, so that a flood does not keep the cycle from its work.
@@ -82,8 +82,8 @@ impl Cards {
 
     /// What wakes the thread that waits.
     #[must_use]
-    pub fn bell(&self) -> Bell {
-        self.waker.bell()
+    pub fn wake_handle(&self) -> WakeHandle {
+        self.waker.wake_handle()
     }
 
     /// How many cards there are.
@@ -99,7 +99,7 @@ impl Cards {
     }
 }
 
-impl Line for Cards {
+impl Transport for Cards {
     fn options(&self) -> Options {
         // The network's time begins as the host's, so that times of both can be compared.
         let unix = self.clock.started_at().as_nanos();
@@ -113,7 +113,7 @@ impl Line for Cards {
         self.clock.now()
     }
 
-    fn receive(&mut self, now: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError> {
+    fn receive(&mut self, now: Instant, intake: &mut dyn FrameSink) -> Result<usize, LinkError> {
         if !std::mem::replace(&mut self.ready, false) {
             return Ok(0);
         }
@@ -131,7 +131,12 @@ impl Line for Cards {
                 // The first one was there when we came to look.
                 let at = if count == 1 { now } else { clock.now() };
                 let path = card.path;
-                intake.arrived(Arrived { at, path, len: len.min(most), truncated: len > most });
+                intake.frame_received(RxFrame {
+                    at,
+                    path,
+                    len: len.min(most),
+                    truncated: len > most,
+                });
                 *expected = expected.saturating_sub(1);
                 // All are back. Should there be more, the next wait tells at once.
                 if *expected == 0 {

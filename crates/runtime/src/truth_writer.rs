@@ -1,4 +1,4 @@
-//! The truth of a running segment, written down as it happens: to a file, and to whoever listens.
+//! Writer of the truth of a running segment, as it happens: to a file, and to whoever listens.
 //!
 //! The thread that runs the segment hands over what happened and goes on; a thread of its own turns
 //! it into lines of JSON, so that no file and no slow reader ever makes the segment late.
@@ -19,9 +19,9 @@ use linesman_sim::segment::Segment;
 use linesman_sim::truth::{Effect, Entry, FaultId, Place};
 use serde::{Deserialize, Serialize};
 
-use crate::kept_file::KeptFile;
 use crate::names::Names;
 use crate::part::guard;
+use crate::watched_file::WatchedFile;
 
 /// Name and version of a line's format.
 pub const SCHEMA: &str = "linesman.truth/1";
@@ -87,7 +87,7 @@ pub enum EventKind {
 }
 
 /// What the segment's thread hands over.
-enum Note {
+enum WriterOrder {
     Fault(FaultName, Vec<Place>),
     Happened(Vec<Entry>),
     Reader(UnixStream, bool),
@@ -96,19 +96,19 @@ enum Note {
 }
 
 /// Writes down what happens, until it is finished or dropped.
-pub struct Journal {
-    sender: Sender<Note>,
+pub struct TruthWriter {
+    sender: Sender<WriterOrder>,
     thread: Option<JoinHandle<io::Result<()>>>,
-    watch: JournalWatch,
+    watch: TruthWriterWatch,
     /// Faults that were told of so far.
     told: usize,
 }
 
 /// Whether all that happens is still written down.
 #[derive(Clone, Default, Debug)]
-pub struct JournalWatch(Arc<Mutex<Option<String>>>);
+pub struct TruthWriterWatch(Arc<Mutex<Option<String>>>);
 
-impl JournalWatch {
+impl TruthWriterWatch {
     /// Why not; `None` while all is well.
     #[must_use]
     pub fn trouble(&self) -> Option<String> {
@@ -120,11 +120,11 @@ impl JournalWatch {
     }
 }
 
-/// Who may ask a journal to read from it.
+/// Handle by which others read from a truth writer.
 #[derive(Clone)]
-pub struct Reading(Sender<Note>);
+pub struct TruthReader(Sender<WriterOrder>);
 
-impl Journal {
+impl TruthWriter {
     /// Begins one: to a file that must not be there yet, if there is to be one.
     ///
     /// # Errors
@@ -132,11 +132,12 @@ impl Journal {
     pub fn begin(segment: &Segment, file: Option<&Path>) -> io::Result<Self> {
         let kept = file;
         let file = file.map(File::create_new).transpose()?.map(BufWriter::new);
-        let kept = kept.map(KeptFile::at);
+        let kept = kept.map(WatchedFile::at);
         let (sender, notes) = mpsc::channel();
         let names = Names::of(segment);
-        let watch = JournalWatch::default();
-        let mut writer = Writer { names, file, kept, watch: watch.clone(), ..Writer::default() };
+        let watch = TruthWriterWatch::default();
+        let mut writer =
+            TruthThread { names, file, kept, watch: watch.clone(), ..TruthThread::default() };
         let thread = thread::Builder::new().name("truth".to_owned()).spawn(move || {
             let watch = writer.watch.clone();
             let effect = "what happens is not written down any more";
@@ -150,25 +151,25 @@ impl Journal {
 
     /// For whoever tells that not all is written down.
     #[must_use]
-    pub fn watch(&self) -> JournalWatch {
+    pub fn watch(&self) -> TruthWriterWatch {
         self.watch.clone()
     }
 
     /// Takes what happened in a segment since the last call.
     pub fn take(&mut self, segment: &mut Segment) {
         for fault in &segment.truth().faults()[self.told..] {
-            let _ = self.sender.send(Note::Fault(fault.name, fault.places.clone()));
+            let _ = self.sender.send(WriterOrder::Fault(fault.name, fault.places.clone()));
             self.told += 1;
         }
         if !segment.truth().entries().is_empty() {
-            let _ = self.sender.send(Note::Happened(segment.take_truth()));
+            let _ = self.sender.send(WriterOrder::Happened(segment.take_truth()));
         }
     }
 
     /// For those who want to read.
     #[must_use]
-    pub fn reading(&self) -> Reading {
-        Reading(self.sender.clone())
+    pub fn reading(&self) -> TruthReader {
+        TruthReader(self.sender.clone())
     }
 
     /// Ends it: everything is written, readers are told that no more comes.
@@ -181,34 +182,34 @@ impl Journal {
 
     fn end(&mut self) -> io::Result<()> {
         let Some(thread) = self.thread.take() else { return Ok(()) };
-        let _ = self.sender.send(Note::End);
+        let _ = self.sender.send(WriterOrder::End);
         thread.join().unwrap_or_else(|_| Err(io::Error::other("the writer failed")))
     }
 }
 
-impl Drop for Journal {
+impl Drop for TruthWriter {
     fn drop(&mut self) {
         // Whoever wants to know whether all was written finishes it.
         let _ = self.end();
     }
 }
 
-impl Reading {
+impl TruthReader {
     /// Sends what happened so far to `stream`, and what comes from now on if it wants to follow;
     /// then closes it.
     pub fn send_to(&self, stream: UnixStream, follow: bool) {
-        // A journal that has ended closes the stream, which says so.
-        let _ = self.0.send(Note::Reader(stream, follow));
+        // A writer that has ended closes the stream, which says so.
+        let _ = self.0.send(WriterOrder::Reader(stream, follow));
     }
 }
 
 /// The thread that writes.
 #[derive(Default)]
-struct Writer {
+struct TruthThread {
     names: Names,
     file: Option<BufWriter<File>>,
-    kept: Option<KeptFile>,
-    watch: JournalWatch,
+    kept: Option<WatchedFile>,
+    watch: TruthWriterWatch,
     faults: Vec<(FaultName, Vec<Place>)>,
     lines: VecDeque<Box<str>>,
     readers: Vec<UnixStream>,
@@ -217,13 +218,13 @@ struct Writer {
     failed: Option<io::Error>,
 }
 
-impl Writer {
-    fn run(&mut self, notes: &Receiver<Note>) -> io::Result<()> {
+impl TruthThread {
+    fn run(&mut self, notes: &Receiver<WriterOrder>) -> io::Result<()> {
         while let Ok(first) = notes.recv() {
             let mut note = Some(first);
             let mut ended = false;
             while let Some(one) = note {
-                ended |= matches!(one, Note::End);
+                ended |= matches!(one, WriterOrder::End);
                 self.note(one);
                 note = notes.try_recv().ok();
             }
@@ -235,16 +236,16 @@ impl Writer {
         self.failed.take().map_or(Ok(()), Err)
     }
 
-    fn note(&mut self, note: Note) {
+    fn note(&mut self, note: WriterOrder) {
         match note {
-            Note::End => {}
-            Note::Fault(name, places) => self.faults.push((name, places)),
-            Note::Happened(entries) => {
+            WriterOrder::End => {}
+            WriterOrder::Fault(name, places) => self.faults.push((name, places)),
+            WriterOrder::Happened(entries) => {
                 for entry in entries {
                     self.write(&entry);
                 }
             }
-            Note::Reader(stream, follow) => self.welcome(stream, follow),
+            WriterOrder::Reader(stream, follow) => self.welcome(stream, follow),
         }
     }
 
@@ -305,7 +306,7 @@ impl Writer {
 
     fn flush(&mut self) {
         let Some(file) = &mut self.file else { return };
-        let kept = self.kept.as_ref().map_or(Ok(()), KeptFile::check);
+        let kept = self.kept.as_ref().map_or(Ok(()), WatchedFile::check);
         if let Err(error) = file.flush().and(kept) {
             self.fail(error);
         }
@@ -352,9 +353,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("truth.jsonl");
         let mut segment = plant();
-        let mut journal = Journal::begin(&segment, Some(&path)).unwrap();
+        let mut truth_writer = TruthWriter::begin(&segment, Some(&path)).unwrap();
         let (mut early, end) = UnixStream::pair().unwrap();
-        journal.reading().send_to(end, true);
+        truth_writer.reading().send_to(end, true);
 
         let second = Instant::ZERO + Span::s(1);
         let fault = FaultEntry::new(FaultName::LinkOpen).at("K1.B-I1.A");
@@ -365,15 +366,15 @@ mod tests {
         segment.handle_frame(second + Span::ns(100), Card::A, &frame);
         segment.heal(second + Span::ms(2), id);
         segment.advance(second + Span::ms(3));
-        journal.take(&mut segment);
+        truth_writer.take(&mut segment);
         assert!(segment.truth().entries().is_empty(), "they are in the journal now");
 
         let (mut late, end) = UnixStream::pair().unwrap();
-        let still_held = journal.reading();
+        let still_held = truth_writer.reading();
         still_held.send_to(end, false);
         let mut heard = [String::new(), String::new()];
         late.read_to_string(&mut heard[1]).unwrap();
-        journal.finish().unwrap();
+        truth_writer.finish().unwrap();
         early.read_to_string(&mut heard[0]).unwrap();
         let written = std::fs::read_to_string(&path).unwrap();
         assert_eq!(heard, [written.clone(), written.clone()]);
@@ -390,7 +391,7 @@ mod tests {
         assert!(kinds.contains(&"signal-lost") && kinds.contains(&"frame-lost"), "{all:?}");
         assert!(all.iter().any(|event| event.event == EventKind::End), "{all:?}");
 
-        let again = Journal::begin(&segment, Some(&path)).err().unwrap();
+        let again = TruthWriter::begin(&segment, Some(&path)).err().unwrap();
         assert_eq!(again.kind(), io::ErrorKind::AlreadyExists);
     }
 }

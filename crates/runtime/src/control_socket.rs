@@ -1,4 +1,4 @@
-//! A socket in the file system through which a running program is asked: a line of JSON each way.
+//! Control socket of a running program in the file system: a line of JSON each way.
 //!
 //! A connection may carry one request after another. Threads of their own talk to those who ask; what
 //! is asked is done by the one thread that runs the line, between two frames. What may be asked, and
@@ -14,17 +14,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use linesman_link::socket::Bell;
+use linesman_link::socket::WakeHandle;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::kept_file::KeptFile;
 use crate::part::guard;
+use crate::watched_file::WatchedFile;
 
 /// Longest request in bytes.
 const MOST: u64 = 64 * 1024;
 /// Bytes that are read and thrown away behind a request that is too long.
-const RUBBISH: u64 = 16 * 1024 * 1024;
+const DISCARD_MAX: u64 = 16 * 1024 * 1024;
 /// How long the other side may take to read an answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Requests that may wait for the thread that does them.
@@ -39,7 +39,7 @@ pub(crate) trait Protocol: Send + Sync + 'static {
     /// What can be asked.
     type Request: DeserializeOwned + Clone + Send;
     /// What the thread that runs the line gives.
-    type Given: Send;
+    type Reply: Send;
     /// What is answered.
     type Answer: Serialize;
     /// Who is asked, for messages: `segment`.
@@ -51,7 +51,7 @@ pub(crate) trait Protocol: Send + Sync + 'static {
 
     /// What is answered when this was given. Threads that talk to those who ask do that, so that the
     /// one that runs the line need not put anything into words.
-    fn answer(&self, given: Self::Given) -> Self::Answer;
+    fn answer(&self, reply: Self::Reply) -> Self::Answer;
 
     /// Why a request was not done.
     fn refusal(&self, why: String) -> Self::Answer;
@@ -66,23 +66,23 @@ pub(crate) trait Protocol: Send + Sync + 'static {
 }
 
 /// The socket. It is removed at the end.
-pub(crate) struct Desk<P: Protocol> {
+pub(crate) struct ControlSocket<P: Protocol> {
     path: PathBuf,
     requests: Receiver<Asked<P>>,
-    watch: DeskWatch,
+    watch: ControlSocketWatch,
 }
 
 /// Whether a socket can still be asked.
 #[derive(Clone, Debug)]
-pub struct DeskWatch {
-    socket: KeptFile,
+pub struct ControlSocketWatch {
+    socket: WatchedFile,
     /// Why nobody listens any more.
     failed: Arc<Mutex<Option<String>>>,
     /// Closed in order: nothing is wrong with that.
     closed: Arc<AtomicBool>,
 }
 
-impl DeskWatch {
+impl ControlSocketWatch {
     /// Why nobody can ask any more, with the next step; `None` while all is well.
     #[must_use]
     pub fn trouble(&self) -> Option<String> {
@@ -108,46 +108,47 @@ impl DeskWatch {
 /// A request, and who waits for its answer.
 pub(crate) struct Asked<P: Protocol> {
     pub(crate) request: P::Request,
-    reply: Sender<P::Given>,
+    reply: Sender<P::Reply>,
 }
 
 impl<P: Protocol> Asked<P> {
-    pub(crate) fn give(self, given: P::Given) {
+    pub(crate) fn give(self, reply: P::Reply) {
         // Whoever asked may have lost patience.
-        let _ = self.reply.send(given);
+        let _ = self.reply.send(reply);
     }
 }
 
 /// What a connection's thread needs.
-struct Clerk<P: Protocol> {
+struct Connection<P: Protocol> {
     requests: SyncSender<Asked<P>>,
-    bell: Bell,
+    wake_handle: WakeHandle,
     protocol: P,
     clients: AtomicUsize,
 }
 
-impl<P: Protocol> Desk<P> {
-    /// Begins to listen at `path`. What an earlier run left there is replaced. `bell` wakes the
-    /// thread that calls [`Desk::poll`].
+impl<P: Protocol> ControlSocket<P> {
+    /// Begins to listen at `path`. What an earlier run left there is replaced. `wake_handle` wakes the
+    /// thread that calls [`ControlSocket::poll`].
     ///
     /// # Errors
     /// When somebody listens there already, something else is there, or the system refuses.
-    pub(crate) fn open(path: &Path, bell: Bell, protocol: P) -> io::Result<Self> {
+    pub(crate) fn open(path: &Path, wake_handle: WakeHandle, protocol: P) -> io::Result<Self> {
         if fs::symlink_metadata(path).is_ok() {
             make_room(path, P::WHO)?;
         }
         let listener = UnixListener::bind(path)?;
         hand_over(path);
         let (requests, receiver) = mpsc::sync_channel(WAITING);
-        let clerk = Clerk { requests, bell, protocol, clients: AtomicUsize::default() };
-        let clerk = Arc::new(clerk);
+        let connection =
+            Connection { requests, wake_handle, protocol, clients: AtomicUsize::default() };
+        let connection = Arc::new(connection);
         let failed = Arc::default();
-        let (socket, closed) = (KeptFile::at(path), Arc::default());
-        let watch = DeskWatch { socket, failed: Arc::clone(&failed), closed };
+        let (socket, closed) = (WatchedFile::at(path), Arc::default());
+        let watch = ControlSocketWatch { socket, failed: Arc::clone(&failed), closed };
         // It ends with the process: nothing hangs on it.
         thread::Builder::new().name("control".to_owned()).spawn(move || {
             let listened = guard("the control socket", "nobody can ask any more", || {
-                listen(&listener, &clerk);
+                listen(&listener, &connection);
             });
             if let Err(failure) = listened {
                 *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure.to_string());
@@ -157,7 +158,7 @@ impl<P: Protocol> Desk<P> {
     }
 
     /// For whoever tells that nobody can ask any more.
-    pub(crate) fn watch(&self) -> DeskWatch {
+    pub(crate) fn watch(&self) -> ControlSocketWatch {
         self.watch.clone()
     }
 
@@ -167,7 +168,7 @@ impl<P: Protocol> Desk<P> {
     }
 }
 
-impl<P: Protocol> Drop for Desk<P> {
+impl<P: Protocol> Drop for ControlSocket<P> {
     fn drop(&mut self) {
         self.watch.closed.store(true, Ordering::Release);
         // It may be gone already, and what is there now is somebody else's.
@@ -178,15 +179,15 @@ impl<P: Protocol> Drop for Desk<P> {
 }
 
 /// Takes one connection after another.
-fn listen<P: Protocol>(listener: &UnixListener, clerk: &Arc<Clerk<P>>) {
+fn listen<P: Protocol>(listener: &UnixListener, connection: &Arc<Connection<P>>) {
     for stream in listener.incoming() {
         let Ok(stream) = stream else {
             thread::sleep(REST);
             continue;
         };
-        let clerk = Arc::clone(clerk);
+        let connection = Arc::clone(connection);
         // Whoever asked and went away needs no answer; a thread that cannot be had is as good as a full house.
-        let _ = thread::Builder::new().spawn(move || clerk.welcome(&stream));
+        let _ = thread::Builder::new().spawn(move || connection.welcome(&stream));
     }
 }
 
@@ -213,7 +214,7 @@ fn make_room(path: &Path, who: &str) -> io::Result<()> {
     fs::remove_file(path)
 }
 
-impl<P: Protocol> Clerk<P> {
+impl<P: Protocol> Connection<P> {
     /// Serves one connection, if there are not too many.
     fn welcome(&self, stream: &UnixStream) -> io::Result<()> {
         let others = self.clients.fetch_add(1, Ordering::Relaxed);
@@ -246,7 +247,7 @@ impl<P: Protocol> Clerk<P> {
                 self.refuse(stream, format!("the request is longer than {MOST} bytes"))?;
                 // Whoever still writes would be cut off, and not read why.
                 stream.set_read_timeout(Some(PATIENCE))?;
-                return io::copy(&mut lines.take(RUBBISH), &mut io::sink()).map(drop);
+                return io::copy(&mut lines.take(DISCARD_MAX), &mut io::sink()).map(drop);
             }
             if line.iter().all(u8::is_ascii_whitespace) {
                 continue;
@@ -277,11 +278,11 @@ impl<P: Protocol> Clerk<P> {
     fn relay(&self, request: P::Request) -> P::Answer {
         let (reply, answer) = mpsc::channel();
         let asked = self.requests.try_send(Asked { request, reply });
-        self.bell.ring();
+        self.wake_handle.wake();
         let (who, seconds) = (P::WHO, P::PATIENCE.as_secs());
         match asked {
             Ok(()) => match answer.recv_timeout(P::PATIENCE) {
-                Ok(given) => self.protocol.answer(given),
+                Ok(reply) => self.protocol.answer(reply),
                 Err(_) => self
                     .protocol
                     .refusal(format!("the {who} gave no answer within {seconds} s: ask again")),

@@ -1,4 +1,4 @@
-//! From a project and what a scan found to the plan that is run.
+//! Choices beside a project, and the plan made of project and scan.
 
 use linesman_config::identity::{mismatch, text};
 use linesman_config::inventory::Inventory;
@@ -8,11 +8,11 @@ use linesman_config::project::{ClockChoice, Project};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
-use super::operator::{MakePlan, Wanted};
+use super::session::{MakePlan, PlanSource};
 
 /// Choices beside the project.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Choices {
+pub struct PlanChoices {
     /// The state that SubDevices are driven to.
     pub target: AlState,
     /// Cycle time; `None`: that of the plan.
@@ -21,13 +21,13 @@ pub struct Choices {
     pub clocks: bool,
 }
 
-impl Default for Choices {
+impl Default for PlanChoices {
     fn default() -> Self {
         Self { target: AlState::Op, cycle: None, clocks: false }
     }
 }
 
-impl Choices {
+impl PlanChoices {
     fn plan(self, inventory: &Inventory, project: Option<&Project>) -> Result<Plan, String> {
         let mut planned = inventory.planned(self.target);
         if let Some(project) = project {
@@ -79,16 +79,16 @@ impl Choices {
 
     /// What is there is run, as it is.
     #[must_use]
-    pub fn as_found(self) -> Wanted {
+    pub fn as_found(self) -> PlanSource {
         let make: MakePlan = Box::new(move |inventory| self.plan(inventory, None));
-        Wanted::Found(make)
+        PlanSource::Found(make)
     }
 
     /// What is there is run, if it is what the project says.
     #[must_use]
-    pub fn project(self, project: Project) -> Wanted {
+    pub fn project(self, project: Project) -> PlanSource {
         let make: MakePlan = Box::new(move |inventory| self.plan(inventory, Some(&project)));
-        Wanted::Found(make)
+        PlanSource::Found(make)
     }
 
     /// The plan of what was found.

@@ -13,7 +13,7 @@ use linesman_proto::time::Instant;
 const FRAME: usize = 256;
 
 /// Asks on one card.
-pub struct Asking {
+pub struct QuestionSocket {
     socket: RawSocket,
     asker: Asker,
     clock: HostClock,
@@ -22,7 +22,7 @@ pub struct Asking {
     _lock: CardLock,
 }
 
-impl Asking {
+impl QuestionSocket {
     /// Makes ready to ask on the card with this name, on which another program may drive a line. Nothing is sent.
     ///
     /// # Errors
@@ -61,7 +61,7 @@ impl Asking {
         Ok(())
     }
 
-    /// When [`Asking::turn`] has something to do, though nothing is heard.
+    /// When [`QuestionSocket::turn`] has something to do, though nothing is heard.
     #[must_use]
     pub fn deadline(&self) -> Instant {
         self.asker.poll_timeout().unwrap_or(Instant::MAX)

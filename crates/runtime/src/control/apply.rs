@@ -1,4 +1,4 @@
-//! Doing what was asked of a segment.
+//! Execution of the requests to a running segment.
 
 use linesman_config::attachment::Attachment;
 use linesman_proto::time::Instant;
@@ -12,7 +12,7 @@ use crate::names::Names;
 use crate::serve::Server;
 
 /// Does what was asked at `now` and tells how it is then.
-pub(crate) fn obey(now: Instant, request: &Request, server: &mut Server) -> Answer {
+pub(crate) fn apply(now: Instant, request: &Request, server: &mut Server) -> Answer {
     let (segment, wiring) = server.parts();
     match request {
         Request::Inject { fault, for_ms } => {

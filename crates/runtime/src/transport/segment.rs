@@ -8,13 +8,13 @@ use linesman_diagnosis::HostObservation;
 use linesman_diagnosis::observe::HostEvent;
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
-use linesman_link::socket::{Bell, Waitable, Waker, wait_any};
+use linesman_link::socket::{Waitable, WakeHandle, Waker, wait_any};
 use linesman_maindevice::Options;
 use linesman_proto::address::{Network, Path};
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::{HostPort, Segment};
 
-use super::{Arrived, Intake, Line};
+use super::{FrameSink, RxFrame, Transport};
 use crate::wiring::Wiring;
 
 /// How fast virtual time goes.
@@ -30,7 +30,7 @@ pub enum Pace {
 const EVERY: Span = Span::ms(100);
 
 /// The segment, its cards and its time.
-pub struct VirtualLine {
+pub struct SegmentTransport {
     segment: Segment,
     wiring: Wiring,
     paths: usize,
@@ -43,7 +43,7 @@ pub struct VirtualLine {
     last: [Option<HostPort>; 2],
 }
 
-impl VirtualLine {
+impl SegmentTransport {
     /// A segment with one card, or with two at the ends of a ring. Its outputs come back to its
     /// inputs by `wiring`.
     ///
@@ -82,12 +82,12 @@ impl VirtualLine {
 
     /// What wakes the thread that waits.
     #[must_use]
-    pub fn bell(&self) -> Bell {
-        self.waker.bell()
+    pub fn wake_handle(&self) -> WakeHandle {
+        self.waker.wake_handle()
     }
 }
 
-impl Line for VirtualLine {
+impl Transport for SegmentTransport {
     fn options(&self) -> Options {
         let usual = Options { ring: self.paths > 1, ..Options::default() };
         usual.on_line(self.segment.tree().len(), self.segment.longest_way())
@@ -97,7 +97,7 @@ impl Line for VirtualLine {
         self.now
     }
 
-    fn receive(&mut self, _: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError> {
+    fn receive(&mut self, _: Instant, intake: &mut dyn FrameSink) -> Result<usize, LinkError> {
         self.segment.advance(self.now);
         self.wiring.carry(self.segment.signals_mut());
         let mut count = 0;
@@ -109,7 +109,7 @@ impl Line for VirtualLine {
                 let len = self.arrival.len().min(room.len());
                 room[..len].copy_from_slice(&self.arrival[..len]);
                 let truncated = len < self.arrival.len();
-                intake.arrived(Arrived { at: came.at, path: came.path, len, truncated });
+                intake.frame_received(RxFrame { at: came.at, path: came.path, len, truncated });
             }
         }
         Ok(count)

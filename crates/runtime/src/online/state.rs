@@ -1,4 +1,4 @@
-//! What has happened on a line so far, shared by whoever is told and whoever asks.
+//! State of a line so far, shared by the threads that report to it and those that ask.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -18,7 +18,7 @@ const FORGIVEN_AFTER: Span = Span::s(1);
 
 /// What has happened on a line. Clones mean the same one.
 #[derive(Clone, Debug, Default)]
-pub struct Board {
+pub struct OnlineState {
     inner: Arc<Mutex<Inner>>,
 }
 
@@ -33,7 +33,7 @@ struct Inner {
     base: Statistics,
 }
 
-impl Board {
+impl OnlineState {
     /// Of the line that is called so.
     #[must_use]
     pub fn new(on: &str) -> Self {

@@ -1,4 +1,4 @@
-//! A line that nobody drives, looked at again and again with nothing but reads.
+//! Polling of a line that nobody drives, with nothing but reads.
 
 use linesman_config::plan::{DevicePlan, Plan};
 use linesman_diagnosis::{FrameSeen, HostObservation};
@@ -14,13 +14,13 @@ use linesman_proto::topology::{Reconstruction, SeenController};
 
 use super::build;
 use super::report::OnlineReport;
-use crate::drive::Audience;
+use crate::drive::DriverHooks;
 
 /// Between two looks. Each is a few frames long, so that damage has something to hit.
 const LOOK_EVERY: Span = Span::ms(20);
 
-/// Somebody who looks. The [`Audience`] of a [`Driver`](crate::drive::Driver).
-pub struct Looker {
+/// Somebody who looks. The [`DriverHooks`] of a [`Driver`](crate::drive::Driver).
+pub struct ReadOnlyPoller {
     on: String,
     names: Vec<String>,
     next: Option<Instant>,
@@ -35,7 +35,7 @@ pub struct Looker {
     once: bool,
 }
 
-impl Looker {
+impl ReadOnlyPoller {
     /// Looks at the line that is called `on`, at SubDevices with these names in their order; those that
     /// have none are called by their numbers.
     #[must_use]
@@ -201,7 +201,7 @@ fn seen(look: &ReadOnlyScan, names: &[String]) -> Plan {
     plan
 }
 
-impl Audience for Looker {
+impl DriverHooks for ReadOnlyPoller {
     fn frame(&mut self, _: &FrameSeen<'_>) {}
 
     fn host(&mut self, _: &HostObservation) {}

@@ -1,4 +1,4 @@
-//! The thread that judges: the diagnosis of a line while it runs.
+//! Diagnosis thread: the diagnosis of a line while it runs.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -10,7 +10,7 @@ use linesman_proto::address::Network;
 use linesman_proto::time::Instant;
 
 use super::note::Note;
-use super::tap::{Listener, Log};
+use super::tap::{Listener, TapLog};
 use crate::part::{PartFailure, guard};
 
 /// The diagnosis in messages.
@@ -19,9 +19,9 @@ const PART: &str = "the diagnosis";
 const EFFECT: &str = "the line is driven on, and not judged any more";
 
 /// A diagnosis that is fed with the frames of a run: an [`Engine`], but in tests.
-pub trait LineObserver: Send {
+pub trait DiagnosisObserver: Send {
     /// Takes frames and what the host noticed, in order of time; gives the time of the last frame.
-    fn take(&mut self, log: &Log) -> Instant;
+    fn take(&mut self, log: &TapLog) -> Instant;
     /// Time has passed.
     fn turn(&mut self, now: Instant);
     /// The run has ended.
@@ -34,8 +34,8 @@ pub trait LineObserver: Send {
     fn diagnosis(&self) -> Diagnosis;
 }
 
-impl LineObserver for Engine {
-    fn take(&mut self, log: &Log) -> Instant {
+impl DiagnosisObserver for Engine {
+    fn take(&mut self, log: &TapLog) -> Instant {
         let mut last = Instant::ZERO;
         let mut host = log.host().iter().peekable();
         for frame in log.frames() {
@@ -75,7 +75,7 @@ impl LineObserver for Engine {
 }
 
 /// Where a diagnosis tells what it finds.
-pub struct Told {
+pub struct DiagnosisOutput {
     /// Findings, and that it has failed.
     pub notes: SyncSender<Note>,
     /// Notes for which there was no room.
@@ -84,8 +84,8 @@ pub struct Told {
     pub probes: SyncSender<Probe>,
 }
 
-impl Told {
-    fn events(&self, observer: &mut dyn LineObserver) {
+impl DiagnosisOutput {
+    fn events(&self, observer: &mut dyn DiagnosisObserver) {
         while let Some(event) = observer.poll_event() {
             self.note(Note::Finding(Box::new(event)));
         }
@@ -104,9 +104,9 @@ impl Told {
 /// # Errors
 /// When the system has no more threads.
 pub fn judge(
-    observer: Box<dyn LineObserver>,
+    observer: Box<dyn DiagnosisObserver>,
     listener: Listener,
-    told: Told,
+    told: DiagnosisOutput,
 ) -> std::io::Result<JoinHandle<Result<Diagnosis, PartFailure>>> {
     thread::Builder::new().name("judge".to_owned()).spawn(move || {
         let reporting = &told;
@@ -118,7 +118,11 @@ pub fn judge(
     })
 }
 
-fn work(mut observer: Box<dyn LineObserver>, listener: &Listener, told: &Told) -> Diagnosis {
+fn work(
+    mut observer: Box<dyn DiagnosisObserver>,
+    listener: &Listener,
+    told: &DiagnosisOutput,
+) -> Diagnosis {
     let (mut done, mut last) = (None, Instant::ZERO);
     while let Some(log) = listener.next(done.take()) {
         last = last.max(observer.take(&log));

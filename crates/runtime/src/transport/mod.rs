@@ -1,4 +1,4 @@
-//! Where the frames of a MainDevice go: to cards, or to a virtual segment in this process.
+//! Transport of the frames of a MainDevice: network cards, or a virtual segment in this process.
 
 pub mod cards;
 pub mod segment;
@@ -10,11 +10,11 @@ use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
 pub use cards::Cards;
-pub use segment::{Pace, VirtualLine};
+pub use segment::{Pace, SegmentTransport};
 
 /// A frame that has come back.
 #[derive(Clone, Copy, Debug)]
-pub struct Arrived {
+pub struct RxFrame {
     /// When it was seen.
     pub at: Instant,
     /// At which card.
@@ -26,15 +26,15 @@ pub struct Arrived {
 }
 
 /// Who takes in what has come back: it says where, so that nothing is copied on the way.
-pub trait Intake {
+pub trait FrameSink {
     /// Where the next frame is to be received: room for the longest.
     fn room(&mut self) -> &mut [u8];
     /// It was.
-    fn arrived(&mut self, arrived: Arrived);
+    fn frame_received(&mut self, frame_received: RxFrame);
 }
 
 /// A line, and the clock that it is driven by.
-pub trait Line {
+pub trait Transport {
     /// How a MainDevice has to be set up for this line; all else is as usual.
     fn options(&self) -> Options;
 
@@ -45,7 +45,7 @@ pub trait Line {
     ///
     /// # Errors
     /// When an interface vanished, was switched off, or the kernel refuses something else.
-    fn receive(&mut self, now: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError>;
+    fn receive(&mut self, now: Instant, intake: &mut dyn FrameSink) -> Result<usize, LinkError>;
 
     /// Sends a frame. What a full queue refuses is lost, and counted by the host.
     ///
@@ -73,7 +73,7 @@ pub trait Line {
     fn note_late(&mut self, late: Span);
 }
 
-impl<L: Line + ?Sized> Line for &mut L {
+impl<L: Transport + ?Sized> Transport for &mut L {
     fn options(&self) -> Options {
         (**self).options()
     }
@@ -82,7 +82,7 @@ impl<L: Line + ?Sized> Line for &mut L {
         (**self).now()
     }
 
-    fn receive(&mut self, now: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError> {
+    fn receive(&mut self, now: Instant, intake: &mut dyn FrameSink) -> Result<usize, LinkError> {
         (**self).receive(now, intake)
     }
 

@@ -1,4 +1,4 @@
-//! A file that is being written, or a socket that is listened on: whether its path still leads to it.
+//! File that is being written, or socket that is listened on: whether its path still leads to it.
 //!
 //! What is written to a file that somebody has removed is lost without an error.
 
@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 
 /// A path, and what it led to at first.
 #[derive(Clone, Debug)]
-pub(crate) struct KeptFile {
+pub(crate) struct WatchedFile {
     path: PathBuf,
     was: Option<(u64, u64)>,
 }
 
-impl KeptFile {
+impl WatchedFile {
     /// What is at the path now.
     pub(crate) fn at(path: &Path) -> Self {
         Self { path: path.to_owned(), was: identity(path) }
@@ -52,7 +52,7 @@ mod tests {
         let (path, other) = (folder.path().join("log"), folder.path().join("other"));
         fs::write(&path, "one").unwrap();
         fs::write(&other, "two").unwrap();
-        let kept = KeptFile::at(&path);
+        let kept = WatchedFile::at(&path);
         fs::write(&path, "more").unwrap();
         assert!(kept.check().is_ok());
         fs::rename(&other, &path).unwrap();

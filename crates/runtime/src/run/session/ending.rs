@@ -11,11 +11,11 @@ use linesman_proto::time::{Instant, Span};
 
 use super::super::io::Application;
 use super::super::note::{Note, RunError};
-use super::Operator;
+use super::RunSession;
 use crate::drive::Driver;
-use crate::line::Line;
 use crate::part::{PartFailure, guard};
 use crate::stop::Stop;
+use crate::transport::Transport;
 
 /// How long SubDevices may take to go down at the end.
 const LEAVE_PATIENCE: Span = Span::s(5);
@@ -26,10 +26,10 @@ const PART: &str = "the MainDevice or its application";
 /// So often all SubDevices are ordered to INIT where nothing else works: a frame may be lost.
 const ORDERS: u8 = 3;
 
-impl<A: Application> Operator<A> {
+impl<A: Application> RunSession<A> {
     /// Drives the line until its end. A panic on the way, of the application or of the MainDevice, is told, and the
     /// SubDevices are left as after any other end.
-    pub(super) fn drive<L: Line>(
+    pub(super) fn drive<L: Transport>(
         &mut self,
         driver: &mut Driver<L>,
         until: Instant,
@@ -46,7 +46,7 @@ impl<A: Application> Operator<A> {
     }
 
     /// Leaves the SubDevices in a state. Where that fails, too, all are ordered to INIT.
-    pub(super) fn leave<L: Line>(
+    pub(super) fn leave<L: Transport>(
         &mut self,
         driver: &mut Driver<L>,
         to: AlState,
@@ -64,7 +64,7 @@ impl<A: Application> Operator<A> {
     }
 
     /// Outputs to zero, then the exchange ends, then the states.
-    fn leave_in_order<L: Line>(
+    fn leave_in_order<L: Transport>(
         &mut self,
         driver: &mut Driver<L>,
         to: AlState,
@@ -95,7 +95,7 @@ fn unordered(failure: &PartFailure) -> PartFailure {
 }
 
 /// Orders all SubDevices to INIT by broadcast, past the MainDevice.
-fn order_init<L: Line>(driver: &mut Driver<L>) -> Result<(), LinkError> {
+fn order_init<L: Transport>(driver: &mut Driver<L>) -> Result<(), LinkError> {
     /// INIT, and whatever error is shown acknowledged.
     const INIT: [u8; 2] = [0x11, 0];
     let mut buffer = [0; 60];
