@@ -1,4 +1,4 @@
-//! What a scan found, and the plan made of it.
+//! Result of a scan, and the plan made of it.
 
 use std::path::Path;
 

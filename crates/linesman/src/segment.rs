@@ -86,7 +86,7 @@ pub struct Segment {
 
 /// How often, and how.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Cycle {
+pub struct RunOptions {
     time: Span,
     misses: u32,
     real_time: RealTime,
@@ -96,7 +96,7 @@ pub struct Cycle {
     hold: bool,
 }
 
-impl Cycle {
+impl RunOptions {
     /// A cycle of so many microseconds.
     #[must_use]
     pub fn us(micros: u64) -> Self {
@@ -215,7 +215,7 @@ impl Segment {
     pub fn run(
         &mut self,
         plan: Plan,
-        cycle: Cycle,
+        cycle: RunOptions,
         application: impl FnMut(&mut Io<'_>) -> Next,
     ) -> Result<RunReport, Error> {
         self.run_application(plan, cycle, application)
@@ -228,7 +228,7 @@ impl Segment {
     pub fn run_application(
         &mut self,
         plan: Plan,
-        cycle: Cycle,
+        cycle: RunOptions,
         application: impl Application,
     ) -> Result<RunReport, Error> {
         let mut plan = if cycle.clocks { plan.clocked(cycle.time)? } else { plan.plan };

@@ -1,5 +1,5 @@
-//! When frames of a task leave, what they carry, and what the program has seen by then: before or after
-//! the program, and inputs ahead of both.
+//! Time at which frames of a task leave, what they carry, and what the program has seen by then:
+//! before or after the program, and inputs ahead of both.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

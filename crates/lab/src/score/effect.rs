@@ -1,4 +1,5 @@
-//! How often a fault has acted: what the truth log says of it, less what no observer could ever see.
+//! Number of effects of a fault: what the truth log says of it, less what no observer could ever
+//! see.
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::topology::End;

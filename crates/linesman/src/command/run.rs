@@ -1,6 +1,6 @@
 //! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
 
-mod told;
+mod reporter;
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -29,8 +29,8 @@ use linesman_runtime::stop::Stop;
 use linesman_runtime::system_log::SystemLog;
 use linesman_runtime::transport::{Cards, Pace, Transport};
 
-use self::told::{Logs, Teller};
-use super::driven;
+use self::reporter::{Logs, RunReporter};
+use super::line_access;
 use crate::amount::{MICROSECOND, count as count_of, cycle, duration, lasting};
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -211,19 +211,19 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     };
     let without = arguments.log_without.clone();
     let logs = Logs { file: log, system: system_log, without };
-    let teller = Teller::new(arguments.json, began, logs, online.clone());
+    let reporter = RunReporter::new(arguments.json, began, logs, online.clone());
     let application = arguments.image.clone();
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let said = format!(
         "Drives {title} on {} to {}; Ctrl-C stops it: outputs to zero, all back to {}.",
         arguments.on, arguments.to, arguments.leave
     );
     match &selector {
         Selector::Cards(names) => {
-            driven::refuse(names)?;
+            line_access::refuse(names)?;
             let mut line = Cards::open(names, clock)?;
             line.set_spin(arguments.spin_us);
-            stop.wakes(&line.wake_handle()).map_err(driven::no_wake_handle)?;
+            stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
             let real_time = Some(RealTime {
                 priority: (arguments.priority > 0).then_some(arguments.priority),
@@ -231,18 +231,18 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
                 lock_memory: arguments.priority > 0,
             });
             let options = with_source(options, real_time, began.rfc3339());
-            drive(line, wanted, &options, application, socket, &stop, &said, teller, output)
+            drive(line, wanted, &options, application, socket, &stop, &said, reporter, output)
         }
         Selector::Segment(path) => {
             // Without an end it goes no faster than the host's clock, for a person to look on.
             let pace = if lasts.is_some() { Pace::Free } else { Pace::Host };
-            let line = driven::virtual_line(path, pace)?;
-            stop.wakes(&line.wake_handle()).map_err(driven::no_wake_handle)?;
+            let line = line_access::virtual_line(path, pace)?;
+            stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
-            drive(line, wanted, &options, application, socket, &stop, &said, teller, output)
+            drive(line, wanted, &options, application, socket, &stop, &said, reporter, output)
         }
         Selector::Listen(_) | Selector::File(_) => {
-            Err(driven::not_drivable(&arguments.on, &selector))
+            Err(line_access::not_drivable(&arguments.on, &selector))
         }
     }
 }
@@ -316,16 +316,16 @@ fn drive<L: Transport + Send>(
     socket: Option<ServiceSocket>,
     stop: &Stop,
     said: &str,
-    mut teller: Teller,
+    mut reporter: RunReporter,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    teller.line(said, output);
+    reporter.line(said, output);
     let (notes, told) = mpsc::sync_channel(NOTES);
     let socket_watch = socket.as_ref().map(ServiceSocket::watch);
-    let look = |teller: &mut Teller, output: &Output| {
-        teller.look_at_logs(output);
+    let look = |reporter: &mut RunReporter, output: &Output| {
+        reporter.look_at_logs(output);
         if let Some(why) = socket_watch.as_ref().and_then(ControlSocketWatch::trouble) {
-            teller.complain(&why, output);
+            reporter.complain(&why, output);
         }
     };
     let ended = std::thread::scope(|scope| {
@@ -339,12 +339,12 @@ fn drive<L: Transport + Send>(
         loop {
             if looked.elapsed() >= LOOK_EVERY {
                 looked = std::time::Instant::now();
-                look(&mut teller, output);
+                look(&mut reporter, output);
             }
             match told.recv_timeout(QUIET) {
-                Ok(note) => teller.note(&note, output),
+                Ok(note) => reporter.note(&note, output),
                 Err(RecvTimeoutError::Timeout) => {
-                    teller.flush(output);
+                    reporter.flush(output);
                     output.look_for_reader();
                 }
                 Err(RecvTimeoutError::Disconnected) => break,
@@ -355,47 +355,48 @@ fn drive<L: Transport + Send>(
                 stop.set();
             }
         }
-        teller.flush(output);
+        reporter.flush(output);
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     });
     let lasted = ended.as_ref().map_or(Span::ZERO, |ended| Span::ns(ended.report.time_ns));
-    if let Some((lost, why)) = teller.lost() {
-        teller.complain(&format!("{lost} entries are missing in the system's log: {why}"), output);
+    if let Some((lost, why)) = reporter.lost() {
+        reporter
+            .complain(&format!("{lost} entries are missing in the system's log: {why}"), output);
     }
-    if let Some(log) = teller.finish(lasted)
+    if let Some(log) = reporter.finish(lasted)
         && (log.dropped > 0 || log.failure.is_some())
     {
         let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
-        teller.complain(&why, output);
+        reporter.complain(&why, output);
         let lost = format!("{} missing in the event log", count(log.dropped, "entry"));
-        teller.complain(&lost, output);
+        reporter.complain(&lost, output);
     }
     let RunOutcome { mut report, error, failed } =
-        ended.map_err(|error| driven::nobody(&error).at(&options.on))?;
+        ended.map_err(|error| line_access::nobody(&error).at(&options.on))?;
     if let Some(diagnosis) = &mut report.diagnosis {
         diagnosis.tool = version::tool();
     }
-    if teller.is_json() {
+    if reporter.is_json() {
         output.json(&report);
     } else {
-        output.text(&told::summary(&report, output.paint()));
+        output.text(&reporter::summary(&report, output.paint()));
         if let Some(diagnosis) = &report.diagnosis {
-            output.text(&told::findings(diagnosis, teller.names(), output));
+            output.text(&reporter::findings(diagnosis, reporter.names(), output));
         }
     }
     if report.counts.untold > 0 {
         let lost = count(report.counts.untold, "event");
-        teller.complain(
+        reporter.complain(
             &format!("{lost} neither told nor logged. Do: end other programs on this computer"),
             output,
         );
     }
     if let Some(error) = error {
-        return Err(driven::nobody(&error).at(&options.on));
+        return Err(line_access::nobody(&error).at(&options.on));
     }
     if let Some(failure) = failed {
         // It was said when it happened.
-        teller.failed(&failure, output);
+        reporter.failed(&failure, output);
         return Ok(Status::NotJudged);
     }
     let faulty =

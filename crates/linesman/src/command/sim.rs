@@ -18,7 +18,7 @@ use linesman_runtime::stop::Stop;
 use linesman_runtime::truth_writer::{TruthWriter, TruthWriterWatch};
 use linesman_runtime::wiring::Wiring;
 
-use super::driven;
+use super::line_access;
 use crate::amount::lasting;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -68,7 +68,7 @@ struct Ready {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let until = arguments.seconds.map_or(Instant::MAX, |lasts| Instant::ZERO + lasts);
     let cards = cards(arguments)?;
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let mut ready = Vec::new();
     for (index, (file, names)) in arguments.segments.iter().zip(&cards).enumerate() {
         let control = arguments.control.get(index).map(PathBuf::as_path);

@@ -11,8 +11,8 @@ use linesman_runtime::listen::{CardListener, ListenEvent, TapCounts};
 use linesman_runtime::question_socket::QuestionSocket;
 use linesman_runtime::record::Recorder;
 
-use super::{Session, asking};
-use crate::command::driven;
+use super::{Session, questions};
+use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Progress};
@@ -32,11 +32,11 @@ pub(super) fn run(
     session: Session,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let clock = HostClock::start();
     let until = session.until(if questions.is_some() { ASKING_LASTS } else { LASTS });
     let mut card_listener = CardListener::open(names, clock)?;
-    let asking = questions.map(|setup| asking::open(names, clock, setup)).transpose()?;
+    let asking = questions.map(|setup| questions::open(names, clock, setup)).transpose()?;
     let recorder = session.recorder(clock.started_at(), names)?;
     let mut listening =
         Listening { session, clock, recorder, engine: None, asking, frames: 0, is_local: false };
@@ -155,7 +155,7 @@ impl Listening {
     /// Sends the question that is due. Gives why nothing is asked at all beside this MainDevice, if that is so.
     fn ask(&mut self, names: &[String], output: &Output) -> Result<Option<Failure>, LinkError> {
         match (&mut self.asking, &mut self.engine) {
-            (Some(asking), Some(engine)) => asking::turn(asking, engine, names, output),
+            (Some(asking), Some(engine)) => questions::turn(asking, engine, names, output),
             (_, None) | (None, _) => Ok(None),
         }
     }

@@ -5,7 +5,7 @@ use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
 use serde::Serialize;
 
-use super::{Arguments, Session, driven, file, status};
+use super::{Arguments, Session, file, line_access, status};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::files::Planned;
@@ -49,7 +49,7 @@ struct JudgedFile {
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selectors = selectors(arguments)?;
     let project = arguments.project.as_deref().map(Planned::open).transpose()?;
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let mut all = Vec::new();
     for (selector, name) in selectors.iter().zip(&arguments.places) {
         let result = judge(selector, arguments, project.clone(), &stop, output);

@@ -1,4 +1,4 @@
-//! Exchanges that the diagnosis does not get to see: a recorder that drops, a tap that is overrun.
+//! Loss of exchanges on their way to the diagnosis: a recorder that drops, a tap that is overrun.
 
 use std::collections::VecDeque;
 
@@ -14,14 +14,14 @@ const COUNTERS: std::ops::Range<u16> = 0x0300..0x0314;
 
 /// Hides a share of the exchanges in which error counters are read, both the request and its return.
 #[derive(Clone, Debug)]
-pub(super) struct Veil {
+pub(super) struct CaptureLoss {
     stream: Stream,
     share: f64,
     /// Requests that were hidden: first index and length.
     hidden: VecDeque<(u8, usize)>,
 }
 
-impl Veil {
+impl CaptureLoss {
     pub(super) fn new(stream: Stream, share: f64) -> Self {
         Self { stream, share, hidden: VecDeque::new() }
     }

@@ -1,4 +1,4 @@
-//! What goes from engine to engine: frames, events, probes, what the cards count.
+//! Transfer between the engines: frames, events, probes, counters of the cards.
 
 use std::sync::Arc;
 
@@ -110,7 +110,11 @@ impl Lab {
 
     pub(super) fn show(&mut self, direction: Direction, path: Path, time: Instant, bytes: &[u8]) {
         self.frames += 1;
-        if self.veil.as_mut().is_some_and(|veil| veil.hides(direction, bytes)) {
+        if self
+            .capture_loss
+            .as_mut()
+            .is_some_and(|capture_loss| capture_loss.hides(direction, bytes))
+        {
             return;
         }
         let seen = FrameSeen {
@@ -153,7 +157,11 @@ impl Lab {
         if !self.is_recorded() {
             return;
         }
-        if self.recorder_veil.as_mut().is_some_and(|veil| veil.hides(direction, bytes)) {
+        if self
+            .recorder_veil
+            .as_mut()
+            .is_some_and(|capture_loss| capture_loss.hides(direction, bytes))
+        {
             return;
         }
         self.recorded += 1;

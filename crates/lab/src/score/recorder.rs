@@ -1,4 +1,4 @@
-//! Recordings in memory: the frames of a run, and what the computer observed of its cards.
+//! Recorder in memory: the frames of a run, and what the computer observed of its cards.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -8,7 +8,7 @@ use linesman_proto::time::Instant;
 
 /// A frame of a recording.
 #[derive(Clone, Debug)]
-pub struct TapedFrame {
+pub struct RecordedFrame {
     /// When it passed the card.
     pub time: Instant,
     /// The card that it left by or arrived at.
@@ -24,17 +24,17 @@ pub struct TapedFrame {
 /// All that a listener on the cards of the MainDevice is shown.
 #[derive(Clone, Default, Debug)]
 pub(super) struct Recording {
-    pub(super) frames: Vec<TapedFrame>,
+    pub(super) frames: Vec<RecordedFrame>,
     /// Observations of the host, each with the number of frames before it.
     pub(super) host: Vec<(usize, HostObservation)>,
 }
 
 /// A recording that is being made.
-pub(super) type Tape = Arc<Mutex<Recording>>;
+pub(super) type SharedRecording = Arc<Mutex<Recording>>;
 
 /// Takes one frame down.
-pub(super) fn take_down(tape: &Tape, seen: &FrameSeen<'_>) {
-    tape.lock().unwrap_or_else(PoisonError::into_inner).frames.push(TapedFrame {
+pub(super) fn take_down(shared_recording: &SharedRecording, seen: &FrameSeen<'_>) {
+    shared_recording.lock().unwrap_or_else(PoisonError::into_inner).frames.push(RecordedFrame {
         time: seen.time,
         path: seen.path,
         is_sent: seen.direction == Direction::Sent,
@@ -44,8 +44,8 @@ pub(super) fn take_down(tape: &Tape, seen: &FrameSeen<'_>) {
 }
 
 /// Takes an observation of the host down.
-pub(super) fn take_down_host(tape: &Tape, seen: &HostObservation) {
-    let mut recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
+pub(super) fn take_down_host(shared_recording: &SharedRecording, seen: &HostObservation) {
+    let mut recording = shared_recording.lock().unwrap_or_else(PoisonError::into_inner);
     let before = recording.frames.len();
     recording.host.push((before, *seen));
 }

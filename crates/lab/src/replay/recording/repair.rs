@@ -1,4 +1,4 @@
-//! Frames that a recorder lost or put in another order.
+//! Repair of recordings: frames that a recorder lost or put in another order.
 //!
 //! A return that was recorded before its request belongs to it all the same. A return whose request is
 //! missing tells what the request was: controllers change data only where something was read, count
@@ -19,7 +19,7 @@ const HEADER: usize = 10;
 const COUNTER: usize = 2;
 
 /// Puts returns without a request where they belong; `turns` are in order.
-pub(super) fn mend(recording: &mut Recording, alone: Vec<Frame>) {
+pub(super) fn repair(recording: &mut Recording, alone: Vec<Frame>) {
     let mut rebuilt = Vec::new();
     let count = passed(recording);
     for reply in alone {

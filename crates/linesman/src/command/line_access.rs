@@ -1,4 +1,5 @@
-//! Lines that are driven: does somebody else drive them, the segment of a file, the wish to stop.
+//! Access to a line that is to be driven: check for another MainDevice, the segment of a file, the
+//! stop signal.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What listeners beside the MainDevice of a score said, as tables.
+//! Answers of the listeners beside the MainDevice of a score, as tables.
 
 use linesman_lab::score::Rate;
 use linesman_lab::score::listen::report::{

@@ -1,11 +1,12 @@
-//! What the listeners of a score heard, as capture files that `linesman diagnose` and other tools read.
+//! Frames that the listeners of a score heard, as capture files that `linesman diagnose` and other
+//! tools read.
 
 use std::path::Path as FilePath;
 
 use linesman_diagnosis::{Direction, FrameSeen};
 use linesman_lab::habit::Habit;
 use linesman_lab::score::listen::Heard;
-use linesman_lab::score::{CaseReport, TapedFrame};
+use linesman_lab::score::{CaseReport, RecordedFrame};
 use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Network;
 use linesman_runtime::record::Recorder;
@@ -46,7 +47,7 @@ fn record(path: &FilePath, heard: &Heard) -> Result<(), Failure> {
     recorder.finish().map_err(|error| files::in_file(path, &error))
 }
 
-fn seen(frame: &TapedFrame, number: u64) -> FrameSeen<'_> {
+fn seen(frame: &RecordedFrame, number: u64) -> FrameSeen<'_> {
     FrameSeen {
         network: Network::default(),
         path: frame.path,

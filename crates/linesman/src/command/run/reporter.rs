@@ -1,4 +1,4 @@
-//! What a run tells while it lasts, and at its end.
+//! Reporter of a run while it lasts, and at its end.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use crate::text::names::Names;
 use crate::text::quantity::{count, grouped, time};
 
 /// Tells what happens.
-pub(super) struct Teller {
+pub(super) struct RunReporter {
     json: bool,
     names: Names,
     follower: Follower,
@@ -62,7 +62,7 @@ pub(super) struct Logs {
     pub(super) without: Vec<EntryKind>,
 }
 
-impl Teller {
+impl RunReporter {
     pub(super) fn new(json: bool, began: UnixTime, logs: Logs, online: OnlineState) -> Self {
         let follower = Follower::new(false);
         let (counted, failures) = (HashMap::new(), Vec::new());

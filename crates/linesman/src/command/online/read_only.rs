@@ -1,4 +1,4 @@
-//! A line that nobody drives, looked at with nothing but reads.
+//! Online view of a line that nobody drives, with nothing but reads.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use linesman_runtime::transport::{Cards, Pace as VirtualPace, Transport};
 
 use super::live::{Live, Pace};
 use super::{Arguments, interval, lasts};
-use crate::command::driven;
+use crate::command::line_access;
 use crate::failure::Failure;
 use crate::output::Output;
 
@@ -29,7 +29,7 @@ pub(super) fn cards(
     arguments: &Arguments,
     output: &mut Output,
 ) -> Result<OnlineReport, Failure> {
-    driven::refuse(names)?;
+    line_access::refuse(names)?;
     let line = Cards::open(names, HostClock::start())?;
     look(line, ReadOnlyPoller::new(place, Vec::new()), place, arguments, output)
 }
@@ -42,7 +42,7 @@ pub(super) fn segment(
     output: &mut Output,
 ) -> Result<OnlineReport, Failure> {
     let pace = if arguments.live { VirtualPace::Host } else { VirtualPace::Free };
-    let line = driven::virtual_line(path, pace)?;
+    let line = line_access::virtual_line(path, pace)?;
     let segment = line.segment();
     let names = segment.devices().map(|id| segment.name(id).to_owned()).collect();
     look(line, ReadOnlyPoller::new(place, names), place, arguments, output)
@@ -55,7 +55,7 @@ fn look<L: Transport>(
     arguments: &Arguments,
     output: &mut Output,
 ) -> Result<OnlineReport, Failure> {
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let options = line.options();
     let mut driver = Driver::new(line, options);
     let lasts = lasts(arguments);
@@ -76,9 +76,9 @@ fn look<L: Transport>(
     };
     let clears = arguments.clear.is_some_and(super::What::errors);
     let mut looking =
-        Looking { poller, live, output, clears, show_at: Instant::ZERO, failure: None };
+        ReadOnlyView { poller, live, output, clears, show_at: Instant::ZERO, failure: None };
     let result = driver.run(until, &stop, &mut looking);
-    let Looking { poller, live, failure, .. } = looking;
+    let ReadOnlyView { poller, live, failure, .. } = looking;
     // The terminal is given back before anything else is told.
     drop(live);
     result?;
@@ -87,12 +87,12 @@ fn look<L: Transport>(
     }
     poller.report(driver.now()).ok_or_else(|| {
         let why = poller.failure().unwrap_or("nobody has answered yet");
-        driven::nobody_since(why).at(place)
+        line_access::nobody_since(why).at(place)
     })
 }
 
 /// Looks, and shows what was seen.
-struct Looking<'a> {
+struct ReadOnlyView<'a> {
     poller: ReadOnlyPoller,
     live: Option<Live>,
     output: &'a mut Output,
@@ -102,7 +102,7 @@ struct Looking<'a> {
     failure: Option<Failure>,
 }
 
-impl Looking<'_> {
+impl ReadOnlyView<'_> {
     fn show(&mut self, now: Instant) -> Result<bool, Failure> {
         let Some(live) = &mut self.live else { return Ok(true) };
         if now < self.show_at {
@@ -115,7 +115,7 @@ impl Looking<'_> {
     }
 }
 
-impl DriverHooks for Looking<'_> {
+impl DriverHooks for ReadOnlyView<'_> {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.poller.frame(frame);
     }

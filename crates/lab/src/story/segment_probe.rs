@@ -1,4 +1,4 @@
-//! What a story sees of the segment: frames on their way, and counters as they were.
+//! Probe of the segment for a story: frames on their way, and counters as they were.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,7 +11,7 @@ use linesman_proto::register::{ErrorCounter, SYSTEM_TIME_DIFFERENCE, SystemTimeD
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::FrameTally;
 
-use super::ground::{Fate, Ground, Moved};
+use super::assertion::{Assertion, FrameFate, Moved};
 use crate::habit::Habit;
 use crate::lab::{Lab, Tap};
 use crate::swarm::counter::{Kind, expected};
@@ -75,7 +75,7 @@ impl Frames {
 
 /// Sees what happens on the segment, for the expectations of a story.
 #[derive(Default)]
-pub(super) struct Witness {
+pub(super) struct SegmentProbe {
     frames: Arc<Mutex<Frames>>,
     /// Counters at the last `inject`.
     counters: BTreeMap<(DeviceId, ErrorCounter), u8>,
@@ -86,15 +86,15 @@ pub(super) struct Witness {
     named: BTreeSet<(DeviceId, ErrorCounter)>,
 }
 
-impl Witness {
+impl SegmentProbe {
     /// Who looks on; the tap goes to the lab.
     pub(super) fn new() -> (Self, Tap) {
-        let witness = Self::default();
-        let frames = Arc::clone(&witness.frames);
+        let segment_probe = Self::default();
+        let frames = Arc::clone(&segment_probe.frames);
         let tap = Box::new(move |seen: &FrameSeen<'_>| {
             frames.lock().unwrap_or_else(PoisonError::into_inner).note(seen);
         });
-        (witness, tap)
+        (segment_probe, tap)
     }
 
     /// From now on differences count from here.
@@ -106,8 +106,8 @@ impl Witness {
     }
 
     /// A step names counters.
-    pub(super) fn names(&mut self, lab: &Lab, ground: &Ground) {
-        if let Ground::Counters(moved) = ground {
+    pub(super) fn names(&mut self, lab: &Lab, assertion: &Assertion) {
+        if let Assertion::Counters(moved) = assertion {
             let found =
                 moved.iter().filter_map(|one| Some((device(lab, &one.device).ok()?, one.counter)));
             self.named.extend(found);
@@ -125,17 +125,17 @@ impl Witness {
     }
 
     /// Whether an expectation holds now; what is so instead if not.
-    pub(super) fn holds(&self, ground: &Ground, lab: &Lab) -> Result<(), String> {
-        match ground {
-            Ground::Counters(moved) => self.counters_moved(moved, lab),
-            Ground::NoOtherCounter => {
+    pub(super) fn holds(&self, assertion: &Assertion, lab: &Lab) -> Result<(), String> {
+        match assertion {
+            Assertion::Counters(moved) => self.counters_moved(moved, lab),
+            Assertion::NoOtherCounter => {
                 let others = self.moved(lab).filter(|(which, _)| !self.named.contains(which));
                 let others: Vec<String> = others.map(|(which, by)| text(lab, which, by)).collect();
                 check(others.is_empty(), || {
                     format!("no other counter to move, found {}", others.join(", "))
                 })
             }
-            Ground::Port { device: name, port, open, link } => {
+            Assertion::Port { device: name, port, open, link } => {
                 let controller = controller(lab, name)?;
                 let state = controller.dl_status().port_state(*port);
                 let fits = open.is_none_or(|open| open != state.closed)
@@ -146,23 +146,23 @@ impl Witness {
                     format!("another state of {name}.{port}: it is {open} {link} link")
                 })
             }
-            Ground::State { device: name, state, error } => {
+            Assertion::State { device: name, state, error } => {
                 let controller = controller(lab, name)?;
                 let (status, code) = (controller.al_status(), controller.al_code());
-                let shown = status.error().then_some(code.0);
-                let fits = status.state().state() == Some(*state) && shown == *error;
+                let visibility = status.error().then_some(code.0);
+                let fits = status.state().state() == Some(*state) && visibility == *error;
                 check(fits, || format!("another state of {name}: it is {status}, code {code}"))
             }
-            Ground::Frames { fate, amount } => {
+            Assertion::Frames { fate, amount } => {
                 let (now, then) = (lab.segment().frames(), self.tally);
                 let damaged = now.damaged - then.damaged;
                 let vanished = now.vanished - then.vanished;
                 let dropped = now.dropped - then.dropped;
                 let count = match fate {
-                    Fate::Lost => damaged + vanished + dropped,
-                    Fate::Damaged => damaged,
-                    Fate::Vanished => vanished,
-                    Fate::Dropped => dropped,
+                    FrameFate::Lost => damaged + vanished + dropped,
+                    FrameFate::Damaged => damaged,
+                    FrameFate::Vanished => vanished,
+                    FrameFate::Dropped => dropped,
                 };
                 check(amount.takes(count), || {
                     format!(
@@ -171,27 +171,27 @@ impl Witness {
                     )
                 })
             }
-            Ground::Answered(wanted) => self.answered(*wanted, lab),
-            Ground::WorkingCounter { full } => self.working_counter(*full, lab),
-            Ground::Reached(amount) => {
+            Assertion::Answered(wanted) => self.answered(*wanted, lab),
+            Assertion::WorkingCounter { full } => self.working_counter(*full, lab),
+            Assertion::Reached(amount) => {
                 let frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
                 let count = frames.last(Kind::Broadcast, lab.options().cycle);
                 check(count.is_some_and(|count| amount.takes(u64::from(count))), || {
                     format!("{amount} controllers in the last broadcast, found {count:?}")
                 })
             }
-            Ground::Carrier(wanted) => {
+            Assertion::Carrier(wanted) => {
                 let carrier = lab.segment().host(Path::A).carrier;
                 check(carrier == *wanted, || format!("the other: carrier is {carrier}"))
             }
-            Ground::Register { device: name, address, bytes } => {
+            Assertion::Register { device: name, address, bytes } => {
                 let controller = controller(lab, name)?;
                 let addresses = (address.0..).zip(bytes).map(|(at, _)| at);
                 let found: Vec<u8> =
                     addresses.map(|at| controller.register(RegisterAddress(at))).collect();
                 check(found == *bytes, || format!("{bytes:02X?} in {name}, found {found:02X?}"))
             }
-            Ground::Clock { device: name, nanoseconds } => {
+            Assertion::Clock { device: name, nanoseconds } => {
                 let controller = controller(lab, name)?;
                 let start = SYSTEM_TIME_DIFFERENCE.address.0;
                 let bytes: [u8; 4] = std::array::from_fn(|at| {
@@ -278,11 +278,11 @@ fn counters(lab: &Lab) -> impl Iterator<Item = ((DeviceId, ErrorCounter), u8)> {
     lab.segment().devices().flat_map(|id| {
         let controller = lab.segment().controller(id).filter(|known| known.is_powered());
         let counters = controller.map(|known| known.error_counters());
-        let shown: Vec<_> = counters
+        let visibility: Vec<_> = counters
             .iter()
             .flat_map(|all| all.iter().map(|(which, value)| ((id, which), value)))
             .collect();
-        shown
+        visibility
     })
 }
 

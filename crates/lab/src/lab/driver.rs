@@ -1,4 +1,4 @@
-//! What is asked of whoever drives the line: our MainDevice or one of others.
+//! Driver of the line: requests to our MainDevice or to one of others.
 
 use linesman_config::plan::Plan;
 use linesman_maindevice::ProbeRequest;

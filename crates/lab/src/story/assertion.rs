@@ -1,4 +1,4 @@
-//! What a story expects of the segment itself: what is so, whatever a diagnosis says.
+//! Assertions of a story on the segment itself, whatever a diagnosis says.
 //!
 //! ```text
 //! expect counter NAME.PORT frame|physical|forwarded|lost-link AMOUNT [, …]
@@ -66,7 +66,7 @@ pub struct Moved {
 
 /// What became of frames.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Fate {
+pub enum FrameFate {
     /// They came back damaged or not at all, or the host lost them.
     Lost,
     /// They came back damaged.
@@ -79,7 +79,7 @@ pub enum Fate {
 
 /// Something that must be so on the segment.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Ground {
+pub enum Assertion {
     /// Counters have moved so far.
     Counters(Vec<Moved>),
     /// None moved but those that were named since the last `inject`.
@@ -107,7 +107,7 @@ pub enum Ground {
     /// So many frames of the MainDevice had this fate.
     Frames {
         /// Which.
-        fate: Fate,
+        fate: FrameFate,
         /// How many.
         amount: Amount,
     },
@@ -140,17 +140,17 @@ pub enum Ground {
     },
 }
 
-impl Ground {
+impl Assertion {
     /// Reads an expectation that begins with `word`; `None` if it is none of these.
     pub(super) fn parse(word: &str, words: &mut Words<'_>) -> Result<Option<Self>, String> {
         Ok(Some(match word {
             "counter" => Self::Counters(counters(std::mem::take(&mut words.rest))?),
             "port" => port(words)?,
             "state" => state(words)?,
-            "lost" => frames(Fate::Lost, words)?,
-            "damaged" => frames(Fate::Damaged, words)?,
-            "vanished" => frames(Fate::Vanished, words)?,
-            "dropped" => frames(Fate::Dropped, words)?,
+            "lost" => frames(FrameFate::Lost, words)?,
+            "damaged" => frames(FrameFate::Damaged, words)?,
+            "vanished" => frames(FrameFate::Vanished, words)?,
+            "dropped" => frames(FrameFate::Dropped, words)?,
             "answered" => Self::Answered(true),
             "unanswered" => Self::Answered(false),
             "working" => {
@@ -171,9 +171,9 @@ impl Ground {
     }
 }
 
-fn frames(fate: Fate, words: &mut Words<'_>) -> Result<Ground, String> {
+fn frames(fate: FrameFate, words: &mut Words<'_>) -> Result<Assertion, String> {
     words.expect("frames")?;
-    Ok(Ground::Frames { fate, amount: amount(std::mem::take(&mut words.rest))? })
+    Ok(Assertion::Frames { fate, amount: amount(std::mem::take(&mut words.rest))? })
 }
 
 pub(super) fn amount(text: &str) -> Result<Amount, String> {
@@ -223,7 +223,7 @@ fn end(text: &str) -> Option<(&str, Port)> {
     letters.next().is_none().then_some((device, port))
 }
 
-fn port(words: &mut Words<'_>) -> Result<Ground, String> {
+fn port(words: &mut Words<'_>) -> Result<Assertion, String> {
     let text = words.next();
     let (device, port) = end(text).ok_or_else(|| format!("`{text}` is no port, such as `T2.B`"))?;
     let (mut open, mut link) = (None, None);
@@ -246,10 +246,10 @@ fn port(words: &mut Words<'_>) -> Result<Ground, String> {
     if open.is_none() && link.is_none() {
         return Err(format!("how `{text}` stands: `open`, `closed`, `with link`, `without link`"));
     }
-    Ok(Ground::Port { device: device.to_owned(), port, open, link })
+    Ok(Assertion::Port { device: device.to_owned(), port, open, link })
 }
 
-fn state(words: &mut Words<'_>) -> Result<Ground, String> {
+fn state(words: &mut Words<'_>) -> Result<Assertion, String> {
     let (device, name) = (words.next().to_owned(), words.next());
     let state = AlState::from_name(name).ok_or_else(|| format!("`{name}` is no state"))?;
     let error = match words.take("error") {
@@ -261,14 +261,14 @@ fn state(words: &mut Words<'_>) -> Result<Ground, String> {
             Some(bytes.iter().rev().fold(0, |code, byte| code << 8 | u16::from(*byte)))
         }
     };
-    Ok(Ground::State { device, state, error })
+    Ok(Assertion::State { device, state, error })
 }
 
-fn register(words: &mut Words<'_>) -> Result<Ground, String> {
+fn register(words: &mut Words<'_>) -> Result<Assertion, String> {
     let (device, address) = place(words)?;
     let text = words.next();
     let bytes = value(text).ok_or_else(|| format!("`{text}` is no value, such as `0x5A37`"))?;
-    Ok(Ground::Register { device, address, bytes })
+    Ok(Assertion::Register { device, address, bytes })
 }
 
 /// `T2 0x0110 =`: a register of a SubDevice.
@@ -281,11 +281,11 @@ pub(super) fn place(words: &mut Words<'_>) -> Result<(String, RegisterAddress), 
 }
 
 /// `T2 off <= 1000`.
-fn clock(words: &mut Words<'_>) -> Result<Ground, String> {
+fn clock(words: &mut Words<'_>) -> Result<Assertion, String> {
     let device = words.next().to_owned();
     words.expect("off")?;
     let nanoseconds = amount(std::mem::take(&mut words.rest))?;
-    Ok(Ground::Clock { device, nanoseconds })
+    Ok(Assertion::Clock { device, nanoseconds })
 }
 
 /// `0x1234`: as many bytes as pairs of digits, lowest first.
@@ -302,10 +302,10 @@ pub(super) fn value(text: &str) -> Option<Vec<u8>> {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Option<Ground>, String> {
+    fn read(text: &str) -> Result<Option<Assertion>, String> {
         let mut words = Words { rest: text };
         let word = words.next();
-        Ground::parse(word, &mut words)
+        Assertion::parse(word, &mut words)
     }
 
     #[test]
@@ -316,14 +316,14 @@ mod tests {
         let table = [
             (
                 "counter T2.A frame = 3, K1 processing-unit >= 1",
-                Ground::Counters(vec![
+                Assertion::Counters(vec![
                     moved("T2", ErrorCounter::InvalidFrame(Port::A), exactly(3)),
                     moved("K1", ErrorCounter::ProcessingUnit, Amount { low: 1, high: u64::MAX }),
                 ]),
             ),
             (
                 "counter J1/2.C lost-link 3..5",
-                Ground::Counters(vec![moved(
+                Assertion::Counters(vec![moved(
                     "J1/2",
                     ErrorCounter::LostLink(Port::C),
                     Amount { low: 3, high: 5 },
@@ -331,7 +331,7 @@ mod tests {
             ),
             (
                 "port T2.B closed without link",
-                Ground::Port {
+                Assertion::Port {
                     device: "T2".to_owned(),
                     port: Port::B,
                     open: Some(false),
@@ -340,7 +340,7 @@ mod tests {
             ),
             (
                 "state T2 SAFEOP error 0x001B",
-                Ground::State {
+                Assertion::State {
                     device: "T2".to_owned(),
                     state: AlState::SafeOp,
                     error: Some(0x001B),
@@ -348,14 +348,14 @@ mod tests {
             ),
             (
                 "lost frames <= 1",
-                Ground::Frames { fate: Fate::Lost, amount: Amount { low: 0, high: 1 } },
+                Assertion::Frames { fate: FrameFate::Lost, amount: Amount { low: 0, high: 1 } },
             ),
-            ("unanswered", Ground::Answered(false)),
-            ("working counter short", Ground::WorkingCounter { full: false }),
-            ("reached 5", Ground::Reached(exactly(5))),
+            ("unanswered", Assertion::Answered(false)),
+            ("working counter short", Assertion::WorkingCounter { full: false }),
+            ("reached 5", Assertion::Reached(exactly(5))),
             (
                 "register K1 0x0110 = 0x5A37",
-                Ground::Register {
+                Assertion::Register {
                     device: "K1".to_owned(),
                     address: RegisterAddress(0x0110),
                     bytes: vec![0x37, 0x5A],
