@@ -10,10 +10,10 @@
 
 pub mod capture;
 pub mod clock;
-pub mod computer;
 pub mod direction;
 pub mod error;
 pub mod host;
+pub mod host_check;
 pub mod input;
 pub mod interface;
 pub mod real_time;

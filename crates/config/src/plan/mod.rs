@@ -40,8 +40,8 @@ pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
 pub use lint::{Doubt, Severity};
 pub use settings::{
-    AddressingChoice, ClockSettings, DeviceSettings, Keeping, OnWrongCounter, ProcessAccess,
-    WatchdogSettings,
+    AddressingChoice, AutomaticActions, ClockSettings, DeviceSettings, OnWrongCounter,
+    ProcessAccess, WatchdogSettings,
 };
 pub use task::{DatagramPlan, FramePlan, IoAt, Ownership, Role, SyncUnit, Task};
 pub use variable::Variable;

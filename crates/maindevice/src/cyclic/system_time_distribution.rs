@@ -388,7 +388,7 @@ mod tests {
 
     /// A clock that was wrong before it was away for a moment is so after it, too: that is told by others.
     #[test]
-    fn who_answers_for_a_second_is_believed() {
+    fn reference_that_answers_for_a_second_is_believed() {
         for mut test_line in test_lines() {
             test_line.pass(None);
             let shows = |test_line: &TestLine| Some(test_line.shown() + 5_000_000);

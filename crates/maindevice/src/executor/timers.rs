@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_leaves_is_not_waited_for_and_many_who_leave_are_forgotten() {
+    fn cancelled_sleeper_is_not_waited_for_and_many_cancelled_are_forgotten() {
         let mut timers = Timers::default();
         let at = |nanos| Instant::from_nanos(nanos);
         let waker = Waker::noop();

@@ -482,7 +482,7 @@ fn anything() -> impl Strategy<Value = (u8, Said)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
     #[test]
-    fn whatever_comes_an_errand_ends(said in vec(anything(), 0..10), which in 0..6_usize) {
+    fn operation_ends_whatever_the_mailbox_answers(said in vec(anything(), 0..10), which in 0..6_usize) {
         let object = ObjectAddress::new(0x2000, 1);
         let name = "file".to_owned();
         let request = match which {

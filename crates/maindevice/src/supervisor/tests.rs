@@ -17,7 +17,7 @@ fn device_table(devices: usize) -> DeviceTable {
 }
 
 #[test]
-fn who_is_lost_serves_nothing() {
+fn lost_subdevice_serves_nothing() {
     let mut device_table = device_table(2);
     let id = DeviceId(1);
     device_table.set_found(id, Reachability::There { restarted: true });

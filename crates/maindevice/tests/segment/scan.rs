@@ -153,13 +153,13 @@ fn identifying(pause: Span, without_power: Option<&str>) -> Span {
 const ASKED: Span = Span::us(1_360);
 
 #[test]
-fn who_was_scanned_a_moment_ago_is_not_asked_again() {
+fn recently_scanned_subdevice_is_not_asked_again() {
     let at_once = identifying(Span::ms(1), None);
     assert!(at_once < ASKED, "{at_once}");
 }
 
 #[test]
-fn who_was_scanned_long_ago_or_has_lost_its_address_is_asked_again() {
+fn subdevice_scanned_long_ago_or_without_address_is_asked_again() {
     let later = identifying(Span::s(2), None);
     assert!(later >= ASKED, "{later}");
     let without_power = identifying(Span::ms(800), Some("T3"));

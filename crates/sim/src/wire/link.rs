@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_strikes_once_and_goes_with_its_fault() {
+    fn armed_frame_error_strikes_once_and_goes_with_its_fault() {
         let mut noise = Noise::default();
         let wait = |from, fault| ArmedFrameError {
             from: Instant::from_nanos(from),

@@ -6,7 +6,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 
-use linesman_link::computer::{Check, DriverSettings, Files, Outcome, inspect};
+use linesman_link::host_check::{Check, DriverSettings, Files, Outcome, inspect};
 use tempfile::TempDir;
 
 /// What is well: a computer for machines.
