@@ -49,7 +49,7 @@ pub(crate) struct Shared {
     now: AtomicU64,
     /// When the first sleeper is to be woken, in ns.
     first_timer: AtomicU64,
-    /// What there is to do, as bits of [`raise`].
+    /// What there is to do, as bits of [`wake_flags`](mod@wake_flags).
     wake_flags: AtomicU8,
     /// Tasks that want to be polled.
     ready: Mutex<VecDeque<u64>>,
