@@ -1,4 +1,4 @@
-//! Where a SubDevice hangs, as people write it: `maindevice`, `maindevice.B`, `K1.C`.
+//! Attachment of a SubDevice, as people write it: `maindevice`, `maindevice.B`, `K1.C`.
 //!
 //! The notation is the same in segment files, projects and observation files (DESIGN 5).
 

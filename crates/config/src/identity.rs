@@ -1,4 +1,4 @@
-//! Who a SubDevice is, and when two identities count as the same.
+//! Identity of a SubDevice, and when two identities count as the same.
 //!
 //! Reference: SII words 8..15, object 0x1018; the comparison modes are those of the ESI attribute
 //! `CheckRevisionNo` (ETG.2000).

@@ -1,4 +1,4 @@
-//! What is there: the result of a scan.
+//! Inventory: the result of a scan.
 
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias};
 use linesman_proto::register::{AlStatus, DlStatus, ErrorCounters, EscInformation};

@@ -1,4 +1,4 @@
-//! What was wanted, what is there, what follows.
+//! Project, inventory and plan: what was wanted, what is there, what follows.
 //!
 //! Three nouns: a [`project`] is what the user wrote, an [`inventory`] is what was found, a [`plan`]
 //! is what follows: addresses, FMMUs, frames, expected working counters. Diagnosis compares them.

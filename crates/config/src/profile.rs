@@ -1,4 +1,4 @@
-//! What a type of SubDevice needs from its MainDevice: mailbox, SyncManagers, process data.
+//! Profile of a type of SubDevice, as its MainDevice needs it: mailbox, SyncManagers, process data.
 //!
 //! It is made from the SII image, which the device itself carries.
 

@@ -1,4 +1,4 @@
-//! What a SubDevice is told on its way between states beside what every SubDevice is told: values of
+//! Start-up commands of a SubDevice between states, beside what every SubDevice is told: values of
 //! its objects and registers.
 //!
 //! Such commands stand in project files, in device descriptions (`InitCmd`, ETG.2000) and in ENI files

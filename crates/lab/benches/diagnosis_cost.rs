@@ -1,4 +1,4 @@
-//! What the diagnosis costs beside a running MainDevice: a line of 100 SubDevices, a cycle of 1 ms.
+//! Cost of the diagnosis beside a running MainDevice: a line of 100 SubDevices, a cycle of 1 ms.
 //!
 //! The line runs in virtual time, with the MainDevice's own reads and the probes of a diagnosis; all that
 //! passes is kept. Then a fresh engine takes it in, as the thread beside a real cycle does, and the time on

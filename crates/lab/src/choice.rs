@@ -9,7 +9,7 @@ use linesman_sim::segment_file::{FaultEntry, OneOrMany};
 
 /// The line as far as choosing needs it.
 #[derive(Clone, Debug)]
-pub struct Ground<'a> {
+pub struct LineOutline<'a> {
     /// The wiring; node *n* is device *n*.
     pub tree: &'a Tree,
     /// Names by node.
@@ -47,7 +47,7 @@ pub const AT_RUN_TIME: [FaultName; 10] = [
     FaultName::NicDamaged,
 ];
 
-impl Ground<'_> {
+impl LineOutline<'_> {
     /// An end as segment files write it.
     #[must_use]
     pub fn end(&self, end: End) -> String {
@@ -231,17 +231,17 @@ mod tests {
         let first = Wired { on: End::MainDevice(Path::A), entry: Port::A };
         let tree = Tree::from_wiring(&[first, on(0, Port::B), on(0, Port::C)], None).unwrap();
         let names = ["K1", "T1", "K2"].map(str::to_owned);
-        let ground = Ground { tree: &tree, names: &names, cabled: &[true, false, true] };
+        let outline = LineOutline { tree: &tree, names: &names, cabled: &[true, false, true] };
         for seed in 0..50 {
             let mut stream = Seed(seed).stream("choice");
             for name in AT_RUN_TIME {
-                let choice = ground.choose(name, &mut stream).unwrap();
+                let choice = outline.choose(name, &mut stream).unwrap();
                 assert_eq!(choice.entry.kind, name.name());
                 if matches!(name, FaultName::EmcNoise | FaultName::CableDegraded) {
                     assert_ne!(choice.link, Some(1), "no cable there: {}", choice.text());
                 }
             }
-            assert_eq!(ground.choose(FaultName::HostJitter, &mut stream), None);
+            assert_eq!(outline.choose(FaultName::HostJitter, &mut stream), None);
         }
     }
 }

@@ -14,12 +14,12 @@ use linesman_sim::segment_file::SegmentFile;
 use linesman_sim::segment_file::{PlantOptions, plant};
 use linesman_sim::truth::{FaultId, Place};
 
-use crate::choice::{Choice, Ground};
+use crate::choice::{Choice, LineOutline};
 use crate::drawing::{Label, Row, draw};
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 use crate::swarm::run::cabled;
-use crate::verdict::judge::{Company, best_finding};
+use crate::verdict::judge::{FaultContext, best_finding};
 use crate::verdict::{Claim, Match, Scene, Site};
 
 /// SubDevices of a demo plant, at least.
@@ -212,13 +212,13 @@ impl Demo {
         let names: Vec<String> =
             self.lab.project().devices.iter().map(|device| device.name.clone()).collect();
         let cabled = cabled(self.lab.segment());
-        let ground = Ground { tree, names: &names, cabled: &cabled };
+        let outline = LineOutline { tree, names: &names, cabled: &cabled };
         let mut stream = self.seed.stream(&format!("demo {name}"));
         // Faults at the very first device leave little to tell apart: they come when nothing else
         // was drawn.
         let mut drawn = None;
         for _ in 0..20 {
-            drawn = ground.choose(name, &mut stream);
+            drawn = outline.choose(name, &mut stream);
             let Some(choice) = &drawn else { break };
             if choice.link != Some(0) && choice.device != Some(DeviceId(0)) {
                 break;
@@ -269,9 +269,9 @@ fn verdict_on(lab: &Lab, id: FaultId) -> Option<(FindingReport, Match)> {
     let log = lab.truth();
     let truth = lab.truth_of(id)?;
     let scene = Scene { tree: lab.tree(), host_counters: true, answered_again: false };
-    let company = Company::of(log, log.fault(id)?);
+    let context = FaultContext::of(log, log.fault(id)?);
     let diagnosis = lab.diagnosis();
-    let (finding, fits) = best_finding(&diagnosis, &truth, &scene, company)?;
+    let (finding, fits) = best_finding(&diagnosis, &truth, &scene, context)?;
     Some((finding.clone(), fits))
 }
 

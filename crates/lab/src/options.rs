@@ -1,4 +1,4 @@
-//! How a lab is set up.
+//! Options of a lab.
 
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;

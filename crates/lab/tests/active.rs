@@ -1,4 +1,5 @@
-//! Where frames vanish is found by closing ports for a moment, and nothing of it stays.
+//! Active search by closing ports for a moment: it finds where frames vanish, and nothing of it
+//! stays.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 

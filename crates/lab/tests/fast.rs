@@ -1,4 +1,5 @@
-//! How soon: the first flag in the cycle of the event, the cause of a hard fault within 100 ms.
+//! Latency of the diagnosis: the first flag in the cycle of the event, the cause of a hard fault
+//! within 100 ms.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

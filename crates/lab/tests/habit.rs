@@ -1,4 +1,4 @@
-//! What the MainDevice of the lab asks with each habit: which registers, of whom, how often.
+//! Reads of the MainDevice of the lab with each habit: which registers, of whom, how often.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

@@ -61,7 +61,7 @@ fn every_kind_of_fault_has_a_physics_story() {
                     open.insert(toml::from_str::<FaultEntry>(entry).unwrap().kind);
                 }
                 // Only what was looked at behind it counts as told.
-                Step::Expect { what: Expectation::Ground(_), .. } => told.append(&mut open),
+                Step::Expect { what: Expectation::Assertion(_), .. } => told.append(&mut open),
                 Step::Wait
                 | Step::Heal(_)
                 | Step::Unplug(_)

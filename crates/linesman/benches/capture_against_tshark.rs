@@ -1,4 +1,4 @@
-//! How fast `linesman diagnose` goes through a capture, with tshark on the same file beside it.
+//! Speed of `linesman diagnose` on a capture, with tshark on the same file beside it.
 //!
 //! `cargo bench -p linesman`. The capture is made here: a plant of 30 SubDevices in the lab, brought
 //! to OP and run until there are enough frames. Both programs then read it in turns; what counts is

@@ -69,7 +69,7 @@ fn main() -> Result<(), linesman::Error> {
         cycles: 0,
         log: Vec::with_capacity(1_000), // memory is got before the cycle begins, not in it
     };
-    let cycle = Cycle::us(1000).dc().allow_misses(3); // .on_cpu(3).priority(Some(80))
+    let cycle = RunOptions::us(1000).dc().allow_misses(3); // .on_cpu(3).priority(Some(80))
     let report = segment.run_application(plan, cycle, axis)?;
     println!("{} cycles, {} wrong", report.counts.cycles, report.counts.working_counter_errors);
     Ok(())

@@ -16,7 +16,7 @@ fn main() -> Result<(), linesman::Error> {
     let sensor = sensor.map_or(DeviceId(0), |device| device.id);
 
     let (mut cycle, mut bad) = (0_u64, 0);
-    let report = segment.run(plan, Cycle::us(1000).allow_misses(3), |io| {
+    let report = segment.run(plan, RunOptions::us(1000).allow_misses(3), |io| {
         if !io.is_settled() {
             return Next::Continue;
         }

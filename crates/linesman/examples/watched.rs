@@ -22,7 +22,7 @@ pub fn watch(place: &str, mut tell: impl FnMut(String)) -> Result<(), linesman::
         plan.as_plan().devices.iter().map(|device| (device.id, device.name.clone())).collect();
     let mut told: Vec<(bool, DeviceState)> = vec![(false, GOOD); names.len()];
     let mut cycle = 0;
-    segment.run(plan, Cycle::us(1000), |io| {
+    segment.run(plan, RunOptions::us(1000), |io| {
         if !io.is_settled() && cycle == 0 {
             return Next::Continue;
         }

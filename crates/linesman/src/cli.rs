@@ -1,4 +1,4 @@
-//! Which commands and options there are.
+//! Command line: commands and options.
 
 use clap::{Parser, Subcommand};
 

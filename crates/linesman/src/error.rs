@@ -1,4 +1,4 @@
-//! Why a line cannot be opened, planned or run.
+//! Errors of a line that cannot be opened, planned or run.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! How a command ends, as scripts see it.
+//! Exit status of a command, as scripts see it.
 
 use std::process::ExitCode;
 

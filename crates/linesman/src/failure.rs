@@ -1,4 +1,4 @@
-//! Why nothing could be judged, and what to do next.
+//! Failure of a command to judge anything, and what to do next.
 
 use linesman_link::capture::CaptureError;
 use linesman_link::error::LinkError;

@@ -15,7 +15,7 @@
 //! let lamp: Output<bool> = plan.output("EL2008/1")?; // found and type-checked once
 //! let button: Input<bool> = plan.input("EL1008/1")?;
 //! let mut cycles = 0;
-//! let report = segment.run(plan, Cycle::us(1000), |io| {
+//! let report = segment.run(plan, RunOptions::us(1000), |io| {
 //!     io.set(lamp, !io.get(button));
 //!     cycles += 1;
 //!     if cycles < 500 { Next::Continue } else { Next::Stop }
@@ -27,14 +27,14 @@
 //! # std::fs::remove_dir_all(&folder).unwrap();
 //! ```
 //!
-//! For axes, [`Cycle::dc`] puts the cycle in step with the distributed clocks; `examples/axis.rs` drives one:
+//! For axes, [`RunOptions::dc`] puts the cycle in step with the distributed clocks; `examples/axis.rs` drives one:
 //!
 //! ```
 #![doc = include_str!("../examples/axis.rs")]
 //! ```
 //!
 //! The closure is called once a cycle, with inputs that have just come back; outputs leave with the
-//! next frames ([`Cycle::exchange_at_end`] turns that round). When it is late more often than [`Cycle::allow_misses`] says, outputs are withheld, so
+//! next frames ([`RunOptions::exchange_at_end`] turns that round). When it is late more often than [`RunOptions::allow_misses`] says, outputs are withheld, so
 //! that the watchdogs of SubDevices do their work. At the end outputs go to zero and every SubDevice
 //! back to INIT.
 //!
@@ -53,9 +53,9 @@ pub use linesman_runtime::image::{Input, Output, Value, VariableError};
 pub use linesman_runtime::run::report::RunReport;
 pub use linesman_runtime::run::{Application, Io, Next, RunError};
 pub use plan::{Plan, Scan};
-pub use segment::{Cycle, Segment, open};
+pub use segment::{RunOptions, Segment, open};
 
 /// What nearly every program needs.
 pub mod prelude {
-    pub use crate::{Cycle, Input, Io, Next, Output, Plan, Segment};
+    pub use crate::{Input, Io, Next, Output, Plan, RunOptions, Segment};
 }

@@ -1,4 +1,4 @@
-//! What a scan found, and the plan made of it.
+//! Result of a scan, and the plan made of it.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use linesman_config::eni::Eni;
 use linesman_config::inventory::Inventory;
 use linesman_proto::time::Span;
 use linesman_runtime::image::{Input, Output, Value};
-use linesman_runtime::run::Choices;
+use linesman_runtime::run::PlanChoices;
 
 use crate::Error;
 
@@ -22,7 +22,7 @@ impl Scan {
     /// # Errors
     /// When its process data do not fit.
     pub fn plan(&self) -> Result<Plan, Error> {
-        let plan = Choices::default().plan_of(&self.inventory).map_err(Error::Plan)?;
+        let plan = PlanChoices::default().plan_of(&self.inventory).map_err(Error::Plan)?;
         Ok(Plan { plan, found: Some(Box::new(self.inventory.clone())) })
     }
 
@@ -85,7 +85,7 @@ impl Plan {
             return Err(Error::Plan(why.to_owned()));
         };
         // Clocks have datagrams of their own: where process data lie does not change.
-        let choices = Choices { cycle: Some(cycle), clocks: true, ..Choices::default() };
+        let choices = PlanChoices { cycle: Some(cycle), clocks: true, ..PlanChoices::default() };
         choices.plan_of(&found).map_err(Error::Plan)
     }
 

@@ -10,17 +10,18 @@ use linesman_config::project::Project;
 use linesman_link::clock::HostClock;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
-use linesman_runtime::line::{Cards, Line, Pace, VirtualLine};
 use linesman_runtime::listen::is_driven;
 use linesman_runtime::named_files::NamedFiles;
 use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::run::scan::PATIENCE;
 use linesman_runtime::run::{
-    self as running, Application, Beside, Choices, MakePlan, RealTime, RunOptions, Wanted,
+    self as running, Application, MakePlan, PlanChoices, PlanSource, RealTime, RunControls,
+    SessionOptions,
 };
 use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
+use linesman_runtime::transport::{Cards, Pace, SegmentTransport, Transport};
 use linesman_runtime::wiring::Wiring;
 use linesman_sim::segment::Segment as VirtualSegment;
 use linesman_sim::segment_file::SegmentFile;
@@ -57,18 +58,18 @@ fn virtual_line(path: &Path) -> Result<Where, Error> {
     let segment = VirtualSegment::build(&file).map_err(|error| refuse(error.to_string()))?;
     let ring = file.ring.is_some();
     let wiring = Wiring::of(&segment, &project);
-    let line = VirtualLine::new(segment, wiring, ring, Pace::Free)
+    let line = SegmentTransport::new(segment, wiring, ring, Pace::Free)
         .map_err(|source| Error::System { doing: "making a virtual line", source })?;
     Ok(Where::Virtual(Box::new(line)))
 }
 
 enum Where {
     Cards(Cards),
-    Virtual(Box<VirtualLine>),
+    Virtual(Box<SegmentTransport>),
 }
 
 impl Where {
-    fn line(&mut self) -> &mut dyn Line {
+    fn line(&mut self) -> &mut dyn Transport {
         match self {
             Self::Cards(cards) => cards,
             Self::Virtual(line) => &mut **line,
@@ -85,7 +86,7 @@ pub struct Segment {
 
 /// How often, and how.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Cycle {
+pub struct RunOptions {
     time: Span,
     misses: u32,
     real_time: RealTime,
@@ -95,7 +96,7 @@ pub struct Cycle {
     hold: bool,
 }
 
-impl Cycle {
+impl RunOptions {
     /// A cycle of so many microseconds.
     #[must_use]
     pub fn us(micros: u64) -> Self {
@@ -197,7 +198,7 @@ impl Segment {
             let file = PlanFile::open(path).map_err(|error| refuse(error.to_string()))?;
             return Ok(file.plan.into());
         }
-        let Wanted::Found(make) = Choices::default().project(project) else {
+        let PlanSource::Found(make) = PlanChoices::default().project(project) else {
             return Err(refuse("it makes no plan".to_owned()));
         };
         let inventory: Inventory = running::scan(self.line.line(), PATIENCE, &self.stop)?;
@@ -214,7 +215,7 @@ impl Segment {
     pub fn run(
         &mut self,
         plan: Plan,
-        cycle: Cycle,
+        cycle: RunOptions,
         application: impl FnMut(&mut Io<'_>) -> Next,
     ) -> Result<RunReport, Error> {
         self.run_application(plan, cycle, application)
@@ -227,7 +228,7 @@ impl Segment {
     pub fn run_application(
         &mut self,
         plan: Plan,
-        cycle: Cycle,
+        cycle: RunOptions,
         application: impl Application,
     ) -> Result<RunReport, Error> {
         let mut plan = if cycle.clocks { plan.clocked(cycle.time)? } else { plan.plan };
@@ -236,7 +237,7 @@ impl Segment {
             task.cycle = cycle.time;
             task.io_at = cycle.io_at.unwrap_or(task.io_at);
         }
-        let options = RunOptions {
+        let options = SessionOptions {
             on: self.place.clone(),
             leave: cycle.leave,
             lasts: None,
@@ -247,9 +248,9 @@ impl Segment {
         };
         // Nobody listens to notes here; they go nowhere.
         let (notes, _) = mpsc::sync_channel(1);
-        let wanted = Wanted::Plan(Box::new(plan));
+        let wanted = PlanSource::Plan(Box::new(plan));
         let line = self.line.line();
-        let beside = Beside { stop: &self.stop, notes, desk: None };
+        let beside = RunControls { stop: &self.stop, notes, socket: None };
         let ended = running::run(line, wanted, application, &options, beside)?;
         match ended.error {
             Some(error) => Err(error.into()),

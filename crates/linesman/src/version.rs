@@ -1,4 +1,4 @@
-//! Which build this is.
+//! Version of this build.
 
 /// `0.1.0 (1a2b3c4d5e)`, or without the commit where it was built outside of a clone.
 pub(crate) const VERSION: &str = {

@@ -1,4 +1,5 @@
-//! How SubDevices are addressed, compared and repeated: by choice of the project, else as their makers say.
+//! Addressing, identity checks and repetition of SubDevices: by choice of the project, else as
+//! their makers say.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

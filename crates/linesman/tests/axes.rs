@@ -61,7 +61,7 @@ fn outputs_of_a_program_move_the_axes_and_inputs_tell_it() {
     let mut seen: Vec<(u16, i32, i32)> = Vec::new();
     let (mut is_ready, mut is_enabled) = (false, false);
     let report = segment
-        .run(plan, Cycle::us(1_000), |io| {
+        .run(plan, RunOptions::us(1_000), |io| {
             if !io.is_settled() {
                 return Next::Continue;
             }

@@ -1,4 +1,4 @@
-//! What cannot be used: a clear message, exit status 2, never a panic.
+//! Unusable input: a clear message, exit status 2, never a panic.
 
 mod support;
 

@@ -1,4 +1,4 @@
-//! What the program says about itself and its surroundings.
+//! Basics: what the program says about itself and its surroundings.
 
 mod support;
 

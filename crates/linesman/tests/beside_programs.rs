@@ -1,4 +1,5 @@
-//! What other programs see of a run: the process image and states in shared memory, the log of the system.
+//! Interfaces of a run to other programs: the process image and states in shared memory, the log of
+//! the system.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

@@ -1,4 +1,4 @@
-//! What happens to SubDevices, in the words of the sources: in the log, with times, and exported.
+//! Events of SubDevices, in the words of the sources: in the log, with times, and exported.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

@@ -1,5 +1,5 @@
-//! When frames of a task leave, what they carry, and what the program has seen by then: before or after
-//! the program, and inputs ahead of both.
+//! Time at which frames of a task leave, what they carry, and what the program has seen by then:
+//! before or after the program, and inputs ahead of both.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -23,11 +23,11 @@ use linesman_proto::command::Command;
 use linesman_proto::frame::FrameView;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::line::{Arrived, Intake, Line};
 use linesman_runtime::named_files::NamedFiles;
 use linesman_runtime::plan_file::PlanFile;
-use linesman_runtime::run::{Beside, RunOptions, Wanted, run};
+use linesman_runtime::run::{PlanSource, RunControls, SessionOptions, run};
 use linesman_runtime::stop::Stop;
+use linesman_runtime::transport::{FrameSink, RxFrame, Transport};
 use linesman_runtime::wiring::Wiring;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::SegmentFile;
@@ -90,7 +90,7 @@ impl Watched {
     }
 }
 
-impl Line for Watched {
+impl Transport for Watched {
     fn options(&self) -> Options {
         Options::default().on_line(self.segment.tree().len(), self.segment.longest_way())
     }
@@ -99,7 +99,7 @@ impl Line for Watched {
         self.clock.get()
     }
 
-    fn receive(&mut self, now: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError> {
+    fn receive(&mut self, now: Instant, intake: &mut dyn FrameSink) -> Result<usize, LinkError> {
         self.segment.advance(now);
         self.wiring.carry(self.segment.signals_mut());
         let mut count = 0;
@@ -107,7 +107,7 @@ impl Line for Watched {
             count += 1;
             let len = self.arrival.len();
             intake.room()[..len].copy_from_slice(&self.arrival);
-            intake.arrived(Arrived { at: came.at, path: came.path, len, truncated: false });
+            intake.frame_received(RxFrame { at: came.at, path: came.path, len, truncated: false });
         }
         Ok(count)
     }
@@ -211,7 +211,7 @@ fn played(io_at: IoAt) -> (Vec<Call>, Vec<Departure>) {
         let options = PlanOptions { tasks: vec![task], ..PlanOptions::default() };
         Plan::build(&planned, inventory.tree().clone(), &options).map_err(|error| error.to_string())
     };
-    drive(line, Wanted::Found(Box::new(make)), program, None);
+    drive(line, PlanSource::Found(Box::new(make)), program, None);
     let mut calls: Vec<Call> = calls.take();
     // The end sets outputs to zero.
     let end = calls.last().unwrap().begin;
@@ -222,8 +222,8 @@ fn played(io_at: IoAt) -> (Vec<Call>, Vec<Departure>) {
     (calls, meanwhile.collect())
 }
 
-fn drive(line: Watched, wanted: Wanted, program: impl Application, lasts: Option<Span>) {
-    let options = RunOptions {
+fn drive(line: Watched, wanted: PlanSource, program: impl Application, lasts: Option<Span>) {
+    let options = SessionOptions {
         on: "watched".to_owned(),
         leave: AlState::Init,
         lasts,
@@ -233,7 +233,7 @@ fn drive(line: Watched, wanted: Wanted, program: impl Application, lasts: Option
         diagnose: None,
     };
     let (notes, _told) = sync_channel(1);
-    let beside = Beside { stop: &Stop::default(), notes, desk: None };
+    let beside = RunControls { stop: &Stop::default(), notes, socket: None };
     let ended = run(line, wanted, program, &options, beside).unwrap();
     assert!(ended.error.is_none());
     let counts = ended.report.counts;
@@ -325,7 +325,7 @@ fn ahead(folder: &FilePath, base_time_us: u32, pre_ticks: u32) -> Span {
     let (line, _, departures) = Watched::new(&file);
     let plan = PlanFile::open(&project).unwrap().plan;
     let idle = linesman_runtime::run::Idle;
-    drive(line, Wanted::Plan(Box::new(plan)), idle, Some(Span::s(2)));
+    drive(line, PlanSource::Plan(Box::new(plan)), idle, Some(Span::s(2)));
     let departures = departures.take();
     // The last half second of it.
     let end = departures.last().unwrap().at;

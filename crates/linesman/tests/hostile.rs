@@ -1,4 +1,4 @@
-//! What the cycle must survive, and what a careless user does: a storm of SDOs, SubDevices that stay in PREOP,
+//! Hostile use, which the cycle must survive: a storm of SDOs, SubDevices that stay in PREOP,
 //! descriptions that are missing, files without end, a reader who goes away.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]

@@ -1,4 +1,4 @@
-//! What a project leaves to the MainDevice and what to the user, once the line runs.
+//! Division of work between MainDevice and user in a project, once the line runs.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -155,7 +155,7 @@ fn start_state_waiting_and_what_is_logged_are_options() {
     let plan = line.scan().unwrap().plan().unwrap();
     let (mut calls, mut waiting, mut toggles, mut ready_at) = (0, Vec::new(), 0, None);
     let mut last = None;
-    let cycle = linesman::Cycle::us(1_000).wait_for_outputs();
+    let cycle = linesman::RunOptions::us(1_000).wait_for_outputs();
     line.run(plan, cycle, |io| {
         calls += 1;
         let states = [0, 1, 2].map(|id| io.state(linesman::DeviceId(id)).0 & 0xF);

@@ -54,7 +54,7 @@ impl Place {
         Self { folder, line }
     }
 
-    fn run(&self, cycle: Cycle, application: impl FnMut(&mut Io<'_>) -> Next) -> RunReport {
+    fn run(&self, cycle: RunOptions, application: impl FnMut(&mut Io<'_>) -> Next) -> RunReport {
         let mut segment = linesman::open(&self.line).unwrap();
         let plan = segment.load(self.folder.path().join("machine.toml")).unwrap();
         segment.run(plan, cycle, application).unwrap()
@@ -66,7 +66,7 @@ impl Place {
 fn while_bad_as(change: impl Fn(String) -> String) -> BTreeSet<u8> {
     let place = Place::new(&format!("{LINE}{CUT}"), change);
     let (mut calls, mut was_on, mut seen) = (0, false, BTreeSet::new());
-    place.run(Cycle::us(1_000), |io| {
+    place.run(RunOptions::us(1_000), |io| {
         calls += 1;
         io.outputs_mut().fill(0xFF);
         let place = io.plan().unwrap().devices[1].inputs.start;
@@ -107,7 +107,7 @@ fn inputs_come_with_a_right_counter_only_and_the_old_ones_stay_till_then() {
     // What is set changes with every cycle, and comes back with the next frames.
     let (mut calls, mut set) = (0, 0_u8);
     let (mut last, mut changes, mut bad, mut kept, mut after) = (None, 0, 0, 0, 0);
-    let report = place.run(Cycle::us(250), |io| {
+    let report = place.run(RunOptions::us(250), |io| {
         calls += 1;
         let value = io.inputs()[io.plan().unwrap().devices[1].inputs.start];
         if io.quality(DeviceId(1)).valid {
@@ -138,7 +138,7 @@ fn tasks_have_cycle_times_of_their_own() {
     };
     let place = Place::new(LINE, slow);
     let (mut calls, mut was_on) = (0_u64, false);
-    let report = place.run(Cycle::us(2_000), |io| {
+    let report = place.run(RunOptions::us(2_000), |io| {
         calls += 1;
         io.outputs_mut().fill(0xFF);
         let plan = io.plan().unwrap();

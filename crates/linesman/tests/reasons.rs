@@ -1,5 +1,5 @@
-//! What a person is told to look for: the reasons of a lost link, interference against a fault inside a device,
-//! hardware before software.
+//! Reasons that a person is told to look for: a lost link, interference against a fault inside a
+//! device, hardware before software.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

@@ -1,4 +1,4 @@
-//! What an application sees in its cycle of a line that fails, through the library.
+//! State words that an application sees in its cycle of a line that fails, through the library.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -34,7 +34,7 @@ fn the_counter_accuses_all_and_the_state_the_one() {
     let terminals = [1, 2, 3].map(DeviceId);
     let mut seen: Vec<Seen> = Vec::new();
     segment
-        .run(plan, Cycle::us(1000), |io| {
+        .run(plan, RunOptions::us(1000), |io| {
             let settled = io.is_settled();
             let frame = io.frame_status(0, 0).unwrap();
             let now = (

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
-use linesman::{Cycle, DeviceId, Next};
+use linesman::{DeviceId, Next, RunOptions};
 use serde_json::{Value, json};
 use support::linesman;
 use tempfile::TempDir;
@@ -114,7 +114,7 @@ fn a_drive_that_fails_costs_the_data_of_its_sync_unit_only() {
         let plan = line.load(&bench.project).unwrap();
         let mut discarded = BTreeSet::new();
         let mut cycles = 0;
-        line.run(plan, Cycle::us(2_000), |io| {
+        line.run(plan, RunOptions::us(2_000), |io| {
             cycles += 1;
             if cycles > 200 {
                 let all = (0..7).map(DeviceId);

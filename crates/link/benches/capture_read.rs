@@ -1,4 +1,4 @@
-//! How many frames a second the capture reader delivers: small frames, the hardest case.
+//! Frames a second that the capture reader delivers: small frames, the hardest case.
 //!
 //! `cargo bench -p linesman-link`. The goal is well over 5 million frames a second, so that reading
 //! is a small part of judging a capture 20 times as fast as tshark dissects it (42,000 frames/s).

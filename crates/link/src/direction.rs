@@ -1,4 +1,4 @@
-//! Which way a frame went at the card where it was seen.
+//! Direction of a frame at the card where it was seen.
 
 /// Which way a frame went at the card where it was seen.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]

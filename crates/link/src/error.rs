@@ -1,4 +1,4 @@
-//! Why a network card cannot be used, or cannot be used any longer.
+//! Errors of a network card that cannot be used, or can no longer be used.
 
 use std::io;
 use std::path::PathBuf;

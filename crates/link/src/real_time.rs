@@ -1,5 +1,4 @@
-//! What a thread with a cycle asks of the host: to go before others, to stay on one CPU, and never
-//! to wait for memory.
+//! Real-time requests of a cyclic thread to the host: priority, a CPU of its own, locked memory.
 //!
 //! Reference: sched(7), sched_setaffinity(2), mlockall(2), capabilities(7). Priority and CPU are
 //! those of the calling thread, and of threads that it starts afterwards; memory is locked for the

@@ -1,4 +1,4 @@
-//! What is written can be read again, here and by tshark, and is the same bytes each time.
+//! Written captures can be read again, here and by tshark, and are the same bytes each time.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 

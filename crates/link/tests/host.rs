@@ -1,4 +1,4 @@
-//! What the host tells of its cards, in a network namespace of the test's own.
+//! Host counters of cards, in a network namespace of the test's own.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 

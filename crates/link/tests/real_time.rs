@@ -1,4 +1,4 @@
-//! What a thread with a cycle asks of the host: granted, or refused with the way to get it.
+//! Real-time requests of a cyclic thread: granted, or refused with the way to get them.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 

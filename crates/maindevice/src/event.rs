@@ -1,4 +1,4 @@
-//! What a MainDevice tells its user.
+//! Events that a MainDevice reports to its user.
 
 use linesman_config::identity::Mismatch;
 use linesman_config::inventory::Inventory;
@@ -15,7 +15,7 @@ use linesman_proto::time::Span;
 use crate::exchange::{ExchangeError, Reply};
 use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
-use crate::procedure::{ClockError, Look, LookError, ScanError};
+use crate::procedure::{ClockError, ReadOnlyScan, ReadOnlyScanError, ScanError};
 use crate::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
 use crate::supervisor::StartUpError;
 
@@ -24,10 +24,10 @@ mod text;
 /// Something that happened. Events come in the order in which it did.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// [`MainDevice::look`](crate::MainDevice::look) is done.
-    Looked(Box<Look>),
+    /// [`MainDevice::read_only_scan`](crate::MainDevice::read_only_scan) is done.
+    ReadOnlyScanned(Box<ReadOnlyScan>),
     /// It could not be done.
-    LookFailed(LookError),
+    ReadOnlyScanFailed(ReadOnlyScanError),
     /// [`MainDevice::scan`](crate::MainDevice::scan) is done.
     Scanned(Box<Inventory>),
     /// It could not be done.

@@ -1,4 +1,4 @@
-//! What the user of a MainDevice chooses.
+//! Options of a MainDevice that its user chooses.
 
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::state::StateTimeouts;

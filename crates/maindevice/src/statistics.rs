@@ -1,4 +1,4 @@
-//! What has been sent and what has come back.
+//! Statistics of the frames that were sent and came back.
 
 /// Counts since the MainDevice was made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]

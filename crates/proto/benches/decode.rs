@@ -1,5 +1,5 @@
-//! How long it takes to decode a datagram: header, data and working counter, in frames of one and of
-//! fifteen datagrams.
+//! Time to decode a datagram: header, data and working counter, in frames of one and of fifteen
+//! datagrams.
 
 use std::hint::black_box;
 

@@ -1,4 +1,4 @@
-//! What lies around the EtherCAT data: Ethernet II, an optional VLAN tag, and the UDP form.
+//! Headers around the EtherCAT data: Ethernet II, an optional VLAN tag, and the UDP form.
 //!
 //! Reference: S1 chapter 2.1. A controller looks for EtherType 0x88A4, past one 802.1Q tag, or for
 //! IPv4 without options carrying UDP to port 0x88A4.

@@ -1,4 +1,4 @@
-//! How long a virtual segment takes to answer over a virtual cable, beside a bare reflector: a
+//! Time that a virtual segment takes to answer over a virtual cable, beside a bare reflector: a
 //! thread that sends back each frame as it came, with the same sockets, on the same cable, in turns
 //! in the same run. The client sleeps until its answer comes, as MainDevices do.
 //!
@@ -17,7 +17,7 @@ use linesman_link::real_time::sched_fifo;
 use linesman_link::socket::{Batch, RawSocket, SocketOptions, Waitable, Waker, wait_any};
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::serve::{Beside, Server};
+use linesman_runtime::serve::{ServeControls, Server};
 use linesman_runtime::stop::Stop;
 use linesman_runtime::wiring::Wiring;
 use linesman_sim::segment::Segment;
@@ -146,7 +146,7 @@ fn client() -> Vec<f64> {
 fn reflected() -> Vec<f64> {
     let clock = HostClock::start();
     let (waker, stop) = (Waker::new().unwrap(), Stop::default());
-    stop.rings(&waker.bell()).unwrap();
+    stop.wakes(&waker.wake_handle()).unwrap();
     let mut card = RawSocket::open(FAR, &SocketOptions::default()).unwrap();
     thread::scope(|scope| {
         let ended = stop.clone();
@@ -169,10 +169,12 @@ fn reflected() -> Vec<f64> {
 fn answered(count: usize) -> Vec<f64> {
     let stop = Stop::default();
     let mut server = Server::open(line(count), Wiring::default(), &[FAR.to_owned()]).unwrap();
-    stop.rings(&server.bell()).unwrap();
+    stop.wakes(&server.wake_handle()).unwrap();
     thread::scope(|scope| {
         let ended = stop.clone();
-        scope.spawn(move || server.run(Instant::MAX, &ended, &mut Beside::default()).unwrap());
+        scope.spawn(move || {
+            server.run(Instant::MAX, &ended, &mut ServeControls::default()).unwrap()
+        });
         let times = client();
         stop.set();
         times

@@ -1,5 +1,5 @@
-//! What one cycle costs the MainDevice, as `linesman run` ships it: working counters judged, frames
-//! tallied, shown to the diagnosis, the application watched.
+//! Cost of one cycle for the MainDevice, as `linesman run` ships it: working counters judged,
+//! frames tallied, shown to the diagnosis, the application watched.
 //!
 //! Without arguments: a table of ns per cycle for lines of 10, 100 and 1,000 SubDevices and for one
 //! LRW of 64 and of 1,400 bytes. `count KIND CYCLES` runs so many cycles of one kind, for counting
@@ -21,7 +21,7 @@ use linesman_diagnosis::Direction;
 use linesman_maindevice::MainDevice;
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::run::tap::{Passed, Tap, tap};
+use linesman_runtime::run::tap::{FrameSummary, Tap, tap};
 
 use steady::{Answer, Running, answers, received, running, scripted};
 
@@ -77,14 +77,14 @@ impl Cycle {
             number += 1;
             let (path, truncated) = (Some(transmit.path), false);
             let direction = Direction::Sent;
-            tap.keep(&Passed { time: now, number, path, direction, truncated }, transmit.len);
+            tap.keep(&FrameSummary { time: now, number, path, direction, truncated }, transmit.len);
             let at = now + Span::us(20);
             let room = tap.room(at);
             let len = received(answer, room);
             main.handle_frame(at, Path::A, &room[..len]);
             number += 1;
             let (path, direction) = (Some(Path::A), Direction::Received);
-            tap.keep(&Passed { time: at, number, path, direction, truncated }, len);
+            tap.keep(&FrameSummary { time: at, number, path, direction, truncated }, len);
         }
         black_box(main.inputs().first());
         while let Some(event) = main.poll_event() {

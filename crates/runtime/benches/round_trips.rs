@@ -1,4 +1,4 @@
-//! What a cycle costs on a card, as a share of bare sending and receiving: the same frame, the same
+//! Cost of a cycle on a card, as a share of bare sending and receiving: the same frame, the same
 //! far end, on one CPU, in turns in the same run.
 //!
 //! The far end is a thread that answers each frame as a line in OP does. The floor sends that frame
@@ -27,10 +27,10 @@ use linesman_link::socket::{RawSocket, SocketOptions};
 use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Audience, Driver};
-use linesman_runtime::line::Cards;
-use linesman_runtime::run::tap::{Passed, Tap, tap};
+use linesman_runtime::drive::{Driver, DriverHooks};
+use linesman_runtime::run::tap::{FrameSummary, Tap, tap};
 use linesman_runtime::stop::Stop;
+use linesman_runtime::transport::Cards;
 
 use own_namespace::{FAR, NEAR};
 use steady::{Running, answers, running, scripted};
@@ -240,7 +240,10 @@ fn engine_trips(running: Running) -> Best {
             let _ = card.send_one(&room[..sent.len]).unwrap();
             number += 1;
             let (path, direction) = (Some(sent.path), Direction::Sent);
-            tap.keep(&Passed { time: now, number, path, direction, truncated: false }, sent.len);
+            tap.keep(
+                &FrameSummary { time: now, number, path, direction, truncated: false },
+                sent.len,
+            );
             let _ = card.wait(&clock, Instant::MAX).unwrap();
             let at = now + Span::ns(black_box(clock.now()).as_nanos() & 0xFF);
             let room = tap.room(at);
@@ -248,7 +251,7 @@ fn engine_trips(running: Running) -> Best {
             number += 1;
             main.handle_frame(at, Path::A, &room[..len]);
             let direction = Direction::Received;
-            tap.keep(&Passed { time: at, number, path, direction, truncated: false }, len);
+            tap.keep(&FrameSummary { time: at, number, path, direction, truncated: false }, len);
             while main.poll_event().is_some() {}
             tap.turn(now);
         }
@@ -267,14 +270,14 @@ fn driver_cycles(keeps: bool) -> Best {
         Driver::new(Cards::open(&[NEAR.to_owned()], clock).unwrap(), Options::default());
     clock.sleep_until(running.now + CYCLE);
     *driver.main_mut() = running.main;
-    let mut audience = Keeping { tap: keeps.then(kept) };
+    let mut hooks = Keeping { tap: keeps.then(kept) };
     let stop = Stop::default();
     let now = driver.now();
-    driver.run(now + CYCLE * 100, &stop, &mut audience).unwrap();
+    driver.run(now + CYCLE * 100, &stop, &mut hooks).unwrap();
     let before = driver.main_mut().statistics();
     let now = driver.now();
     let best = timed(CYCLES, || {
-        driver.run(now + CYCLE * CYCLES, &stop, &mut audience).unwrap();
+        driver.run(now + CYCLE * CYCLES, &stop, &mut hooks).unwrap();
     });
     let after = driver.main_mut().statistics();
     if after.working_counter_errors != before.working_counter_errors {
@@ -291,7 +294,7 @@ struct Keeping {
     tap: Option<Tap>,
 }
 
-impl Audience for Keeping {
+impl DriverHooks for Keeping {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         if let Some(tap) = &mut self.tap {
             tap.frame(frame);
@@ -302,7 +305,7 @@ impl Audience for Keeping {
         self.tap.as_mut().map(|tap| &mut tap.room(now)[..])
     }
 
-    fn keep(&mut self, sent: &Passed, len: usize) {
+    fn keep(&mut self, sent: &FrameSummary, len: usize) {
         if let Some(tap) = &mut self.tap {
             tap.keep(sent, len);
         }

@@ -7,27 +7,27 @@ use linesman_maindevice::{Event, MainDevice, Options, Transmit};
 use linesman_proto::address::{Network, Path};
 use linesman_proto::time::{Instant, Span};
 
-use crate::line::{Arrived, Cards, Intake, Line};
-use crate::run::tap::{FRAME_ROOM, Passed};
+use crate::run::tap::{FRAME_ROOM, FrameSummary};
 use crate::stop::Stop;
+use crate::transport::{Cards, FrameSink, RxFrame, Transport};
 
 /// Most frames handed out in one go; a MainDevice has far fewer out at once.
 const MOST_FRAMES: usize = 1024;
 /// Longest sleep, so that a wish to stop is noticed.
-const NAP: Span = Span::ms(50);
+const MAX_SLEEP: Span = Span::ms(50);
 
-/// Who watches a MainDevice at work, and gives it its commands.
-pub trait Audience {
+/// Hooks of a driver: they see a MainDevice at work, and give it its commands.
+pub trait DriverHooks {
     /// A frame left a card or came back.
     fn frame(&mut self, frame: &FrameSeen<'_>);
-    /// Room for the longest frame that may be sent, or come back, at `now`, where the audience keeps
+    /// Room for the longest frame that may be sent, or come back, at `now`, where the hooks keep
     /// frames: it is built, or received, there. When it was, [`keep`](Self::keep) follows in place
     /// of [`frame`](Self::frame).
     fn room(&mut self, _now: Instant) -> Option<&mut [u8]> {
         None
     }
     /// The frame in [`room`](Self::room), so many bytes, has been sent or has come back.
-    fn keep(&mut self, _passed: &Passed, _len: usize) {}
+    fn keep(&mut self, _passed: &FrameSummary, _len: usize) {}
     /// The host noticed something.
     fn host(&mut self, observation: &HostObservation);
     /// The MainDevice tells something.
@@ -49,7 +49,7 @@ pub struct Driver<L = Cards> {
 }
 
 impl Driver<Cards> {
-    /// Opens the cards; nothing is sent until the audience gives a command.
+    /// Opens the cards; nothing is sent until the hooks give a command.
     ///
     /// # Errors
     /// When an interface cannot be used.
@@ -65,7 +65,7 @@ impl Driver<Cards> {
     }
 }
 
-impl<L: Line> Driver<L> {
+impl<L: Transport> Driver<L> {
     /// A MainDevice with these options on a line.
     pub fn new(line: L, options: Options) -> Self {
         Self {
@@ -91,7 +91,7 @@ impl<L: Line> Driver<L> {
         self.line.now()
     }
 
-    /// Drives the line until `until`, `stop`, or the audience has enough.
+    /// Drives the line until `until`, `stop`, or the hooks have enough.
     ///
     /// # Errors
     /// When an interface vanished, was switched off, or the kernel refuses something else.
@@ -99,57 +99,58 @@ impl<L: Line> Driver<L> {
         &mut self,
         until: Instant,
         stop: &Stop,
-        audience: &mut impl Audience,
+        hooks: &mut impl DriverHooks,
     ) -> Result<(), LinkError> {
         loop {
             let now = self.line.now();
-            self.receive(now, audience)?;
+            self.receive(now, hooks)?;
             if let Some(due) = self.main.poll_cycle_timeout()
                 && due <= now
             {
                 let late = now.since(due);
                 self.line.note_late(late);
-                audience.late(late);
+                hooks.late(late);
             }
             self.main.handle_timeout(now);
             while let Some(event) = self.main.poll_event() {
-                audience.event(now, event, &mut self.main);
+                hooks.event(now, event, &mut self.main);
             }
-            let goes_on = audience.turn(now, &mut self.main);
-            self.send(now, audience)?;
+            let goes_on = hooks.turn(now, &mut self.main);
+            self.send(now, hooks)?;
             if !goes_on || stop.is_set() || now >= until {
                 return Ok(());
             }
-            let due = [self.main.poll_timeout(), audience.poll_timeout()];
+            let due = [self.main.poll_timeout(), hooks.poll_timeout()];
             let due = due.into_iter().flatten().min().unwrap_or(Instant::MAX);
-            self.line.wait(due.min(until).min(now + NAP))?;
+            self.line.wait(due.min(until).min(now + MAX_SLEEP))?;
         }
     }
 
     /// Takes in what has come back, and what the host noticed.
-    fn receive(&mut self, now: Instant, audience: &mut impl Audience) -> Result<(), LinkError> {
+    fn receive(&mut self, now: Instant, hooks: &mut impl DriverHooks) -> Result<(), LinkError> {
         let Self { main, line, buffer, frames } = self;
         // Frames are judged at the time at which they are taken in, not at that of their stamp.
-        let taking = &mut Taking { audience: &mut *audience, main, buffer, frames, now };
+        let taking = &mut HookSink { hooks: &mut *hooks, main, buffer, frames, now };
         line.receive(now, taking)?;
-        line.look_at_host(now, &mut |observation| audience.host(observation))
+        line.look_at_host(now, &mut |observation| hooks.host(observation))
     }
 
     /// Sends what the MainDevice has to send at `now`, which is a little ago.
-    fn send(&mut self, now: Instant, audience: &mut impl Audience) -> Result<(), LinkError> {
+    fn send(&mut self, now: Instant, hooks: &mut impl DriverHooks) -> Result<(), LinkError> {
         let Self { main, line, buffer, frames } = self;
         for _ in 0..MOST_FRAMES {
             if !main.may_transmit(now) {
                 break;
             }
             let now = line.now();
-            if let Some(room) = audience.room(now) {
+            if let Some(room) = hooks.room(now) {
                 let Some(Transmit { path, len, .. }) = main.poll_transmit(now, room) else { break };
                 line.send(path, room.get(..len).unwrap_or_default())?;
                 *frames += 1;
                 let (path, direction) = (Some(path), Direction::Sent);
-                let sent = Passed { time: now, number: *frames, path, direction, truncated: false };
-                audience.keep(&sent, len);
+                let sent =
+                    FrameSummary { time: now, number: *frames, path, direction, truncated: false };
+                hooks.keep(&sent, len);
             } else {
                 let Some(Transmit { path, len, .. }) = main.poll_transmit(now, buffer) else {
                     break;
@@ -157,48 +158,49 @@ impl<L: Line> Driver<L> {
                 let bytes = &buffer[..len];
                 line.send(path, bytes)?;
                 *frames += 1;
-                audience.frame(&seen(*frames, path, Direction::Sent, now, bytes));
+                hooks.frame(&seen(*frames, path, Direction::Sent, now, bytes));
             }
         }
         Ok(())
     }
 }
 
-/// Takes in frames: the MainDevice judges them, the audience keeps them.
-struct Taking<'a, A> {
-    audience: &'a mut A,
+/// Takes in frames: the MainDevice judges them, the hooks keep them.
+struct HookSink<'a, A> {
+    hooks: &'a mut A,
     main: &'a mut MainDevice,
-    /// Where frames are received that the audience does not keep.
+    /// Where frames are received that the hooks do not keep.
     buffer: &'a mut [u8],
     frames: &'a mut u64,
     now: Instant,
 }
 
-impl<A: Audience> Intake for Taking<'_, A> {
+impl<A: DriverHooks> FrameSink for HookSink<'_, A> {
     fn room(&mut self) -> &mut [u8] {
-        match self.audience.room(self.now) {
+        match self.hooks.room(self.now) {
             Some(room) => room,
             None => self.buffer,
         }
     }
 
-    fn arrived(&mut self, arrived: Arrived) {
-        let Arrived { at, path, len, truncated } = arrived;
+    fn frame_received(&mut self, frame_received: RxFrame) {
+        let RxFrame { at, path, len, truncated } = frame_received;
         *self.frames += 1;
         let (number, direction) = (*self.frames, Direction::Received);
         let at_once = at.max(self.now);
-        match self.audience.room(self.now) {
+        match self.hooks.room(self.now) {
             Some(room) => {
                 if !truncated && let Some(bytes) = room.get(..len) {
                     self.main.handle_frame(at_once, path, bytes);
                 }
-                let passed = Passed { time: at, number, path: Some(path), direction, truncated };
-                self.audience.keep(&passed, len);
+                let passed =
+                    FrameSummary { time: at, number, path: Some(path), direction, truncated };
+                self.hooks.keep(&passed, len);
             }
             None => {
                 let Some(bytes) = self.buffer.get(..len) else { return };
                 let seen = seen(number, path, direction, at, bytes);
-                self.audience.frame(&FrameSeen { truncated, ..seen });
+                self.hooks.frame(&FrameSeen { truncated, ..seen });
                 if !truncated {
                     self.main.handle_frame(at_once, path, bytes);
                 }

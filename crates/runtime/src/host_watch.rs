@@ -1,4 +1,4 @@
-//! What the host notices about one card, in the words of the diagnosis.
+//! Watch over one card by the host, in the words of the diagnosis.
 
 use linesman_diagnosis::observe::{HostEvent, HostObservation};
 use linesman_link::clock::HostClock;

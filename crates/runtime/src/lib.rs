@@ -1,30 +1,27 @@
 //! Threads, selectors and recorders: what joins the cores to a real interface.
 //!
 //! [`selector`] says what a word like `eth0+eth1` means, wherever it is written; [`capture`] reads
-//! files, [`line`](mod@line) is where frames go, [`drive`] runs a MainDevice there, [`listen`] hears what is on a card, [`asking`]
+//! files, [`transport`] is where frames go, [`drive`] runs a MainDevice there, [`listen`] hears what is on a card, [`question_socket`]
 //! asks SubDevices there, [`host_watch`] asks about a card, [`record`] writes what was seen to a file. [`serve`] puts a segment on real
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
-//! outside, [`journal`] writes down what really happened, [`names`] says where. [`plan_file`] reads
+//! outside, [`truth_writer`] writes down what really happened, [`names`] says where. [`plan_file`] reads
 //! the file that a line is planned with, [`named_files`] the files that a file names. [`stop`] is the wish to stop,
 //! [`part`] says that a part of a command has failed.
 
-pub mod asking;
 pub mod capture;
 pub mod control;
-mod desk;
+mod control_socket;
 pub mod drive;
 pub mod event_log;
 pub mod host_watch;
 pub mod image;
-pub mod journal;
-mod kept_file;
-pub mod line;
 pub mod listen;
 pub mod named_files;
 pub mod names;
 pub mod online;
 pub mod part;
 pub mod plan_file;
+pub mod question_socket;
 pub mod record;
 pub mod run;
 pub mod selector;
@@ -32,4 +29,7 @@ pub mod serve;
 pub mod service;
 pub mod stop;
 pub mod system_log;
+pub mod transport;
+pub mod truth_writer;
+mod watched_file;
 pub mod wiring;

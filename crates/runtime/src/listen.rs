@@ -25,14 +25,14 @@ const BEFORE_DRIVING: Span = Span::ms(300);
 const LONGER: Span = Span::ms(200);
 
 /// One card, or the two at the ends of a ring, that are listened on.
-pub struct Ears {
+pub struct CardListener {
     clock: HostClock,
-    cards: Vec<Ear>,
+    cards: Vec<ListenedCard>,
     batch: Batch,
     frames: u64,
 }
 
-struct Ear {
+struct ListenedCard {
     listener: Listener,
     path: Path,
     watch: HostWatch,
@@ -45,7 +45,7 @@ struct Ear {
 
 /// Something that was heard.
 #[derive(Clone, Copy, Debug)]
-pub enum Heard<'a> {
+pub enum ListenEvent<'a> {
     /// A frame.
     Frame(FrameSeen<'a>),
     /// Something about the host, which is that of the MainDevice: at a tap the card's counters are about the tap.
@@ -63,14 +63,14 @@ pub struct TapCounts {
     pub dropped: u64,
 }
 
-impl Ears {
+impl CardListener {
     /// Begins to listen; the first interface is card A, the second card B.
     ///
     /// # Errors
     /// When an interface cannot be used.
     pub fn open(names: &[String], clock: HostClock) -> Result<Self, LinkError> {
         let open = |(path, name): (Path, &String)| {
-            Ok(Ear {
+            Ok(ListenedCard {
                 listener: Listener::open(name, ListenFilter::EtherCat)?,
                 watch: HostWatch::open(name, path, &clock)?,
                 path,
@@ -78,7 +78,7 @@ impl Ears {
                 sees_own: false,
             })
         };
-        let cards: Result<Vec<Ear>, LinkError> =
+        let cards: Result<Vec<ListenedCard>, LinkError> =
             Path::ALL.into_iter().zip(names).map(open).collect();
         Ok(Self { clock, cards: cards?, batch: Batch::new(BATCH), frames: 0 })
     }
@@ -102,7 +102,7 @@ impl Ears {
     pub fn hear(
         &mut self,
         deadline: Instant,
-        mut sink: impl FnMut(Heard<'_>),
+        mut sink: impl FnMut(ListenEvent<'_>),
     ) -> Result<(), LinkError> {
         let Self { clock, cards, batch, frames } = self;
         match cards.as_slice() {
@@ -120,7 +120,7 @@ impl Ears {
                     FrameDirection::Incoming if card.sees_own => Direction::Received,
                     FrameDirection::Incoming | FrameDirection::Unknown => Direction::Unknown,
                 };
-                sink(Heard::Frame(FrameSeen {
+                sink(ListenEvent::Frame(FrameSeen {
                     network: Network::default(),
                     path: Some(card.path),
                     direction,
@@ -138,7 +138,7 @@ impl Ears {
             let drops = card.listener.counters()?.drops;
             let missed = drops - std::mem::replace(&mut card.drops, drops);
             if missed > 0 {
-                sink(Heard::Missed(missed, now));
+                sink(ListenEvent::Missed(missed, now));
             }
             // Until it is known whether this host drives the line, the watch adds up.
             if !card.sees_own {
@@ -146,7 +146,7 @@ impl Ears {
             }
             // What this socket has no room for is no loss of the MainDevice's socket.
             for observation in card.watch.poll(now, SocketCounters::default())? {
-                sink(Heard::Host(observation));
+                sink(ListenEvent::Host(observation));
             }
         }
         Ok(())
@@ -178,7 +178,7 @@ impl Ears {
 
 /// What is on a line that somebody else drives.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Driven {
+pub struct ObservedTraffic {
     /// EtherCAT frames that were heard.
     pub frames: u64,
     /// For how long.
@@ -197,22 +197,22 @@ fn listening(chance: u64) -> Span {
 ///
 /// # Errors
 /// When an interface cannot be used, or is used by another process of this host.
-pub fn is_driven(names: &[String]) -> Result<Option<Driven>, LinkError> {
+pub fn is_driven(names: &[String]) -> Result<Option<ObservedTraffic>, LinkError> {
     for interface in names {
         if let Some(holder) = CardLock::holder(interface)? {
             return Err(LinkError::InUse { interface: interface.clone(), holder });
         }
     }
     let clock = HostClock::start();
-    let mut ears = Ears::open(names, clock)?;
+    let mut card_listener = CardListener::open(names, clock)?;
     // No seed: two hosts must not draw the same. The standard library asks the system.
     let chance = std::hash::RandomState::new().hash_one(names);
     let began = clock.now();
     let until = began + listening(chance);
-    let mut driven = Driven { frames: 0, within: Span::ZERO, source: None };
+    let mut driven = ObservedTraffic { frames: 0, within: Span::ZERO, source: None };
     while clock.now() < until && (driven.frames == 0 || clock.now() < began + BEFORE_DRIVING) {
-        ears.hear(until, |heard| {
-            let Heard::Frame(frame) = heard else { return };
+        card_listener.hear(until, |heard| {
+            let ListenEvent::Frame(frame) = heard else { return };
             driven.frames += 1;
             let source = frame.bytes.get(6..12).and_then(|bytes| bytes.first_chunk::<6>());
             driven.source = driven.source.or(source.map(|bytes| MacAddress(*bytes)));

@@ -1,4 +1,4 @@
-//! What was seen, as a capture file that other tools read too.
+//! Recorder of frames and host observations, as a capture file that other tools read too.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -13,7 +13,7 @@ use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
-use crate::kept_file::KeptFile;
+use crate::watched_file::WatchedFile;
 
 /// That the file is still there is looked up this often.
 const LOOK_EVERY: Span = Span::s(1);
@@ -26,7 +26,7 @@ pub struct Recorder {
     names: Vec<String>,
     /// The first thing that went wrong; nothing is written after it.
     fault: Option<CaptureWriteError>,
-    file: KeptFile,
+    file: WatchedFile,
     look_at: Instant,
 }
 
@@ -44,7 +44,7 @@ impl Recorder {
     ) -> Result<Self, CaptureWriteError> {
         let file = BufWriter::new(File::create_new(path)?);
         let writer = PcapngWriter::new(file, application)?;
-        let (names, file) = (names.to_vec(), KeptFile::at(path));
+        let (names, file) = (names.to_vec(), WatchedFile::at(path));
         let look_at = Instant::ZERO;
         Ok(Self { writer, start, cards: [None; 2], names, fault: None, file, look_at })
     }

@@ -1,4 +1,4 @@
-//! What a word like `eth0+eth1` or `sim:plant.toml` means: the same in every command.
+//! Selectors, words like `eth0+eth1` or `sim:plant.toml`: the same in every command.
 //!
 //! ```
 //! use linesman_runtime::selector::Selector;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_link::signal;
-use linesman_link::socket::Bell;
+use linesman_link::socket::WakeHandle;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 /// Signals by which somebody asks for the end; the second of them ends the program at once.
@@ -15,7 +15,7 @@ const ASKED: [i32; 2] = [SIGINT, SIGTERM];
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
     wish: Arc<AtomicBool>,
-    bells: Arc<Mutex<Vec<Bell>>>,
+    wake_handles: Arc<Mutex<Vec<WakeHandle>>>,
     /// The signals that are this wish.
     signals: Vec<i32>,
 }
@@ -55,28 +55,28 @@ impl Stop {
     /// Asks to stop.
     pub fn set(&self) {
         self.wish.store(true, Ordering::Relaxed);
-        for bell in self.bells().iter() {
-            bell.ring();
+        for wake_handle in self.wake_handles().iter() {
+            wake_handle.wake();
         }
     }
 
-    /// Rings this bell when the wish comes, for a thread that waits without end.
+    /// Wakes through this handle when the wish comes, for a thread that waits without end.
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn rings(&self, bell: &Bell) -> io::Result<()> {
+    pub fn wakes(&self, wake_handle: &WakeHandle) -> io::Result<()> {
         for signal in &self.signals {
-            signal_hook::low_level::pipe::register(*signal, bell.for_signals()?)?;
+            signal_hook::low_level::pipe::register(*signal, wake_handle.for_signals()?)?;
         }
-        self.bells().push(bell.clone());
+        self.wake_handles().push(wake_handle.clone());
         if self.is_set() {
-            bell.ring();
+            wake_handle.wake();
         }
         Ok(())
     }
 
-    fn bells(&self) -> std::sync::MutexGuard<'_, Vec<Bell>> {
-        self.bells.lock().unwrap_or_else(PoisonError::into_inner)
+    fn wake_handles(&self) -> std::sync::MutexGuard<'_, Vec<WakeHandle>> {
+        self.wake_handles.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -89,11 +89,11 @@ mod tests {
     #[test]
     fn a_wish_rings_those_who_wait() {
         let (stop, early, late) = (Stop::default(), Waker::new().unwrap(), Waker::new().unwrap());
-        stop.rings(&early.bell()).unwrap();
+        stop.wakes(&early.wake_handle()).unwrap();
         assert!(!early.take() && !stop.is_set());
         stop.clone().set();
         assert!(early.take() && stop.is_set());
-        stop.rings(&late.bell()).unwrap();
+        stop.wakes(&late.wake_handle()).unwrap();
         assert!(late.take(), "the wish was there before");
     }
 }

@@ -14,10 +14,10 @@ use linesman_config::fault::FaultName;
 use linesman_proto::time::Instant;
 use linesman_runtime::control::message::{Faults, Request, SignalTable};
 use linesman_runtime::control::{Control, ask, listen};
-use linesman_runtime::journal::{EventKind, Journal, TruthEvent};
 use linesman_runtime::serve::report::Status;
-use linesman_runtime::serve::{Beside, Server};
+use linesman_runtime::serve::{ServeControls, Server};
 use linesman_runtime::stop::Stop;
+use linesman_runtime::truth_writer::{EventKind, TruthEvent, TruthWriter};
 use linesman_runtime::wiring::Wiring;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{FaultEntry, SegmentFile};
@@ -52,19 +52,20 @@ impl Running {
         let segment = Segment::build(&file).unwrap();
         let wiring = Wiring::of(&segment, &file.project().unwrap());
         let folder = TempDir::new().unwrap();
-        let journal = Journal::begin(&segment, Some(&folder.path().join("truth"))).unwrap();
+        let truth_writer =
+            TruthWriter::begin(&segment, Some(&folder.path().join("truth"))).unwrap();
         let mut server = Server::open(segment, wiring, &[]).unwrap();
         let socket = folder.path().join("control");
-        let control = Control::open(&socket, server.bell(), journal.reading()).unwrap();
+        let control = Control::open(&socket, server.wake_handle(), truth_writer.reading()).unwrap();
         let stop = Stop::default();
-        stop.rings(&server.bell()).unwrap();
-        let mut beside = Beside { control: Some(control), journal: Some(journal) };
+        stop.wakes(&server.wake_handle()).unwrap();
+        let mut beside = ServeControls { control: Some(control), truth_writer: Some(truth_writer) };
         let thread = {
             let stop = stop.clone();
             std::thread::spawn(move || {
                 server.run(Instant::MAX, &stop, &mut beside).unwrap();
                 drop(beside.control);
-                beside.journal.unwrap().finish().unwrap();
+                beside.truth_writer.unwrap().finish().unwrap();
             })
         };
         Self { folder, stop, thread: Some(thread) }

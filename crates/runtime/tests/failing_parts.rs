@@ -13,28 +13,28 @@ use linesman_proto::address::Path;
 use linesman_proto::register;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::line::{Intake, Line, Pace, VirtualLine};
-use linesman_runtime::run::judge::LineObserver;
-use linesman_runtime::run::tap::Log;
+use linesman_runtime::run::diagnosis_thread::DiagnosisObserver;
+use linesman_runtime::run::tap::TapLog;
 use linesman_runtime::run::{
-    Application, Beside, Choices, Ended, Idle, Io, NOTES, Next, Note, RunError, RunOptions,
-    run_observed,
+    Application, Idle, Io, NOTES, Next, Note, PlanChoices, RunControls, RunError, RunOutcome,
+    SessionOptions, run_observed,
 };
 use linesman_runtime::stop::Stop;
+use linesman_runtime::transport::{FrameSink, Pace, SegmentTransport, Transport};
 use linesman_runtime::wiring::Wiring;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::SegmentFile;
 
-fn line() -> VirtualLine {
+fn line() -> SegmentTransport {
     let row = [("K1", "EK1100"), ("I1", "EL1008"), ("O1", "EL2008")];
     let file = SegmentFile::in_a_row("plant", 1, &row);
     let segment = Segment::build(&file).unwrap();
     let wiring = Wiring::of(&segment, &file.project().unwrap());
-    VirtualLine::new(segment, wiring, false, Pace::Free).unwrap()
+    SegmentTransport::new(segment, wiring, false, Pace::Free).unwrap()
 }
 
 /// The AL status of each SubDevice, as it is in its register.
-fn states(line: &VirtualLine) -> Vec<u8> {
+fn states(line: &SegmentTransport) -> Vec<u8> {
     let segment = line.segment();
     let state = |id| segment.controller(id).unwrap().register(register::AL_STATUS.address);
     segment.devices().map(state).collect()
@@ -42,12 +42,12 @@ fn states(line: &VirtualLine) -> Vec<u8> {
 
 const INIT: [u8; 3] = [1; 3];
 
-fn driven<L: Line>(
+fn driven<L: Transport>(
     line: L,
     application: impl Application,
-    observer: impl FnOnce(Setup) -> Box<dyn LineObserver>,
-) -> (Result<Ended, RunError>, Receiver<Note>) {
-    let options = RunOptions {
+    observer: impl FnOnce(Setup) -> Box<dyn DiagnosisObserver>,
+) -> (Result<RunOutcome, RunError>, Receiver<Note>) {
+    let options = SessionOptions {
         on: "plant".to_owned(),
         leave: AlState::Init,
         lasts: Some(Span::s(3)),
@@ -57,20 +57,20 @@ fn driven<L: Line>(
         diagnose: Some(Setup::default()),
     };
     let (notes, told) = sync_channel(NOTES);
-    let beside = Beside { stop: &Stop::default(), notes, desk: None };
-    let wanted = Choices::default().as_found();
+    let beside = RunControls { stop: &Stop::default(), notes, socket: None };
+    let wanted = PlanChoices::default().as_found();
     (run_observed(line, wanted, application, &options, beside, observer), told)
 }
 
-fn engine(setup: Setup) -> Box<dyn LineObserver> {
+fn engine(setup: Setup) -> Box<dyn DiagnosisObserver> {
     Box::new(Engine::new(setup))
 }
 
 /// A diagnosis that panics over the frames of a line that is up.
 struct Panics;
 
-impl LineObserver for Panics {
-    fn take(&mut self, log: &Log) -> Instant {
+impl DiagnosisObserver for Panics {
+    fn take(&mut self, log: &TapLog) -> Instant {
         let last = log.frames().last().map_or(Instant::ZERO, |frame| frame.time);
         assert!(last < Instant::ZERO + Span::s(1), "the judge stumbles");
         last
@@ -97,7 +97,7 @@ impl LineObserver for Panics {
 fn a_diagnosis_that_panics_is_told_at_once_and_the_line_is_driven_on_to_its_end() {
     let mut line = line();
     let (ended, told) = driven(&mut line, Idle, |_| Box::new(Panics));
-    let Ended { report, error, failed } = ended.unwrap();
+    let RunOutcome { report, error, failed } = ended.unwrap();
     assert!(error.is_none(), "{error:?}");
     let failed = failed.unwrap();
     assert_eq!(failed.why.split(": ").last(), Some("the judge stumbles"));
@@ -128,7 +128,7 @@ impl Application for Stumbles {
 fn an_application_that_panics_leaves_the_subdevices_as_after_any_other_end() {
     let mut line = line();
     let (ended, told) = driven(&mut line, Stumbles, engine);
-    let Ended { report, error, .. } = ended.unwrap();
+    let RunOutcome { report, error, .. } = ended.unwrap();
     let error = error.unwrap().to_string();
     assert!(error.contains("the application stumbles; the line is stopped"), "{error}");
     assert_eq!(report.error, Some(error));
@@ -139,9 +139,9 @@ fn an_application_that_panics_leaves_the_subdevices_as_after_any_other_end() {
 }
 
 /// A line on which nothing can be received any more without a panic once the application has stumbled.
-struct Broken(VirtualLine, u64);
+struct Broken(SegmentTransport, u64);
 
-impl Line for Broken {
+impl Transport for Broken {
     fn options(&self) -> Options {
         self.0.options()
     }
@@ -150,7 +150,7 @@ impl Line for Broken {
         self.0.now()
     }
 
-    fn receive(&mut self, now: Instant, intake: &mut dyn Intake) -> Result<usize, LinkError> {
+    fn receive(&mut self, now: Instant, intake: &mut dyn FrameSink) -> Result<usize, LinkError> {
         assert!(now < Instant::ZERO + Span::ms(self.1), "the line stumbles");
         self.0.receive(now, intake)
     }

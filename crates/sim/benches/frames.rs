@@ -1,4 +1,4 @@
-//! How long a frame takes in process: from `handle_frame` to the bytes that `poll_arrival` gives.
+//! Time that a frame takes in process: from `handle_frame` to the bytes that `poll_arrival` gives.
 //!
 //! ```text
 //! cargo bench -p linesman-sim --bench frames             the table

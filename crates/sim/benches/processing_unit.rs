@@ -1,4 +1,4 @@
-//! How long a controller takes for a datagram: what a segment of many devices is made of.
+//! Time that a controller takes for a datagram: what a segment of many devices is made of.
 //!
 //! Time per frame through one processing unit; each frame carries one datagram unless said.
 

@@ -1,4 +1,4 @@
-//! How long a frame takes through a whole segment: controller visits per second.
+//! Time that a frame takes through a whole segment: controller visits per second.
 //!
 //! A plant of 60 controllers; throughput is counted in controllers passed (each once, both ways).
 

@@ -1,4 +1,4 @@
-//! What one type of controller is made of: data, so that types differ in tables and not in code.
+//! Hardware of one type of controller: data, so that types differ in tables and not in code.
 //!
 //! References: S2 chapter 2 (identity, features), S1 chapter 3 (error counting), `docs/` for the
 //! delays that were measured on real devices.

@@ -14,7 +14,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
 use crate::controller::WatchdogKind;
-use crate::device::Trouble;
+use crate::device::SoftwareFault;
 
 pub use audit::{AuditedCounter, Unexplained};
 pub(crate) use audit::{Cause, Ledger};
@@ -83,7 +83,7 @@ pub enum Effect {
         code: u16,
     },
     /// The software of a device misbehaves from now on.
-    Misbehaves(Trouble),
+    Misbehaves(SoftwareFault),
     /// The processor of a device stopped.
     ProcessorStopped,
     /// It runs again.

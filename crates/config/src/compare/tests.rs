@@ -52,7 +52,7 @@ fn press() -> (Tree, Vec<u32>) {
 }
 
 #[test]
-fn what_is_as_planned_has_no_differences() {
+fn equal_plan_and_scan_have_no_differences() {
     let comparison = compared(&press(), &press());
     assert_eq!(comparison.differences, []);
     assert_eq!(comparison.pairs, (0..6).map(Some).collect::<Vec<_>>());

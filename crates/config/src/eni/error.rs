@@ -1,4 +1,4 @@
-//! What can be wrong with a network configuration, and where.
+//! Errors of a network configuration, with their places.
 
 use crate::esi::EsiError;
 

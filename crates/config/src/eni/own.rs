@@ -1,5 +1,5 @@
-//! Who owns which bytes of the cyclic datagrams: what the FMMUs of the SubDevices say. And whether the
-//! file's own numbers agree.
+//! Ownership of the bytes of the cyclic datagrams: what the FMMUs of the SubDevices say, checked
+//! against the file's own numbers.
 
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::command::Command;

@@ -1,5 +1,5 @@
-//! What the register commands of a SubDevice mean: what every MainDevice does by itself is taken out of
-//! them as settings, what is left are start-up commands.
+//! Meaning of the register commands of a SubDevice: what every MainDevice does by itself is taken
+//! out of them as settings, what is left are start-up commands.
 
 use std::ops::Range;
 

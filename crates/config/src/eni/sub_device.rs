@@ -15,7 +15,7 @@ use crate::esi::setting;
 use crate::esi::xml::Element;
 use crate::identity::RevisionRule;
 use crate::plan::{
-    AddressingChoice, ClockSettings, DevicePlan, Keeping, OnWrongCounter, ProcessAccess,
+    AddressingChoice, AutomaticActions, ClockSettings, DevicePlan, OnWrongCounter, ProcessAccess,
 };
 use crate::profile::Mailbox;
 use crate::start_up::{StartUpCommand, left_out};
@@ -342,7 +342,7 @@ fn ours(own: &Element, file: &mut FileDevice) -> Result<(), EsiError> {
         Some(_) => own.flag(name),
         None => Ok(true),
     };
-    device.settings.keeping = Keeping {
+    device.settings.keeping = AutomaticActions {
         restore_state: unless_said("restore-state")?,
         reinitialise: unless_said("reinitialise")?,
         clear_counters: unless_said("clear-counters")?,

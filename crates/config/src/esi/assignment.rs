@@ -1,4 +1,4 @@
-//! Which PDOs each SyncManager carries: by default, in an alternative mapping, in an operation mode.
+//! PDO assignment of each SyncManager: by default, in an alternative mapping, in an operation mode.
 //!
 //! Reference: ETG.2000: attribute `Sm` of a PDO, elements `AlternativeSmMapping` and `OpMode/Sm`.
 

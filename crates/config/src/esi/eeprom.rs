@@ -1,4 +1,4 @@
-//! What is to be programmed into the EEPROM: element `Eeprom` (ETG.2000).
+//! Content to be programmed into the EEPROM: element `Eeprom` (ETG.2000).
 
 use linesman_proto::sii::{Configuration, MailboxPair};
 

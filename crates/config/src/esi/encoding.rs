@@ -1,4 +1,4 @@
-//! From bytes to text: the encoding that the XML declaration names, else UTF-8.
+//! Decoding of bytes to text: the encoding that the XML declaration names, else UTF-8.
 
 use std::borrow::Cow;
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a device description, and where.
+//! Errors of a device description, with their places.
 
 /// A device description that cannot be used.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]

@@ -1,4 +1,4 @@
-//! What devices a file describes, found without reading it: their types, product codes, revisions.
+//! Devices that a file describes, found without reading it: their types, product codes, revisions.
 //!
 //! A folder of a maker's descriptions has hundreds of megabytes. To find one device in it, only the
 //! elements `Vendor/Id` and `Device/Type` of each file are looked at; the file that has it is read

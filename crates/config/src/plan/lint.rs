@@ -1,4 +1,4 @@
-//! What is doubtful about a plan before anything is switched on.
+//! Lint of a plan: what is doubtful about it before anything is switched on.
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::register::SmDirection;

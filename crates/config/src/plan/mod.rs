@@ -1,5 +1,5 @@
-//! What follows from what was wanted and what is there: addresses, SyncManagers, FMMUs, frames, and
-//! which working counter each datagram must come back with.
+//! Plan, made from project and inventory: addresses, SyncManagers, FMMUs, frames, and the working
+//! counter that each datagram must come back with.
 //!
 //! A plan is of one network. Tasks have sync units; a task's frames carry datagrams; every byte of
 //! a logical datagram is owned by one SubDevice and direction ([`Ownership`]), so that a missing
@@ -40,8 +40,8 @@ pub use expect::{PathView, Presence, Served};
 pub use layout::{PlanError, PlanOptions};
 pub use lint::{Doubt, Severity};
 pub use settings::{
-    AddressingChoice, ClockSettings, DeviceSettings, Keeping, OnWrongCounter, ProcessAccess,
-    WatchdogSettings,
+    AddressingChoice, AutomaticActions, ClockSettings, DeviceSettings, OnWrongCounter,
+    ProcessAccess, WatchdogSettings,
 };
 pub use task::{DatagramPlan, FramePlan, IoAt, Ownership, Role, SyncUnit, Task};
 pub use variable::Variable;

@@ -1,4 +1,4 @@
-//! Which couplers and junctions can be the reference clock, and since which revision.
+//! Couplers and junctions that can be the reference clock, and since which revision.
 //!
 //! Reference: S0 L735-757 ("use as potential reference clock"). A type that is not named here has no lowest
 //! revision: with a clock of 64 bits it can be the reference.

@@ -1,5 +1,5 @@
-//! What a user chooses for one SubDevice: how it is addressed, guarded, clocked, and what becomes of
-//! its inputs when a working counter is wrong.
+//! Settings that a user chooses for one SubDevice: how it is addressed, guarded, clocked, and what
+//! becomes of its inputs when a working counter is wrong.
 //!
 //! The defaults are what the MainDevice does when nothing is said.
 
@@ -29,7 +29,7 @@ pub struct DeviceSettings {
     /// What becomes of its inputs when the working counter of their datagram is wrong.
     pub on_wrong_counter: OnWrongCounter,
     /// What the MainDevice does for it by itself.
-    pub keeping: Keeping,
+    pub keeping: AutomaticActions,
     /// Modules that must sit in its slots, as object 0xF050 counts them from 1; 0 is an empty slot.
     /// No entries: not compared.
     pub modules: Vec<u32>,
@@ -37,7 +37,7 @@ pub struct DeviceSettings {
 
 /// What the MainDevice does for a SubDevice by itself while the network runs (SW-15).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub struct Keeping {
+pub struct AutomaticActions {
     /// When it left its state it is brought back; else it stays there until somebody asks for a state.
     pub restore_state: bool,
     /// When it was lost and answers again it is set up anew; else it stays in INIT until somebody asks for a state.
@@ -46,7 +46,7 @@ pub struct Keeping {
     pub clear_counters: bool,
 }
 
-impl Default for Keeping {
+impl Default for AutomaticActions {
     fn default() -> Self {
         Self { restore_state: true, reinitialise: true, clear_counters: true }
     }

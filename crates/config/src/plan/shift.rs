@@ -1,4 +1,4 @@
-//! Where SYNC0 falls within the cycle.
+//! Shift of SYNC0 within the cycle.
 //!
 //! A cycle begins when its first frame is at the reference clock (SYN-09). A SubDevice that works with
 //! SYNC0 needs its outputs before it, in every cycle: the signal comes some time after the frames, so that

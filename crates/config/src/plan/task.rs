@@ -1,4 +1,4 @@
-//! What is exchanged cyclically: tasks, their sync units, frames, datagrams, and who owns which bytes.
+//! Cyclic exchange of a plan: tasks, their sync units, frames, datagrams, and who owns which bytes.
 
 use std::ops::Range;
 

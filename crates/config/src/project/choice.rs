@@ -1,4 +1,4 @@
-//! What a user chooses in a project: tasks, the network as a whole, clocks, watchdogs, PDOs, start-up
+//! Choices of a user in a project: tasks, the network as a whole, clocks, watchdogs, PDOs, start-up
 //! commands.
 
 use linesman_proto::time::Span;

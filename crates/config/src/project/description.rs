@@ -1,5 +1,5 @@
-//! What a project itself says of a type of device, where no description of its maker is at hand:
-//! `[device.description]`. A saved scan writes what stands in the SII.
+//! Description of a type of device in the project itself, where no description of its maker is at
+//! hand: `[device.description]`. A saved scan writes what stands in the SII.
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;

@@ -1,4 +1,4 @@
-//! What a description of its maker says of a device of a project.
+//! Description of a device of a project by its maker (ESI).
 
 use super::{Described, ProjectDevice};
 use crate::esi::image::image;

@@ -1,4 +1,4 @@
-//! What was wanted: the user's project file.
+//! Project: the user's file with what is wanted.
 //!
 //! ```toml
 //! name = "machine"

@@ -1,4 +1,4 @@
-//! From a project to what the planner needs: each device with what its description says and what the
+//! Resolution of a project for the planner: each device with what its description says and what the
 //! user chose, in processing order.
 
 use linesman_proto::address::{RegisterAddress, StationAlias};
@@ -13,7 +13,7 @@ use super::{Project, ProjectDevice, ProjectError};
 use crate::esi::value;
 use crate::identity::RevisionRule;
 use crate::plan::layout::PlanOptions;
-use crate::plan::{DeviceSettings, Keeping, Plan, PlanError, PlannedDevice};
+use crate::plan::{AutomaticActions, DeviceSettings, Plan, PlanError, PlannedDevice};
 use crate::profile::{DeviceProfile, MappedEntry, MappedPdo};
 use crate::start_up::{StartUpAction, StartUpCommand, Transition};
 
@@ -176,7 +176,7 @@ impl Project {
             watchdog: device.watchdog.settings(),
             clock: clock.transpose()?,
             on_wrong_counter: device.on_wrong_counter.unwrap_or(self.network.on_wrong_counter),
-            keeping: Keeping {
+            keeping: AutomaticActions {
                 restore_state: device.restore_state.unwrap_or(self.network.restore_state),
                 reinitialise: device.reinitialise.unwrap_or(self.network.reinitialise),
                 clear_counters: device.clear_counters.unwrap_or(self.network.clear_counters),

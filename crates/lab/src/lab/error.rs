@@ -1,4 +1,4 @@
-//! Why a lab cannot go on.
+//! Errors that end a lab.
 
 use linesman_config::project::ProjectError;
 use linesman_proto::time::{Instant, Span};

@@ -4,14 +4,14 @@
 //! the diagnosis, and a tap if there is one; what the card counts becomes host observations, as it
 //! does with a real card.
 
+mod capture_loss;
+mod driver;
+mod engines;
 mod error;
-mod exchange;
 mod object;
-mod other;
 mod pause;
 mod register;
 mod truth;
-mod veil;
 
 use std::collections::VecDeque;
 
@@ -35,8 +35,8 @@ use linesman_sim::truth::TruthLog;
 
 pub use error::LabError;
 
+use self::capture_loss::CaptureLoss;
 use self::pause::Socket;
-use self::veil::Veil;
 use crate::habit::Habit;
 use crate::options::{Begin, LabOptions};
 use crate::soem::Soem;
@@ -74,8 +74,8 @@ pub struct Lab {
     recorder: Option<Tap>,
     recorded: u64,
     host_tap: Option<HostTap>,
-    veil: Option<Veil>,
-    recorder_veil: Option<Veil>,
+    capture_loss: Option<CaptureLoss>,
+    recorder_veil: Option<CaptureLoss>,
     frames: u64,
     events: Vec<(Instant, Event)>,
     finding_events: VecDeque<FindingEvent>,
@@ -157,7 +157,7 @@ impl Lab {
             recorder: None,
             recorded: 0,
             host_tap: None,
-            veil: None,
+            capture_loss: None,
             recorder_veil: None,
             frames: 0,
             events: Vec::new(),
@@ -206,9 +206,9 @@ impl Lab {
     /// Hides a share of the exchanges in which error counters are read from the diagnosis and the tap, and
     /// from the recorder.
     pub fn hide_counters(&mut self, share: f64, stream: Stream) {
-        let veil = (share > 0.0).then(|| Veil::new(stream, share));
-        self.recorder_veil.clone_from(&veil);
-        self.veil = veil;
+        let capture_loss = (share > 0.0).then(|| CaptureLoss::new(stream, share));
+        self.recorder_veil.clone_from(&capture_loss);
+        self.capture_loss = capture_loss;
     }
 
     /// The present.

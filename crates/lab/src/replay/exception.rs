@@ -1,4 +1,4 @@
-//! Why an answer differs, where the recording itself shows the reason.
+//! Exceptions: reasons for which an answer may differ, where the recording itself shows them.
 //!
 //! A difference with such a reason is an exception; one without is a fault of the segment, or a
 //! device that the segment does not know.

@@ -15,7 +15,7 @@ use linesman_sim::device::application_layer::{ApplicationLayer, Refusal};
 use linesman_sim::device::dictionary::Dictionary;
 use linesman_sim::device::files::Files;
 use linesman_sim::device::mailbox::{ANSWERS, Mailbox, REQUESTS, Served};
-use linesman_sim::device::{Firmware, SignalId, Signals, Troubles};
+use linesman_sim::device::{Firmware, SignalId, Signals, SoftwareFaults};
 
 use super::learn::{AlStep, DeviceSeen, MailboxTurn};
 
@@ -52,7 +52,7 @@ pub(super) struct Learned {
     filled: bool,
     dictionary: Dictionary,
     files: Files,
-    troubles: Troubles,
+    software_faults: SoftwareFaults,
     /// One for each byte of its inputs, in the order of SyncManagers.
     inputs: Vec<SignalId>,
     buffer: Vec<u8>,
@@ -83,7 +83,7 @@ impl Learned {
             filled: false,
             dictionary: seen.objects.dictionary(),
             files: Files::default(),
-            troubles: Troubles::default(),
+            software_faults: SoftwareFaults::default(),
             inputs,
             buffer: Vec::new(),
         }
@@ -207,7 +207,7 @@ impl Learned {
         let mut served = Served {
             dictionary: &mut self.dictionary,
             files: &mut self.files,
-            troubles: &mut self.troubles,
+            software_faults: &mut self.software_faults,
             state: ApplicationLayer::state(pdi),
         };
         self.mailbox.serve(now, pdi, &mut served)

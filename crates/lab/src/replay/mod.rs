@@ -5,7 +5,7 @@
 //! they were like, [`mod@model`] makes a segment of such devices, [`mod@play`] sends and [`mod@compare`]
 //! compares; [`mod@exception`] says for what reasons answers may differ; [`report`] is the result. What the recording cannot tell is in [`learn::Learned::notes`].
 //!
-//! Nothing is answered from the tape: registers, SyncManagers, FMMUs, SII and mailbox are those of the
+//! Nothing is answered from the recording: registers, SyncManagers, FMMUs, SII and mailbox are those of the
 //! model. From the recording come the content of memories (SII words, objects), how long a device took
 //! for what, and what the world outside did: the inputs of process data.
 

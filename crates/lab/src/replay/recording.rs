@@ -1,6 +1,6 @@
 //! A recording as turns: a request and what came back for it.
 
-mod mend;
+mod repair;
 
 use linesman_diagnosis::FrameSeen;
 use linesman_diagnosis::observe::{Exchange, Fingerprint, FrameCopy, Pairing};
@@ -147,7 +147,7 @@ impl Recorder {
         self.pairing.finish(&mut |exchange| note(recording, alone, exchange));
         // By number: time stamps may run backwards.
         recording.turns.sort_by_key(|turn| turn.request.number);
-        mend::mend(recording, std::mem::take(alone));
+        repair::repair(recording, std::mem::take(alone));
         self.recording.turns.sort_by_key(|turn| turn.request.number);
         self.recording
     }

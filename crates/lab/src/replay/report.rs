@@ -1,4 +1,4 @@
-//! What a replay showed.
+//! Report of a replay.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,4 +1,5 @@
-//! What a course teaches: read all error counters, and look at the first port with one above zero.
+//! Baseline of the score, as a course teaches it: read all error counters, and look at the first
+//! port with one above zero.
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;

@@ -1,4 +1,4 @@
-//! Faults that are so from the start, and why a case cannot be played.
+//! Built-in faults, which are there from the start, and reasons for which a case cannot be played.
 
 use linesman_config::fault::FaultName;
 use linesman_config::project::Project;
@@ -10,18 +10,18 @@ use linesman_sim::segment_file::{FaultEntry, SegmentFile};
 
 use super::case::Case;
 use super::draw::{Drawn, Offer, When, draw, when};
-use crate::choice::Ground;
+use crate::choice::LineOutline;
 use crate::lab::LabError;
 
 /// Why a case ends early.
-pub(super) enum Stop {
+pub(super) enum EarlyEnd {
     /// This plant has no place for the faults.
     NoPlace,
     /// It cannot be played at all.
     Failed(String),
 }
 
-impl From<LabError> for Stop {
+impl From<LabError> for EarlyEnd {
     fn from(error: LabError) -> Self {
         Self::Failed(error.to_string())
     }
@@ -31,7 +31,7 @@ impl From<LabError> for Stop {
 pub(super) fn with_built_in(
     case: &Case,
     stream: &mut Stream,
-) -> Result<(SegmentFile, Vec<Drawn>), Stop> {
+) -> Result<(SegmentFile, Vec<Drawn>), EarlyEnd> {
     let is_early = |name: FaultName| when(name, case.from_start) == When::FromStart;
     let names: Vec<FaultName> =
         case.faults.iter().copied().filter(|name| is_early(*name)).collect();
@@ -40,20 +40,20 @@ pub(super) fn with_built_in(
     if names.is_empty() {
         return Ok((file, built_in));
     }
-    let project = case.file.project().map_err(|_| Stop::NoPlace)?;
-    let tree = project.tree().map_err(|_| Stop::NoPlace)?;
+    let project = case.file.project().map_err(|_| EarlyEnd::NoPlace)?;
+    let tree = project.tree().map_err(|_| EarlyEnd::NoPlace)?;
     let devices: Vec<String> = project.devices.iter().map(|device| device.name.clone()).collect();
     let cabled = vec![true; tree.links().len()];
-    let ground = Ground { tree: &tree, names: &devices, cabled: &cabled };
+    let outline = LineOutline { tree: &tree, names: &devices, cabled: &cabled };
     for name in names {
         let offer = Offer {
-            ground: &ground,
+            outline: &outline,
             file: &case.file,
             clocked: &[],
             reference: None,
             when: When::FromStart,
         };
-        let drawn = (0..10).find_map(|_| draw(name, &offer, stream)).ok_or(Stop::NoPlace)?;
+        let drawn = (0..10).find_map(|_| draw(name, &offer, stream)).ok_or(EarlyEnd::NoPlace)?;
         if name == FaultName::TwinsSwapped && case.from_start {
             give_aliases(&mut file, &drawn.choice.entry);
         }

@@ -1,4 +1,4 @@
-//! What a seed stands for: the kind of case, the plant and its features.
+//! Case of a seed: its kind, the plant and its features.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;

@@ -1,4 +1,5 @@
-//! What is done to a healthy line that is no fault: whatever the diagnosis makes of it is a false alarm.
+//! Disturbances of a healthy line that are no fault: whatever the diagnosis makes of them is a
+//! false alarm.
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::observe::HostEvent;

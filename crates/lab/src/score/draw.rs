@@ -1,5 +1,5 @@
-//! Where a fault of the catalogue sits and how bad it is: wider than [`crate::choice`] draws, down to
-//! a single hit.
+//! Random place and severity of a fault of the catalogue: wider than [`crate::choice`] draws, down
+//! to a single hit.
 
 #![expect(clippy::wildcard_enum_match_arm, reason = "menus, not tables of all faults")]
 
@@ -13,7 +13,7 @@ use linesman_sim::device::library;
 use linesman_sim::seed::Stream;
 use linesman_sim::segment_file::{FaultEntry, OneOrMany, SegmentDevice, SegmentFile};
 
-use crate::choice::{Choice, Ground};
+use crate::choice::{Choice, LineOutline};
 
 /// When a fault is put in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -48,7 +48,7 @@ pub struct Drawn {
 #[derive(Clone, Copy, Debug)]
 pub struct Offer<'a> {
     /// Wiring and names.
-    pub ground: &'a Ground<'a>,
+    pub outline: &'a LineOutline<'a>,
     /// The segment as described.
     pub file: &'a SegmentFile,
     /// SubDevices that are in step with SYNC0.
@@ -150,28 +150,28 @@ impl Drawer<'_, '_> {
 
     /// Both directions of a link, as segment files write it.
     fn both(&self, link: usize) -> String {
-        let ends = self.offer.ground.tree.links()[link];
-        let end = |end: End| self.offer.ground.end(end);
+        let ends = self.offer.outline.tree.links()[link];
+        let end = |end: End| self.offer.outline.end(end);
         format!("{}-{}", end(ends.upstream), end(ends.downstream))
     }
 
     /// One direction of a link.
     fn one(&mut self, link: usize) -> String {
-        let ends = self.offer.ground.tree.links()[link];
+        let ends = self.offer.outline.tree.links()[link];
         let (mut from, mut to) = (ends.upstream, ends.downstream);
         if self.stream.chance(0.5) {
             std::mem::swap(&mut from, &mut to);
         }
-        format!("{}>{}", self.offer.ground.end(from), self.offer.ground.end(to))
+        format!("{}>{}", self.offer.outline.end(from), self.offer.outline.end(to))
     }
 
     fn opened(&mut self) -> Option<Drawn> {
         let is_false = self.name == FalseLink;
-        let ground = self.offer.ground;
+        let outline = self.offer.outline;
         let link =
-            if is_false { ground.any_cable(self.stream) } else { ground.any_link(self.stream) }?;
+            if is_false { outline.any_cable(self.stream) } else { outline.any_link(self.stream) }?;
         // A link of a ring that is open is a ring that is open.
-        if !is_false && ground.tree.is_on_ring(link) {
+        if !is_false && outline.tree.is_on_ring(link) {
             return None;
         }
         let one_way = self.stream.chance(if is_false { 0.3 } else { 0.1 });
@@ -185,7 +185,7 @@ impl Drawer<'_, '_> {
     }
 
     fn flapping(&mut self) -> Option<Drawn> {
-        let link = self.offer.ground.any_link(self.stream)?;
+        let link = self.offer.outline.any_link(self.stream)?;
         let entry = self
             .entry()
             .at(self.both(link))
@@ -196,7 +196,7 @@ impl Drawer<'_, '_> {
     }
 
     fn ring(&mut self) -> Option<Drawn> {
-        let tree = self.offer.ground.tree;
+        let tree = self.offer.outline.tree;
         let on_ring: Vec<usize> =
             (0..tree.links().len()).filter(|link| tree.is_on_ring(*link)).collect();
         let link = *self.stream.pick(&on_ring)?;
@@ -206,7 +206,7 @@ impl Drawer<'_, '_> {
     }
 
     fn early(&mut self) -> Option<Drawn> {
-        let link = self.offer.ground.any_cable(self.stream)?;
+        let link = self.offer.outline.any_cable(self.stream)?;
         let entry = self
             .entry()
             .at(self.both(link))
@@ -230,10 +230,10 @@ impl Drawer<'_, '_> {
     }
 
     fn noise(&mut self) -> Option<Drawn> {
-        let ground = self.offer.ground;
+        let outline = self.offer.outline;
         let is_cable = matches!(self.name, CableDegraded | EmcNoise);
         let link =
-            if is_cable { ground.any_cable(self.stream) } else { ground.any_link(self.stream) }?;
+            if is_cable { outline.any_cable(self.stream) } else { outline.any_link(self.stream) }?;
         let is_whole = is_cable && self.stream.chance(0.5);
         let at = if is_whole { self.both(link) } else { self.one(link) };
         // The transmitter and the receiver of the card are parts of it: that is `nic-damaged`.
@@ -249,7 +249,7 @@ impl Drawer<'_, '_> {
         if self.name == EmcNoise {
             let mut places = vec![at];
             for _ in 0..self.stream.below(3) {
-                let other = ground.any_cable(self.stream)?;
+                let other = outline.any_cable(self.stream)?;
                 let place = self.both(other);
                 let is_new = |known: &String| !known.contains(&place) && other != link;
                 if places.iter().all(is_new) {
@@ -270,7 +270,7 @@ impl Drawer<'_, '_> {
 
     fn card(&mut self) -> Option<Drawn> {
         let part = self.word(&["receiver", "transmitter"]);
-        let link = self.offer.ground.tree.link_at(End::MainDevice(Path::A))?;
+        let link = self.offer.outline.tree.link_at(End::MainDevice(Path::A))?;
         let entry = self.entry().at("maindevice").with("part", part);
         let drawn = self.hits(entry, 20.0, 3_000.0);
         Some(Self::at_link(drawn, link))
@@ -419,12 +419,12 @@ impl Drawer<'_, '_> {
     }
 
     fn id(&self, device: &SegmentDevice) -> Option<DeviceId> {
-        let at = self.offer.ground.names.iter().position(|name| *name == device.name)?;
+        let at = self.offer.outline.names.iter().position(|name| *name == device.name)?;
         Some(DeviceId(at as u32))
     }
 
     fn device(&self, id: DeviceId) -> Option<SegmentDevice> {
-        let name = self.offer.ground.names.get(id.index())?;
+        let name = self.offer.outline.names.get(id.index())?;
         self.offer.file.devices.iter().find(|device| device.name == *name).cloned()
     }
 }

@@ -1,8 +1,9 @@
-//! How often a fault has acted: what the truth log says of it, less what no observer could ever see.
+//! Number of effects of a fault: what the truth log says of it, less what no observer could ever
+//! see.
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::topology::End;
-use linesman_sim::device::Trouble;
+use linesman_sim::device::SoftwareFault;
 use linesman_sim::truth::{Effect, Entry, FaultRecord, Place};
 
 use crate::lab::Lab;
@@ -50,7 +51,9 @@ fn is_traceless(lab: &Lab, record: &FaultRecord) -> bool {
             (Effect::SymbolError, Place::Direction(_, End::MainDevice(_))) => true,
             (
                 Effect::Misbehaves(
-                    Trouble::Mismatch(_) | Trouble::FrozenApplication | Trouble::DeafToRequests,
+                    SoftwareFault::Mismatch(_)
+                    | SoftwareFault::FrozenApplication
+                    | SoftwareFault::DeafToRequests,
                 ),
                 Place::Device(id),
             ) => record.is_active() && is_up(*id),

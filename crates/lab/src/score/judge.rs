@@ -3,7 +3,7 @@
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, Severity};
 use linesman_proto::time::{Instant, Span};
 
-use crate::verdict::judge::{Company, may_be_common};
+use crate::verdict::judge::{FaultContext, may_be_common};
 use crate::verdict::{Claim, Grade, Match, Naming, Scene, Truth, matches};
 
 /// What was said of a fault.
@@ -39,10 +39,10 @@ pub fn judge(
     truth: &Truth,
     all: &[Truth],
     scene: &Scene<'_>,
-    (company, among): (Company, usize),
+    (context, among): (FaultContext, usize),
     naming: Naming<'_>,
 ) -> Judged {
-    let began = company.began.unwrap_or(Instant::ZERO);
+    let began = context.began.unwrap_or(Instant::ZERO);
     let of_its_time: Vec<&FindingReport> = diagnosis
         .findings
         .iter()
@@ -51,7 +51,7 @@ pub fn judge(
     let first = || of_its_time.iter().take(among).copied();
     // Two faults that began together may look like one source: then one of them hangs beneath.
     let beneath = first()
-        .filter(|finding| company.is_shared && may_be_common(finding.cause))
+        .filter(|finding| context.is_shared && may_be_common(finding.cause))
         .flat_map(|finding| &finding.consequences);
     let graded = first().chain(beneath).map(|finding| {
         let fits = matches(truth, scene, claim(finding, naming));

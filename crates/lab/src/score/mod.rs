@@ -19,15 +19,15 @@ pub mod listen;
 pub mod perturb;
 pub mod play;
 pub mod rate;
+mod recorder;
 pub mod report;
 pub mod tally;
-mod tape;
 mod trace;
 
 pub use case::{CaseKind, ScoreOptions};
 pub use perturb::Perturbation;
 pub use play::{CaseReport, FaultOutcome, run_case};
 pub use rate::Rate;
+pub use recorder::RecordedFrame;
 pub use report::ScoreReport;
 pub use tally::Tally;
-pub use tape::TapedFrame;

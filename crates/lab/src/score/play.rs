@@ -15,20 +15,20 @@ use linesman_sim::segment_file::{FaultEntry, Value};
 use linesman_sim::truth::{FaultId, TruthLog};
 
 use super::baseline;
-use super::built_in::{Stop, around_extra, with_built_in};
+use super::built_in::{EarlyEnd, around_extra, with_built_in};
 use super::case::{Case, CaseKind, ScoreOptions};
 use super::disturb::disturb;
 use super::draw::{Drawn, Ends, Offer, When, draw};
 use super::effect::effects;
 use super::judge::{Judged, alarms, claim, judge};
 use super::listen::{HealthyListened, Heard, Listeners};
-use super::tape::{Tape, take_down, take_down_host};
-use crate::choice::{Ground, are_apart, text};
+use super::recorder::{SharedRecording, take_down, take_down_host};
+use crate::choice::{LineOutline, are_apart, text};
 use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 use crate::swarm::run::cabled;
-use crate::verdict::judge::Company;
+use crate::verdict::judge::FaultContext;
 use crate::verdict::{Grade, Scene, Truth, TruthPlace, matches};
 
 /// How long the bring-up may take.
@@ -116,11 +116,11 @@ pub fn run_case(seed: u64, options: &ScoreOptions) -> CaseReport {
         let case = Case::draw(seed, attempt, options);
         match Play::new(&case, options).and_then(Play::play) {
             Ok(report) => return report,
-            Err(Stop::NoPlace) => {
+            Err(EarlyEnd::NoPlace) => {
                 let names: Vec<&str> = case.faults.iter().map(|name| name.name()).collect();
                 why = format!("no place for {} in any plant", names.join(" and "));
             }
-            Err(Stop::Failed(error)) => {
+            Err(EarlyEnd::Failed(error)) => {
                 why = error;
                 break;
             }
@@ -135,10 +135,10 @@ pub fn run_case(seed: u64, options: &ScoreOptions) -> CaseReport {
 pub(super) fn play_taped(
     case: &Case,
     options: &ScoreOptions,
-    tape: &Tape,
-) -> Result<(CaseReport, TruthLog, Option<Project>), Stop> {
+    shared_recording: &SharedRecording,
+) -> Result<(CaseReport, TruthLog, Option<Project>), EarlyEnd> {
     let mut play = Play::new(case, options)?;
-    let reader = Arc::clone(tape);
+    let reader = Arc::clone(shared_recording);
     play.lab.set_recorder(Box::new(move |seen| take_down(&reader, seen)));
     let report = play.run_all()?;
     let project = play.has_project.then(|| play.lab.project().clone());
@@ -183,7 +183,7 @@ pub(super) struct Play<'a> {
     stream: Stream,
     pub(super) lab: Lab,
     /// What listeners hear, beside a MainDevice with the habits of others.
-    pub(super) tape: Option<Tape>,
+    pub(super) shared_recording: Option<SharedRecording>,
     /// Since when the line has been up, or broken from the start.
     pub(super) up: Instant,
     /// What reads the recording.
@@ -197,7 +197,7 @@ pub(super) struct Play<'a> {
 }
 
 impl<'a> Play<'a> {
-    fn new(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, Stop> {
+    fn new(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, EarlyEnd> {
         let mut stream = case.seed.stream("score faults");
         let (file, built_in) = with_built_in(case, &mut stream)?;
         let lab_options = LabOptions {
@@ -210,7 +210,7 @@ impl<'a> Play<'a> {
             ..LabOptions::default()
         };
         // What cannot be built so is no case.
-        let mut lab = Lab::new(&file, lab_options).map_err(|_| Stop::NoPlace)?;
+        let mut lab = Lab::new(&file, lab_options).map_err(|_| EarlyEnd::NoPlace)?;
         let has_project = !built_in.is_empty();
         let setup = Setup {
             project: has_project.then(|| lab.project().clone()),
@@ -222,11 +222,11 @@ impl<'a> Play<'a> {
         }
         let recording = Arc::new(Mutex::new(Engine::new(setup)));
         let reader = Arc::clone(&recording);
-        let tape = (options.habit != Habit::Own).then(Tape::default);
-        if let Some(tape) = tape.clone() {
-            lab.set_host_tap(Box::new(move |seen| take_down_host(&tape, seen)));
+        let shared_recording = (options.habit != Habit::Own).then(SharedRecording::default);
+        if let Some(shared_recording) = shared_recording.clone() {
+            lab.set_host_tap(Box::new(move |seen| take_down_host(&shared_recording, seen)));
         }
-        let heard = tape.clone();
+        let heard = shared_recording.clone();
         lab.set_recorder(Box::new(move |seen| {
             if let Some(heard) = &heard {
                 take_down(heard, seen);
@@ -241,7 +241,7 @@ impl<'a> Play<'a> {
             options,
             stream,
             lab,
-            tape,
+            shared_recording,
             up,
             recording,
             built_in,
@@ -250,13 +250,13 @@ impl<'a> Play<'a> {
         })
     }
 
-    fn play(mut self) -> Result<CaseReport, Stop> {
+    fn play(mut self) -> Result<CaseReport, EarlyEnd> {
         self.run_all()
     }
 
     /// A line that has been up for a while, and on which all is well.
     #[cfg(test)]
-    pub(super) fn calm(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, Stop> {
+    pub(super) fn calm(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, EarlyEnd> {
         let mut play = Self::new(case, options)?;
         play.lab.wait_up(BRING_UP)?;
         play.up = play.lab.now();
@@ -264,7 +264,7 @@ impl<'a> Play<'a> {
         Ok(play)
     }
 
-    fn run_all(&mut self) -> Result<CaseReport, Stop> {
+    fn run_all(&mut self) -> Result<CaseReport, EarlyEnd> {
         let mut report = empty(self.case, self.lab.tree().len());
         report.project = self.options.keeps_heard.then(|| self.lab.project().to_toml());
         let mut active: Vec<Active> = Vec::new();
@@ -311,10 +311,10 @@ impl<'a> Play<'a> {
     }
 
     /// Puts the faults in, one a while after the other.
-    fn break_line(&mut self, active: &mut Vec<Active>) -> Result<(), Stop> {
+    fn break_line(&mut self, active: &mut Vec<Active>) -> Result<(), EarlyEnd> {
         let beside = self.options.perturb.and_then(|perturb| perturb.beside(&mut self.stream));
         if let Some(entry) = beside {
-            self.lab.inject(&entry).map_err(|_| Stop::NoPlace)?;
+            self.lab.inject(&entry).map_err(|_| EarlyEnd::NoPlace)?;
             self.beside = 1;
         }
         for name in self.case.faults.clone() {
@@ -336,7 +336,7 @@ impl<'a> Play<'a> {
                 entry = entry.from_to(ms(from), Some(ms(until)));
             }
             // What chance has put together wrongly is no case.
-            let id = self.lab.inject(&entry).map_err(|_| Stop::NoPlace)?;
+            let id = self.lab.inject(&entry).map_err(|_| EarlyEnd::NoPlace)?;
             active.push(Active { id, drawn, until });
             if self.case.kind == CaseKind::Double && self.stream.chance(0.5) {
                 let pause = Span::us(self.stream.between(0, 1_500_000));
@@ -346,11 +346,11 @@ impl<'a> Play<'a> {
         Ok(())
     }
 
-    fn draw(&mut self, name: FaultName, active: &[Active]) -> Result<Drawn, Stop> {
+    fn draw(&mut self, name: FaultName, active: &[Active]) -> Result<Drawn, EarlyEnd> {
         let segment = self.lab.segment();
         let names: Vec<String> = segment.devices().map(|id| segment.name(id).to_owned()).collect();
         let cabled = cabled(segment);
-        let ground = Ground { tree: segment.tree(), names: &names, cabled: &cabled };
+        let outline = LineOutline { tree: segment.tree(), names: &names, cabled: &cabled };
         let plan = self.lab.plan();
         let clocked: Vec<DeviceId> = plan
             .into_iter()
@@ -360,7 +360,7 @@ impl<'a> Play<'a> {
             .collect();
         let reference = plan.and_then(|plan| plan.reference_clock()).map(|id| self.lab.of_plan(id));
         let offer = Offer {
-            ground: &ground,
+            outline: &outline,
             file: &self.case.file,
             clocked: &clocked,
             reference,
@@ -370,17 +370,17 @@ impl<'a> Play<'a> {
             let drawn = draw(name, &offer, &mut self.stream);
             // One of two faults must not hide the other.
             let fits = |drawn: &Drawn| {
-                active.iter().all(|one| are_apart(ground.tree, &one.drawn.choice, &drawn.choice))
+                active.iter().all(|one| are_apart(outline.tree, &one.drawn.choice, &drawn.choice))
             };
             if let Some(drawn) = drawn.filter(fits) {
                 return Ok(drawn);
             }
         }
-        Err(Stop::NoPlace)
+        Err(EarlyEnd::NoPlace)
     }
 
     /// Lets the faults act, end, and be seen.
-    fn wait(&mut self, active: &mut [Active]) -> Result<(), Stop> {
+    fn wait(&mut self, active: &mut [Active]) -> Result<(), EarlyEnd> {
         let mut order: Vec<usize> = (0..active.len()).collect();
         order.sort_by_key(|index| active[*index].until);
         for index in order {
@@ -512,8 +512,8 @@ impl<'a> Play<'a> {
         let answered_again = self.lab.reached().len() >= tree.len();
         let host_counters = self.case.host_counters;
         let scene = Scene { tree, host_counters, answered_again };
-        let company = Company::of(self.lab.truth(), record);
-        let when = (company, self.case.faults.len().max(1) + self.beside);
+        let context = FaultContext::of(self.lab.truth(), record);
+        let when = (context, self.case.faults.len().max(1) + self.beside);
         let cycle = self.case.cycle.as_nanos().max(1);
         let cycles = first.place.map(|after| after.as_nanos().div_ceil(cycle));
         let live = self.options.judges_live().then(|| Judged {

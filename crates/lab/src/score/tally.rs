@@ -1,4 +1,4 @@
-//! Adding up cases, in the order of their seeds.
+//! Tally of cases, in the order of their seeds.
 
 use std::collections::BTreeMap;
 
@@ -172,10 +172,10 @@ impl Tally {
             self.unplayable.push(format!("seed {}: {why}", case.seed));
         }
         if let Some((live, capture)) = &case.healthy {
-            let shown = if self.options.judges_live() { live } else { capture };
-            self.healthy.add(shown.is_empty());
+            let visibility = if self.options.judges_live() { live } else { capture };
+            self.healthy.add(visibility.is_empty());
             self.healthy_capture.add(capture.is_empty());
-            for alarm in shown {
+            for alarm in visibility {
                 self.alarms.push(format!("seed {}: {alarm}", case.seed));
             }
         }

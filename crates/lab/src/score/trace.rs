@@ -10,7 +10,7 @@ use linesman_proto::frame::{Datagram, FrameView};
 use linesman_proto::register::table;
 use linesman_proto::time::{Instant, Span};
 
-use super::tape::TapedFrame;
+use super::recorder::RecordedFrame;
 use crate::soem;
 
 /// A sign of trouble.
@@ -65,13 +65,17 @@ const PAUSE: (u64, Span) = (5, Span::ms(20));
 const LATE: Span = Span::us(150);
 
 /// Looks through the frames of an excerpt; `whole` is the recording from which it was taken.
-pub(super) fn find(whole: &[TapedFrame], left: &[TapedFrame], snap: Option<usize>) -> Vec<Trace> {
+pub(super) fn find(
+    whole: &[RecordedFrame],
+    left: &[RecordedFrame],
+    snap: Option<usize>,
+) -> Vec<Trace> {
     let best = best_counters(whole);
     // In a ring nobody touches the copies of card B, and each copy has a part of the working counter.
-    let touched = |frame: &&TapedFrame| {
+    let touched = |frame: &&RecordedFrame| {
         FrameView::parse(&frame.bytes).is_ok_and(|view| view.source().is_marked())
     };
-    let is_copy = |frame: &TapedFrame| !frame.is_sent && !is_companion(frame);
+    let is_copy = |frame: &RecordedFrame| !frame.is_sent && !is_companion(frame);
     let is_ring = whole.iter().any(|frame| is_copy(frame) && !touched(&frame));
     let mut seen = Seen { is_ring, ..Seen::default() };
     for frame in left.iter().filter(|frame| is_copy(frame)).filter(touched) {
@@ -90,13 +94,13 @@ pub(super) fn find(whole: &[TapedFrame], left: &[TapedFrame], snap: Option<usize
 /// Looks through what a listener has heard of a line. From the start it hears the bring-up; one that joins later
 /// meets what was set up before, and a line that it does not know at its best: `whole` is all that was to be heard.
 pub(super) fn heard(
-    whole: &[TapedFrame],
-    heard: &[TapedFrame],
+    whole: &[RecordedFrame],
+    heard: &[RecordedFrame],
     cycle: Span,
     from_start: bool,
 ) -> Vec<Trace> {
     let mut traces = find(whole, heard, None);
-    let mut seen = AsUsual::new(whole, cycle, from_start);
+    let mut seen = NormalTraffic::new(whole, cycle, from_start);
     for frame in heard.iter().filter(|frame| !is_companion(frame)) {
         seen.take(frame, &mut traces);
     }
@@ -106,7 +110,7 @@ pub(super) fn heard(
 }
 
 /// What comes back of a line, held against how it is while all is well.
-struct AsUsual {
+struct NormalTraffic {
     cycle: Span,
     /// The highest working counter of each datagram that is for all or for a logical address.
     best: BTreeMap<Key, u16>,
@@ -127,8 +131,8 @@ struct AsUsual {
     first_copies: BTreeMap<(u8, Key), (Instant, u16)>,
 }
 
-impl AsUsual {
-    fn new(whole: &[TapedFrame], cycle: Span, from_start: bool) -> Self {
+impl NormalTraffic {
+    fn new(whole: &[RecordedFrame], cycle: Span, from_start: bool) -> Self {
         let mut usual = Self {
             cycle,
             best: BTreeMap::new(),
@@ -159,7 +163,7 @@ impl AsUsual {
         usual
     }
 
-    fn learn(&mut self, frame: &TapedFrame) {
+    fn learn(&mut self, frame: &RecordedFrame) {
         let Ok(view) = FrameView::parse(&frame.bytes) else { return };
         if let Some(trip) = self.round_trip_of(frame, &view) {
             self.round_trip = Some(self.round_trip.map_or(trip, |known| known.min(trip)));
@@ -199,7 +203,7 @@ impl AsUsual {
     }
 
     /// How long process data were under way, when they come back. In a ring they come back to the other card.
-    fn round_trip_of(&mut self, frame: &TapedFrame, view: &FrameView<'_>) -> Option<Span> {
+    fn round_trip_of(&mut self, frame: &RecordedFrame, view: &FrameView<'_>) -> Option<Span> {
         let first = view.datagrams().next()?.ok()?.index();
         data_of(view).filter(|_| !self.is_ring)?;
         let key = (frame.path, first);
@@ -210,7 +214,7 @@ impl AsUsual {
         self.out.remove(&key).map(|left| frame.time.since(left))
     }
 
-    fn take(&mut self, frame: &TapedFrame, traces: &mut Vec<Trace>) {
+    fn take(&mut self, frame: &RecordedFrame, traces: &mut Vec<Trace>) {
         let Ok(view) = FrameView::parse(&frame.bytes) else { return };
         let data = data_of(&view);
         let tenth = Span::ns(self.cycle.as_nanos() / 10).max(LATE);
@@ -277,7 +281,7 @@ fn data_of(view: &FrameView<'_>) -> Option<u32> {
 }
 
 /// Whether a frame is what SOEM's second card sends beside one of the first.
-fn is_companion(frame: &TapedFrame) -> bool {
+fn is_companion(frame: &RecordedFrame) -> bool {
     FrameView::parse(&frame.bytes).is_ok_and(|view| soem::is_companion(&view))
 }
 
@@ -311,7 +315,7 @@ fn state_read(datagram: &Datagram<'_>) -> Option<(u16, u8)> {
 type Key = (u8, u32, usize);
 
 /// The highest working counter of each logical datagram in the whole recording.
-fn best_counters(whole: &[TapedFrame]) -> BTreeMap<Key, u16> {
+fn best_counters(whole: &[RecordedFrame]) -> BTreeMap<Key, u16> {
     let mut best = BTreeMap::new();
     for frame in whole.iter().filter(|frame| !frame.is_sent) {
         let Ok(view) = FrameView::parse(&frame.bytes) else { continue };
@@ -406,8 +410,8 @@ impl Seen {
     }
 
     /// Requests that later ones overtook: returns come in the order of requests.
-    fn lost(&mut self, left: &[TapedFrame]) {
-        let key = |frame: &TapedFrame| {
+    fn lost(&mut self, left: &[RecordedFrame]) {
+        let key = |frame: &RecordedFrame| {
             let view = FrameView::parse(&frame.bytes).ok()?;
             let first = view.datagrams().next()?.ok()?;
             // A frame that is too short for the wire comes back longer than it was handed to the card.

@@ -57,7 +57,7 @@ struct Buffer {
 
 /// What the engine and its procedures share.
 #[derive(Default)]
-struct Board {
+struct BusState {
     now: Instant,
     /// When the first of those who wait is to be asked again.
     next: Option<Instant>,
@@ -69,14 +69,14 @@ struct Board {
 
 /// The way of procedures to the line.
 #[derive(Clone, Default)]
-pub(super) struct Bus(Arc<Mutex<Board>>);
+pub(super) struct Bus(Arc<Mutex<BusState>>);
 
 impl Bus {
     pub(super) fn new(now: Instant, ring: bool) -> Self {
-        Self(Arc::new(Mutex::new(Board { now, ring, ..Board::default() })))
+        Self(Arc::new(Mutex::new(BusState { now, ring, ..BusState::default() })))
     }
 
-    fn lock(&self) -> MutexGuard<'_, Board> {
+    fn lock(&self) -> MutexGuard<'_, BusState> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -125,7 +125,7 @@ impl Bus {
     }
 
     /// Waits for something, at most until then; says whether it has come about.
-    async fn until(&self, end: Instant, done: impl Fn(&Board) -> bool) -> bool {
+    async fn until(&self, end: Instant, done: impl Fn(&BusState) -> bool) -> bool {
         poll_fn(|_| {
             let mut board = self.lock();
             if done(&board) {
@@ -226,8 +226,9 @@ impl Bus {
     async fn wait(&self, index: usize, timeout: Span) -> bool {
         let end = self.now() + timeout;
         let wanted = if self.lock().ring { 2 } else { 1 };
-        let all =
-            |board: &Board| board.buffers[index].returned.iter().take(wanted).all(Option::is_some);
+        let all = |board: &BusState| {
+            board.buffers[index].returned.iter().take(wanted).all(Option::is_some)
+        };
         self.until(end, all).await;
         if wanted == 1 {
             return self.lock().buffers[index].returned[0].is_some();

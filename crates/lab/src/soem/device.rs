@@ -1,4 +1,4 @@
-//! What SOEM knows of a SubDevice.
+//! Knowledge that SOEM has of a SubDevice.
 
 use linesman_config::plan::ClockSettings;
 use linesman_config::start_up::StartUpCommand;

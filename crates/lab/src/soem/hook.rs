@@ -1,5 +1,5 @@
-//! What a program that uses SOEM does to a SubDevice between PREOP and SAFEOP (`PO2SOconfig`): its start-up commands,
-//! and SYNC0.
+//! Hook of a program that uses SOEM between PREOP and SAFEOP (`PO2SOconfig`): its start-up
+//! commands, and SYNC0.
 
 use linesman_config::plan::ClockSettings;
 use linesman_config::start_up::{StartUpAction, Transition};

@@ -1,10 +1,11 @@
-//! What the program is told to do while it runs: registers and objects that a person looks at, states, and to stop.
+//! Orders to the program while it runs: registers and objects that a person looks at, states, and
+//! to stop.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use linesman_maindevice::mailbox::{Errand, MailboxFailure, Step, Why};
+use linesman_maindevice::mailbox::{MailboxFailure, MailboxOperation, Step, Why};
 use linesman_maindevice::{Event, ExchangeError, ProbeRequest, Request};
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
@@ -32,7 +33,7 @@ pub(crate) enum Order {
 }
 
 #[derive(Default)]
-struct Book {
+struct OrderQueue {
     given: VecDeque<Order>,
     events: VecDeque<Event>,
     held: BTreeSet<usize>,
@@ -40,10 +41,10 @@ struct Book {
 
 /// Orders and what came of them.
 #[derive(Clone, Default)]
-pub(super) struct Orders(Arc<Mutex<Book>>);
+pub(super) struct Orders(Arc<Mutex<OrderQueue>>);
 
 impl Orders {
-    fn lock(&self) -> MutexGuard<'_, Book> {
+    fn lock(&self) -> MutexGuard<'_, OrderQueue> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -98,7 +99,7 @@ impl Orders {
         };
         let failure = || MailboxFailure {
             id,
-            errand: Errand::Read { object, complete: false },
+            operation: MailboxOperation::Read { object, complete: false },
             step: Step::Request,
             why: Why::NoAnswer { patience: PATIENCE, rubbish: None },
         };

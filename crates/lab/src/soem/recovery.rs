@@ -1,5 +1,6 @@
-//! What SOEM's `simple_test` does about SubDevices that have left OP (`ecatcheck`): a look at the states of all; an
-//! error is acknowledged, SAFEOP becomes OP, who is below is set up anew, who is lost is looked for by its place.
+//! Recovery of SubDevices that have left OP, as SOEM's `simple_test` does it (`ecatcheck`): a look
+//! at the states of all; an error is acknowledged, SAFEOP becomes OP, who is below is set up anew,
+//! who is lost is looked for by its place.
 
 use linesman_maindevice::Target;
 use linesman_proto::address::{RegisterAddress, StationAddress};

@@ -30,14 +30,14 @@
 //! SubDevices have reached the target state; `at` waits for a time, the other steps happen where
 //! they stand.
 
-pub mod ground;
+pub mod assertion;
 pub mod object;
 pub mod parse;
 pub mod run;
+mod segment_probe;
 pub mod step;
-mod witness;
 
-pub use ground::Ground;
-pub use parse::{Front, SegmentText, Story, StoryError};
+pub use assertion::Assertion;
+pub use parse::{FrontMatter, SegmentText, Story, StoryError};
 pub use run::{StepReport, StoryReport, exit_status, play};
 pub use step::{Expectation, Heal, Step, StepAt, What};

@@ -1,4 +1,4 @@
-//! What a story expects of an object that is read through a mailbox.
+//! Expectation of a story on an object that is read through a mailbox.
 //!
 //! ```text
 //! expect object NAME 0x1018:1 = 0x00000002
@@ -11,7 +11,7 @@ use linesman_maindevice::mailbox::Why;
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 
-use super::ground::{Amount, amount, value};
+use super::assertion::{Amount, amount, value};
 use super::step::Words;
 use crate::lab::Lab;
 

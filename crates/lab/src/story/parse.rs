@@ -10,7 +10,7 @@ use crate::habit::Habit;
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Story {
     /// What stands above it.
-    pub front: Front,
+    pub front: FrontMatter,
     /// The line it happens on.
     pub segment: SegmentText,
     /// What the MainDevice is told beyond who is where: tables of a project file.
@@ -21,7 +21,7 @@ pub struct Story {
 
 /// The front matter of a story: `key: value` lines between two lines of `---`.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Front {
+pub struct FrontMatter {
     /// What it is about, in one sentence.
     pub title: String,
     /// The requirement rows it proves, as test annotations write them.
@@ -44,7 +44,7 @@ pub struct Front {
     pub segment: Option<String>,
 }
 
-impl Default for Front {
+impl Default for FrontMatter {
     fn default() -> Self {
         Self {
             title: String::new(),
@@ -151,8 +151,10 @@ fn fenced<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>) -> String {
     inside.map(|(_, line)| format!("{line}\n")).collect()
 }
 
-fn front<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>) -> Result<Front, StoryError> {
-    let mut front = Front::default();
+fn front<'a>(
+    lines: &mut impl Iterator<Item = (usize, &'a str)>,
+) -> Result<FrontMatter, StoryError> {
+    let mut front = FrontMatter::default();
     if lines.next().is_none_or(|(_, line)| line.trim() != "---") {
         return Err(StoryError::Whole("a story begins with `---`, `title: …`, `---`"));
     }
@@ -171,7 +173,7 @@ fn front<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>) -> Result<Front
     Err(StoryError::Whole("the front matter does not end: a second line of `---` is missing"))
 }
 
-fn entry(front: &mut Front, text: &str) -> Result<(), String> {
+fn entry(front: &mut FrontMatter, text: &str) -> Result<(), String> {
     let (key, value) =
         text.split_once(':').ok_or_else(|| format!("`{text}` is no `key: value`"))?;
     let value = value.trim();

@@ -13,11 +13,11 @@ use linesman_sim::segment_file::{DescriptionFiles, FaultEntry, SegmentFile};
 use linesman_sim::truth::{FaultId, FaultRecord};
 
 use super::parse::{SegmentText, Story};
+use super::segment_probe::SegmentProbe;
 use super::step::{Expectation, Heal, Step, StepAt, What, Written};
-use super::witness::Witness;
 use crate::lab::Lab;
 use crate::options::LabOptions;
-use crate::verdict::judge::{Company, best_finding};
+use crate::verdict::judge::{FaultContext, best_finding};
 use crate::verdict::{Claim, Scene, Site};
 
 /// How long a line may take to be brought up.
@@ -132,25 +132,25 @@ fn try_play(
         ..LabOptions::default()
     };
     let mut lab = Lab::with_project(&file, project, options).map_err(|error| error.to_string())?;
-    let (witness, tap) = Witness::new();
+    let (segment_probe, tap) = SegmentProbe::new();
     lab.set_tap(tap);
-    let mut stage = Stage { lab, start: Instant::ZERO, faults: Vec::new(), witness };
+    let mut story_run = StoryRun { lab, start: Instant::ZERO, faults: Vec::new(), segment_probe };
     // A line that does not come up is for the steps to judge: it may be what the story is about.
-    stage.bring_up()?;
-    stage.start = stage.lab.now();
-    stage.witness.mark(&stage.lab);
-    report.up_in = stage.start.since(Instant::ZERO);
+    story_run.bring_up()?;
+    story_run.start = story_run.lab.now();
+    story_run.segment_probe.mark(&story_run.lab);
+    report.up_in = story_run.start.since(Instant::ZERO);
     for step in &story.steps {
-        let failure = stage.step(step).err();
+        let failure = story_run.step(step).err();
         let failed = failure.is_some();
-        let at = stage.lab.now().since(stage.start);
+        let at = story_run.lab.now().since(story_run.start);
         report.steps.push(StepReport { line: step.line, text: step.text.clone(), at, failure });
         if failed {
             break;
         }
     }
-    report.diagnosis = Some(stage.lab.diagnosis());
-    let unexplained = stage.lab.audit();
+    report.diagnosis = Some(story_run.lab.diagnosis());
+    let unexplained = story_run.lab.audit();
     if unexplained.is_empty() {
         Ok(())
     } else {
@@ -158,14 +158,14 @@ fn try_play(
     }
 }
 
-struct Stage {
+struct StoryRun {
     lab: Lab,
     start: Instant,
     faults: Vec<FaultId>,
-    witness: Witness,
+    segment_probe: SegmentProbe,
 }
 
-impl Stage {
+impl StoryRun {
     /// Waits until the line is up, or nothing has come of it for a while.
     fn bring_up(&mut self) -> Result<(), String> {
         let mut best = (usize::MAX, self.lab.now());
@@ -194,14 +194,14 @@ impl Stage {
                     let end = self.lab.now() + *lasts;
                     entry.to_ms = Some(end.as_nanos() as f64 / 1e6);
                 }
-                self.witness.mark(&self.lab);
+                self.segment_probe.mark(&self.lab);
                 let id = self.lab.inject(&entry).map_err(|error| error.to_string())?;
                 self.faults.push(id);
                 Ok(())
             }
             Step::Heal(heal) => self.heal(*heal),
             Step::Unplug(device) => {
-                self.witness.mark(&self.lab);
+                self.segment_probe.mark(&self.lab);
                 let faults = self.lab.unplug(device).map_err(|error| error.to_string())?;
                 self.faults.extend(faults);
                 Ok(())
@@ -220,8 +220,8 @@ impl Stage {
         address: RegisterAddress,
         value: &Written,
     ) -> Result<(), String> {
-        let known = |stage: &Self, name: &str| {
-            let id = stage.device(name);
+        let known = |story_run: &Self, name: &str| {
+            let id = story_run.device(name);
             id.ok_or_else(|| format!("no SubDevice of this line is called `{name}`"))
         };
         let bytes = match value {
@@ -257,8 +257,8 @@ impl Stage {
     }
 
     fn expect(&mut self, what: &Expectation, within: Span) -> Result<(), String> {
-        if let Expectation::Ground(ground) = what {
-            self.witness.names(&self.lab, ground);
+        if let Expectation::Assertion(assertion) = what {
+            self.segment_probe.names(&self.lab, assertion);
         }
         if let Expectation::Object(reading) = what {
             let id = self.device(&reading.device);
@@ -269,9 +269,9 @@ impl Stage {
         let what = self.resolve(what)?;
         let held = self
             .lab
-            .run_while(within, LOOK, |lab| holds(&what, lab, &self.witness).is_ok())
+            .run_while(within, LOOK, |lab| holds(&what, lab, &self.segment_probe).is_ok())
             .map_err(|error| error.to_string())?;
-        if held { Ok(()) } else { holds(&what, &self.lab, &self.witness) }
+        if held { Ok(()) } else { holds(&what, &self.lab, &self.segment_probe) }
     }
 
     fn resolve<'a>(&self, what: &'a Expectation) -> Result<Resolved<'a>, String> {
@@ -333,7 +333,7 @@ struct Resolved<'a> {
 }
 
 /// Whether an expectation holds now; what is so instead if not.
-fn holds(resolved: &Resolved<'_>, lab: &Lab, witness: &Witness) -> Result<(), String> {
+fn holds(resolved: &Resolved<'_>, lab: &Lab, segment_probe: &SegmentProbe) -> Result<(), String> {
     let diagnosis = lab.diagnosis();
     let check = |held: bool, expected: &str| {
         if held { Ok(()) } else { Err(format!("expected {expected}\n{}", said(&diagnosis))) }
@@ -375,8 +375,8 @@ fn holds(resolved: &Resolved<'_>, lab: &Lab, witness: &Witness) -> Result<(), St
             let found = exit_status(&diagnosis);
             check(found == *status, &format!("exit status {status}, found {found}"))
         }
-        Expectation::Log { words, told } => witness.logged(words, *told, lab),
-        Expectation::Ground(ground) => witness.holds(ground, lab),
+        Expectation::Log { words, told } => segment_probe.logged(words, *told, lab),
+        Expectation::Assertion(assertion) => segment_probe.holds(assertion, lab),
         // Reading takes time of its own and is done before.
         Expectation::Object(_) => Ok(()),
     }
@@ -399,7 +399,7 @@ fn verdict(on: Option<FaultName>, lab: &Lab, diagnosis: &Diagnosis) -> Result<()
             let over = !fault.is_active();
             let scene = Scene { tree: lab.tree(), host_counters, answered_again };
             (over || !answered_again)
-                && best_finding(diagnosis, &truth, &scene, Company::of(log, fault))
+                && best_finding(diagnosis, &truth, &scene, FaultContext::of(log, fault))
                     .is_some_and(|(_, fits)| fits.is_right())
         });
         if !fits {

@@ -20,7 +20,7 @@
 //! [at TIME] expect exit N
 //! [at TIME] expect [no] log "WORDS"
 //! [at TIME] expect object …     what comes of reading an object: see `object`
-//! [at TIME] expect …            what is so on the segment: see `ground`
+//! [at TIME] expect …            what is so on the segment: see `assertion`
 //! ```
 //! `PLACE` is `K1.C-B3.A` (a link), `K1.C>B3.A` (one direction), `device K1`, `host` or `network`.
 //! `TIME` is a whole number of `us`, `ms` or `s`. Back-quotes are for the reader only.
@@ -30,7 +30,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::time::Span;
 
-use super::ground::{self, Ground};
+use super::assertion::{self, Assertion};
 use super::object::Reading;
 
 /// A step and where it stands.
@@ -152,7 +152,7 @@ pub enum Expectation {
         told: bool,
     },
     /// Something is so on the segment, whatever the diagnosis says.
-    Ground(Ground),
+    Assertion(Assertion),
     /// Something comes of reading an object.
     Object(Reading),
 }
@@ -229,14 +229,14 @@ fn inject(words: &mut Words<'_>) -> Result<Step, String> {
 }
 
 fn write(words: &mut Words<'_>) -> Result<Step, String> {
-    let (device, address) = ground::place(words)?;
+    let (device, address) = assertion::place(words)?;
     let value = match words.next() {
         "now" => Written::Now,
         "clock" => {
             words.expect("of")?;
             Written::ClockOf(words.next().to_owned())
         }
-        text => Written::Bytes(ground::value(text).ok_or_else(|| {
+        text => Written::Bytes(assertion::value(text).ok_or_else(|| {
             format!("`{text}` is no value: write `0x5A37`, `now` or `clock of K1`")
         })?),
     };
@@ -282,11 +282,11 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
         }
         "no" if words.take("other") => {
             words.expect("counter")?;
-            Expectation::Ground(Ground::NoOtherCounter)
+            Expectation::Assertion(Assertion::NoOtherCounter)
         }
         "no" if words.take("log") => Expectation::Log { words: quoted(words)?, told: false },
         "log" => Expectation::Log { words: quoted(words)?, told: true },
-        "no" if words.take("carrier") => Expectation::Ground(Ground::Carrier(false)),
+        "no" if words.take("carrier") => Expectation::Assertion(Assertion::Carrier(false)),
         "no" => {
             words.expect("finding")?;
             let what = words.next();
@@ -308,8 +308,8 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             Expectation::Exit(status.parse().map_err(|_| format!("`{status}` is no exit status"))?)
         }
         other => {
-            if let Some(ground) = Ground::parse(other, words)? {
-                return Ok(Step::Expect { what: Expectation::Ground(ground), within });
+            if let Some(assertion) = Assertion::parse(other, words)? {
+                return Ok(Step::Expect { what: Expectation::Assertion(assertion), within });
             }
             let count = other.parse().map_err(|_| {
                 format!(

@@ -15,10 +15,10 @@ use linesman_sim::truth::{Effect, Entry, FaultId, FaultRecord, Place};
 use super::counter::{Kind, Returned, expected};
 use super::reach::Reach;
 use super::run::{SwarmOptions, cabled};
-use crate::choice::{AT_RUN_TIME, Choice, Ground, are_apart};
+use crate::choice::{AT_RUN_TIME, Choice, LineOutline, are_apart};
 use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
-use crate::verdict::judge::{Company, best_finding, explains, is_left_open};
+use crate::verdict::judge::{FaultContext, best_finding, explains, is_left_open};
 use crate::verdict::{Claim, Match, Naming, Scene, Site, Truth};
 
 /// Slices of time between two checks.
@@ -116,10 +116,10 @@ impl<'a> Episode<'a> {
             .map(|n| segment.name(linesman_proto::address::DeviceId(n)).to_owned())
             .collect();
         let cabled = cabled(segment);
-        let ground = Ground { tree, names: &names, cabled: &cabled };
+        let outline = LineOutline { tree, names: &names, cabled: &cabled };
         let mut draw = || {
             let name = *stream.pick(&AT_RUN_TIME)?;
-            ground.choose(name, stream)
+            outline.choose(name, stream)
         };
         let mut choices: Vec<Choice> = draw().into_iter().collect();
         if let (Some(first), Some(second)) = (choices.first(), draw())
@@ -233,7 +233,7 @@ impl<'a> Episode<'a> {
         let diagnosis = self.lab.diagnosis();
         let Some(truth) = self.lab.truth_of(id) else { return outcome };
         if let Some((finding, graded)) =
-            best_finding(&diagnosis, &truth, &scene, Company::of(log, fault))
+            best_finding(&diagnosis, &truth, &scene, FaultContext::of(log, fault))
         {
             let site = Site::from(&finding.place);
             let text = format!("{} {} at {site}", finding.code, finding.cause);

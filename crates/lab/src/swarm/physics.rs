@@ -377,8 +377,8 @@ fn any_fault(kind: &Kind, file: &SegmentFile, stream: &mut Stream) -> FaultEntry
     let one = if stream.chance(0.5) { format!("{near}>{far}") } else { format!("{far}>{near}") };
     entry = match kind.place {
         PlaceRule::Link => entry.at(both),
-        PlaceRule::Lines | PlaceRule::ManyLines => entry.at(way),
-        PlaceRule::Line => entry.at(one),
+        PlaceRule::Directions | PlaceRule::ManyDirections => entry.at(way),
+        PlaceRule::Direction => entry.at(one),
         PlaceRule::Pair => {
             let other = file.devices.iter().find(|other| other.name != device.name);
             let pair = |other: &SegmentDevice| vec![device.name.clone(), other.name.clone()];

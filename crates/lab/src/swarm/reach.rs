@@ -1,4 +1,4 @@
-//! Who can be reached, told from the truth log alone: links without signal, devices without
+//! Reachability of SubDevices, told from the truth log alone: links without signal, devices without
 //! supply. It knows nothing of frames, and so checks what the walk and the MainDevice made of them.
 
 use std::collections::BTreeSet;

@@ -1,4 +1,5 @@
-//! What the evidence of a fault allows: the fault itself, and what looks the same on the wire.
+//! Verdicts that the evidence of a fault allows: the fault itself, and what looks the same on the
+//! wire.
 //!
 //! Each entry that is not the injected fault belongs to one of the [`sets`], which has the reason. What
 //! is here knows the cause and the wiring, nothing of any rule of the diagnosis.

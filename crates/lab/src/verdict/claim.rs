@@ -1,4 +1,4 @@
-//! What a report claims, in the words that are held against the truth.
+//! Claims of a report, in the words that are compared with the truth.
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::{DirectionReport, EndReport, FindingReport, PlaceReport};

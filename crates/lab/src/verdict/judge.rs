@@ -44,14 +44,14 @@ pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
 
 /// When and in what company a fault acted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Company {
+pub struct FaultContext {
     /// When it began.
     pub began: Option<Instant>,
     /// Whether another began with it.
     pub is_shared: bool,
 }
 
-impl Company {
+impl FaultContext {
     /// Of a fault of the log.
     #[must_use]
     pub fn of(log: &TruthLog, fault: &FaultRecord) -> Self {
@@ -77,12 +77,12 @@ pub fn best_finding<'a>(
     diagnosis: &'a Diagnosis,
     truth: &Truth,
     scene: &Scene<'_>,
-    company: Company,
+    context: FaultContext,
 ) -> Option<(&'a FindingReport, Match)> {
-    let began = company.began.unwrap_or(Instant::ZERO).as_nanos();
+    let began = context.began.unwrap_or(Instant::ZERO).as_nanos();
     let of_its_time =
         |finding: &&FindingReport| finding.closed_ns.is_none_or(|closed| closed.0 >= began);
-    let is_common = |finding: &&FindingReport| company.is_shared && may_be_common(finding.cause);
+    let is_common = |finding: &&FindingReport| context.is_shared && may_be_common(finding.cause);
     let beneath = diagnosis.findings.iter().filter(is_common).flat_map(|f| &f.consequences);
     let all = diagnosis.findings.iter().chain(beneath);
     let graded = all.filter(of_its_time).map(|finding| {

@@ -1,4 +1,4 @@
-//! Holding a verdict against the truth.
+//! Comparison of a verdict with the truth.
 //!
 //! A verdict is right when it names what was injected. It is *admitted* when it names something
 //! that the same evidence allows: no reading on a live line tells a cut cable from a dead neighbour.

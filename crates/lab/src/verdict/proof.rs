@@ -3,7 +3,7 @@
 //! What the MainDevice sends and gets, and what its computer notices, is written down with its times; of
 //! a set all that must be the same. Two controls keep the proof from being empty: each fault must have
 //! acted by the truth log, and what it leaves must differ from a line on which nothing is wrong. What
-//! parts the causes ([`Parted`]) must part them here, too.
+//! parts the causes ([`Separation`]) must part them here, too.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,7 +13,7 @@ use linesman_proto::address::Path;
 use linesman_proto::time::Instant;
 use linesman_sim::segment_file::SegmentFile;
 
-use super::sets::{AdmittedSet, Parted, Play, Shown};
+use super::sets::{AdmittedSet, Play, Separation, Visibility};
 use crate::lab::Lab;
 use crate::options::{Begin, LabOptions};
 
@@ -109,16 +109,16 @@ pub struct Played {
 
 /// How a play is made other than the proof has it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Twist {
+pub struct ProofVariation {
     /// By this, if anything.
-    pub by: Option<Parted>,
+    pub by: Option<Separation>,
 }
 
 /// Plays a line with one cause of a set.
 ///
 /// # Errors
 /// What is wrong with the line or the fault, in words.
-pub fn play(set: &AdmittedSet, play: &Play, twist: Twist) -> Result<Played, String> {
+pub fn play(set: &AdmittedSet, play: &Play, variation: ProofVariation) -> Result<Played, String> {
     let mut until_ms = set.proof.until_ms;
     let mut text = LINE.to_owned();
     let (head, fault) = match play.file.strip_prefix(ALONE) {
@@ -144,12 +144,12 @@ pub fn play(set: &AdmittedSet, play: &Play, twist: Twist) -> Result<Played, Stri
         if play.file.contains("hits") && !play.file.contains("at_ms") {
             // All at once, one frame after the other: the rhythm is the same for all.
             text += &format!("to_ms = {BEGIN_MS}.001\n");
-        } else if twist.by == Some(Parted::ByHealing) {
+        } else if variation.by == Some(Separation::ByHealing) {
             text += &format!("to_ms = {until_ms}\n");
         }
         text += play.file;
     }
-    if twist.by == Some(Parted::ByHealing) {
+    if variation.by == Some(Separation::ByHealing) {
         until_ms += PARTED_MS;
     }
     let mut file = SegmentFile::parse(&text).map_err(|error| error.to_string())?;
@@ -157,16 +157,20 @@ pub fn play(set: &AdmittedSet, play: &Play, twist: Twist) -> Result<Played, Stri
         let known = file.devices.iter_mut().find(|known| known.name == name);
         known.ok_or_else(|| format!("{name} is not in the line"))?.serial = Some(serial);
     }
-    if twist.by == Some(Parted::ByAlias) {
+    if variation.by == Some(Separation::ByAlias) {
         let twins = file.devices.len() - 2;
         for (device, alias) in file.devices[twins..].iter_mut().zip(11..) {
             device.alias = Some(alias);
         }
     }
-    let shown = if twist.by == Some(Parted::ByHost) { Shown::All } else { set.proof.shown };
+    let visibility = if variation.by == Some(Separation::ByHost) {
+        Visibility::All
+    } else {
+        set.proof.visibility
+    };
     // Of whom nobody was ever seen the line is looked at when all has happened.
     let from_ms = if play.file.starts_with(ALONE) { LOOKED_AT_MS } else { 0 };
-    run(&file, shown, (from_ms, until_ms))
+    run(&file, visibility, (from_ms, until_ms))
 }
 
 /// What a line says that begins as [`OTHER`] does: who is not planned, who is, and his serial number.
@@ -177,10 +181,10 @@ fn other_device(line: &str) -> Option<(&str, &str, u32)> {
 
 fn run(
     file: &SegmentFile,
-    shown: Shown,
+    visibility: Visibility,
     (from_ms, until_ms): (u64, u64),
 ) -> Result<Played, String> {
-    let host_counters = shown == Shown::All;
+    let host_counters = visibility == Visibility::All;
     // The sets are about devices that nobody knows by number.
     let begin = if from_ms > 0 { Begin::Idle } else { Begin::Run };
     let options = LabOptions { host_counters, serials: false, begin, ..LabOptions::default() };
@@ -234,8 +238,8 @@ mod tests {
     use super::super::sets;
     use super::*;
 
-    fn plays(set: &AdmittedSet, twist: Twist) -> Vec<Played> {
-        set.proof.plays.iter().map(|one| play(set, one, twist).unwrap()).collect()
+    fn plays(set: &AdmittedSet, variation: ProofVariation) -> Vec<Played> {
+        set.proof.plays.iter().map(|one| play(set, one, variation).unwrap()).collect()
     }
 
     const QUIET: Play =
@@ -244,7 +248,7 @@ mod tests {
     #[test]
     fn every_cause_of_every_set_leaves_the_same_frames_and_observations() {
         for set in sets::ALL {
-            let all = plays(set, Twist::default());
+            let all = plays(set, ProofVariation::default());
             for (index, played) in all.iter().enumerate() {
                 let at = format!("{} {}", set.name, set.proof.plays[index].file);
                 let is_sent = |one: &&Observed| {
@@ -270,7 +274,7 @@ mod tests {
                 assert!((1..=most).contains(&plays), "{}: {cause}", set.name);
             }
             if !std::ptr::eq(*set, &raw const sets::TWINS) {
-                let quiet = play(set, &QUIET, Twist::default()).unwrap();
+                let quiet = play(set, &QUIET, ProofVariation::default()).unwrap();
                 assert!(difference(&all[0], &quiet).is_some(), "{}: nothing is seen", set.name);
             }
         }
@@ -279,14 +283,14 @@ mod tests {
     #[test]
     fn what_is_said_to_part_them_parts_them() {
         for set in sets::ALL {
-            let by = set.proof.parted;
+            let by = set.proof.separated;
             let least = match by {
-                Parted::ByHealing | Parted::ByAlias => set.proof.plays.len(),
+                Separation::ByHealing | Separation::ByAlias => set.proof.plays.len(),
                 // What the computer drops is parted from the rest.
-                Parted::ByHost => 2,
-                Parted::ByExchange => continue,
+                Separation::ByHost => 2,
+                Separation::ByExchange => continue,
             };
-            let all = plays(set, Twist { by: Some(by) });
+            let all = plays(set, ProofVariation { by: Some(by) });
             let mut kinds: Vec<&Played> = Vec::new();
             for played in &all {
                 if kinds.iter().all(|known| difference(known, played).is_some()) {
@@ -301,7 +305,7 @@ mod tests {
     fn a_finding_names_the_others_of_its_set_and_says_what_would_tell_them_apart() {
         for set in sets::ALL {
             for one in set.proof.plays {
-                let diagnosis = play(set, one, Twist::default()).unwrap().diagnosis;
+                let diagnosis = play(set, one, ProofVariation::default()).unwrap().diagnosis;
                 let mut findings = diagnosis.findings.iter();
                 // Where there is no warning, a note must do so, too.
                 let warned = findings.clone().find(|f| f.severity != Severity::Info);

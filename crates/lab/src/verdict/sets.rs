@@ -29,18 +29,18 @@ pub struct AdmittedSet {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Proof {
     /// What is shown of the plays.
-    pub shown: Shown,
+    pub visibility: Visibility,
     /// How long after the begin of the line nothing tells the plays apart, in ms.
     pub until_ms: u64,
     /// The plays.
     pub plays: &'static [Play],
     /// What parts them.
-    pub parted: Parted,
+    pub separated: Separation,
 }
 
 /// What a diagnosis is given to see.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub enum Shown {
+pub enum Visibility {
     /// Frames, and all that the computer tells of its card.
     All,
     /// Without what the card has counted.
@@ -60,7 +60,7 @@ pub struct Play {
 
 /// How the causes of a set come to differ: a check on the proof, which could not fail otherwise.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub enum Parted {
+pub enum Separation {
     /// All faults are healed, and the line is watched for another two seconds.
     ByHealing,
     /// What the computer tells of its card is shown.
@@ -88,7 +88,7 @@ pub static SILENT: AdmittedSet = AdmittedSet {
     why: "whoever hangs behind a cut and whoever has no power are equally silent, and the \
           neighbour's port sees no signal in both cases",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 6_000,
         plays: &[
             Play { cause: Some(LinkOpen), file: "kind = 'link-open'\nat = 'K1.C-K2.A'" },
@@ -98,7 +98,7 @@ pub static SILENT: AdmittedSet = AdmittedSet {
                 file: "kind = 'supply-off'\ndevices = ['K2', 'T4']\nspread_us = 0",
             },
         ],
-        parted: Parted::ByHealing,
+        separated: Separation::ByHealing,
     },
 };
 
@@ -110,7 +110,7 @@ pub static ONE_END: AdmittedSet = AdmittedSet {
     why: "with one of two pairs of contacts or fibres open the sender keeps its link and its frames \
           vanish: so they do in something between that shows it one",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 6_000,
         plays: &[
             Play { cause: Some(LinkOpen), file: "kind = 'link-open'\nat = 'K1.B>T1.A'" },
@@ -119,7 +119,7 @@ pub static ONE_END: AdmittedSet = AdmittedSet {
                 file: "kind = 'false-link'\nat = 'K1.B>T1.A'\nfar = 'without-link'",
             },
         ],
-        parted: Parted::ByExchange,
+        separated: Separation::ByExchange,
     },
 };
 
@@ -130,7 +130,7 @@ pub static OVERLOAD: AdmittedSet = AdmittedSet {
     while_so: "terminals of one coupler fall and start anew",
     why: "terminals that lose their E-bus voltage start anew, whether their load took it or a contact",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 8_000,
         plays: &[
             Play {
@@ -142,7 +142,7 @@ pub static OVERLOAD: AdmittedSet = AdmittedSet {
                 file: "kind = 'brown-out'\ndevices = ['T1', 'T2']\ndip_ms = 200\nevery_ms = 2000",
             },
         ],
-        parted: Parted::ByExchange,
+        separated: Separation::ByExchange,
     },
 };
 
@@ -154,7 +154,7 @@ pub static SYMBOLS: AdmittedSet = AdmittedSet {
     why: "a receiver sees symbol errors; whether the sender, the cable, the plug, its own input or \
           interference made them is not in the symbols: their rhythm is a hint only",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -171,7 +171,7 @@ pub static SYMBOLS: AdmittedSet = AdmittedSet {
                 file: "kind = 'receiver-damaged'\nat = 'K2.A>K1.C'\nhits = 7",
             },
         ],
-        parted: Parted::ByExchange,
+        separated: Separation::ByExchange,
     },
 };
 
@@ -182,7 +182,7 @@ pub static BOTH_WAYS: AdmittedSet = AdmittedSet {
     while_so: "both directions of one link are hit",
     why: "a worn cable and interference hit both directions of a link alike: their rhythm is a hint only",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -198,7 +198,7 @@ pub static BOTH_WAYS: AdmittedSet = AdmittedSet {
                        kind = 'emc-noise'\nat = 'K1.C>K2.A'\nhits = 1",
             },
         ],
-        parted: Parted::ByExchange,
+        separated: Separation::ByExchange,
     },
 };
 
@@ -209,7 +209,7 @@ pub static FIRST_HOP: AdmittedSet = AdmittedSet {
     while_so: "the way from the card to the first SubDevice is hit",
     why: "one direction of a link like any other, but that its transmitter is a part of the card",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -229,7 +229,7 @@ pub static FIRST_HOP: AdmittedSet = AdmittedSet {
                 file: "kind = 'receiver-damaged'\nat = 'maindevice>K1.A'\nhits = 1",
             },
         ],
-        parted: Parted::ByExchange,
+        separated: Separation::ByExchange,
     },
 };
 
@@ -240,7 +240,7 @@ pub static LAST_HOP: AdmittedSet = AdmittedSet {
     while_so: "the way from the first SubDevice to the card is hit",
     why: "one direction of a link like any other, but that its receiver is a part of the card",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -260,7 +260,7 @@ pub static LAST_HOP: AdmittedSet = AdmittedSet {
                 file: "kind = 'transmitter-damaged'\nat = 'K1.A>maindevice'\nhits = 5",
             },
         ],
-        parted: Parted::ByExchange,
+        separated: Separation::ByExchange,
     },
 };
 
@@ -271,7 +271,7 @@ pub static UNCOUNTED: AdmittedSet = AdmittedSet {
     while_so: "frames get lost on the last hop, and the card's counters are not known",
     why: "frames that the card or the computer drops just do not come back, and no SubDevice counts",
     proof: Proof {
-        shown: Shown::WithoutCounters,
+        visibility: Visibility::WithoutCounters,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -295,7 +295,7 @@ pub static UNCOUNTED: AdmittedSet = AdmittedSet {
                        at_ms = [0, 30, 70, 110, 130, 180, 250, 300, 330, 390, 440, 500]\nfor_ms = 0.001",
             },
         ],
-        parted: Parted::ByHost,
+        separated: Separation::ByHost,
     },
 };
 
@@ -307,7 +307,7 @@ pub static TWINS: AdmittedSet = AdmittedSet {
     why: "two devices of one type in each other's place are the line that was planned, to everyone who \
           does not know them by name",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 4_000,
         plays: &[
             Play {
@@ -316,7 +316,7 @@ pub static TWINS: AdmittedSet = AdmittedSet {
             },
             Play { cause: None, file: "" },
         ],
-        parted: Parted::ByAlias,
+        separated: Separation::ByAlias,
     },
 };
 
@@ -329,7 +329,7 @@ pub static EQUALS: AdmittedSet = AdmittedSet {
     why: "whichever of two equal devices in a row is taken out, one of them is left, and stands at the same \
           place of the line",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 4_000,
         plays: &[
             Play { cause: Some(DeviceMissing), file: "kind = 'device-missing'\ndevice = 'T4'" },
@@ -339,7 +339,7 @@ pub static EQUALS: AdmittedSet = AdmittedSet {
                 file: "# exchanged\nkind = 'device-missing'\ndevice = 'T4'",
             },
         ],
-        parted: Parted::ByAlias,
+        separated: Separation::ByAlias,
     },
 };
 
@@ -351,7 +351,7 @@ pub static EXTRAS: AdmittedSet = AdmittedSet {
                number",
     why: "of equal devices in a row there is one more than planned: whichever was put in, the row is the same",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 4_000,
         plays: &[
             // In the row stand T4, X and T5, one behind the other.
@@ -370,7 +370,7 @@ pub static EXTRAS: AdmittedSet = AdmittedSet {
                        kind = 'device-extra'\ndevice = 'T5'\ntype = 'EL2004'\non = 'X.B'\nserial = 105",
             },
         ],
-        parted: Parted::ByAlias,
+        separated: Separation::ByAlias,
     },
 };
 
@@ -381,7 +381,7 @@ pub static NOBODY: AdmittedSet = AdmittedSet {
     while_so: "the card never had a link, and nothing has ever answered",
     why: "whoever was never seen may have no power, no cable, or not be there: the card has no link either way",
     proof: Proof {
-        shown: Shown::All,
+        visibility: Visibility::All,
         until_ms: 6_000,
         plays: &[
             Play {
@@ -401,7 +401,7 @@ pub static NOBODY: AdmittedSet = AdmittedSet {
                 file: "# alone\nkind = 'device-missing'\ndevice = 'K1'",
             },
         ],
-        parted: Parted::ByExchange,
+        separated: Separation::ByExchange,
     },
 };
 

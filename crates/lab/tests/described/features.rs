@@ -1,4 +1,5 @@
-//! What descriptions say beyond process data: identification, modules, start-up commands, mappings.
+//! Features of descriptions beyond process data: identification, modules, start-up commands,
+//! mappings.
 
 use linesman_config::esi::{EsiDevice, EsiModule};
 use linesman_config::plan::{Plan, PlanOptions};

@@ -1,4 +1,4 @@
-//! What a recording tells of each device, for the responder to answer from.
+//! Knowledge that a recording gives of each device, for the responder to answer from.
 
 use std::collections::{BTreeMap, VecDeque};
 

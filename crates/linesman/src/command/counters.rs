@@ -156,7 +156,7 @@ fn watch(
 
 /// What people call the SubDevices.
 pub(super) fn names(session: &Session) -> Names {
-    let name = |known: &super::service::Known| {
+    let name = |known: &super::service::KnownDevice| {
         (known.name.clone().unwrap_or_default(), known.type_name.clone())
     };
     Names::new(session.devices().iter().map(name))
@@ -179,7 +179,7 @@ fn report(
     diagnosis: Option<Diagnosis>,
 ) -> Report {
     let devices = session.devices();
-    let of = |known: &super::service::Known| of_device(session, samples, known.id);
+    let of = |known: &super::service::KnownDevice| of_device(session, samples, known.id);
     Report {
         schema: "linesman.counters/1".to_owned(),
         tool: version::tool(),

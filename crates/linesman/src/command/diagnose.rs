@@ -1,12 +1,12 @@
 //! `linesman diagnose`: what is wrong with a line, where, why, and what to do.
 
-mod asking;
 mod capture;
 mod cards;
 mod file;
 pub(crate) mod follow;
 mod listen;
 mod observations;
+mod questions;
 mod segment;
 pub(crate) mod several;
 
@@ -35,7 +35,7 @@ use crate::text::finding::Writer;
 use crate::text::names::Names;
 use crate::version;
 
-use super::driven;
+use super::line_access;
 
 /// The clock of an observation file.
 pub(super) const NO_CLOCK: &str = "none";
@@ -80,7 +80,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     ask: bool,
     /// Most questions in a second
-    #[arg(long, requires = "ask", value_name = "N", default_value_t = asking::PER_S, value_parser = count(1, 200))]
+    #[arg(long, requires = "ask", value_name = "N", default_value_t = questions::PER_S, value_parser = count(1, 200))]
     ask_per_s: u64,
     /// After trouble of the MainDevice that no question was near: go on asking once it runs steadily again
     #[arg(long, requires = "ask")]
@@ -152,7 +152,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let project = arguments.project.as_deref().map(Planned::open).transpose()?;
     match &selector {
         Selector::File(path) => {
-            let stop = driven::stop()?;
+            let stop = line_access::stop()?;
             let mut session = Session::new(arguments, &selector, project);
             let judged = file::judge(path, &stop, &mut session, output)?;
             Ok(session.answer(&judged.engine, &judged.names, judged.at, output))

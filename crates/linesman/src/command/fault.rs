@@ -9,8 +9,8 @@ use linesman_runtime::control::message::{
     FaultState, Faults, Request, SignalDirection, SignalState, SignalTable,
 };
 use linesman_runtime::control::{ask, listen};
-use linesman_runtime::journal::{EventKind, TruthEvent};
 use linesman_runtime::serve::report::Status as SimStatus;
+use linesman_runtime::truth_writer::{EventKind, TruthEvent};
 use linesman_sim::segment_file::FaultEntry;
 use serde::Serialize;
 use serde::de::DeserializeOwned;

@@ -8,7 +8,7 @@ use linesman_proto::address::DeviceId;
 use serde::Serialize;
 
 use super::sdo::value::whole;
-use super::service::{DeviceReport, Place, Session, Trouble, end};
+use super::service::{DeviceReport, ServiceError, ServiceTarget, Session, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -23,7 +23,7 @@ const LONGEST: u64 = 64 << 20;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    pub(crate) place: Place,
+    pub(crate) place: ServiceTarget,
     #[command(subcommand)]
     action: Action,
     /// JSON, schema linesman.file/1; linesman.refusal/1 when it is refused
@@ -116,7 +116,7 @@ fn act(
     data: Option<Vec<u8>>,
     json: bool,
     output: &mut Output,
-) -> Result<(), Trouble> {
+) -> Result<(), ServiceError> {
     let (name, password) = (transfer.name.clone(), transfer.password);
     let (action, size) = match data {
         Some(data) => {

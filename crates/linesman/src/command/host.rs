@@ -6,7 +6,7 @@ mod jitter;
 
 use std::path::PathBuf;
 
-use linesman_link::computer::{Check, DriverSettings, Files, Outcome, inspect};
+use linesman_link::host_check::{Check, DriverSettings, Files, Outcome, inspect};
 use linesman_link::interface::{self, InterfaceKind};
 use linesman_proto::time::Span;
 use serde::Serialize;

@@ -1,8 +1,8 @@
 //! `linesman lab`: stories, swarms, scores and recordings in virtual time.
 
 pub(crate) mod excerpts;
-mod heard;
-mod listened;
+mod listener_captures;
+mod listener_tables;
 pub(crate) mod replay;
 pub(crate) mod score;
 

@@ -4,8 +4,8 @@
 //! nothing but reads; a saved report is shown again.
 
 mod detail;
-mod line;
 mod live;
+mod read_only;
 mod table;
 
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use linesman_runtime::service;
 
 use self::live::{Live, Pace};
 use crate::amount::{MILLISECOND, SECOND, duration};
-use crate::command::driven;
+use crate::command::line_access;
 use crate::command::service::{is_socket, silent};
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -113,10 +113,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         saved(Path::new(&place))?
     } else {
         match place.parse::<Selector>()? {
-            Selector::Cards(names) => line::cards(&names, &place, arguments, output)?,
-            Selector::Segment(path) => line::segment(&path, &place, arguments, output)?,
+            Selector::Cards(names) => read_only::cards(&names, &place, arguments, output)?,
+            Selector::Segment(path) => read_only::segment(&path, &place, arguments, output)?,
             selector @ (Selector::Listen(_) | Selector::File(_)) => {
-                return Err(driven::not_drivable(&place, &selector));
+                return Err(line_access::not_drivable(&place, &selector));
             }
         }
     };

@@ -9,7 +9,7 @@ use linesman_proto::register::{address_by_name, describe, pieces};
 use serde::Serialize;
 
 use super::sdo::value::{bytes, hex, whole};
-use super::service::{DeviceReport, Place, Session, Trouble, end};
+use super::service::{DeviceReport, ServiceError, ServiceTarget, Session, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -22,7 +22,7 @@ const MOST: u16 = 1_486;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    pub(crate) place: Place,
+    pub(crate) place: ServiceTarget,
     #[command(subcommand)]
     action: Action,
     /// JSON, schema linesman.registers/1
@@ -138,7 +138,7 @@ fn act(
     arguments: &Arguments,
     data: Option<Vec<u8>>,
     output: &mut Output,
-) -> Result<(), Trouble> {
+) -> Result<(), ServiceError> {
     let (action, address, data) = match (&arguments.action, data) {
         (Action::Read { address, len }, _) => {
             let len = len.unwrap_or_else(|| rest_of_register(*address));

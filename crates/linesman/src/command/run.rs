@@ -1,6 +1,6 @@
 //! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
 
-mod told;
+mod reporter;
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -12,24 +12,25 @@ use linesman_config::project::Project;
 use linesman_diagnosis::report::Verdict;
 use linesman_diagnosis::{InputKind, Setup};
 use linesman_link::clock::HostClock;
-use linesman_link::socket::Bell;
+use linesman_link::socket::WakeHandle;
 use linesman_maindevice::watch::EntryKind;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
-use linesman_runtime::line::{Cards, Line, Pace};
-use linesman_runtime::online::Board;
+use linesman_runtime::online::OnlineState;
 use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::{
-    self as running, Beside, Choices, Ended, Idle, NOTES, RealTime, RunOptions, Shared, Wanted,
+    self as running, Idle, NOTES, PlanChoices, PlanSource, RealTime, RunControls, RunOutcome,
+    SessionOptions, Shared,
 };
 use linesman_runtime::selector::Selector;
-use linesman_runtime::service::{DeskWatch, ServiceDesk};
+use linesman_runtime::service::{ControlSocketWatch, ServiceSocket};
 use linesman_runtime::stop::Stop;
 use linesman_runtime::system_log::SystemLog;
+use linesman_runtime::transport::{Cards, Pace, Transport};
 
-use self::told::{Logs, Teller};
-use super::driven;
+use self::reporter::{Logs, RunReporter};
+use super::line_access;
 use crate::amount::{MICROSECOND, count as count_of, cycle, duration, lasting};
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -144,7 +145,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Some(path) => Source::read(path, arguments.cycle_us, output)?,
         None => Source::AsFound,
     };
-    let choices = Choices { target: arguments.to, cycle: arguments.cycle_us, ..Choices::default() };
+    let choices =
+        PlanChoices { target: arguments.to, cycle: arguments.cycle_us, ..PlanChoices::default() };
     let title = match (&source, &arguments.file) {
         (Source::Project(project), Some(path)) => {
             format!("{} of {}", count(project.devices.len() as u64, "SubDevice"), path.display())
@@ -167,7 +169,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         source: arguments.on.clone(),
         ..Setup::default()
     });
-    let options = RunOptions {
+    let options = SessionOptions {
         on: arguments.on.clone(),
         leave: arguments.leave,
         lasts,
@@ -185,7 +187,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             for device in &mut plan.devices {
                 device.target = device.target.min(arguments.to);
             }
-            Wanted::Plan(plan)
+            PlanSource::Plan(plan)
         }
         Source::AsFound => choices.as_found(),
     };
@@ -202,45 +204,45 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
         None => None,
     };
-    let board = Board::new(&arguments.on);
+    let online = OnlineState::new(&arguments.on);
     let system_log = match arguments.system_log {
         true => Some(SystemLog::open(&arguments.on).map_err(no_journal)?),
         false => None,
     };
     let without = arguments.log_without.clone();
     let logs = Logs { file: log, system: system_log, without };
-    let teller = Teller::new(arguments.json, began, logs, board.clone());
+    let reporter = RunReporter::new(arguments.json, began, logs, online.clone());
     let application = arguments.image.clone();
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let said = format!(
         "Drives {title} on {} to {}; Ctrl-C stops it: outputs to zero, all back to {}.",
         arguments.on, arguments.to, arguments.leave
     );
     match &selector {
         Selector::Cards(names) => {
-            driven::refuse(names)?;
+            line_access::refuse(names)?;
             let mut line = Cards::open(names, clock)?;
             line.set_spin(arguments.spin_us);
-            stop.rings(&line.bell()).map_err(driven::no_bell)?;
-            let desk = desk(arguments.control.as_deref(), line.bell(), board)?;
+            stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
+            let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
             let real_time = Some(RealTime {
                 priority: (arguments.priority > 0).then_some(arguments.priority),
                 cpu: arguments.cpu,
                 lock_memory: arguments.priority > 0,
             });
             let options = with_source(options, real_time, began.rfc3339());
-            drive(line, wanted, &options, application, desk, &stop, &said, teller, output)
+            drive(line, wanted, &options, application, socket, &stop, &said, reporter, output)
         }
         Selector::Segment(path) => {
             // Without an end it goes no faster than the host's clock, for a person to look on.
             let pace = if lasts.is_some() { Pace::Free } else { Pace::Host };
-            let line = driven::virtual_line(path, pace)?;
-            stop.rings(&line.bell()).map_err(driven::no_bell)?;
-            let desk = desk(arguments.control.as_deref(), line.bell(), board)?;
-            drive(line, wanted, &options, application, desk, &stop, &said, teller, output)
+            let line = line_access::virtual_line(path, pace)?;
+            stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
+            let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
+            drive(line, wanted, &options, application, socket, &stop, &said, reporter, output)
         }
         Selector::Listen(_) | Selector::File(_) => {
-            Err(driven::not_drivable(&arguments.on, &selector))
+            Err(line_access::not_drivable(&arguments.on, &selector))
         }
     }
 }
@@ -269,13 +271,17 @@ impl Source {
 }
 
 /// The socket for services, if one is wanted.
-fn desk(path: Option<&Path>, bell: Bell, board: Board) -> Result<Option<ServiceDesk>, Failure> {
+fn socket(
+    path: Option<&Path>,
+    wake_handle: WakeHandle,
+    online: OnlineState,
+) -> Result<Option<ServiceSocket>, Failure> {
     let Some(path) = path else { return Ok(None) };
-    let desk = ServiceDesk::open(path, bell, board).map_err(|error| {
+    let socket = ServiceSocket::open(path, wake_handle, online).map_err(|error| {
         let reason = format!("{}: opening the socket: {error}", path.display());
         Failure::new(reason, "name a path where nothing is, in a folder that you may write to")
     })?;
-    Ok(Some(desk))
+    Ok(Some(socket))
 }
 
 fn no_journal(error: std::io::Error) -> Failure {
@@ -287,10 +293,10 @@ fn no_journal(error: std::io::Error) -> Failure {
 
 /// The diagnosis learns by which clock times are given.
 fn with_source(
-    mut options: RunOptions,
+    mut options: SessionOptions,
     real_time: Option<RealTime>,
     start: Option<String>,
-) -> RunOptions {
+) -> SessionOptions {
     options.real_time = real_time;
     if let Some(setup) = &mut options.diagnose {
         setup.clock = "host, monotonic".to_owned();
@@ -302,28 +308,28 @@ fn with_source(
 
 /// Runs the line in a thread of its own, and tells what happens meanwhile.
 #[allow(clippy::too_many_arguments, reason = "called twice, from above")]
-fn drive<L: Line + Send>(
+fn drive<L: Transport + Send>(
     line: L,
-    wanted: Wanted,
-    options: &RunOptions,
+    wanted: PlanSource,
+    options: &SessionOptions,
     image: Option<PathBuf>,
-    desk: Option<ServiceDesk>,
+    socket: Option<ServiceSocket>,
     stop: &Stop,
     said: &str,
-    mut teller: Teller,
+    mut reporter: RunReporter,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    teller.line(said, output);
+    reporter.line(said, output);
     let (notes, told) = mpsc::sync_channel(NOTES);
-    let socket = desk.as_ref().map(ServiceDesk::watch);
-    let look = |teller: &mut Teller, output: &Output| {
-        teller.look_at_logs(output);
-        if let Some(why) = socket.as_ref().and_then(DeskWatch::trouble) {
-            teller.complain(&why, output);
+    let socket_watch = socket.as_ref().map(ServiceSocket::watch);
+    let look = |reporter: &mut RunReporter, output: &Output| {
+        reporter.look_at_logs(output);
+        if let Some(why) = socket_watch.as_ref().and_then(ControlSocketWatch::trouble) {
+            reporter.complain(&why, output);
         }
     };
     let ended = std::thread::scope(|scope| {
-        let beside = Beside { stop, notes, desk };
+        let beside = RunControls { stop, notes, socket };
         let work = move || match image {
             None => running::run(line, wanted, Idle, options, beside),
             Some(path) => running::run(line, wanted, Shared::at(path), options, beside),
@@ -333,12 +339,12 @@ fn drive<L: Line + Send>(
         loop {
             if looked.elapsed() >= LOOK_EVERY {
                 looked = std::time::Instant::now();
-                look(&mut teller, output);
+                look(&mut reporter, output);
             }
             match told.recv_timeout(QUIET) {
-                Ok(note) => teller.note(&note, output),
+                Ok(note) => reporter.note(&note, output),
                 Err(RecvTimeoutError::Timeout) => {
-                    teller.flush(output);
+                    reporter.flush(output);
                     output.look_for_reader();
                 }
                 Err(RecvTimeoutError::Disconnected) => break,
@@ -349,47 +355,48 @@ fn drive<L: Line + Send>(
                 stop.set();
             }
         }
-        teller.flush(output);
+        reporter.flush(output);
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     });
     let lasted = ended.as_ref().map_or(Span::ZERO, |ended| Span::ns(ended.report.time_ns));
-    if let Some((lost, why)) = teller.lost() {
-        teller.complain(&format!("{lost} entries are missing in the system's log: {why}"), output);
+    if let Some((lost, why)) = reporter.lost() {
+        reporter
+            .complain(&format!("{lost} entries are missing in the system's log: {why}"), output);
     }
-    if let Some(log) = teller.finish(lasted)
+    if let Some(log) = reporter.finish(lasted)
         && (log.dropped > 0 || log.failure.is_some())
     {
         let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
-        teller.complain(&why, output);
+        reporter.complain(&why, output);
         let lost = format!("{} missing in the event log", count(log.dropped, "entry"));
-        teller.complain(&lost, output);
+        reporter.complain(&lost, output);
     }
-    let Ended { mut report, error, failed } =
-        ended.map_err(|error| driven::nobody(&error).at(&options.on))?;
+    let RunOutcome { mut report, error, failed } =
+        ended.map_err(|error| line_access::nobody(&error).at(&options.on))?;
     if let Some(diagnosis) = &mut report.diagnosis {
         diagnosis.tool = version::tool();
     }
-    if teller.is_json() {
+    if reporter.is_json() {
         output.json(&report);
     } else {
-        output.text(&told::summary(&report, output.paint()));
+        output.text(&reporter::summary(&report, output.paint()));
         if let Some(diagnosis) = &report.diagnosis {
-            output.text(&told::findings(diagnosis, teller.names(), output));
+            output.text(&reporter::findings(diagnosis, reporter.names(), output));
         }
     }
     if report.counts.untold > 0 {
         let lost = count(report.counts.untold, "event");
-        teller.complain(
+        reporter.complain(
             &format!("{lost} neither told nor logged. Do: end other programs on this computer"),
             output,
         );
     }
     if let Some(error) = error {
-        return Err(driven::nobody(&error).at(&options.on));
+        return Err(line_access::nobody(&error).at(&options.on));
     }
     if let Some(failure) = failed {
         // It was said when it happened.
-        teller.failed(&failure, output);
+        reporter.failed(&failure, output);
         return Ok(Status::NotJudged);
     }
     let faulty =

@@ -10,12 +10,12 @@ use linesman_config::inventory::Inventory;
 use linesman_config::project::Project;
 use linesman_link::clock::HostClock;
 use linesman_proto::time::Span;
-use linesman_runtime::line::{Cards, Pace};
 use linesman_runtime::run as running;
 use linesman_runtime::run::scan::PATIENCE;
 use linesman_runtime::selector::Selector;
+use linesman_runtime::transport::{Cards, Pace};
 
-use super::driven;
+use super::line_access;
 use crate::drawing;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Selector::Cards(names) => on_cards(names)?,
         Selector::Segment(path) => on_segment(path)?,
         Selector::Listen(_) | Selector::File(_) => {
-            return Err(driven::not_drivable(&arguments.place, &selector));
+            return Err(line_access::not_drivable(&arguments.place, &selector));
         }
     };
     let Scan { inventory, start } = &scan;
@@ -99,22 +99,22 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 
 /// Scans the line on these cards: listens first, looks, then addresses and reads.
 fn on_cards(names: &[String]) -> Result<Scan, Failure> {
-    driven::refuse(names)?;
-    let stop = driven::stop()?;
+    line_access::refuse(names)?;
+    let stop = line_access::stop()?;
     let clock = HostClock::start();
     let line = Cards::open(names, clock)?;
     let inventory = running::scan(line, PATIENCE, &stop)
-        .map_err(|error| driven::nobody(&error).at(&names.join("+")))?;
+        .map_err(|error| line_access::nobody(&error).at(&names.join("+")))?;
     Ok(Scan { inventory, start: clock.started_at().rfc3339() })
 }
 
 /// Scans the segment of a file, in virtual time.
 fn on_segment(path: &Path) -> Result<Scan, Failure> {
-    let line = driven::virtual_line(path, Pace::Free)?;
+    let line = line_access::virtual_line(path, Pace::Free)?;
     // Virtual seconds cost little.
     let patience = PATIENCE + Span::s(line.segment().tree().len() as u64);
-    let inventory =
-        running::scan(line, patience, &driven::stop()?).map_err(|error| driven::nobody(&error))?;
+    let inventory = running::scan(line, patience, &line_access::stop()?)
+        .map_err(|error| line_access::nobody(&error))?;
     Ok(Scan { inventory, start: None })
 }
 

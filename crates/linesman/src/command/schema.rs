@@ -5,10 +5,10 @@ use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
 use linesman_lab::score::ScoreReport;
 use linesman_runtime::control::message::{Faults, Request, SignalTable};
-use linesman_runtime::journal::TruthEvent;
 use linesman_runtime::online::report::OnlineReport;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::serve::report::Status as SimStatus;
+use linesman_runtime::truth_writer::TruthEvent;
 use linesman_sim::segment_file::SegmentFile;
 use schemars::{Schema, schema_for};
 

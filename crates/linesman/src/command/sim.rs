@@ -8,17 +8,17 @@ use std::time::Duration;
 use linesman_lab::drawing;
 use linesman_link::error::LinkError;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::control::{Control, DeskWatch};
-use linesman_runtime::journal::{Journal, JournalWatch};
+use linesman_runtime::control::{Control, ControlSocketWatch};
 use linesman_runtime::part::guard;
 use linesman_runtime::selector::Selector;
 use linesman_runtime::serve::lateness::LatenessReport;
 use linesman_runtime::serve::report::Status as SimStatus;
-use linesman_runtime::serve::{Beside, Server};
+use linesman_runtime::serve::{ServeControls, Server};
 use linesman_runtime::stop::Stop;
+use linesman_runtime::truth_writer::{TruthWriter, TruthWriterWatch};
 use linesman_runtime::wiring::Wiring;
 
-use super::driven;
+use super::line_access;
 use crate::amount::lasting;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -61,14 +61,14 @@ pub(crate) struct Arguments {
 /// A segment that is ready to run.
 struct Ready {
     server: Server,
-    beside: Beside,
+    beside: ServeControls,
 }
 
 /// Answers frames until asked to stop.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let until = arguments.seconds.map_or(Instant::MAX, |lasts| Instant::ZERO + lasts);
     let cards = cards(arguments)?;
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let mut ready = Vec::new();
     for (index, (file, names)) in arguments.segments.iter().zip(&cards).enumerate() {
         let control = arguments.control.get(index).map(PathBuf::as_path);
@@ -153,17 +153,17 @@ fn prepare(
     let drawing: Vec<_> = drawing::draw(plant.segment.tree(), &labels(&plant));
     let wiring = Wiring::of(&plant.segment, &plant.project);
     let said = described(&plant, &wiring, names);
-    let mut beside = Beside::default();
+    let mut beside = ServeControls::default();
     if control.is_some() || log.is_some() {
-        let journal = Journal::begin(&plant.segment, log).map_err(|error| {
+        let truth_writer = TruthWriter::begin(&plant.segment, log).map_err(|error| {
             let path = log.map(|path| format!("{}: ", path.display())).unwrap_or_default();
             let reason = format!("{path}writing down what happens: {error}");
             Failure::new(reason, "name a file that is not there yet, where you may write")
         })?;
-        beside.journal = Some(journal);
+        beside.truth_writer = Some(truth_writer);
     }
     let server = Server::open(plant.segment, wiring, names)?;
-    stop.rings(&server.bell())
+    stop.wakes(&server.wake_handle())
         .map_err(|error| Failure::new(format!("listening for Ctrl-C: {error}"), ""))?;
     if let Some(output) = shown {
         for row in drawing {
@@ -171,14 +171,18 @@ fn prepare(
         }
         output.line(&said);
     }
-    if let (Some(path), Some(journal)) = (control, &beside.journal) {
-        beside.control = Some(open_control(path, &server, journal)?);
+    if let (Some(path), Some(truth_writer)) = (control, &beside.truth_writer) {
+        beside.control = Some(open_control(path, &server, truth_writer)?);
     }
     Ok(Ready { server, beside })
 }
 
-fn open_control(path: &Path, server: &Server, journal: &Journal) -> Result<Control, Failure> {
-    Control::open(path, server.bell(), journal.reading()).map_err(|error| {
+fn open_control(
+    path: &Path,
+    server: &Server,
+    truth_writer: &TruthWriter,
+) -> Result<Control, Failure> {
+    Control::open(path, server.wake_handle(), truth_writer.reading()).map_err(|error| {
         let reason = format!("{}: opening the control socket: {error}", path.display());
         Failure::new(reason, "name another path, in a directory where you may write")
     })
@@ -213,7 +217,7 @@ fn serve(ready: Vec<Ready>, until: Instant, stop: &Stop, output: &Output) -> Vec
         }
         let status = server.status();
         drop(beside.control);
-        let written = beside.journal.map_or(Ok(()), Journal::finish);
+        let written = beside.truth_writer.map_or(Ok(()), TruthWriter::finish);
         let unwritten = |error| {
             let reason = format!("writing down what happened: {error}: the log is not complete");
             Failure::new(reason, "check the free space")
@@ -245,17 +249,17 @@ fn serve(ready: Vec<Ready>, until: Instant, stop: &Stop, output: &Output) -> Vec
 
 /// Sockets and logs that are looked after while segments run.
 struct Watch {
-    sockets: Vec<DeskWatch>,
-    logs: Vec<JournalWatch>,
+    sockets: Vec<ControlSocketWatch>,
+    logs: Vec<TruthWriterWatch>,
 }
 
 impl Watch {
     fn of(ready: &[Ready]) -> Self {
         let controls = ready.iter().filter_map(|one| one.beside.control.as_ref());
-        let journals = ready.iter().filter_map(|one| one.beside.journal.as_ref());
+        let journals = ready.iter().filter_map(|one| one.beside.truth_writer.as_ref());
         Self {
             sockets: controls.map(Control::watch).collect(),
-            logs: journals.map(Journal::watch).collect(),
+            logs: journals.map(TruthWriter::watch).collect(),
         }
     }
 

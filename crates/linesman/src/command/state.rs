@@ -7,7 +7,7 @@ use linesman_proto::state::transition::steps;
 use linesman_proto::state::{AlState, AlStatusCode};
 use serde::Serialize;
 
-use super::service::{DeviceReport, Known, Session, Trouble, end};
+use super::service::{DeviceReport, KnownDevice, ServiceError, Session, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -110,7 +110,7 @@ fn act(
     chosen: &[DeviceId],
     arguments: &Arguments,
     output: &mut Output,
-) -> Result<bool, Trouble> {
+) -> Result<bool, ServiceError> {
     let seen = look_at(session, chosen)?;
     let service = match (arguments.to, arguments.acknowledge) {
         (Some(to), _) => {
@@ -169,7 +169,7 @@ fn act(
 }
 
 /// What each is in. That nobody answers at all is no answer.
-fn look_at(session: &mut Session, chosen: &[DeviceId]) -> Result<Vec<Seen>, Trouble> {
+fn look_at(session: &mut Session, chosen: &[DeviceId]) -> Result<Vec<Seen>, ServiceError> {
     let (mut all, mut silent) = (Vec::with_capacity(chosen.len()), None);
     for id in chosen {
         all.push(match look(session, *id)? {
@@ -189,7 +189,7 @@ fn look_at(session: &mut Session, chosen: &[DeviceId]) -> Result<Vec<Seen>, Trou
 fn look(
     session: &mut Session,
     id: DeviceId,
-) -> Result<Result<(AlStatus, AlStatusCode), Trouble>, Failure> {
+) -> Result<Result<(AlStatus, AlStatusCode), ServiceError>, Failure> {
     let answer = session.attempt(id, Service::State)?;
     Ok(answer.map(|answer| match answer {
         ServiceAnswer::State { status, code } => (status, code),
@@ -219,7 +219,7 @@ fn check(
         let advice = format!("find out why with `{look}`, or name the others one by one");
         return Err(Failure::new(reason, advice));
     }
-    let with = |fault: &dyn Fn(&Known) -> bool| {
+    let with = |fault: &dyn Fn(&KnownDevice) -> bool| {
         let ids = chosen.iter().copied();
         named(ids.filter(|id| session.known(*id).is_some_and(fault)).collect())
     };

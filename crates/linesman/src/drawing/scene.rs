@@ -1,4 +1,4 @@
-//! What is drawn.
+//! Scene of a drawing: the boxes, links and marks.
 
 use linesman_diagnosis::report::{DirectionReport, PlaceReport, Severity};
 use linesman_proto::port::Port;

@@ -221,7 +221,7 @@ const KEYS: [(&str, &str, usize); 7] = [
 ];
 
 /// A key to a colour.
-struct Key {
+struct LegendEntry {
     class: &'static str,
     text: &'static str,
     at: (usize, usize),
@@ -229,7 +229,7 @@ struct Key {
 
 /// The keys to the colours, beneath all, in lines of the drawing's width. A drawing of a plan, which
 /// nobody has looked at, has none.
-fn keys(scene: &Scene<'_>, floor: usize, width: usize) -> Vec<Key> {
+fn keys(scene: &Scene<'_>, floor: usize, width: usize) -> Vec<LegendEntry> {
     if scene.boxes.iter().all(|label| label.state.is_none()) {
         return Vec::new();
     }
@@ -238,7 +238,7 @@ fn keys(scene: &Scene<'_>, floor: usize, width: usize) -> Vec<Key> {
         if at.0 + length > width {
             at = (MARGIN, at.1 + LEGEND);
         }
-        let key = Key { class, text, at };
+        let key = LegendEntry { class, text, at };
         at.0 += length;
         key
     };

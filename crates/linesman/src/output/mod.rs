@@ -1,4 +1,4 @@
-//! Where answers go: text for people, JSON for programs, complaints and progress to the side.
+//! Output of a command: text for people, JSON for programs, complaints and progress to the side.
 
 pub(crate) mod markdown;
 pub(crate) mod paint;

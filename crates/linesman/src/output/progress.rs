@@ -1,4 +1,4 @@
-//! How far long work has come: one line on standard error, when that is a terminal.
+//! Progress of long work: one line on standard error, when that is a terminal.
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! What is wrong, worst first: where, why, how it is known, what to do, what follows from it.
+//! Findings of a page, worst first: where, why, how it is known, what to do, what follows from it.
 
 use linesman_diagnosis::report::{EvidenceReport, FindingReport, FindingState, Number};
 use maud::{Markup, html};

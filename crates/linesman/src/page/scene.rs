@@ -1,4 +1,4 @@
-//! What is drawn of a diagnosis, and of a scan.
+//! Scene of a diagnosis, and of a scan.
 
 use linesman_config::fault::FaultName;
 use linesman_config::inventory::Inventory;

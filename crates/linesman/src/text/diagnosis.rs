@@ -4,7 +4,7 @@ use linesman_diagnosis::report::{Diagnosis, Verdict};
 
 use super::finding::{Writer, tally};
 use super::quantity::{count, date, grouped};
-use super::{asking, coverage, devices, main_device};
+use super::{coverage, devices, main_device, questions};
 use crate::command::diagnose::READINGS;
 use crate::hint;
 use crate::output::wrapped;
@@ -113,7 +113,7 @@ fn network(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     for sentence in diagnosis.main_device.iter().flat_map(main_device::sentences) {
         text.push_str(&wrapped("  ", &sentence, writer.width));
     }
-    for sentence in diagnosis.asking.iter().flat_map(asking::sentences) {
+    for sentence in diagnosis.asking.iter().flat_map(questions::sentences) {
         text.push_str(&wrapped("  ", &sentence, writer.width));
     }
     if let Some(start) = &diagnosis.start {

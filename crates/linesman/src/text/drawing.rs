@@ -1,4 +1,4 @@
-//! What stands beside each SubDevice in a drawing.
+//! Labels beside each SubDevice in a drawing.
 
 use linesman_lab::drawing::Label;
 

@@ -1,6 +1,5 @@
 //! Answers as people read them: what the JSON says, in words and by names.
 
-pub(crate) mod asking;
 pub(crate) mod coverage;
 pub(crate) mod devices;
 pub(crate) mod diagnosis;
@@ -9,4 +8,5 @@ pub(crate) mod finding;
 pub(crate) mod main_device;
 pub(crate) mod names;
 pub(crate) mod quantity;
+pub(crate) mod questions;
 pub(crate) mod understood;

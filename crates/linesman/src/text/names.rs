@@ -1,4 +1,4 @@
-//! What people call the SubDevices.
+//! Names of the SubDevices for people.
 
 use linesman_config::inventory::label;
 use linesman_diagnosis::report::{DirectionReport, EndReport, PlaceReport};

@@ -1,4 +1,4 @@
-//! What was understood of a pasted text, and what not: told before the diagnosis of it.
+//! Summary of what was understood of a pasted text, and what not: told before the diagnosis of it.
 
 use linesman_diagnosis::report::Understood;
 

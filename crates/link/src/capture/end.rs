@@ -1,4 +1,4 @@
-//! How a capture ended: at its end, or before it by a damage.
+//! End of a capture: regular, or early by a damage.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Why a capture cannot be opened, or not be written.
+//! Errors of captures that cannot be opened or written.
 
 use std::fmt::Write as _;
 use std::io;

@@ -1,4 +1,4 @@
-//! What a reader gives: frames, and what the file says about where they come from.
+//! Output of a reader: frames, and what the file says about where they come from.
 
 use std::fmt;
 

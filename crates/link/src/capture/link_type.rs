@@ -1,4 +1,4 @@
-//! What the bytes of a captured frame begin with.
+//! Link types: the header that the bytes of a captured frame begin with.
 //!
 //! Reference: the registry at <https://www.tcpdump.org/linktypes.html>.
 

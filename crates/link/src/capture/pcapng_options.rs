@@ -1,4 +1,4 @@
-//! What is taken from the options of pcapng blocks.
+//! Options of pcapng blocks that the reader uses.
 //!
 //! Reference: draft-ietf-opsawg-pcapng, section 3.5 and the option tables of each block.
 //! `pcap-parser` takes them apart, but reads on behind the end mark and takes every number for

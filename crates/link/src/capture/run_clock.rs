@@ -1,4 +1,4 @@
-//! From the absolute times of a capture to times of the run.
+//! Conversion of the absolute times of a capture to times of the run.
 //!
 //! A run begins at 0, its clock is the capture's. Times stay as the file has them: they may repeat,
 //! jump, or run backwards between interfaces, and whoever judges them is told when they do.

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use self::wait::{Patient, open_pipe};
+use self::wait::{PipeReader, open_pipe};
 
 /// The name by which standard input is asked for.
 pub const STANDARD_INPUT: &str = "-";
@@ -198,7 +198,7 @@ impl Input {
         let progress = Progress { whole: is_file.then_some(metadata.len()), ..Progress::default() };
         let source: Box<dyn Read + Send> = match is_file {
             true => Box::new(file),
-            false => Box::new(Patient::new(file, enough)),
+            false => Box::new(PipeReader::new(file, enough)),
         };
         let counted = Counted { source, taken: Arc::clone(&progress.taken) };
         // What another process reads from standard input beside us cannot be read a second time.

@@ -30,13 +30,13 @@ pub(super) fn standard_input() -> io::Result<File> {
 }
 
 /// Reads from a pipe until its end, or until it is enough.
-pub(super) struct Patient {
+pub(super) struct PipeReader {
     file: File,
     enough: Box<dyn Fn() -> bool + Send>,
     until: Option<Instant>,
 }
 
-impl Patient {
+impl PipeReader {
     pub(super) fn new(file: File, enough: impl Fn() -> bool + Send + 'static) -> Self {
         Self { file, enough: Box::new(enough), until: None }
     }
@@ -50,7 +50,7 @@ impl Patient {
     }
 }
 
-impl Read for Patient {
+impl Read for PipeReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let look = Timespec { tv_sec: 0, tv_nsec: LOOK_NS };
         loop {

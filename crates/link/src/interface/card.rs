@@ -9,8 +9,8 @@ use linesman_proto::ethernet::MacAddress;
 
 use super::ethtool::Ethtool;
 use super::netlink::{LinkRecord, Netlink};
-use crate::computer::DriverSettings;
 use crate::error::LinkError;
+use crate::host_check::DriverSettings;
 
 /// A network interface as it is now.
 #[derive(Clone, PartialEq, Eq, Debug)]

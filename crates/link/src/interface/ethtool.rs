@@ -10,7 +10,7 @@ use std::os::fd::{AsRawFd as _, OwnedFd};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, socket_with};
 
 use super::card::Duplex;
-use crate::computer::DriverSettings;
+use crate::host_check::DriverSettings;
 
 const GET_DRIVER_INFO: u32 = 0x03;
 const GET_COALESCE: u32 = 0x0E;

@@ -1,4 +1,4 @@
-//! Whether a network card suits EtherCAT, with reasons and what to do about them.
+//! Suitability of a network card for EtherCAT, with reasons and what to do about them.
 //!
 //! Reference: ETG.1000.2 (100 Mbit/s, full duplex, no other traffic on the line).
 

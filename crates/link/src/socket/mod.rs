@@ -18,4 +18,4 @@ pub use listener::{ListenFilter, Listener};
 pub use raw::{RawSocket, Reception, Sent, SocketOptions};
 pub use receiver::SocketCounters;
 pub use wait::{Ready, Waitable, wait_any, wait_for};
-pub use wake::{Bell, Waker};
+pub use wake::{WakeHandle, Waker};

@@ -1,4 +1,4 @@
-//! What both kinds of socket share: being opened on a card, receiving, waiting, failing.
+//! Common part of both kinds of socket: opening on a card, receiving, waiting, failing.
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};

@@ -23,7 +23,7 @@ pub enum Ready {
 pub(super) mod sealed {
     use std::os::fd::BorrowedFd;
 
-    /// What to wait for. Its content is known to this room only: sockets are never handed out.
+    /// What to wait for. Its content is known to this module only: sockets are never handed out.
     pub struct Polled<'a> {
         pub(in super::super) socket: BorrowedFd<'a>,
         pub(in super::super) name: &'a str,

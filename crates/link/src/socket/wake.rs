@@ -10,49 +10,49 @@ use std::sync::Arc;
 
 use super::wait::{Waitable, sealed};
 
-/// The ear of a thread that waits: another thing to wait for beside sockets.
+/// Wake-up of a waiting thread: another thing to wait for beside sockets.
 #[derive(Debug)]
 pub struct Waker {
-    ear: UnixStream,
-    bell: Bell,
+    receiver: UnixStream,
+    wake_handle: WakeHandle,
 }
 
-/// What wakes it. Copies ring the same thread.
+/// Handle that wakes the thread of a [`Waker`]. Copies wake the same thread.
 #[derive(Clone, Debug)]
-pub struct Bell(Arc<UnixStream>);
+pub struct WakeHandle(Arc<UnixStream>);
 
 impl Waker {
-    /// A waker that nobody has rung yet.
+    /// A waker that nothing has woken yet.
     ///
     /// # Errors
     /// When the system has no more sockets.
     pub fn new() -> io::Result<Self> {
-        let (ear, bell) = UnixStream::pair()?;
-        ear.set_nonblocking(true)?;
-        bell.set_nonblocking(true)?;
-        Ok(Self { ear, bell: Bell(Arc::new(bell)) })
+        let (receiver, wake_handle) = UnixStream::pair()?;
+        receiver.set_nonblocking(true)?;
+        wake_handle.set_nonblocking(true)?;
+        Ok(Self { receiver, wake_handle: WakeHandle(Arc::new(wake_handle)) })
     }
 
-    /// What wakes it.
+    /// The handle that wakes it.
     #[must_use]
-    pub fn bell(&self) -> Bell {
-        self.bell.clone()
+    pub fn wake_handle(&self) -> WakeHandle {
+        self.wake_handle.clone()
     }
 
-    /// Whether it was rung since it was asked last.
+    /// Whether it was woken since it was asked last.
     pub fn take(&self) -> bool {
         let mut bytes = [0; 64];
-        let mut rung = false;
-        while matches!((&self.ear).read(&mut bytes), Ok(1..)) {
-            rung = true;
+        let mut woken = false;
+        while matches!((&self.receiver).read(&mut bytes), Ok(1..)) {
+            woken = true;
         }
-        rung
+        woken
     }
 }
 
-impl Bell {
+impl WakeHandle {
     /// Wakes the thread, or lets its next wait end at once.
-    pub fn ring(&self) {
+    pub fn wake(&self) {
         // A full pipe wakes it all the same.
         let _ = (&*self.0).write(&[1]);
     }
@@ -68,7 +68,7 @@ impl Bell {
 
 impl sealed::Pollable for Waker {
     fn polled(&self) -> sealed::Polled<'_> {
-        sealed::Polled::new(self.ear.as_fd(), "waker")
+        sealed::Polled::new(self.receiver.as_fd(), "waker")
     }
 }
 
@@ -89,7 +89,7 @@ mod tests {
         assert!(!waker.take());
         assert_eq!(wait(clock.now() + Span::ms(1)), Ready::Deadline);
         for _ in 0..100_000 {
-            waker.bell().ring();
+            waker.wake_handle().wake();
         }
         assert_eq!(wait(Instant::MAX), Ready::Readable);
         assert!(waker.take() && !waker.take());
@@ -99,8 +99,8 @@ mod tests {
     #[test]
     fn another_thread_wakes_a_wait_without_end() {
         let (waker, clock) = (Waker::new().unwrap(), HostClock::start());
-        let bell = waker.bell();
-        let ringer = std::thread::spawn(move || bell.ring());
+        let wake_handle = waker.wake_handle();
+        let ringer = std::thread::spawn(move || wake_handle.wake());
         assert_eq!(
             wait_any([&waker as &dyn Waitable], &clock, Instant::MAX).unwrap(),
             Ready::Readable

@@ -1,4 +1,4 @@
-//! What the capture tests share: real captures, captures made byte by byte, and tshark.
+//! Common part of the capture tests: real captures, captures made byte by byte, and tshark.
 
 #![allow(dead_code, reason = "each test program uses a part of it")]
 

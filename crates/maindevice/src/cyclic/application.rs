@@ -1,4 +1,4 @@
-//! Whether the application keeps up: outputs that it has not given anew are not sent as fresh ones.
+//! Supervision of the application: outputs that it has not given anew are not sent as fresh ones.
 //!
 //! A SubDevice's watchdog guards the way from the MainDevice; it cannot know that the program behind
 //! the MainDevice hangs while its frames go on. So when the application is late too often, datagrams
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn so_many_misses_are_allowed_and_no_more() {
+    fn allowed_misses_are_tolerated_and_one_more_is_not() {
         let mut application = Application::new(Some(2));
         assert_eq!(application.begin_cycle(0), None, "it has not begun");
         application.give();
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_not_watched_may_be_late() {
+    fn application_without_limit_may_be_late() {
         let mut application = Application::new(None);
         application.give();
         assert!((0..100).all(|_| application.begin_cycle(0).is_none()));

@@ -7,7 +7,7 @@ use linesman_proto::frame::WKC_LEN;
 use linesman_proto::sii::Direction;
 use linesman_proto::time::Instant;
 
-use super::run::Runs;
+use super::copy_range::CopyRanges;
 use crate::event::Event;
 use crate::exchange::prebuilt;
 
@@ -28,9 +28,9 @@ pub(super) struct Datagram {
     /// The datagram with its outputs withheld, where that makes a difference.
     without_outputs: Option<DatagramPlan>,
     /// Inputs of those that surely give theirs.
-    inputs: Runs,
+    inputs: CopyRanges,
     /// Inputs that become zero when the working counter is wrong.
-    cleared: Runs,
+    cleared: CopyRanges,
     /// Whether it came back as it should the last time.
     pub(super) good: bool,
     /// How often it did.
@@ -96,7 +96,7 @@ impl Datagram {
     pub(super) fn new(plan: &Plan, datagram: &DatagramPlan, data_at: usize) -> Self {
         let command = prebuilt::withheld(datagram.command);
         let differs = command != datagram.command;
-        let mut cleared = Runs::default();
+        let mut cleared = CopyRanges::default();
         for owned in &datagram.ownership {
             let clears = plan
                 .device(owned.device)
@@ -118,7 +118,7 @@ impl Datagram {
             expected: [Expected::default(); 2],
             usual: [Usual::NONE; 2],
             without_outputs: differs.then(|| DatagramPlan { command, ..datagram.clone() }),
-            inputs: Runs::with_room(most.sum()),
+            inputs: CopyRanges::with_room(most.sum()),
             cleared,
             good: false,
             receipts: 0,

@@ -6,22 +6,22 @@
 //! SyncManagers are on before it gives data. Until it has arrived the expectation is a range, so that
 //! one SubDevice that comes back, or is stuck, does not stop the inputs of all others.
 //!
-//! [`send`] sends, [`receive`] takes in, [`run`] copies, [`datagram`] judges, [`quality`] tells how good
-//! and how old data are, [`application`] sees to it that old outputs are not sent as fresh ones, [`spread`]
-//! that clocks follow the reference clock and nothing else, [`steer`] that the cycle does.
+//! [`send`] sends, [`receive`] takes in, [`copy_range`] copies, [`datagram`] judges, [`quality`] tells how good
+//! and how old data are, [`application`] sees to it that old outputs are not sent as fresh ones, [`system_time_distribution`]
+//! that clocks follow the reference clock and nothing else, [`dc_servo`] that the cycle does.
 //!
 //! A frame that leaves or comes back is found once: all that sending and receiving need of it is in its
-//! [`Frame`], all that is shared with those that leave together in their [`Departure`].
+//! [`Frame`], all that is shared with those that leave together in their [`FrameBatch`].
 
 mod application;
+mod copy_range;
 mod datagram;
-mod departure;
+mod dc_servo;
+mod frame_batch;
 mod quality;
 mod receive;
-mod run;
 mod send;
-mod spread;
-mod steer;
+mod system_time_distribution;
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -34,17 +34,17 @@ use linesman_proto::sii::Direction;
 use linesman_proto::time::Instant;
 
 use self::application::Application;
+use self::copy_range::CopyRanges;
 use self::datagram::{Datagram, clear_lost};
-use self::departure::{Departing, Departure, departing, earliest};
+use self::dc_servo::DcServo;
+use self::frame_batch::{BatchFrame, FrameBatch, earliest, frame_batches};
 use self::quality::Share;
-use self::run::Runs;
-use self::spread::{ClockDatagram, Spread};
-use self::steer::Steer;
+use self::system_time_distribution::{ClockDatagram, SystemTimeDistribution};
 use crate::exchange::Exchange;
 use crate::exchange::prebuilt::{Prebuilt, data_offsets};
 use crate::executor::lock;
-use crate::mailbox::{MailboxBits, Queues};
-use crate::supervisor::Line;
+use crate::mailbox::{MailboxBits, MailboxQueues};
+use crate::supervisor::DeviceTable;
 
 pub use self::quality::{FrameStatus, Quality};
 
@@ -53,7 +53,7 @@ pub use self::quality::{FrameStatus, Quality};
 struct Frame {
     prebuilt: Prebuilt,
     /// Where outputs go into it.
-    outputs: Runs,
+    outputs: CopyRanges,
     /// Its outputs are withheld, as those of its whole task.
     withheld: bool,
     /// What [`FrameStatus::not_sent`] is when it is sent: the datagrams whose outputs are withheld.
@@ -70,7 +70,7 @@ struct Frame {
     version: u64,
     status: FrameStatus,
     /// With which frames it leaves.
-    departure: usize,
+    batch: usize,
     task: usize,
     /// Its number within the task, and among those of all tasks.
     number: usize,
@@ -81,16 +81,16 @@ struct Frame {
 #[derive(Debug)]
 pub(crate) struct Cyclic {
     plan: Arc<Plan>,
-    line: Arc<Mutex<Line>>,
+    device_table: Arc<Mutex<DeviceTable>>,
     /// The version of the line's state, to be looked at without a lock.
     live: Arc<AtomicU64>,
-    departures: Vec<Departure>,
-    /// In the order of departures.
+    batches: Vec<FrameBatch>,
+    /// In the order of batches.
     frames: Vec<Frame>,
     /// When the next frame is due: now or before while some that leave together are left, else with the
-    /// first departure.
+    /// first batch.
     due: Instant,
-    /// When the first departure is due.
+    /// When the first batch is due.
     next_at: Instant,
     /// The frames that leave now.
     left: Range<usize>,
@@ -109,8 +109,8 @@ pub(crate) struct Cyclic {
     /// What the last broadcast read brought.
     responding: Option<(WorkingCounter, u8)>,
     shares: Vec<Share>,
-    spread: Spread,
-    steer: Steer,
+    time_distribution: SystemTimeDistribution,
+    dc_servo: DcServo,
     mailboxes: MailboxBits,
     pub(crate) outputs: Vec<u8>,
     pub(crate) inputs: Vec<u8>,
@@ -120,22 +120,22 @@ impl Cyclic {
     /// Gives its frames to the exchange, and begins at `now`.
     pub(crate) fn new(
         plan: Arc<Plan>,
-        line: Arc<Mutex<Line>>,
+        device_table: Arc<Mutex<DeviceTable>>,
         exchange: &mut Exchange,
         allowed_misses: Option<u32>,
         now: Instant,
     ) -> Self {
-        let (departures, order) = departing(&plan, Application::new(allowed_misses), now);
-        let planned = |one: &Departing| plan.tasks[one.task].frames[one.number].clone();
+        let (batches, order) = frame_batches(&plan, Application::new(allowed_misses), now);
+        let planned = |one: &BatchFrame| plan.tasks[one.task].frames[one.number].clone();
         let prebuilt = exchange.prebuild(order.iter().map(planned));
-        let frame = |(one, prebuilt): (&Departing, Prebuilt)| {
+        let frame = |(one, prebuilt): (&BatchFrame, Prebuilt)| {
             Frame::new(&plan, one, &plan.tasks[one.task].frames[one.number], prebuilt)
         };
         let frames: Vec<Frame> = order.iter().zip(prebuilt).map(frame).collect();
-        let next_at = earliest(&departures);
-        let live = lock(&line).live_version();
+        let next_at = earliest(&batches);
+        let live = lock(&device_table).live_version();
         let mut cyclic = Self {
-            departures,
+            batches,
             frames,
             due: next_at,
             next_at,
@@ -149,13 +149,13 @@ impl Cyclic {
             version: u64::MAX,
             responding: None,
             shares: quality::shares(&plan, &order),
-            spread: Spread::default(),
-            steer: Steer::default(),
+            time_distribution: SystemTimeDistribution::default(),
+            dc_servo: DcServo::default(),
             mailboxes: MailboxBits::default(),
             outputs: vec![0; plan.outputs_len],
             inputs: vec![0; plan.inputs_len],
             plan,
-            line,
+            device_table,
             live,
         };
         cyclic.refresh();
@@ -163,7 +163,7 @@ impl Cyclic {
     }
 
     /// Tells those who serve mailboxes which of them hold something, where the plan reads that.
-    pub(crate) fn serve(&mut self, mailboxes: Queues) {
+    pub(crate) fn serve(&mut self, mailboxes: MailboxQueues) {
         self.mailboxes = MailboxBits::new(&self.plan, mailboxes);
     }
 
@@ -177,12 +177,12 @@ impl Cyclic {
 
     #[cold]
     fn take_over_changes(&mut self) {
-        let mut line = lock(&self.line);
-        self.version = line.version();
-        line.take_changes(&mut self.least, &mut self.most);
-        let clock = line.clock();
-        self.spread.learn(clock);
-        self.steer.set_base(clock.base);
+        let mut device_table = lock(&self.device_table);
+        self.version = device_table.version();
+        device_table.take_changes(&mut self.least, &mut self.most);
+        let clock = device_table.clock();
+        self.time_distribution.learn(clock);
+        self.dc_servo.set_base(clock.base);
     }
 
     /// When the next frames are due; [`Instant::MAX`]: never.
@@ -196,8 +196,8 @@ impl Cyclic {
     pub(crate) fn give_outputs(&mut self, task: Option<usize>) {
         match task {
             Some(task) => {
-                let mine = |one: &&mut Departure| one.task == task && one.begins;
-                self.departures.iter_mut().filter(mine).for_each(|one| one.application.give());
+                let mine = |one: &&mut FrameBatch| one.task == task && one.begins;
+                self.batches.iter_mut().filter(mine).for_each(|one| one.application.give());
             }
             None => self.given += 1,
         }
@@ -206,14 +206,14 @@ impl Cyclic {
     /// Whether all frames of a task have come back, or were given up, since this was asked last.
     #[inline]
     pub(crate) fn take_exchanged(&mut self, task: usize) -> bool {
-        let mine = self.departures.iter_mut().filter(|one| one.task == task);
+        let mine = self.batches.iter_mut().filter(|one| one.task == task);
         mine.fold(false, |any, one| any | std::mem::replace(&mut one.exchanged, false))
     }
 
     /// When the next cycle of a task begins.
     pub(crate) fn next_cycle(&self, task: usize) -> Option<Instant> {
-        let begins = |one: &&Departure| one.task == task && one.begins;
-        self.departures.iter().find(begins).map(|one| one.next_at)
+        let begins = |one: &&FrameBatch| one.task == task && one.begins;
+        self.batches.iter().find(begins).map(|one| one.next_at)
     }
 
     /// Whether a frame leaves at `now`.
@@ -234,8 +234,8 @@ impl Cyclic {
 }
 
 impl Frame {
-    fn new(plan: &Plan, one: &Departing, planned: &FramePlan, prebuilt: Prebuilt) -> Self {
-        let (mut outputs, mut datagrams, mut carries) = (Runs::default(), Vec::new(), 0);
+    fn new(plan: &Plan, one: &BatchFrame, planned: &FramePlan, prebuilt: Prebuilt) -> Self {
+        let (mut outputs, mut datagrams, mut carries) = (CopyRanges::default(), Vec::new(), 0);
         let mut clock = None;
         for (at, (one, data_at)) in planned.datagrams.iter().zip(data_offsets(planned)).enumerate()
         {
@@ -259,7 +259,7 @@ impl Frame {
             all: FrameStatus::before(planned.datagrams.len()),
             version: u64::MAX,
             status: FrameStatus::default(),
-            departure: one.departure,
+            batch: one.batch,
             task: one.task,
             number: one.number,
             planned: one.planned,

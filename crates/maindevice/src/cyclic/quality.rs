@@ -1,4 +1,4 @@
-//! How good the process data of a SubDevice are, and how old; how each frame came back.
+//! Quality and age of the process data of a SubDevice; status of each frame that came back.
 
 use linesman_config::plan::Plan;
 use linesman_config::plan::expect::Presence;
@@ -7,7 +7,7 @@ use linesman_proto::sii::Direction;
 use linesman_proto::time::{Instant, Span};
 
 use super::Cyclic;
-use super::departure::Departing;
+use super::frame_batch::BatchFrame;
 
 /// The process data of one SubDevice as the application sees them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -87,10 +87,10 @@ pub(super) struct Share {
 }
 
 /// Who has a share in which datagrams of the frames in this order, by [`DeviceId`].
-pub(super) fn shares(plan: &Plan, order: &[Departing]) -> Vec<Share> {
+pub(super) fn shares(plan: &Plan, order: &[BatchFrame]) -> Vec<Share> {
     let mut shares = vec![Share::default(); plan.devices.len()];
     // The first datagram with inputs is that of the first frame as planned.
-    let mut frames: Vec<(usize, &Departing)> = order.iter().enumerate().collect();
+    let mut frames: Vec<(usize, &BatchFrame)> = order.iter().enumerate().collect();
     frames.sort_by_key(|(_, one)| one.planned);
     for (frame, one) in frames {
         let planned = &plan.tasks[one.task].frames[one.number];

@@ -9,15 +9,15 @@ use linesman_proto::state::{AlState, OredStates};
 use linesman_proto::time::{Instant, Span};
 
 use super::datagram::Place;
-use super::departure::{LOST_IS_NEWS, earliest};
-use super::spread::Brought;
+use super::frame_batch::{LOST_IS_NEWS, earliest};
+use super::system_time_distribution::Brought;
 use super::{Cyclic, FrameStatus};
 use crate::event::Event;
 use crate::exchange::Exchange;
 use crate::exchange::prebuilt::FIRST_INDEX;
 use crate::executor::lock;
 use crate::statistics::Statistics;
-use crate::supervisor::Line;
+use crate::supervisor::DeviceTable;
 
 impl Cyclic {
     /// Takes a frame if it is what comes back nearly always: one of ours, as it was sent, that is waited
@@ -41,12 +41,12 @@ impl Cyclic {
         // Nearly always it is one datagram, and all is well: then that is all there is to do.
         if frame.version == self.live.load(Ordering::Relaxed)
             && !self.losing
-            && let [departure] = self.departures.as_mut_slice()
+            && let [batch] = self.batches.as_mut_slice()
             && let [only] = frame.datagrams.as_mut_slice()
             && let Some(wkc) = only.counter(reply)
             && only.is_usual(withheld, wkc)
         {
-            departure.exchanged |= departure.came();
+            batch.exchanged |= batch.came();
             frame.status.wrong_counter = 0;
             frame.status.input_toggle ^= frame.all;
             only.take(now, reply, &mut self.inputs);
@@ -72,8 +72,8 @@ impl Cyclic {
             self.catch_up(index);
         }
         let Some(frame) = self.frames.get(index as usize) else { return };
-        let (task, departure) = (frame.task, frame.departure);
-        self.came_of(departure);
+        let (task, batch) = (frame.task, frame.batch);
+        self.came_of(batch);
         if self.losing {
             self.found(task, events);
         }
@@ -107,15 +107,15 @@ impl Cyclic {
         frame.status.input_toggle ^= frame.all;
     }
 
-    /// A frame of a departure is on its way no longer.
+    /// A frame of a batch is on its way no longer.
     #[inline]
-    pub(super) fn came_of(&mut self, departure: usize) {
-        let Some(one) = self.departures.get_mut(departure) else { return };
+    pub(super) fn came_of(&mut self, batch: usize) {
+        let Some(one) = self.batches.get_mut(batch) else { return };
         if one.came() {
             let task = one.task;
             // Others of the same task may have left a little before.
-            let out = self.departures.iter().any(|one| one.task == task && one.is_out());
-            if let Some(one) = self.departures.get_mut(departure) {
+            let out = self.batches.iter().any(|one| one.task == task && one.is_out());
+            if let Some(one) = self.batches.get_mut(batch) {
                 one.exchanged |= !out;
             }
         }
@@ -168,7 +168,7 @@ impl Cyclic {
                     statistics.working_counter_errors += 1;
                     if datagram.told != Some(wkc) {
                         datagram.tell_wrong(place, withheld, wkc, events);
-                        lock(&self.line).alert();
+                        lock(&self.device_table).alert();
                     }
                 }
             } else {
@@ -180,18 +180,18 @@ impl Cyclic {
                 if role == Role::Presence {
                     if self.responding != seen {
                         self.responding = seen;
-                        watch_line(&self.line, seen, events);
+                        watch_line(&self.device_table, seen, events);
                     }
                 } else if role == Role::ReferenceClock
                     && let Some(clock) = frame.clock.filter(|clock| clock.is_at(datagram.data_at))
                 {
                     let index = reply.get(FIRST_INDEX).copied().unwrap_or_default();
                     let cycle = self.plan.tasks.get(frame.task).map(|task| task.cycle);
-                    moved += match self.spread.read(&clock, index, wkc, reply) {
+                    moved += match self.time_distribution.read(&clock, index, wkc, reply) {
                         Brought::Time => {
-                            self.steer.correction(now, data, cycle.unwrap_or_default())
+                            self.dc_servo.correction(now, data, cycle.unwrap_or_default())
                         }
-                        Brought::Nothing => self.steer.as_before(cycle.unwrap_or_default()),
+                        Brought::Nothing => self.dc_servo.as_before(cycle.unwrap_or_default()),
                     };
                 } else if role == Role::MailboxStates && wkc.0 > 0 {
                     let data = data.get(..datagram.len).unwrap_or_default();
@@ -206,14 +206,13 @@ impl Cyclic {
         }
     }
 
-    /// Moves all departures, by ns.
+    /// Moves all batches, by ns.
     fn shift(&mut self, by: i64) {
-        for departure in &mut self.departures {
+        for batch in &mut self.batches {
             let span = Span::ns(by.unsigned_abs());
-            departure.next_at =
-                if by < 0 { departure.next_at.before(span) } else { departure.next_at + span };
+            batch.next_at = if by < 0 { batch.next_at.before(span) } else { batch.next_at + span };
         }
-        self.next_at = earliest(&self.departures);
+        self.next_at = earliest(&self.batches);
         if self.left.is_empty() {
             self.due = self.next_at;
         }
@@ -226,14 +225,14 @@ impl Cyclic {
         for datagram in &mut frame.datagrams {
             datagram.refuse(&mut self.inputs);
         }
-        let (task, departure) = (frame.task, frame.departure);
-        self.came_of(departure);
+        let (task, batch) = (frame.task, frame.batch);
+        self.came_of(batch);
         let Some(lost) = self.lost.get_mut(task) else { return };
         *lost += 1;
         self.losing = true;
         if *lost == LOST_IS_NEWS {
             events(Event::CyclicFramesLost { task });
-            lock(&self.line).alert();
+            lock(&self.device_table).alert();
         }
     }
 
@@ -244,7 +243,7 @@ impl Cyclic {
         self.losing = self.lost.iter().any(|lost| *lost > 0);
         if lost >= LOST_IS_NEWS {
             events(Event::CyclicFramesBack { task, lost });
-            lock(&self.line).alert();
+            lock(&self.device_table).alert();
         }
     }
 }
@@ -252,13 +251,13 @@ impl Cyclic {
 /// The broadcast read of the AL status tells how many are there and whether all is as it shall be.
 #[cold]
 fn watch_line(
-    line: &Mutex<Line>,
+    device_table: &Mutex<DeviceTable>,
     seen: Option<(WorkingCounter, u8)>,
     events: &mut impl FnMut(Event),
 ) {
     let Some((now, states)) = seen else { return };
     let states: OredStates = AlState::from_or(states);
-    if let Some(before) = lock(line).broadcast(now, states) {
+    if let Some(before) = lock(device_table).broadcast(now, states) {
         events(Event::Responding { before, now });
     }
 }

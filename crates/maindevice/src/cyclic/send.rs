@@ -2,7 +2,7 @@
 
 use linesman_proto::time::Instant;
 
-use super::departure::{Departure, earliest};
+use super::frame_batch::{FrameBatch, earliest};
 use super::{Cyclic, FrameStatus};
 use crate::event::Event;
 use crate::exchange::{Exchange, Order};
@@ -65,12 +65,12 @@ impl Cyclic {
     /// What few frames need: the time of the reference clock, and to be kept for the copies that follow.
     #[inline(never)]
     fn complete(&mut self, index: usize, number: u32, exchange: &mut Exchange, sent: &mut [u8]) {
-        let Self { frames, departures, spread, deadline, .. } = self;
+        let Self { frames, batches, time_distribution, deadline, .. } = self;
         let Some(frame) = frames.get(index) else { return };
-        let departure = departures.get(frame.departure);
-        if let (Some(clock), Some(departure)) = (&frame.clock, departure) {
+        let batch = batches.get(frame.batch);
+        if let (Some(clock), Some(batch)) = (&frame.clock, batch) {
             let [first, ..] = number.to_le_bytes();
-            spread.write(clock, first, deadline.before(departure.cycle), sent);
+            time_distribution.write(clock, first, deadline.before(batch.cycle), sent);
         }
         if frame.prebuilt.is_copied() {
             exchange.keep_copies(index as u32, number, sent);
@@ -98,14 +98,14 @@ impl Cyclic {
             let Some(frame) = self.frames.get_mut(index) else { continue };
             frame.status.not_sent = FrameStatus::WHOLE;
             statistics.cyclic_unsent += 1;
-            let departure = frame.departure;
-            self.came_of(departure);
+            let batch = frame.batch;
+            self.came_of(batch);
         }
         self.due = self.next_at;
         None
     }
 
-    /// The first departure that is due: its frames leave from now on.
+    /// The first batch that is due: its frames leave from now on.
     #[inline]
     fn depart(
         &mut self,
@@ -113,7 +113,7 @@ impl Cyclic {
         statistics: &mut Statistics,
         events: &mut impl FnMut(Event),
     ) -> Option<()> {
-        let (departure, behind) = match self.departures.as_mut_slice() {
+        let (batch, behind) = match self.batches.as_mut_slice() {
             [only] => {
                 let behind = only.depart(now);
                 self.next_at = only.next_at;
@@ -121,15 +121,15 @@ impl Cyclic {
             }
             several => first_due(several, now, &mut self.next_at)?,
         };
-        self.left = departure.frames.clone();
-        self.deadline = now + departure.cycle;
-        if departure.begins {
+        self.left = batch.frames.clone();
+        self.deadline = now + batch.cycle;
+        if batch.begins {
             statistics.cycles += 1;
             if behind > 0 {
                 statistics.cycles_missed += behind;
             }
-            if let Some(judged) = departure.application.begin_cycle(self.given) {
-                let task = departure.task;
+            if let Some(judged) = batch.application.begin_cycle(self.given) {
+                let task = batch.task;
                 judged.tell(task, statistics, events);
                 if judged.changed {
                     self.withhold(task, judged.withheld);
@@ -147,15 +147,15 @@ impl Cyclic {
     }
 }
 
-/// Which of several departures is due, and how many cycles of it were slept through.
+/// Which of several batches is due, and how many cycles of it were slept through.
 #[inline(never)]
 fn first_due<'a>(
-    departures: &'a mut [Departure],
+    batches: &'a mut [FrameBatch],
     now: Instant,
     next_at: &mut Instant,
-) -> Option<(&'a mut Departure, u64)> {
-    let at = departures.iter().position(|one| one.next_at <= now)?;
-    let behind = departures[at].depart(now);
-    *next_at = earliest(departures);
-    Some((&mut departures[at], behind))
+) -> Option<(&'a mut FrameBatch, u64)> {
+    let at = batches.iter().position(|one| one.next_at <= now)?;
+    let behind = batches[at].depart(now);
+    *next_at = earliest(batches);
+    Some((&mut batches[at], behind))
 }

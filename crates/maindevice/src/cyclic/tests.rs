@@ -16,7 +16,7 @@ use super::*;
 use crate::event::Event;
 use crate::exchange::Received;
 use crate::statistics::Statistics;
-use crate::supervisor::Found;
+use crate::supervisor::Reachability;
 
 fn device() -> PlannedDevice {
     let manager = |index, direction, start| ProcessSyncManager {
@@ -48,7 +48,7 @@ fn device() -> PlannedDevice {
 
 struct Fixture {
     cyclic: Cyclic,
-    line: Arc<Mutex<Line>>,
+    device_table: Arc<Mutex<DeviceTable>>,
     exchange: Exchange,
     statistics: Statistics,
     events: Vec<Event>,
@@ -77,13 +77,14 @@ impl Fixture {
         let mut plan = Plan::build(devices, tree, &PlanOptions::default()).unwrap();
         change(&mut plan);
         let plan = Arc::new(plan);
-        let line = Arc::new(Mutex::new(Line::new(&plan)));
+        let device_table = Arc::new(Mutex::new(DeviceTable::new(&plan)));
         let sources = [MacAddress([0, 0, 0, 0, 0, 1]), MacAddress([0, 0, 0, 0, 0, 2])];
         let mut exchange = Exchange::new(sources, false, Span::ms(10));
-        let cyclic = Cyclic::new(plan, Arc::clone(&line), &mut exchange, allowed, Instant::ZERO);
+        let cyclic =
+            Cyclic::new(plan, Arc::clone(&device_table), &mut exchange, allowed, Instant::ZERO);
         Self {
             cyclic,
-            line,
+            device_table,
             exchange,
             statistics: Statistics::default(),
             events: Vec::new(),
@@ -93,9 +94,9 @@ impl Fixture {
     }
 
     fn reach(&mut self, id: u32) {
-        let mut line = lock(&self.line);
-        line.set_found(DeviceId(id), Found::There { restarted: false });
-        line.set_reached(DeviceId(id), AlState::Op);
+        let mut device_table = lock(&self.device_table);
+        device_table.set_found(DeviceId(id), Reachability::There { restarted: false });
+        device_table.set_reached(DeviceId(id), AlState::Op);
     }
 
     /// One cycle: the frame as it is sent, and what comes back with these inputs and this counter.
@@ -205,7 +206,7 @@ fn more_than_there_are_is_no_better_than_less() {
 fn inputs_of_one_flow_while_the_other_is_on_its_way() {
     let mut fixture = Fixture::new();
     fixture.reach(0);
-    lock(&fixture.line).set_found(DeviceId(1), Found::There { restarted: true });
+    lock(&fixture.device_table).set_found(DeviceId(1), Reachability::There { restarted: true });
     for wkc in [3, 5, 6] {
         fixture.cycle([wkc, 0x55], wkc);
         assert_eq!(fixture.cyclic.inputs, [wkc, 0], "working counter {wkc}");
@@ -243,7 +244,7 @@ fn inputs_are_cleared_where_that_was_chosen() {
     fixture.lose();
     assert_eq!(fixture.cyclic.inputs, [3, 0], "a lost frame");
     fixture.cycle([5, 6], 6);
-    lock(&fixture.line).set_found(DeviceId(1), Found::Lost);
+    lock(&fixture.device_table).set_found(DeviceId(1), Reachability::Lost);
     fixture.cycle([7, 8], 3);
     assert_eq!(fixture.cyclic.inputs, [7, 0], "known to be gone");
 }
@@ -263,7 +264,7 @@ fn data_tell_how_old_they_are() {
     assert_eq!([quality(&fixture, 0), quality(&fixture, 1)], [(true, Some(1)); 2]);
     fixture.cycle([1, 2], 5);
     assert_eq!([quality(&fixture, 0), quality(&fixture, 1)], [(false, Some(1)); 2]);
-    lock(&fixture.line).set_found(DeviceId(1), Found::Lost);
+    lock(&fixture.device_table).set_found(DeviceId(1), Reachability::Lost);
     fixture.cycle([1, 2], 3);
     assert_eq!(quality(&fixture, 0), (true, Some(3)));
     assert_eq!(quality(&fixture, 1), (false, Some(1)), "as old as when it was seen last");
@@ -374,7 +375,7 @@ fn the_short_way_does_what_the_long_way_does() {
             }
             match cycle {
                 20 => {
-                    lock(&fixture.line).set_found(DeviceId(1), Found::Lost);
+                    lock(&fixture.device_table).set_found(DeviceId(1), Reachability::Lost);
                 }
                 30 => {
                     fixture.reach(1);

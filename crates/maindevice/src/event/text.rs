@@ -107,8 +107,8 @@ impl Event {
                 let found = linesman_config::identity::text(found);
                 vec![format!("position {position}: a device that is not planned ({found})")]
             }
-            Self::Looked(_)
-            | Self::LookFailed(_)
+            Self::ReadOnlyScanned(_)
+            | Self::ReadOnlyScanFailed(_)
             | Self::Scanned(_)
             | Self::ScanFailed(_)
             | Self::DeviceState { .. }

@@ -1,4 +1,4 @@
-//! Frames that come back: whose they are, and what they are to the slot whose number they carry.
+//! Reception of frames: the slot that a frame belongs to, and what it is to that slot.
 
 use linesman_proto::address::Path;
 use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, MAX_LEN, MacAddress, SOURCE_MARK};

@@ -1,4 +1,4 @@
-//! What a procedure asks of the line: one datagram, and what came back.
+//! Request of a procedure to the line: one datagram, and what came back.
 
 use std::fmt;
 

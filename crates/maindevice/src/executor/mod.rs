@@ -43,20 +43,20 @@ pub(crate) struct Answer {
 }
 
 /// What tasks and the engine share, and what the engine may look at without its lock.
-pub(crate) struct Board {
-    shared: Mutex<Shared>,
+pub(crate) struct Shared {
+    state: Mutex<SharedState>,
     /// Now, in ns.
     now: AtomicU64,
     /// When the first sleeper is to be woken, in ns.
     first_timer: AtomicU64,
-    /// What there is to do, as bits of [`stir`].
-    stirred: AtomicU8,
+    /// What there is to do, as bits of [`wake_flags`](mod@wake_flags).
+    wake_flags: AtomicU8,
     /// Tasks that want to be polled.
     ready: Mutex<VecDeque<u64>>,
 }
 
 /// What there is to do.
-mod stir {
+mod wake_flags {
     /// A task has changed something.
     pub(super) const NEWS: u8 = 1;
     /// A task wants to be polled.
@@ -65,30 +65,30 @@ mod stir {
     pub(super) const EVENTS: u8 = 4;
 }
 
-impl Board {
+impl Shared {
     /// For tasks: whatever they change is news for the engine.
-    pub(crate) fn lock(&self) -> MutexGuard<'_, Shared> {
-        self.stir(stir::NEWS);
-        lock(&self.shared)
+    pub(crate) fn lock(&self) -> MutexGuard<'_, SharedState> {
+        self.raise(wake_flags::NEWS);
+        lock(&self.state)
     }
 
-    fn stir(&self, what: u8) {
-        self.stirred.fetch_or(what, Ordering::Relaxed);
+    fn raise(&self, what: u8) {
+        self.wake_flags.fetch_or(what, Ordering::Relaxed);
     }
 
     fn settle(&self, what: u8) {
-        self.stirred.fetch_and(!what, Ordering::Relaxed);
+        self.wake_flags.fetch_and(!what, Ordering::Relaxed);
     }
 
     #[inline]
-    fn is_stirred(&self, what: u8) -> bool {
-        self.stirred.load(Ordering::Relaxed) & what != 0
+    fn has_wake_flag(&self, what: u8) -> bool {
+        self.wake_flags.load(Ordering::Relaxed) & what != 0
     }
 
     /// A task wants to be polled.
     fn push_ready(&self, id: u64) {
         lock(&self.ready).push_back(id);
-        self.stir(stir::READY);
+        self.raise(wake_flags::READY);
     }
 
     #[inline]
@@ -98,18 +98,18 @@ impl Board {
 
     /// Something was put among the events.
     pub(crate) fn note_event(&self) {
-        self.stir(stir::EVENTS);
+        self.raise(wake_flags::EVENTS);
     }
 
     /// Timers have changed.
-    pub(crate) fn note_timers(&self, shared: &Shared) {
+    pub(crate) fn note_timers(&self, shared: &SharedState) {
         let first = shared.timers.first().map_or(u64::MAX, Instant::as_nanos);
         self.first_timer.store(first, Ordering::Relaxed);
     }
 }
 
 /// What tasks and the engine share.
-pub(crate) struct Shared {
+pub(crate) struct SharedState {
     /// Whether what card A sends arrives at card B.
     pub(crate) ring_intact: Option<bool>,
     /// SubDevices without a station address: what is asked of the one they would have is asked of the
@@ -126,7 +126,7 @@ pub(crate) struct Shared {
 /// Wakes one task by putting it into the queue of those that are ready.
 struct TaskWaker {
     id: u64,
-    board: Arc<Board>,
+    shared: Arc<Shared>,
     /// It is in the queue already.
     queued: Arc<AtomicBool>,
 }
@@ -138,7 +138,7 @@ impl Wake for TaskWaker {
 
     fn wake_by_ref(self: &Arc<Self>) {
         if !self.queued.swap(true, Ordering::Relaxed) {
-            self.board.push_ready(self.id);
+            self.shared.push_ready(self.id);
         }
     }
 }
@@ -152,7 +152,7 @@ struct Task {
 
 /// The poller.
 pub(crate) struct Executor {
-    board: Arc<Board>,
+    shared: Arc<Shared>,
     tasks: BTreeMap<u64, Task>,
     next_task: u64,
     next_group: u32,
@@ -160,7 +160,7 @@ pub(crate) struct Executor {
 
 impl Executor {
     pub(crate) fn new() -> Self {
-        let shared = Shared {
+        let shared = SharedState {
             ring_intact: None,
             places: Vec::new(),
             submitted: VecDeque::new(),
@@ -170,31 +170,31 @@ impl Executor {
             spawned: VecDeque::new(),
             events: VecDeque::new(),
         };
-        let board = Board {
-            shared: Mutex::new(shared),
+        let shared = Shared {
+            state: Mutex::new(shared),
             now: AtomicU64::new(0),
             first_timer: AtomicU64::new(u64::MAX),
-            stirred: AtomicU8::new(0),
+            wake_flags: AtomicU8::new(0),
             ready: Mutex::default(),
         };
-        Self { board: Arc::new(board), tasks: BTreeMap::new(), next_task: 0, next_group: 0 }
+        Self { shared: Arc::new(shared), tasks: BTreeMap::new(), next_task: 0, next_group: 0 }
     }
 
     /// The time to which the engine was advanced last.
     pub(crate) fn now(&self) -> Instant {
-        self.board.now()
+        self.shared.now()
     }
 
-    pub(crate) fn shared(&self) -> MutexGuard<'_, Shared> {
-        lock(&self.board.shared)
+    pub(crate) fn shared(&self) -> MutexGuard<'_, SharedState> {
+        lock(&self.shared.state)
     }
 
     /// Whether tasks have changed something since this was asked last.
     #[inline]
     pub(crate) fn take_news(&self) -> bool {
-        let news = self.board.is_stirred(stir::NEWS);
+        let news = self.shared.has_wake_flag(wake_flags::NEWS);
         if news {
-            self.board.settle(stir::NEWS);
+            self.shared.settle(wake_flags::NEWS);
         }
         news
     }
@@ -202,7 +202,7 @@ impl Executor {
     /// The same, for a look.
     #[inline]
     pub(crate) fn has_news(&self) -> bool {
-        self.board.is_stirred(stir::NEWS)
+        self.shared.has_wake_flag(wake_flags::NEWS)
     }
 
     /// Tells the user of the MainDevice.
@@ -214,19 +214,19 @@ impl Executor {
 
     /// Something was put among the events.
     pub(crate) fn note_event(&self) {
-        self.board.note_event();
+        self.shared.note_event();
     }
 
     /// The next thing to tell.
     #[inline]
     pub(crate) fn poll_event(&mut self) -> Option<Event> {
-        if self.board.is_stirred(stir::EVENTS) { self.take_event() } else { None }
+        if self.shared.has_wake_flag(wake_flags::EVENTS) { self.take_event() } else { None }
     }
 
     fn take_event(&mut self) -> Option<Event> {
         let event = self.shared().events.pop_front();
         if event.is_none() {
-            self.board.settle(stir::EVENTS);
+            self.shared.settle(wake_flags::EVENTS);
         }
         event
     }
@@ -234,7 +234,7 @@ impl Executor {
     /// A wire for a new group of tasks.
     pub(crate) fn group(&mut self, repeats: u8) -> Wire {
         self.next_group += 1;
-        Wire::new(Arc::clone(&self.board), Group(self.next_group), repeats)
+        Wire::new(Arc::clone(&self.shared), Group(self.next_group), repeats)
     }
 
     /// Drops all tasks of a group; their requests are forgotten.
@@ -254,26 +254,26 @@ impl Executor {
     /// Time has come to `now`: wakes whoever slept until then.
     #[inline]
     pub(crate) fn advance(&mut self, now: Instant) {
-        if now > self.board.now() {
-            self.board.now.store(now.as_nanos(), Ordering::Relaxed);
+        if now > self.shared.now() {
+            self.shared.now.store(now.as_nanos(), Ordering::Relaxed);
         }
-        if now.as_nanos() >= self.board.first_timer.load(Ordering::Relaxed) {
+        if now.as_nanos() >= self.shared.first_timer.load(Ordering::Relaxed) {
             self.wake_sleepers(now);
         }
     }
 
     fn wake_sleepers(&mut self, now: Instant) {
-        let mut shared = lock(&self.board.shared);
+        let mut shared = lock(&self.shared.state);
         while let Some(sleeper) = shared.timers.pop_due(now) {
             // Waking touches only the queue of those that are ready.
             sleeper.wake();
         }
-        self.board.note_timers(&shared);
+        self.shared.note_timers(&shared);
     }
 
     /// The answer to a request.
     pub(crate) fn answer(&mut self, ticket: Ticket, result: Result<Reply, ExchangeError>) {
-        let mut shared = lock(&self.board.shared);
+        let mut shared = lock(&self.shared.state);
         let Some(answer) = shared.answers.get_mut(ticket.0) else { return };
         answer.result = Some(result);
         let waker = answer.waker.take();
@@ -285,14 +285,14 @@ impl Executor {
 
     /// Whether there is something to run, or tasks have changed something.
     #[inline]
-    pub(crate) fn is_stirred(&self) -> bool {
-        self.board.is_stirred(stir::NEWS | stir::READY)
+    pub(crate) fn has_wake_flag(&self) -> bool {
+        self.shared.has_wake_flag(wake_flags::NEWS | wake_flags::READY)
     }
 
     /// Polls whoever is ready until nobody is.
     #[inline]
     pub(crate) fn run(&mut self) {
-        if self.is_stirred() {
+        if self.has_wake_flag() {
             self.run_all();
         }
     }
@@ -300,7 +300,7 @@ impl Executor {
     fn run_all(&mut self) {
         loop {
             self.adopt();
-            let Some(id) = lock(&self.board.ready).pop_front() else { break };
+            let Some(id) = lock(&self.shared.ready).pop_front() else { break };
             let Some(task) = self.tasks.get_mut(&id) else { continue };
             task.queued.store(false, Ordering::Relaxed);
             let waker = task.waker.clone();
@@ -311,7 +311,7 @@ impl Executor {
                 }
             }
         }
-        self.board.settle(stir::READY);
+        self.shared.settle(wake_flags::READY);
     }
 
     fn adopt(&mut self) {
@@ -320,17 +320,18 @@ impl Executor {
             let id = self.next_task;
             self.next_task += 1;
             let queued = Arc::new(AtomicBool::new(true));
-            let board = Arc::clone(&self.board);
-            let waker = Waker::from(Arc::new(TaskWaker { id, board, queued: Arc::clone(&queued) }));
+            let shared = Arc::clone(&self.shared);
+            let waker =
+                Waker::from(Arc::new(TaskWaker { id, shared, queued: Arc::clone(&queued) }));
             self.tasks.insert(id, Task { group, future, waker, queued });
-            self.board.push_ready(id);
+            self.shared.push_ready(id);
         }
     }
 
     /// When the first sleeper wants to be woken; [`Instant::MAX`] when nobody sleeps.
     #[inline]
     pub(crate) fn first_timer(&self) -> Instant {
-        Instant::from_nanos(self.board.first_timer.load(Ordering::Relaxed))
+        Instant::from_nanos(self.shared.first_timer.load(Ordering::Relaxed))
     }
 }
 

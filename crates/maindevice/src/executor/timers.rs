@@ -1,5 +1,5 @@
-//! Who sleeps until when. Whoever no longer sleeps leaves at once; its time stays in the heap until it
-//! comes up, or until most of the heap is of that kind.
+//! Timers of sleeping tasks. A cancelled timer stays in the heap until it comes up, or until most
+//! of the heap is of that kind.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_leaves_is_not_waited_for_and_many_who_leave_are_forgotten() {
+    fn cancelled_sleeper_is_not_waited_for_and_many_cancelled_are_forgotten() {
         let mut timers = Timers::default();
         let at = |nanos| Instant::from_nanos(nanos);
         let waker = Waker::noop();

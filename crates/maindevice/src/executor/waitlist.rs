@@ -1,5 +1,5 @@
-//! Those who wait, each under a number that is never given twice. Places are used again, so that a list
-//! which has reached its size allocates nothing any more.
+//! List of waiters, each under a number that is never given twice. Places are used again, so that a
+//! list which has reached its size allocates nothing any more.
 
 use slab::Slab;
 

@@ -1,4 +1,4 @@
-//! What a procedure holds in its hand: the line and the clock.
+//! Handle of a procedure: access to the line and to the time.
 
 use std::future::Future;
 use std::pin::Pin;
@@ -9,20 +9,20 @@ use linesman_proto::address::{RegisterAddress, StationAddress, WorkingCounter};
 use linesman_proto::time::{Instant, Span};
 
 use super::task::{Handle, Spawned, with_handle};
-use super::{Answer, Board, Group};
+use super::{Answer, Group, Shared};
 use crate::event::Event;
 use crate::exchange::{ExchangeError, Reply, Request, Target, Ticket};
 
 /// The line as procedures see it. Clones mean the same line.
 #[derive(Clone)]
 pub struct Wire {
-    shared: Arc<Board>,
+    shared: Arc<Shared>,
     group: Group,
     repeats: u8,
 }
 
 impl Wire {
-    pub(crate) fn new(shared: Arc<Board>, group: Group, repeats: u8) -> Self {
+    pub(crate) fn new(shared: Arc<Shared>, group: Group, repeats: u8) -> Self {
         Self { shared, group, repeats }
     }
 
@@ -162,7 +162,7 @@ impl std::fmt::Debug for Wire {
 
 /// The answer to a datagram, to be awaited.
 pub struct Exchanging {
-    shared: Arc<Board>,
+    shared: Arc<Shared>,
     ticket: Ticket,
 }
 
@@ -196,7 +196,7 @@ impl Drop for Exchanging {
 
 /// A point in time, to be awaited.
 pub struct Sleep {
-    shared: Arc<Board>,
+    shared: Arc<Shared>,
     until: Instant,
     timer: Option<u64>,
 }

@@ -7,37 +7,37 @@ use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::sdo::{Abort, Initial, Request, Response, Segment};
 use linesman_proto::mailbox::coe::{CoeError, Message, ObjectAddress, ObjectIndex};
 
-use super::dialogue::Dialogue;
 use super::failure::{Step, Why};
+use super::transaction::MailboxTransaction;
 
 /// A transfer longer than this is not believed.
 const LONGEST: usize = 16 << 20;
 
 /// Fetches an object.
 pub(crate) async fn upload(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     object: ObjectAddress,
     complete: bool,
 ) -> Result<Vec<u8>, Why> {
-    let mut transfer = Transfer { dialogue, object, complete };
+    let mut transfer = Transfer { transaction, object, complete };
     let result = transfer.upload().await;
     transfer.end(result).await
 }
 
 /// Brings an object.
 pub(crate) async fn download(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     object: ObjectAddress,
     complete: bool,
     data: &[u8],
 ) -> Result<(), Why> {
-    let mut transfer = Transfer { dialogue, object, complete };
+    let mut transfer = Transfer { transaction, object, complete };
     let result = transfer.download(data).await;
     transfer.end(result).await
 }
 
 struct Transfer<'a, 'b> {
-    dialogue: &'a mut Dialogue<'b>,
+    transaction: &'a mut MailboxTransaction<'b>,
     object: ObjectAddress,
     complete: bool,
 }
@@ -90,7 +90,7 @@ impl Transfer<'_, '_> {
         let (mut toggle, mut number) = (false, 0);
         while data.len() < size {
             number += 1;
-            self.dialogue.step = Step::Segment(number);
+            self.transaction.step = Step::Segment(number);
             let expected = "a segment of the upload";
             let answer = self
                 .ask(Request::UploadSegment { toggle }, expected, |answer| {
@@ -122,7 +122,7 @@ impl Transfer<'_, '_> {
             return Err(Why::TooLong { limit: LONGEST });
         }
         let (object, complete) = (self.object, self.complete);
-        let mailbox_size = self.dialogue.multiplexer.out_size();
+        let mailbox_size = self.transaction.multiplexer.out_size();
         let initial = Initial::of(data, mailbox_size);
         let mut rest = data.get(initial.data().len()..).unwrap_or_default();
         self.ask(Request::Download { object, complete, initial }, "the answer", |answer| {
@@ -132,7 +132,7 @@ impl Transfer<'_, '_> {
         let (mut toggle, mut number) = (false, 0);
         while !rest.is_empty() {
             number += 1;
-            self.dialogue.step = Step::Segment(number);
+            self.transaction.step = Step::Segment(number);
             let segment = Segment::of(rest, toggle, mailbox_size);
             rest = &rest[segment.data.len()..];
             let answer = self
@@ -157,9 +157,9 @@ impl Transfer<'_, '_> {
         fits: impl Fn(&Response<'_>) -> bool,
     ) -> Result<Vec<u8>, Why> {
         let message = Message::SdoRequest(request);
-        self.dialogue.say(MailboxType::Coe, |body| message.write(body)).await?;
+        self.transaction.say(MailboxType::Coe, |body| message.write(body)).await?;
         loop {
-            let data = self.dialogue.hear(MailboxType::Coe).await?;
+            let data = self.transaction.hear(MailboxType::Coe).await?;
             match Message::parse(&data) {
                 Ok(Message::Abort(Abort { object, code })) if self.is_about(object) => {
                     return Err(Why::Aborted { code: SdoAbortCode(code) });
@@ -170,7 +170,7 @@ impl Transfer<'_, '_> {
                 )) if !self.is_about(object) => {}
                 Ok(Message::SdoResponse(response)) if fits(&response) => return Ok(data),
                 // The same, about any object.
-                Ok(Message::SdoResponse(_)) if self.dialogue.multiplexer.may_be_late() => {}
+                Ok(Message::SdoResponse(_)) if self.transaction.multiplexer.may_be_late() => {}
                 Ok(Message::SdoResponse(response)) => {
                     return Err(wrong(expected, name(&response)));
                 }
@@ -183,14 +183,14 @@ impl Transfer<'_, '_> {
                 ) => {}
                 Err(error) => return Err(wrong(expected, error.to_string())),
             }
-            self.dialogue.multiplexer.unasked(MailboxType::Coe, data);
+            self.transaction.multiplexer.unasked(MailboxType::Coe, data);
         }
     }
 
     /// Whether an answer that names an object is about ours. Which entry it names with complete
     /// access is up to the SubDevice; some name none when they abort a segment.
     fn is_about(&self, object: ObjectAddress) -> bool {
-        let segment = matches!(self.dialogue.step, Step::Segment(_));
+        let segment = matches!(self.transaction.step, Step::Segment(_));
         object == self.object
             || self.complete && object.index == self.object.index
             || segment && object.index == ObjectIndex(0)
@@ -220,8 +220,8 @@ impl Transfer<'_, '_> {
             | Why::Abandoned => return result,
         };
         let abort = Message::Abort(Abort { object: self.object, code: code.value() });
-        if matches!(self.dialogue.step, Step::Segment(_)) {
-            self.dialogue.mention(MailboxType::Coe, |body| abort.write(body)).await;
+        if matches!(self.transaction.step, Step::Segment(_)) {
+            self.transaction.mention(MailboxType::Coe, |body| abort.write(body)).await;
         }
         result
     }

@@ -1,4 +1,4 @@
-//! An errand through a mailbox that came to nothing: who, doing what, at which step, why, what to do.
+//! Failure of a mailbox operation: SubDevice, operation, step, reason, next step.
 
 use std::fmt;
 
@@ -11,23 +11,23 @@ use linesman_proto::mailbox::soe::SoeError;
 use linesman_proto::mailbox::{BufferTooSmall, MailboxType};
 use linesman_proto::time::Span;
 
-use super::errand::Errand;
+use super::request::MailboxOperation;
 use crate::exchange::ExchangeError;
 
-/// An errand that came to nothing.
+/// An operation that came to nothing.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MailboxFailure {
     /// Whose mailbox.
     pub id: DeviceId,
     /// What was to be done.
-    pub errand: Errand,
+    pub operation: MailboxOperation,
     /// How far it had come.
     pub step: Step,
     /// Why it came to nothing.
     pub why: Why,
 }
 
-/// How far an errand had come.
+/// How far an operation had come.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Step {
     /// Nothing had been sent.
@@ -55,7 +55,7 @@ impl fmt::Display for Step {
     }
 }
 
-/// Why an errand came to nothing.
+/// Why an operation came to nothing.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Why {
     /// The SubDevice ended the SDO transfer, or refused a question about its dictionary.
@@ -104,7 +104,7 @@ pub enum Why {
         /// What it says it does; may be empty.
         text: String,
     },
-    /// Too many errands wait for it already.
+    /// Too many jobs wait for it already.
     Crowded {
         /// How many.
         waiting: usize,
@@ -254,8 +254,8 @@ impl From<BufferTooSmall> for Why {
 
 impl fmt::Display for MailboxFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { id, errand, step, why } = self;
-        write!(f, "SubDevice {}, {errand}", id.no())?;
+        let Self { id, operation, step, why } = self;
+        write!(f, "SubDevice {}, {operation}", id.no())?;
         if !matches!(step, Step::Before | Step::Request) {
             write!(f, ", {step}")?;
         }

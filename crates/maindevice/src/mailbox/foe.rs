@@ -7,8 +7,8 @@ use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::foe::{FoeErrorCode, Message, chunk_len};
 use linesman_proto::time::Span;
 
-use super::dialogue::Dialogue;
 use super::failure::{Step, Why};
+use super::transaction::MailboxTransaction;
 
 /// The longest file that is fetched, in bytes.
 const LONGEST: usize = 64 << 20;
@@ -19,28 +19,28 @@ const BUSY_LIMIT: Span = Span::s(120);
 
 /// Fetches a file.
 pub(crate) async fn read(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     name: &str,
     password: u32,
 ) -> Result<Vec<u8>, Why> {
-    let chunk = chunk_len(dialogue.multiplexer.in_size());
+    let chunk = chunk_len(transaction.multiplexer.in_size());
     let mut file = Vec::new();
     let mut question = Message::Read { password, name: name.as_bytes() };
     let mut expected = 1_u32;
     loop {
-        let answer = ask(dialogue, &question).await?;
+        let answer = ask(transaction, &question).await?;
         match Message::parse(&answer) {
             Ok(Message::Data { packet, data }) if packet == expected => {
-                dialogue.step = Step::Packet(packet);
+                transaction.step = Step::Packet(packet);
                 file.extend_from_slice(data);
                 if file.len() > LONGEST {
-                    give_up(dialogue, FoeErrorCode::DISK_FULL).await;
+                    give_up(transaction, FoeErrorCode::DISK_FULL).await;
                     return Err(Why::TooLong { limit: LONGEST });
                 }
                 question = Message::Ack { packet };
                 expected = expected.wrapping_add(1);
                 if data.len() < chunk {
-                    dialogue.say(MailboxType::Foe, |body| question.write(body)).await?;
+                    transaction.say(MailboxType::Foe, |body| question.write(body)).await?;
                     return Ok(file);
                 }
             }
@@ -48,38 +48,38 @@ pub(crate) async fn read(
             Ok(Message::Data { packet, .. })
                 if expected > 1 && packet == expected.wrapping_sub(1) => {}
             Ok(Message::Data { packet, .. }) => {
-                give_up(dialogue, FoeErrorCode::WRONG_PACKET).await;
+                give_up(transaction, FoeErrorCode::WRONG_PACKET).await;
                 let found = format!("packet {packet} instead of {expected}");
                 return Err(Why::Protocol { expected: "the next packet", found });
             }
-            other => return Err(unexpected(dialogue, "a packet of the file", other).await),
+            other => return Err(unexpected(transaction, "a packet of the file", other).await),
         }
     }
 }
 
 /// Brings a file.
 pub(crate) async fn write(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     name: &str,
     password: u32,
     data: &[u8],
 ) -> Result<(), Why> {
-    let chunk = chunk_len(dialogue.multiplexer.out_size());
+    let chunk = chunk_len(transaction.multiplexer.out_size());
     if chunk == 0 {
-        let available = dialogue.multiplexer.out_size();
+        let available = transaction.multiplexer.out_size();
         let needed = available.saturating_add(1);
         return Err(linesman_proto::mailbox::BufferTooSmall { needed, available }.into());
     }
     let request = Message::Write { password, name: name.as_bytes() };
-    acknowledged(dialogue, &request, 0).await?;
+    acknowledged(transaction, &request, 0).await?;
     let mut packet = 0_u32;
     let mut at = 0;
     loop {
         packet = packet.wrapping_add(1);
-        dialogue.step = Step::Packet(packet);
+        transaction.step = Step::Packet(packet);
         let rest = data.get(at..).unwrap_or_default();
         let piece = rest.get(..chunk).unwrap_or(rest);
-        acknowledged(dialogue, &Message::Data { packet, data: piece }, packet).await?;
+        acknowledged(transaction, &Message::Data { packet, data: piece }, packet).await?;
         at += piece.len();
         if piece.len() < chunk {
             return Ok(());
@@ -89,49 +89,52 @@ pub(crate) async fn write(
 
 /// Sends a message until it is acknowledged.
 async fn acknowledged(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     message: &Message<'_>,
     number: u32,
 ) -> Result<(), Why> {
-    let mut answer = ask(dialogue, message).await?;
+    let mut answer = ask(transaction, message).await?;
     loop {
         match Message::parse(&answer) {
             Ok(Message::Ack { packet }) if packet == number => return Ok(()),
             // The packet before is acknowledged once more.
             Ok(Message::Ack { packet }) if number > 0 && packet == number.wrapping_sub(1) => {
-                answer = dialogue.hear(MailboxType::Foe).await?;
+                answer = transaction.hear(MailboxType::Foe).await?;
             }
             Ok(Message::Ack { packet }) => {
-                give_up(dialogue, FoeErrorCode::WRONG_PACKET).await;
+                give_up(transaction, FoeErrorCode::WRONG_PACKET).await;
                 let found = format!("that of packet {packet} instead of {number}");
                 return Err(Why::Protocol { expected: "the acknowledgement", found });
             }
-            other => return Err(unexpected(dialogue, "an acknowledgement", other).await),
+            other => return Err(unexpected(transaction, "an acknowledgement", other).await),
         }
     }
 }
 
 /// Sends a message and gives the answer that is not "busy".
-async fn ask(dialogue: &mut Dialogue<'_>, message: &Message<'_>) -> Result<Vec<u8>, Why> {
-    let began = dialogue.multiplexer.now();
+async fn ask(
+    transaction: &mut MailboxTransaction<'_>,
+    message: &Message<'_>,
+) -> Result<Vec<u8>, Why> {
+    let began = transaction.multiplexer.now();
     loop {
-        dialogue.say(MailboxType::Foe, |body| message.write(body)).await?;
-        let answer = dialogue.hear(MailboxType::Foe).await?;
+        transaction.say(MailboxType::Foe, |body| message.write(body)).await?;
+        let answer = transaction.hear(MailboxType::Foe).await?;
         let Ok(Message::Busy { text, .. }) = Message::parse(&answer) else { return Ok(answer) };
-        if dialogue.multiplexer.now().since(began) >= BUSY_LIMIT {
+        if transaction.multiplexer.now().since(began) >= BUSY_LIMIT {
             return Err(Why::Busy { patience: BUSY_LIMIT, text: words(text) });
         }
-        dialogue.multiplexer.pause(PAUSE).await;
+        transaction.multiplexer.pause(PAUSE).await;
     }
 }
 
-async fn give_up(dialogue: &mut Dialogue<'_>, code: FoeErrorCode) {
+async fn give_up(transaction: &mut MailboxTransaction<'_>, code: FoeErrorCode) {
     let message = Message::Error { code, text: b"" };
-    dialogue.mention(MailboxType::Foe, |body| message.write(body)).await;
+    transaction.mention(MailboxType::Foe, |body| message.write(body)).await;
 }
 
 async fn unexpected(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     expected: &'static str,
     found: Result<Message<'_>, linesman_proto::mailbox::foe::FoeError>,
 ) -> Why {
@@ -148,7 +151,7 @@ async fn unexpected(
         Ok(Message::Busy { .. }) => "\"busy\"".to_owned(),
         Err(error) => error.to_string(),
     };
-    give_up(dialogue, FoeErrorCode::ILLEGAL).await;
+    give_up(transaction, FoeErrorCode::ILLEGAL).await;
     Why::Protocol { expected, found }
 }
 

@@ -10,52 +10,61 @@ use linesman_proto::mailbox::coe::information::{
 };
 use linesman_proto::mailbox::coe::{CoeError, Message, ObjectAddress, ObjectIndex};
 
-use super::dialogue::Dialogue;
 use super::failure::{Step, Why};
+use super::transaction::MailboxTransaction;
 
 /// No dictionary has a longer list, nor an object a longer description: 65,536 indices and a word.
 const LONGEST: usize = 2 * 65_537;
 
 /// The objects of a list.
-pub(crate) async fn list(dialogue: &mut Dialogue<'_>, list: ListKind) -> Result<Vec<u8>, Why> {
+pub(crate) async fn list(
+    transaction: &mut MailboxTransaction<'_>,
+    list: ListKind,
+) -> Result<Vec<u8>, Why> {
     let about = |data: &[u8]| ObjectList::parse(data).map(|found| found.kind == list);
-    ask(dialogue, Body::ListRequest { list }, Answer::List, "the list that was asked for", about)
+    ask(transaction, Body::ListRequest { list }, Answer::List, "the list that was asked for", about)
         .await
 }
 
 /// What an object is.
 pub(crate) async fn object(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     index: ObjectIndex,
 ) -> Result<Vec<u8>, Why> {
     let about = |data: &[u8]| ObjectDescription::parse(data).map(|found| found.index == index);
-    ask(dialogue, Body::ObjectRequest { index }, Answer::Object, "that object's description", about)
-        .await
+    ask(
+        transaction,
+        Body::ObjectRequest { index },
+        Answer::Object,
+        "that object's description",
+        about,
+    )
+    .await
 }
 
 /// What an entry is.
 pub(crate) async fn entry(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     object: ObjectAddress,
     values: ValueInfo,
 ) -> Result<Vec<u8>, Why> {
     let about = |data: &[u8]| EntryDescription::parse(data).map(|found| found.object == object);
     let question = Body::EntryRequest { object, values };
-    ask(dialogue, question, Answer::Entry, "that entry's description", about).await
+    ask(transaction, question, Answer::Entry, "that entry's description", about).await
 }
 
 async fn ask(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     question: Body<'_>,
     wanted: Answer,
     expected: &'static str,
     is_about: impl Fn(&[u8]) -> Result<bool, CoeError>,
 ) -> Result<Vec<u8>, Why> {
     let message = Message::Information(information::Message::whole(question));
-    dialogue.say(MailboxType::Coe, |body| message.write(body)).await?;
+    transaction.say(MailboxType::Coe, |body| message.write(body)).await?;
     let (mut collected, mut number) = (Vec::new(), 0);
     loop {
-        let data = dialogue.hear(MailboxType::Coe).await?;
+        let data = transaction.hear(MailboxType::Coe).await?;
         let found = match Message::parse(&data) {
             Ok(Message::Information(found)) => found,
             // An SDO answer that comes late.
@@ -66,7 +75,7 @@ async fn ask(
                 | Message::SdoRequest(_)
                 | Message::Pdo { .. },
             ) => {
-                dialogue.multiplexer.unasked(MailboxType::Coe, data);
+                transaction.multiplexer.unasked(MailboxType::Coe, data);
                 continue;
             }
             Err(error) => return Err(Why::Protocol { expected, found: error.to_string() }),
@@ -79,16 +88,16 @@ async fn ask(
                     return Err(Why::TooLong { limit: LONGEST });
                 }
                 number += 1;
-                dialogue.step = Step::Fragment(number);
-                dialogue.wait_anew();
+                transaction.step = Step::Fragment(number);
+                transaction.wait_anew();
                 if found.incomplete {
                     continue;
                 }
                 match is_about(&collected) {
                     Ok(true) => return Ok(collected),
                     // The end of an answer that was given up.
-                    Ok(false) | Err(_) if dialogue.multiplexer.may_be_late() => {
-                        dialogue.multiplexer.all_late_ones_came();
+                    Ok(false) | Err(_) if transaction.multiplexer.may_be_late() => {
+                        transaction.multiplexer.all_late_ones_came();
                         collected.clear();
                     }
                     Ok(false) => {
@@ -103,7 +112,7 @@ async fn ask(
             Body::Answer { .. }
             | Body::ListRequest { .. }
             | Body::ObjectRequest { .. }
-            | Body::EntryRequest { .. } => dialogue.multiplexer.unasked(MailboxType::Coe, data),
+            | Body::EntryRequest { .. } => transaction.multiplexer.unasked(MailboxType::Coe, data),
         }
     }
 }

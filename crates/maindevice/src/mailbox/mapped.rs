@@ -1,5 +1,5 @@
-//! Which mailboxes hold something, as the cycle reads it: a bit each, mapped by an FMMU on the full bit
-//! of the SyncManager of the mailbox in (0x080D bit 3).
+//! Mailboxes that hold a message, as the cycle reads it: a bit each, mapped by an FMMU on the full
+//! bit of the SyncManager of the mailbox in (0x080D bit 3).
 //!
 //! Where that is planned nobody has to ask each SubDevice again and again: whoever serves a mailbox
 //! sleeps until its bit is seen set.
@@ -8,7 +8,7 @@ use linesman_config::plan::{Plan, Role};
 use linesman_proto::address::DeviceId;
 use linesman_proto::frame::builder::DatagramAddress;
 
-use super::Queues;
+use super::MailboxQueues;
 
 /// Where the bit of one mailbox is.
 #[derive(Clone, Copy, Debug)]
@@ -26,14 +26,14 @@ struct Place {
 #[derive(Debug, Default)]
 pub(crate) struct MailboxBits {
     places: Vec<Place>,
-    queues: Queues,
+    queues: MailboxQueues,
     /// Some bit was set the last time.
     any: bool,
 }
 
 impl MailboxBits {
     /// Those that a plan maps. Whoever serves such a mailbox listens for its bit from now on.
-    pub(crate) fn new(plan: &Plan, queues: Queues) -> Self {
+    pub(crate) fn new(plan: &Plan, queues: MailboxQueues) -> Self {
         let mut places = Vec::new();
         let frames = plan.tasks.iter().flat_map(|task| &task.frames).enumerate();
         for (frame, planned) in frames {

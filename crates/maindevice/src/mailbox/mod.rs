@@ -1,14 +1,12 @@
-//! Talking to the software of SubDevices.
+//! Mailbox communication with the software of SubDevices.
 //!
 //! One multiplexer per SubDevice owns its mailbox: it counts messages, looks whether there is
 //! one to be fetched, fetches lost ones again, and hands them on by type. `coe`, `information`,
-//! `foe` and `settings` are its clients; errands ([`MailboxRequest`]) wait in a queue and are done one after
+//! `foe` and `settings` are its clients; jobs ([`MailboxRequest`]) wait in a queue and are done one after
 //! another. Emergencies and messages that nobody asked for become events; what went wrong is kept
 //! ([`ProtocolErrors`]).
 
 mod coe;
-pub(crate) mod dialogue;
-mod errand;
 mod failure;
 mod foe;
 mod information;
@@ -16,7 +14,9 @@ mod mapped;
 pub(crate) mod multiplexer;
 mod protocol_errors;
 pub(crate) mod queue;
+mod request;
 mod settings;
+pub(crate) mod transaction;
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
@@ -24,14 +24,14 @@ use linesman_proto::time::Span;
 use crate::executor::lock;
 use crate::supervisor::Context;
 
-pub use errand::{Errand, MailboxRequest};
 pub use failure::{MailboxFailure, Step, Why};
 pub use protocol_errors::{ProtocolError, ProtocolErrors};
+pub use request::{MailboxOperation, MailboxRequest};
 
 pub(crate) use mapped::MailboxBits;
 use multiplexer::Multiplexer;
 pub use queue::MOST_WAITING;
-pub(crate) use queue::{Job, Outcome, Queues};
+pub(crate) use queue::{MailboxJob, MailboxQueues, Outcome};
 
 /// A mailbox whose bit the cycle reads is looked into all the same once in so long.
 const UNHEARD: Span = Span::s(1);
@@ -50,8 +50,12 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
         };
         let job = mailboxes.next(id, context.wire.sleep(interval)).await;
         let (open, boots, now) = {
-            let line = lock(&context.line);
-            (line.has_mailbox(id), line.boots(id), line.mailbox_openings(id))
+            let device_table = lock(&context.device_table);
+            (
+                device_table.has_mailbox(id),
+                device_table.boots(id),
+                device_table.mailbox_openings(id),
+            )
         };
         // It may have been closed and opened again between two looks.
         if !open || openings != now {
@@ -70,12 +74,12 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
     }
 }
 
-async fn work(context: &Context, multiplexer: &mut Multiplexer, job: Job, open: bool) {
+async fn work(context: &Context, multiplexer: &mut Multiplexer, job: MailboxJob, open: bool) {
     let outcome: Outcome = if open {
-        dialogue::perform(multiplexer, &job.request, context.options.mailbox_patience).await
+        transaction::perform(multiplexer, &job.request, context.options.mailbox_patience).await
     } else {
-        let (id, errand) = (job.id, job.request.errand());
-        Err(MailboxFailure { id, errand, step: Step::Before, why: Why::NotOpen })
+        let (id, operation) = (job.id, job.request.operation());
+        Err(MailboxFailure { id, operation, step: Step::Before, why: Why::NotOpen })
     };
     context.mailboxes.note(job.id, context.wire.now(), &job.request, &outcome);
     job.done(outcome);

@@ -11,7 +11,7 @@ use linesman_proto::register::{SYNC_MANAGER, SmActivate, SmPdiControl, SmStatus}
 use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::time::{Instant, Span};
 
-use super::Queues;
+use super::MailboxQueues;
 use super::failure::Why;
 use crate::event::Event;
 use crate::exchange::{ExchangeError, Request, Target};
@@ -37,7 +37,7 @@ fn byte_of(manager: u16, at: u16) -> RegisterAddress {
 /// One mailbox.
 pub(crate) struct Multiplexer {
     wire: Wire,
-    queues: Queues,
+    queues: MailboxQueues,
     id: DeviceId,
     target: Target,
     areas: MailboxPair,
@@ -49,15 +49,15 @@ pub(crate) struct Multiplexer {
     received: Counter,
     /// A message was asked for again: what comes may be one that we have had.
     fetched_again: bool,
-    /// An errand was given up whose answer may still come.
+    /// An operation was given up whose answer may still come.
     late: bool,
-    /// What came during this errand that is no message: how often, and the last of it in words.
+    /// What came during this operation that is no message: how often, and the last of it in words.
     rubbish: Option<(u32, String)>,
 }
 
 impl Multiplexer {
     /// `None` for a SubDevice without a mailbox.
-    pub(crate) fn new(wire: &Wire, queues: &Queues, device: &DevicePlan) -> Option<Self> {
+    pub(crate) fn new(wire: &Wire, queues: &MailboxQueues, device: &DevicePlan) -> Option<Self> {
         let mailbox = device.mailbox?;
         Some(Self {
             wire: wire.clone(),
@@ -126,7 +126,7 @@ impl Multiplexer {
         self.protocols == Protocols::default() || self.protocols.has(bit)
     }
 
-    /// An errand begins. What is left of one that was given up is fetched first.
+    /// An operation begins. What is left of one that was given up is fetched first.
     pub(crate) async fn begin(&mut self) {
         self.rubbish = None;
         if self.late {
@@ -134,12 +134,12 @@ impl Multiplexer {
         }
     }
 
-    /// An errand was given up.
+    /// An operation was given up.
     pub(crate) fn failed(&mut self, why: &Why) {
         self.late |= why.leaves_answer_behind();
     }
 
-    /// Whether an answer may be that to an errand which was given up.
+    /// Whether an answer may be that to an operation which was given up.
     pub(crate) fn may_be_late(&self) -> bool {
         self.late
     }
@@ -149,7 +149,7 @@ impl Multiplexer {
         self.late = false;
     }
 
-    /// What came during this errand that is no message, in words.
+    /// What came during this operation that is no message, in words.
     pub(crate) fn rubbish(&self) -> Option<String> {
         self.rubbish.as_ref().map(|(count, last)| match count {
             1 => last.clone(),

@@ -1,4 +1,4 @@
-//! What went wrong in the mailbox of a SubDevice: the last error, and those before it.
+//! Protocol errors in the mailbox of a SubDevice: the last error, and those before it.
 //!
 //! Reference: PLC libraries of the vendor tool give the *last* protocol error of a SubDevice, which
 //! its next clean access erases. So does [`ProtocolErrors::last`]; the history stays.
@@ -16,7 +16,7 @@ const KEPT: usize = 64;
 /// An error, and when it was.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct ProtocolError {
-    /// When the errand ended.
+    /// When the operation ended.
     pub at: Instant,
     /// What went wrong.
     pub failure: MailboxFailure,
@@ -36,7 +36,7 @@ impl ProtocolErrors {
     /// The error of the newest access by this protocol; `None` when that was clean.
     #[must_use]
     pub fn last(&self, protocol: MailboxType) -> Option<&ProtocolError> {
-        let of = |error: &&ProtocolError| error.failure.errand.protocol() == protocol;
+        let of = |error: &&ProtocolError| error.failure.operation.protocol() == protocol;
         self.standing.contains(&protocol).then(|| self.history.iter().rev().find(of)).flatten()
     }
 
@@ -63,7 +63,7 @@ impl ProtocolErrors {
 
     /// An access failed.
     pub(crate) fn failed(&mut self, at: Instant, failure: MailboxFailure) {
-        let protocol = failure.errand.protocol();
+        let protocol = failure.operation.protocol();
         if !self.standing.contains(&protocol) {
             self.standing.push(protocol);
         }
@@ -80,15 +80,15 @@ impl ProtocolErrors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mailbox::errand::Errand;
     use crate::mailbox::failure::{Step, Why};
+    use crate::mailbox::request::MailboxOperation;
     use linesman_proto::address::DeviceId;
     use linesman_proto::mailbox::abort_code::SdoAbortCode;
     use linesman_proto::mailbox::coe::ObjectAddress;
     use linesman_proto::mailbox::foe::FoeErrorCode;
 
-    fn failure(errand: Errand, why: Why) -> MailboxFailure {
-        MailboxFailure { id: DeviceId(2), errand, step: Step::Request, why }
+    fn failure(operation: MailboxOperation, why: Why) -> MailboxFailure {
+        MailboxFailure { id: DeviceId(2), operation, step: Step::Request, why }
     }
 
     #[test]
@@ -96,11 +96,11 @@ mod tests {
         let mut errors = ProtocolErrors::default();
         let object = ObjectAddress::new(0x10F0, 1);
         let abort = failure(
-            Errand::Write { object, complete: false },
+            MailboxOperation::Write { object, complete: false },
             Why::Aborted { code: SdoAbortCode::READ_ONLY },
         );
         let file = failure(
-            Errand::ReadFile { name: "a".to_owned() },
+            MailboxOperation::ReadFile { name: "a".to_owned() },
             Why::File { code: FoeErrorCode::DISK_FULL, text: String::new() },
         );
         errors.failed(Instant::ZERO, abort.clone());

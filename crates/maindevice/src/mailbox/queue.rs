@@ -1,4 +1,4 @@
-//! Errands that wait for a SubDevice's mailbox, and what came of them.
+//! Queue of jobs that wait for a SubDevice's mailbox, and their outcomes.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::future::Future;
@@ -9,22 +9,22 @@ use std::task::{Context, Poll, Waker};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 
-use super::errand::MailboxRequest;
 use super::failure::{MailboxFailure, Step, Why};
 use super::protocol_errors::{ProtocolError, ProtocolErrors};
+use super::request::MailboxRequest;
 use crate::executor::lock;
 use crate::executor::wire::Sleep;
 
-/// So many errands may wait for the mailbox of a SubDevice. Whoever asks for more is not served: memory must
+/// So many jobs may wait for the mailbox of a SubDevice. Whoever asks for more is not served: memory must
 /// not grow with somebody's haste.
 pub const MOST_WAITING: usize = 4_096;
 
-/// What came of an errand.
+/// What came of an operation.
 pub(crate) type Outcome = Result<Vec<u8>, MailboxFailure>;
 
 /// Something to be done through a mailbox, and who waits for it.
 #[derive(Debug)]
-pub(crate) struct Job {
+pub(crate) struct MailboxJob {
     pub(crate) id: DeviceId,
     pub(crate) request: MailboxRequest,
     slot: Arc<Mutex<Slot>>,
@@ -36,7 +36,7 @@ struct Slot {
     waker: Option<Waker>,
 }
 
-impl Job {
+impl MailboxJob {
     /// Tells what came of it.
     pub(crate) fn done(self, outcome: Outcome) {
         self.leave(outcome);
@@ -53,7 +53,7 @@ impl Job {
     }
 }
 
-impl Drop for Job {
+impl Drop for MailboxJob {
     /// A job that nobody does any more must not be waited for.
     fn drop(&mut self) {
         if lock(&self.slot).outcome.is_none() {
@@ -63,10 +63,10 @@ impl Drop for Job {
 }
 
 fn failure(id: DeviceId, request: &MailboxRequest, why: Why) -> MailboxFailure {
-    MailboxFailure { id, errand: request.errand(), step: Step::Before, why }
+    MailboxFailure { id, operation: request.operation(), step: Step::Before, why }
 }
 
-/// The outcome of an errand, to be awaited.
+/// The outcome of an operation, to be awaited.
 pub(crate) struct Pending {
     slot: Arc<Mutex<Slot>>,
 }
@@ -87,8 +87,8 @@ impl Future for Pending {
 }
 
 #[derive(Default, Debug)]
-struct Queue {
-    jobs: VecDeque<Job>,
+struct MailboxQueue {
+    jobs: VecDeque<MailboxJob>,
     waker: Option<Waker>,
     errors: ProtocolErrors,
     /// The cycle reads whether the mailbox holds something.
@@ -99,20 +99,20 @@ struct Queue {
 
 /// The queues of all SubDevices with a mailbox. Clones mean the same queues.
 #[derive(Clone, Default, Debug)]
-pub(crate) struct Queues {
-    queues: Arc<Mutex<BTreeMap<DeviceId, Queue>>>,
+pub(crate) struct MailboxQueues {
+    queues: Arc<Mutex<BTreeMap<DeviceId, MailboxQueue>>>,
 }
 
-impl Queues {
+impl MailboxQueues {
     pub(crate) fn of(devices: impl Iterator<Item = DeviceId>) -> Self {
-        let queues = devices.map(|id| (id, Queue::default())).collect();
+        let queues = devices.map(|id| (id, MailboxQueue::default())).collect();
         Self { queues: Arc::new(Mutex::new(queues)) }
     }
 
     /// Asks a SubDevice through its mailbox, behind those who asked before; await what comes of it.
     pub(crate) fn ask(&self, id: DeviceId, request: MailboxRequest) -> Pending {
         let slot = Arc::new(Mutex::new(Slot::default()));
-        let job = Job { id, request, slot: Arc::clone(&slot) };
+        let job = MailboxJob { id, request, slot: Arc::clone(&slot) };
         let mut queues = lock(&self.queues);
         let Some(queue) = queues.get_mut(&id) else {
             drop(queues);
@@ -141,8 +141,8 @@ impl Queues {
     }
 
     /// Waits until a mailbox is seen to hold something, at most so long.
-    pub(crate) fn mail(&self, id: DeviceId, sleep: Sleep) -> Mail {
-        Mail { queues: self.clone(), id, sleep }
+    pub(crate) fn mail(&self, id: DeviceId, sleep: Sleep) -> MailboxNotice {
+        MailboxNotice { queues: self.clone(), id, sleep }
     }
 
     /// From now on the cycle reads whether these mailboxes hold something.
@@ -181,7 +181,7 @@ impl Queues {
     pub(crate) fn note(&self, id: DeviceId, at: Instant, request: &MailboxRequest, how: &Outcome) {
         if let Some(queue) = lock(&self.queues).get_mut(&id) {
             match how {
-                Ok(_) => queue.errors.clean(request.errand().protocol()),
+                Ok(_) => queue.errors.clean(request.operation().protocol()),
                 Err(failure) => queue.errors.failed(at, failure.clone()),
             }
         }
@@ -205,15 +205,15 @@ impl Queues {
 }
 
 pub(crate) struct NextJob {
-    queues: Queues,
+    queues: MailboxQueues,
     id: DeviceId,
     sleep: Sleep,
 }
 
 impl Future for NextJob {
-    type Output = Option<Job>;
+    type Output = Option<MailboxJob>;
 
-    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Job>> {
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<MailboxJob>> {
         if let Some(queue) = lock(&self.queues.queues).get_mut(&self.id) {
             if let Some(job) = queue.jobs.pop_front() {
                 return Poll::Ready(Some(job));
@@ -228,13 +228,13 @@ impl Future for NextJob {
 }
 
 /// Waits until a mailbox is seen to hold something.
-pub(crate) struct Mail {
-    queues: Queues,
+pub(crate) struct MailboxNotice {
+    queues: MailboxQueues,
     id: DeviceId,
     sleep: Sleep,
 }
 
-impl Future for Mail {
+impl Future for MailboxNotice {
     type Output = ();
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {

@@ -7,18 +7,18 @@ use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::eoe::{self, EoeResult, Setting};
 use linesman_proto::mailbox::soe::{self, Operation, SOE_HEADER_LEN};
 
-use super::dialogue::Dialogue;
 use super::failure::{Step, Why};
+use super::transaction::MailboxTransaction;
 
 /// Sets the addresses of a port.
 pub(crate) async fn set_addresses(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     port: u8,
     parameters: &[u8],
 ) -> Result<(), Why> {
     let request = eoe::Message::Request { port, about: Setting::SetIp, parameters };
-    dialogue.say(MailboxType::Eoe, |body| request.write(body)).await?;
-    let answer = dialogue.hear(MailboxType::Eoe).await?;
+    transaction.say(MailboxType::Eoe, |body| request.write(body)).await?;
+    let answer = transaction.hear(MailboxType::Eoe).await?;
     match eoe::Message::parse(&answer) {
         Ok(eoe::Message::Response { about: Setting::SetIp, result, .. }) => match result {
             EoeResult::SUCCESS => Ok(()),
@@ -33,14 +33,14 @@ pub(crate) async fn set_addresses(
 
 /// Writes elements of an IDN, in as many messages as it takes.
 pub(crate) async fn write_idn(
-    dialogue: &mut Dialogue<'_>,
+    transaction: &mut MailboxTransaction<'_>,
     drive: u8,
     elements: u8,
     idn: u16,
     data: &[u8],
 ) -> Result<(), Why> {
     let header = linesman_proto::mailbox::HEADER_LEN + SOE_HEADER_LEN;
-    let room = dialogue.multiplexer.out_size().saturating_sub(header).max(1);
+    let room = transaction.multiplexer.out_size().saturating_sub(header).max(1);
     let pieces = data.len().div_ceil(room).max(1);
     for at in 0..pieces {
         let left = pieces - at - 1;
@@ -54,12 +54,12 @@ pub(crate) async fn write_idn(
             number: if left > 0 { u16::try_from(left).unwrap_or(u16::MAX) } else { idn },
             data: piece,
         };
-        dialogue.say(MailboxType::Soe, |body| message.write(body)).await?;
+        transaction.say(MailboxType::Soe, |body| message.write(body)).await?;
         if pieces > 1 {
-            dialogue.step = Step::Fragment(at as u32 + 1);
+            transaction.step = Step::Fragment(at as u32 + 1);
         }
     }
-    let answer = dialogue.hear(MailboxType::Soe).await?;
+    let answer = transaction.hear(MailboxType::Soe).await?;
     let expected = "the answer to a write request";
     match soe::Message::parse(&answer) {
         Some(answer) if answer.operation == Operation::WriteResponse && answer.drive == drive => {

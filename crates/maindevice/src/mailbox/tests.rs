@@ -26,7 +26,7 @@ use crate::event::Event;
 use crate::exchange::{Reply, Request};
 use crate::executor::Executor;
 use crate::options::Options;
-use crate::supervisor::Line;
+use crate::supervisor::DeviceTable;
 
 const ID: DeviceId = DeviceId(4);
 const OUT: u16 = 0x1000;
@@ -159,7 +159,7 @@ impl Scripted {
     }
 }
 
-/// Runs one errand to its end; gives what came of it, and what was told meanwhile.
+/// Runs one operation to its end; gives what came of it, and what was told meanwhile.
 fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>) {
     let mut executor = Executor::new();
     let wire = executor.group(0);
@@ -167,14 +167,14 @@ fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>
     let mut devices: Vec<DevicePlan> = (0..4).map(|_| device()).collect();
     devices.push(device());
     let plan = Plan { devices, ..Plan::empty(tree) };
-    let mut line = Line::new(&plan);
-    line.set_reached(ID, AlState::PreOp);
-    let mailboxes = Queues::of([ID].into_iter());
+    let mut device_table = DeviceTable::new(&plan);
+    device_table.set_reached(ID, AlState::PreOp);
+    let mailboxes = MailboxQueues::of([ID].into_iter());
     let context = Context {
         wire: wire.clone(),
         network: Network(0),
         plan: Arc::new(plan),
-        line: Arc::new(Mutex::new(line)),
+        device_table: Arc::new(Mutex::new(device_table)),
         options: Arc::new(Options::default()),
         mailboxes: mailboxes.clone(),
         bad_rounds: Arc::default(),
@@ -482,7 +482,7 @@ fn anything() -> impl Strategy<Value = (u8, Said)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
     #[test]
-    fn whatever_comes_an_errand_ends(said in vec(anything(), 0..10), which in 0..6_usize) {
+    fn operation_ends_whatever_the_mailbox_answers(said in vec(anything(), 0..10), which in 0..6_usize) {
         let object = ObjectAddress::new(0x2000, 1);
         let name = "file".to_owned();
         let request = match which {

@@ -14,12 +14,12 @@ use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::{Handle, Wire, lock};
 use crate::mailbox::queue::Pending;
-use crate::mailbox::{MailboxRequest, ProtocolError, ProtocolErrors, Queues};
-use crate::procedure::scan::Identified;
-use crate::procedure::{look, scan, state};
-use crate::service::{self, Attended, Servant, Service, ServiceFailure, ServiceTicket};
-use crate::supervisor::{self, Context, Line, gates};
-use crate::watch::Standing;
+use crate::mailbox::{MailboxQueues, MailboxRequest, ProtocolError, ProtocolErrors};
+use crate::procedure::scan::ScanCache;
+use crate::procedure::{read_only_scan, scan, state};
+use crate::service::{self, Service, ServiceContext, ServiceFailure, ServiceOnly, ServiceTicket};
+use crate::supervisor::{self, Context, DeviceTable, loop_control};
+use crate::watch::NetworkStatus;
 
 /// One register access beside the cycle, for those who want to know more.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -35,14 +35,14 @@ pub struct ProbeRequest {
 }
 
 impl MainDevice {
-    /// Looks at the line: nothing but reads. Ends in [`Event::Looked`] or [`Event::LookFailed`]. Runs
+    /// Looks at the line: nothing but reads. Ends in [`Event::ReadOnlyScanned`] or [`Event::ReadOnlyScanFailed`]. Runs
     /// beside whatever else is going on.
-    pub fn look(&mut self, now: Instant) {
+    pub fn read_only_scan(&mut self, now: Instant) {
         let (wire, network) = (self.aside.clone(), self.network);
         self.aside.spawn(async move {
-            wire.emit(match look::look(wire.clone(), network, true).await {
-                Ok(look) => Event::Looked(Box::new(look)),
-                Err(error) => Event::LookFailed(error),
+            wire.emit(match read_only_scan::scan(wire.clone(), network, true).await {
+                Ok(found) => Event::ReadOnlyScanned(Box::new(found)),
+                Err(error) => Event::ReadOnlyScanFailed(error),
             });
         });
         self.handle_timeout(now);
@@ -52,12 +52,12 @@ impl MainDevice {
     /// [`Event::Scanned`] or [`Event::ScanFailed`]. Another command that is going on is ended.
     pub fn scan(&mut self, now: Instant) {
         let (wire, network) = (self.command(), self.network);
-        let identified = Arc::clone(&self.identified);
+        let scan_cache = Arc::clone(&self.scan_cache);
         let counters = self.options.polling.reads_counters();
         wire.clone().spawn(async move {
             wire.emit(match scan::scan(wire.clone(), network, counters).await {
                 Ok(inventory) => {
-                    *lock(&identified) = Some(Identified::of(&inventory, wire.now()));
+                    *lock(&scan_cache) = Some(ScanCache::of(&inventory, wire.now()));
                     Event::Scanned(Box::new(inventory))
                 }
                 Err(error) => Event::ScanFailed(error),
@@ -72,30 +72,30 @@ impl MainDevice {
     /// It begins with clearing the station addresses of all SubDevices, then gives those of the plan.
     /// A SubDevice that is not who the plan says, or that the plan does not have, is left alone.
     pub fn start(&mut self, now: Instant, plan: Plan) {
-        let identified = lock(&self.identified).take();
+        let scan_cache = lock(&self.scan_cache).take();
         let wire = self.command();
         let plan = Arc::new(plan);
-        let mut line = Line::new(&plan);
-        line.set_hold(self.options.hold_at);
-        let line = Arc::new(Mutex::new(line));
+        let mut device_table = DeviceTable::new(&plan);
+        device_table.set_hold(self.options.hold_at);
+        let device_table = Arc::new(Mutex::new(device_table));
         let with_mailbox = plan.devices.iter().filter(|device| device.mailbox.is_some());
-        let mailboxes = Queues::of(with_mailbox.map(|device| device.id));
+        let mailboxes = MailboxQueues::of(with_mailbox.map(|device| device.id));
         let context = Context {
             wire: wire.clone(),
             network: self.network,
             plan: Arc::clone(&plan),
-            line: Arc::clone(&line),
+            device_table: Arc::clone(&device_table),
             options: Arc::clone(&self.options),
             mailboxes: mailboxes.clone(),
             bad_rounds: Arc::default(),
         };
-        wire.spawn(supervisor::supervise(context, identified));
+        wire.spawn(supervisor::supervise(context, scan_cache));
         let allowed = self.options.allowed_misses;
-        let (shared, known) = (Arc::clone(&plan), Arc::clone(&line));
+        let (shared, known) = (Arc::clone(&plan), Arc::clone(&device_table));
         let mut cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
         cyclic.serve(mailboxes.clone());
-        let standing = Standing::new(&plan);
-        self.running = Some(Running { cyclic, plan, line, mailboxes, standing });
+        let network_status = NetworkStatus::new(&plan);
+        self.running = Some(Running { cyclic, plan, device_table, mailboxes, network_status });
         self.acyclic_left = self.options.frames_at_once;
         self.handle_timeout(now);
     }
@@ -105,12 +105,14 @@ impl MainDevice {
     /// runs, or it has no such SubDevice.
     pub fn request_state(&mut self, now: Instant, id: Option<DeviceId>, state: AlState) -> bool {
         let Some(running) = &self.running else { return false };
-        let mut line = lock(&running.line);
+        let mut device_table = lock(&running.device_table);
         let asked = match id {
-            Some(id) => line.ask_for(id, state),
-            None => running.plan.devices.iter().all(|device| line.ask_for(device.id, state)),
+            Some(id) => device_table.ask_for(id, state),
+            None => {
+                running.plan.devices.iter().all(|device| device_table.ask_for(device.id, state))
+            }
         };
-        drop(line);
+        drop(device_table);
         self.handle_timeout(now);
         asked
     }
@@ -119,7 +121,7 @@ impl MainDevice {
     /// holds them.
     pub fn release(&mut self, now: Instant) {
         if let Some(running) = &self.running {
-            lock(&running.line).set_hold(None);
+            lock(&running.device_table).set_hold(None);
         }
         self.handle_timeout(now);
     }
@@ -147,7 +149,7 @@ impl MainDevice {
                         let _ = state::request(&wire, target, step).await;
                         let planned = plan.as_ref().and_then(|plan| Some((plan, plan.device(id)?)));
                         if let Some((plan, device)) = planned {
-                            gates::release(&wire, plan, device).await;
+                            loop_control::release(&wire, plan, device).await;
                         }
                     })
                 })
@@ -166,8 +168,8 @@ impl MainDevice {
             self.executor.cancel(control.group());
         }
         self.running = None;
-        self.attended = None;
-        *lock(&self.identified) = None;
+        self.service_only = None;
+        *lock(&self.scan_cache) = None;
         self.exchange.abandon_cyclic();
         let wire = self.executor.group(self.options.repeats);
         self.control = Some(wire.clone());
@@ -241,7 +243,7 @@ impl MainDevice {
     /// [`Service`] takes it elsewhere. Another command that is going on is ended.
     pub fn attend(&mut self, now: Instant, plan: Plan) {
         let wire = self.command();
-        self.attended = Some(Attended::new(&wire, self.network, plan, &self.options));
+        self.service_only = Some(ServiceOnly::new(&wire, self.network, plan, &self.options));
         self.handle_timeout(now);
     }
 
@@ -250,10 +252,10 @@ impl MainDevice {
         let ticket = ServiceTicket(self.next_service);
         self.next_service += 1;
         let wire = self.aside.clone();
-        let servant = self.servant();
+        let context = self.context();
         self.aside.spawn(async move {
-            let result = match servant {
-                Some(servant) => service::perform(&servant, id, service).await,
+            let result = match context {
+                Some(context) => service::perform(&context, id, service).await,
                 None => Err(ServiceFailure::Unknown { id }),
             };
             wire.emit(Event::Served { ticket, id, result: Box::new(result) });
@@ -262,19 +264,27 @@ impl MainDevice {
         ticket
     }
 
-    fn servant(&self) -> Option<Servant> {
+    fn context(&self) -> Option<ServiceContext> {
         let (wire, options) = (self.aside.clone(), Arc::clone(&self.options));
-        if let Some(Running { plan, line, mailboxes, .. }) = &self.running {
-            let (plan, line, mailboxes) = (Arc::clone(plan), Arc::clone(line), mailboxes.clone());
-            return Some(Servant { wire, plan, line, mailboxes, driven: true, options });
+        if let Some(Running { plan, device_table, mailboxes, .. }) = &self.running {
+            let (plan, device_table, mailboxes) =
+                (Arc::clone(plan), Arc::clone(device_table), mailboxes.clone());
+            return Some(ServiceContext {
+                wire,
+                plan,
+                device_table,
+                mailboxes,
+                driven: true,
+                options,
+            });
         }
-        let Attended { plan, line, mailboxes } = self.attended.clone()?;
-        Some(Servant { wire, plan, line, mailboxes, driven: false, options })
+        let ServiceOnly { plan, device_table, mailboxes } = self.service_only.clone()?;
+        Some(ServiceContext { wire, plan, device_table, mailboxes, driven: false, options })
     }
 
     /// Asks a running SubDevice through its mailbox. Without a plan that runs nobody has one.
     fn ask(&self, id: DeviceId, request: MailboxRequest) -> Pending {
-        let nobody = Queues::default();
+        let nobody = MailboxQueues::default();
         let queues = self.running.as_ref().map_or(&nobody, |running| &running.mailboxes);
         queues.ask(id, request)
     }
@@ -297,13 +307,16 @@ impl MainDevice {
     /// were asked for.
     #[must_use]
     pub fn wanted_states(&self) -> Vec<AlState> {
-        self.running.as_ref().map(|running| lock(&running.line).all_wanted()).unwrap_or_default()
+        self.running
+            .as_ref()
+            .map(|running| lock(&running.device_table).all_wanted())
+            .unwrap_or_default()
     }
 
-    /// Error and change counters of [`MainDevice::standing`] begin at 0 again. No register is touched.
+    /// Error and change counters of [`MainDevice::network_status`] begin at 0 again. No register is touched.
     pub fn clear_counts(&mut self) {
         if let Some(running) = &mut self.running {
-            running.standing.clear();
+            running.network_status.clear();
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The engine: what comes in, what goes out. What its user can ask of it is in `command`.
 
+mod acyclic_rx;
 mod command;
-mod unusual;
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -20,13 +20,13 @@ use crate::exchange::{
     Transmit,
 };
 use crate::executor::{Executor, Wire, lock};
-use crate::mailbox::Queues;
+use crate::mailbox::MailboxQueues;
 use crate::options::Options;
-use crate::procedure::scan::Identified;
-use crate::service::Attended;
+use crate::procedure::scan::ScanCache;
+use crate::service::ServiceOnly;
 use crate::statistics::Statistics;
-use crate::supervisor::{BringUpTimes, Line};
-use crate::watch::Standing;
+use crate::supervisor::{BringUpTimes, DeviceTable};
+use crate::watch::NetworkStatus;
 
 pub use command::ProbeRequest;
 
@@ -48,9 +48,9 @@ pub struct MainDevice {
     aside: Wire,
     running: Option<Running>,
     /// SubDevices that are served without being driven.
-    attended: Option<Attended>,
+    service_only: Option<ServiceOnly>,
     /// Who the last scan has found: a plan that starts right behind it need not ask again.
-    identified: Arc<Mutex<Option<Identified>>>,
+    scan_cache: Arc<Mutex<Option<ScanCache>>>,
     next_service: u64,
     /// Requests on their way from procedures to the exchange.
     submitted: VecDeque<(Ticket, Request)>,
@@ -62,9 +62,9 @@ pub struct MainDevice {
 struct Running {
     cyclic: Cyclic,
     plan: Arc<Plan>,
-    line: Arc<Mutex<Line>>,
-    mailboxes: Queues,
-    standing: Standing,
+    device_table: Arc<Mutex<DeviceTable>>,
+    mailboxes: MailboxQueues,
+    network_status: NetworkStatus,
 }
 
 impl MainDevice {
@@ -82,8 +82,8 @@ impl MainDevice {
             control: None,
             aside,
             running: None,
-            attended: None,
-            identified: Arc::default(),
+            service_only: None,
+            scan_cache: Arc::default(),
             next_service: 0,
             submitted: VecDeque::new(),
             acyclic_left: 0,
@@ -162,7 +162,7 @@ impl MainDevice {
         }
         let mut room = MAX_LEN;
         // Beside process data so many a cycle; before, as fast as they come back.
-        let settled = |running: &&Running| lock(&running.line).all_have_been_reached();
+        let settled = |running: &&Running| lock(&running.device_table).all_have_been_reached();
         if let Some(running) = self.running.as_ref().filter(settled) {
             let Some(left) = self.acyclic_left.checked_sub(1) else { return };
             let until = running.cyclic.due().since(now).as_nanos() / BYTE_NS;
@@ -246,7 +246,7 @@ impl MainDevice {
     /// Runs whoever is ready.
     #[inline]
     fn work(&mut self) {
-        if self.executor.is_stirred() {
+        if self.executor.has_wake_flag() {
             self.work_on();
         }
     }
@@ -342,7 +342,7 @@ impl MainDevice {
     pub fn poll_event(&mut self) -> Option<Event> {
         let event = self.executor.poll_event()?;
         if let Some(running) = &mut self.running {
-            running.standing.handle_event(self.executor.now(), &event);
+            running.network_status.handle_event(self.executor.now(), &event);
         }
         Some(event)
     }
@@ -359,15 +359,15 @@ impl MainDevice {
     #[must_use]
     pub fn is_settled(&self) -> bool {
         self.running.as_ref().is_some_and(|running| {
-            let line = lock(&running.line);
-            running.plan.devices.iter().all(|device| line.has_reached(device.id))
+            let device_table = lock(&running.device_table);
+            running.plan.devices.iter().all(|device| device_table.has_reached(device.id))
         })
     }
 
     /// What bringing up the running plan took so far; `None` unless one is running.
     #[must_use]
     pub fn bring_up_times(&self) -> Option<BringUpTimes> {
-        self.running.as_ref().and_then(|running| lock(&running.line).times().cloned())
+        self.running.as_ref().and_then(|running| lock(&running.device_table).times().cloned())
     }
 
     /// The outputs of the process image; empty unless a plan is running. Asking for them counts as
@@ -430,8 +430,8 @@ impl MainDevice {
     /// How the network of the running plan stands: the state words of SubDevices and network, error
     /// totals, change counters. It follows the events that were fetched. `None` unless a plan runs.
     #[must_use]
-    pub fn standing(&self) -> Option<&Standing> {
-        self.running.as_ref().map(|running| &running.standing)
+    pub fn network_status(&self) -> Option<&NetworkStatus> {
+        self.running.as_ref().map(|running| &running.network_status)
     }
 
     /// How many SubDevices answered the last cyclic broadcast read.

@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_has_an_address_of_its_own_keeps_it() {
+    fn subdevice_with_unique_address_keeps_it() {
         assert_eq!(chosen(&[1001, 0, 1003]), [1001, 0x1002, 1003]);
         // The one of its position is taken: the next free one.
         assert_eq!(chosen(&[0x1002, 0, 0x1003]), [0x1002, 0x1004, 0x1003]);

@@ -14,7 +14,7 @@ use linesman_proto::register::{self, DlStatus, EscInformation, SystemTimeDiffere
 use linesman_proto::time::{DcTime, DcTime32, Instant, Span};
 use linesman_proto::topology::{DelayError, Delays, Reconstruction, SeenController};
 
-use super::look::{self, LookError};
+use super::read_only_scan::{self, ReadOnlyScanError};
 use super::set_up::write_all;
 use crate::exchange::{DatagramData, ExchangeError, Reply, Request, Target};
 use crate::executor::Wire;
@@ -31,7 +31,7 @@ const SPACING: Span = Span::us(50);
 pub enum ClockError {
     /// There is nobody.
     #[error(transparent)]
-    Line(#[from] LookError),
+    Line(#[from] ReadOnlyScanError),
     /// One does not answer.
     #[error(transparent)]
     Exchange(#[from] ExchangeError),
@@ -68,7 +68,7 @@ pub(crate) struct Latch {
 /// # Errors
 /// [`ClockError`].
 pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockError> {
-    let (places, _) = look::places(wire, network).await?;
+    let (places, _) = read_only_scan::places(wire, network).await?;
     let reading: Vec<_> = (places.iter())
         .map(|place| {
             let len = EscInformation::LEN as u16;

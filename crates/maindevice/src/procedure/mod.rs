@@ -1,9 +1,10 @@
-//! What reads "do this, then that": look, scan, SII access, set-up, change of state.
+//! Procedures, which read "do this, then that": read-only scan, scan, SII access, set-up, change of
+//! state.
 
 pub mod address;
 pub mod clock;
 pub mod counters;
-pub mod look;
+pub mod read_only_scan;
 pub mod scan;
 pub mod set_up;
 pub mod sii;
@@ -12,7 +13,7 @@ pub mod state;
 pub(crate) mod sync_signal;
 
 pub use clock::ClockError;
-pub use look::{Look, LookError, LookedDevice};
+pub use read_only_scan::{DeviceReading, ReadOnlyScan, ReadOnlyScanError};
 pub use scan::ScanError;
 pub use sii::SiiAccessError;
 pub use state::StepError;

@@ -17,7 +17,7 @@ use linesman_proto::time::{DcTime32, Instant, Span};
 use linesman_proto::topology::derive::{Doubt, TopologyError};
 use linesman_proto::topology::{Reconstruction, SeenController, Tree, Wired};
 
-use super::look::{self, Look, LookError, LookedDevice};
+use super::read_only_scan::{self, DeviceReading, ReadOnlyScan, ReadOnlyScanError};
 use super::sii::{Head, SiiAccessError};
 use super::{address, sii};
 use crate::exchange::{ExchangeError, Target};
@@ -28,7 +28,7 @@ use crate::executor::Wire;
 pub enum ScanError {
     /// There is nothing to scan.
     #[error(transparent)]
-    Look(#[from] LookError),
+    ReadOnlyScan(#[from] ReadOnlyScanError),
     /// A SubDevice was counted but does not answer, or not alone.
     #[error("position {position}, of {count} that were counted, cannot be addressed: {error}")]
     Address {
@@ -55,12 +55,12 @@ pub enum ScanError {
 /// Who a scan has found at which station address. A SubDevice that loses its supply loses that address; so
 /// whoever still has it, and has it alone, is the one that was found.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Identified {
+pub struct ScanCache {
     at: Instant,
     devices: BTreeMap<StationAddress, Identity>,
 }
 
-impl Identified {
+impl ScanCache {
     /// So long it is relied upon.
     const FRESH: Span = Span::s(1);
 
@@ -92,25 +92,25 @@ pub async fn scan(wire: Wire, network: Network, counters: bool) -> Result<Invent
         match scan_once(&wire, network, counters).await {
             Ok(inventory) => return Ok(inventory),
             Err(error) if attempt >= ATTEMPTS => return Err(error),
-            Err(ScanError::Look(error)) => return Err(error.into()),
+            Err(ScanError::ReadOnlyScan(error)) => return Err(error.into()),
             Err(ScanError::Address { .. } | ScanError::Changing { .. }) => attempt += 1,
         }
     }
 }
 
 async fn scan_once(wire: &Wire, network: Network, counters: bool) -> Result<Inventory, ScanError> {
-    let look = look::look(wire.clone(), network, counters).await?;
-    let stations = give_addresses(wire, &look).await?;
-    let on_b = |device: &LookedDevice| device.target.card() == Some(Path::B);
-    let half = look.devices.iter().position(on_b).unwrap_or(look.devices.len());
-    let seen = latch(wire, &look, &stations).await;
+    let seen_line = read_only_scan::scan(wire.clone(), network, counters).await?;
+    let stations = give_addresses(wire, &seen_line).await?;
+    let on_b = |device: &DeviceReading| device.target.card() == Some(Path::B);
+    let half = seen_line.devices.iter().position(on_b).unwrap_or(seen_line.devices.len());
+    let seen = latch(wire, &seen_line, &stations).await;
     let images = images(wire, &stations).await;
-    let devices: Vec<_> = (look.devices.into_iter().zip(0..))
+    let devices: Vec<_> = (seen_line.devices.into_iter().zip(0..))
         .zip(stations.iter().zip(images))
         .map(|((looked, id), (station, image))| found(DeviceId(id), looked, *station, image))
         .collect();
     let before = devices.len() as u16;
-    let (after, _) = look::count(wire, network).await?;
+    let (after, _) = read_only_scan::count(wire, network).await?;
     if after != before {
         return Err(ScanError::Changing { before, after });
     }
@@ -159,11 +159,14 @@ fn shift_doubt(doubt: Doubt, by: usize) -> Doubt {
     }
 }
 
-async fn give_addresses(wire: &Wire, look: &Look) -> Result<Vec<StationAddress>, ScanError> {
+async fn give_addresses(
+    wire: &Wire,
+    seen_line: &ReadOnlyScan,
+) -> Result<Vec<StationAddress>, ScanError> {
     let present: Vec<StationAddress> =
-        look.devices.iter().map(|device| device.station.unwrap_or_default()).collect();
+        seen_line.devices.iter().map(|device| device.station.unwrap_or_default()).collect();
     let chosen = address::choose(&present);
-    let giving: Vec<_> = (look.devices.iter().zip(&present).zip(&chosen))
+    let giving: Vec<_> = (seen_line.devices.iter().zip(&present).zip(&chosen))
         .filter(|((_, present), chosen)| present != chosen)
         .map(|((device, _), chosen)| {
             let (wire, position, station) = (wire.clone(), device.position, *chosen);
@@ -181,13 +184,17 @@ async fn give_addresses(wire: &Wire, look: &Look) -> Result<Vec<StationAddress>,
 }
 
 /// Ports and receive times of one and the same frame, for the wiring.
-async fn latch(wire: &Wire, look: &Look, stations: &[StationAddress]) -> Vec<SeenController> {
+async fn latch(
+    wire: &Wire,
+    seen_line: &ReadOnlyScan,
+    stations: &[StationAddress],
+) -> Vec<SeenController> {
     let receive_time = register::RECEIVE_TIME;
     // Who has no clocks does not take it: the working counter says nothing.
     let latched = wire.write(Target::All, receive_time.address, &[0; 4]).await.is_ok();
     // In a closed ring the frame does not come back to the ports it left by.
     let latched = latched && wire.ring_intact() != Some(true);
-    let reading: Vec<_> = (look.devices.iter())
+    let reading: Vec<_> = (seen_line.devices.iter())
         .zip(stations)
         .map(|(device, station)| {
             let clocks = device.information.is_some_and(|it| it.features.distributed_clocks());
@@ -272,7 +279,7 @@ async fn images(wire: &Wire, stations: &[StationAddress]) -> Vec<Result<Image, S
 
 fn found(
     id: DeviceId,
-    looked: LookedDevice,
+    looked: DeviceReading,
     station: StationAddress,
     image: Result<Image, SiiAccessError>,
 ) -> FoundDevice {

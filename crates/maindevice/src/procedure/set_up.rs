@@ -1,4 +1,4 @@
-//! What a SubDevice is told before a step: SyncManagers and FMMUs.
+//! Set-up of a SubDevice before a step: SyncManagers and FMMUs.
 //!
 //! Reference: ETG.1000.6; the order is that of public MainDevices. Watchdogs keep the times the
 //! SubDevice has unless others are chosen.

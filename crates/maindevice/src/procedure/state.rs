@@ -10,7 +10,7 @@ use linesman_proto::register::{self, AlControl, AlStatus};
 use linesman_proto::state::{AlState, AlStatusCode, StateValue};
 use linesman_proto::time::Span;
 
-use super::look::{AL_LEN, al_of};
+use super::read_only_scan::{AL_LEN, al_of};
 use crate::exchange::{ExchangeError, Target};
 use crate::executor::Wire;
 use crate::supervisor::StartUpError;

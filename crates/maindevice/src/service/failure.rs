@@ -1,4 +1,4 @@
-//! Why a service was not done.
+//! Failure of a service.
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::state::AlState;

@@ -1,12 +1,12 @@
 //! Single services for SubDevices: what tools ask for one at a time.
 //!
-//! [`MainDevice::attend`](crate::MainDevice::attend) serves the SubDevices of a plan without driving
+//! [`MainDevice::service_only`](crate::MainDevice::service_only) serves the SubDevices of a plan without driving
 //! them; [`MainDevice::serve`](crate::MainDevice::serve) does one [`Service`], there or beside a
 //! running plan, and ends in [`Event::Served`](crate::Event::Served).
 
-mod attend;
 mod failure;
 mod perform;
+mod service_only;
 mod state;
 
 use linesman_proto::address::RegisterAddress;
@@ -16,9 +16,9 @@ use linesman_proto::state::{AlState, AlStatusCode};
 
 use crate::mailbox::MailboxRequest;
 
-pub(crate) use attend::Attended;
 pub use failure::{RefusalKind, ServiceFailure};
-pub(crate) use perform::{Servant, perform};
+pub(crate) use perform::{ServiceContext, perform};
+pub(crate) use service_only::ServiceOnly;
 
 /// Tells services apart that are under way at once.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]

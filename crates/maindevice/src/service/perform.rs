@@ -9,17 +9,17 @@ use super::failure::ServiceFailure;
 use super::{Service, ServiceAnswer, state};
 use crate::exchange::Target;
 use crate::executor::Wire;
-use crate::mailbox::Queues;
+use crate::mailbox::MailboxQueues;
 use crate::procedure;
-use crate::supervisor::{self, Line};
+use crate::supervisor::{self, DeviceTable};
 
 /// Whoever does services.
 #[derive(Clone)]
-pub(crate) struct Servant {
+pub(crate) struct ServiceContext {
     pub(crate) wire: Wire,
     pub(crate) plan: Arc<Plan>,
-    pub(crate) line: Arc<Mutex<Line>>,
-    pub(crate) mailboxes: Queues,
+    pub(crate) device_table: Arc<Mutex<DeviceTable>>,
+    pub(crate) mailboxes: MailboxQueues,
     /// A plan runs: SubDevices are kept where they shall be, and what is known of them is known to
     /// those who do so.
     pub(crate) driven: bool,
@@ -28,23 +28,23 @@ pub(crate) struct Servant {
 
 /// Does a service for a SubDevice.
 pub(crate) async fn perform(
-    servant: &Servant,
+    context: &ServiceContext,
     id: DeviceId,
     service: Service,
 ) -> Result<ServiceAnswer, ServiceFailure> {
-    let Some(device) = servant.plan.device(id) else {
+    let Some(device) = context.plan.device(id) else {
         return Err(ServiceFailure::Unknown { id });
     };
-    let (wire, target) = (&servant.wire, Target::Station(device.station));
+    let (wire, target) = (&context.wire, Target::Station(device.station));
     match service {
         Service::Mailbox(request) => {
-            state::learn(servant, device).await;
-            Ok(ServiceAnswer::Data(servant.mailboxes.ask(id, request).await?))
+            state::learn(context, device).await;
+            Ok(ServiceAnswer::Data(context.mailboxes.ask(id, request).await?))
         }
-        Service::State => state::look(servant, device).await,
-        Service::Enter(to) => state::enter(servant, device, to).await,
-        Service::Acknowledge => state::acknowledge(servant, device).await,
-        Service::ClearCounters => clear_counters(servant, id, target).await,
+        Service::State => state::read_state(context, device).await,
+        Service::Enter(to) => state::enter(context, device, to).await,
+        Service::Acknowledge => state::acknowledge(context, device).await,
+        Service::ClearCounters => clear_counters(context, id, target).await,
         Service::ReadRegister { address, len } => {
             let reply = wire.read_one(target, address, len).await;
             reply
@@ -64,11 +64,12 @@ pub(crate) async fn perform(
 }
 
 async fn clear_counters(
-    servant: &Servant,
+    context: &ServiceContext,
     id: DeviceId,
     target: Target,
 ) -> Result<ServiceAnswer, ServiceFailure> {
-    let result = supervisor::counters::clear(&servant.wire, &servant.line, id, target).await;
+    let result =
+        supervisor::counters::clear(&context.wire, &context.device_table, id, target).await;
     let counters = result.map_err(|error| register(id, error))?;
     Ok(ServiceAnswer::Data(counters.to_bytes().to_vec()))
 }

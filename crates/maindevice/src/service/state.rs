@@ -7,18 +7,18 @@ use linesman_proto::time::Span;
 
 use super::ServiceAnswer;
 use super::failure::ServiceFailure;
-use super::perform::Servant;
+use super::perform::ServiceContext;
 use crate::exchange::Target;
 use crate::executor::lock;
 use crate::procedure::{StepError, set_up, state};
 
 /// Looks at the state.
-pub(super) async fn look(
-    servant: &Servant,
+pub(super) async fn read_state(
+    context: &ServiceContext,
     device: &DevicePlan,
 ) -> Result<ServiceAnswer, ServiceFailure> {
     let target = Target::Station(device.station);
-    match state::read(&servant.wire, target).await {
+    match state::read(&context.wire, target).await {
         Ok((status, code)) => Ok(ServiceAnswer::State { status, code }),
         Err(error) => Err(ServiceFailure::Register { id: device.id, error }),
     }
@@ -26,10 +26,10 @@ pub(super) async fn look(
 
 /// Acknowledges an error.
 pub(super) async fn acknowledge(
-    servant: &Servant,
+    context: &ServiceContext,
     device: &DevicePlan,
 ) -> Result<ServiceAnswer, ServiceFailure> {
-    let (wire, target, id) = (&servant.wire, Target::Station(device.station), device.id);
+    let (wire, target, id) = (&context.wire, Target::Station(device.station), device.id);
     let looked = state::read(wire, target).await;
     let (status, _) = looked.map_err(|error| ServiceFailure::Register { id, error })?;
     if status.error() {
@@ -38,22 +38,22 @@ pub(super) async fn acknowledge(
             .await
             .map_err(|error| ServiceFailure::State { id, to, error })?;
     }
-    look(servant, device).await
+    read_state(context, device).await
 }
 
 /// Notes in which state a SubDevice of a line is that nobody drives: that opens or closes its mailbox.
-pub(super) async fn learn(servant: &Servant, device: &DevicePlan) {
-    if servant.driven {
+pub(super) async fn learn(context: &ServiceContext, device: &DevicePlan) {
+    if context.driven {
         return;
     }
-    let looked = state::read(&servant.wire, Target::Station(device.station)).await;
+    let looked = state::read(&context.wire, Target::Station(device.station)).await;
     let found = looked.ok().and_then(|(status, _)| status.state().state());
-    lock(&servant.line).set_moving(device.id, found);
+    lock(&context.device_table).set_moving(device.id, found);
 }
 
 /// Takes a SubDevice to a state.
 pub(super) async fn enter(
-    servant: &Servant,
+    context: &ServiceContext,
     device: &DevicePlan,
     to: AlState,
 ) -> Result<ServiceAnswer, ServiceFailure> {
@@ -61,29 +61,29 @@ pub(super) async fn enter(
     if to == AlState::Boot && device.mailbox.is_none_or(|mailbox| mailbox.bootstrap.is_none()) {
         return Err(ServiceFailure::NoBootstrap { id });
     }
-    if servant.driven {
-        return redirect(servant, device, to).await;
+    if context.driven {
+        return redirect(context, device, to).await;
     }
     if to == AlState::Op && !device.outputs.is_empty() {
         return Err(ServiceFailure::NeedsCycle { id });
     }
-    acknowledge(servant, device).await?;
+    acknowledge(context, device).await?;
     let failed = |error| ServiceFailure::State { id, to, error };
-    let looked = state::read(&servant.wire, Target::Station(device.station)).await;
+    let looked = state::read(&context.wire, Target::Station(device.station)).await;
     let (status, _) = looked.map_err(|error| failed(StepError::from(error)))?;
     let mut current = status.state().state();
     loop {
-        lock(&servant.line).set_moving(id, current);
+        lock(&context.device_table).set_moving(id, current);
         let next = match current {
             None => AlState::Init,
             Some(current) => match next_step(current, to) {
                 Some(next) => next,
-                None => return look(servant, device).await,
+                None => return read_state(context, device).await,
             },
         };
-        let made = step(servant, device, current, next).await;
+        let made = step(context, device, current, next).await;
         if made.is_err() {
-            learn(servant, device).await;
+            learn(context, device).await;
         }
         made.map_err(failed)?;
         current = Some(next);
@@ -92,12 +92,12 @@ pub(super) async fn enter(
 
 /// One step of a SubDevice that nobody drives.
 async fn step(
-    servant: &Servant,
+    context: &ServiceContext,
     device: &DevicePlan,
     current: Option<AlState>,
     next: AlState,
 ) -> Result<(), StepError> {
-    let wire = &servant.wire;
+    let wire = &context.wire;
     match (current, next) {
         (Some(AlState::Init), AlState::PreOp) => {
             let areas = device.mailbox.map(|mailbox| mailbox.areas);
@@ -110,7 +110,7 @@ async fn step(
         (Some(AlState::PreOp), AlState::SafeOp) => set_up::before_safe_op(wire, device).await?,
         _ => {}
     }
-    let limit = servant.options.state_timeouts.of(current.unwrap_or(AlState::Op), next);
+    let limit = context.options.state_timeouts.of(current.unwrap_or(AlState::Op), next);
     let step = state::Step { to: next, limit, emulated: device.device_emulation };
     state::request(wire, Target::Station(device.station), step).await
 }
@@ -122,27 +122,27 @@ const OLD_ERROR: Span = Span::ms(500);
 
 /// Asks whoever drives the line for another state of a SubDevice, and waits for it.
 async fn redirect(
-    servant: &Servant,
+    context: &ServiceContext,
     device: &DevicePlan,
     to: AlState,
 ) -> Result<ServiceAnswer, ServiceFailure> {
-    let (wire, target, id) = (&servant.wire, Target::Station(device.station), device.id);
+    let (wire, target, id) = (&context.wire, Target::Station(device.station), device.id);
     let failed = |error| ServiceFailure::State { id, to, error };
     let before = state::read(wire, target).await.map_err(|error| failed(error.into()))?;
-    if !lock(&servant.line).ask_for(id, to) {
+    if !lock(&context.device_table).ask_for(id, to) {
         return Err(ServiceFailure::Unknown { id });
     }
     let began = wire.now();
     let from = before.0.state().state().unwrap_or(AlState::Init);
     let limits = steps(from, to).chain([to]).zip(std::iter::once(from).chain(steps(from, to)));
     let patience = limits
-        .fold(OLD_ERROR, |sum, (next, from)| sum + servant.options.state_timeouts.of(from, next));
+        .fold(OLD_ERROR, |sum, (next, from)| sum + context.options.state_timeouts.of(from, next));
     loop {
         wire.sleep(LOOK).await;
         let looked = state::read(wire, target).await.map_err(|error| failed(error.into()))?;
         let (status, code) = looked;
         let is_there = status.state() == StateValue::Known(to) && !status.error();
-        if is_there && lock(&servant.line).has_reached(id) {
+        if is_there && lock(&context.device_table).has_reached(id) {
             return Ok(ServiceAnswer::State { status, code });
         }
         let waited = wire.now().since(began);

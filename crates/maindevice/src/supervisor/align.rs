@@ -1,5 +1,5 @@
-//! Which of those that were found is which of those that are planned, when some are missing or
-//! too many: the longest common subsequence, since a line keeps its order.
+//! Alignment of found and planned SubDevices, when some are missing or too many: the longest common
+//! subsequence, since a line keeps its order.
 
 /// Pairs (found, planned), in order, as many as possible, for which `fits` holds. When several
 /// answers are equally long, earlier ones are paired first.

@@ -10,7 +10,7 @@ use linesman_proto::address::{RegisterAddress, StationAddress, StationAlias};
 use linesman_proto::register::{STATION_ADDRESS, STATION_ALIAS};
 use linesman_proto::sii::Identity;
 
-use super::{Context, Found, find, lose};
+use super::{Context, Reachability, find, lose};
 use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::lock;
@@ -31,7 +31,9 @@ pub(super) fn alias_of(device: &DevicePlan) -> Option<StationAlias> {
 pub(super) async fn locate(context: &Context) {
     let wire = &context.wire;
     let wanted: Vec<(&DevicePlan, StationAlias)> = (context.plan.devices.iter())
-        .filter(|device| !matches!(lock(&context.line).found(device.id), Found::There { .. }))
+        .filter(|device| {
+            !matches!(lock(&context.device_table).found(device.id), Reachability::There { .. })
+        })
         .filter_map(|device| Some((device, alias_of(device)?)))
         .collect();
     if wanted.is_empty() {
@@ -68,7 +70,7 @@ async fn identify(context: &Context, device: &DevicePlan, alias: StationAlias) -
         0 => return false,
         1 => {}
         count => {
-            if lock(&context.line).add_stranger(Some(id), Identity::default()) {
+            if lock(&context.device_table).add_stranger(Some(id), Identity::default()) {
                 wire.emit(Event::AliasShared { id, alias, count });
             }
             return false;
@@ -78,7 +80,7 @@ async fn identify(context: &Context, device: &DevicePlan, alias: StationAlias) -
     let expected = device.identity;
     let anyone = expected == Identity::default();
     if let Some(mismatch) = mismatch(&expected, &found, device.revision_rule).filter(|_| !anyone) {
-        if lock(&context.line).add_stranger(Some(id), found) {
+        if lock(&context.device_table).add_stranger(Some(id), found) {
             wire.emit(Event::WrongDevice { id, mismatch, expected, found });
         }
         return false;

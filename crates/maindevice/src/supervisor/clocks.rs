@@ -8,7 +8,7 @@ use linesman_proto::register::{self, DlControl, LoopMode};
 use linesman_proto::time::Span;
 
 use super::times::Phase;
-use super::{Context, Found};
+use super::{Context, Reachability};
 use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::lock;
@@ -24,7 +24,7 @@ pub(super) fn wanted(plan: &Plan) -> bool {
         || plan.devices.iter().any(|device| device.settings.clock.is_some())
 }
 
-/// The SubDevice whose time the cyclic frames spread.
+/// The SubDevice whose time the cyclic frames distribute.
 fn reference_in_frames(plan: &Plan) -> Option<DeviceId> {
     let (.., datagram) = plan.datagrams().find(|(.., one)| one.role == Role::ReferenceClock)?;
     let DatagramAddress::Physical(adp, _) = datagram.address else { return None };
@@ -64,17 +64,17 @@ pub(super) async fn set_all(context: &Context) {
         clock::compensate(&context.wire, reference, frames, epoch).await;
     }
     context.note(Phase::Clocks, began);
-    lock(&context.line).set_clocks_ready();
+    lock(&context.device_table).set_clocks_ready();
 }
 
 /// Waits until the clocks of the network have been set for the first time.
 pub(super) async fn ready(context: &Context) {
     loop {
         let seen = context.alerts();
-        if lock(&context.line).are_clocks_ready() {
+        if lock(&context.device_table).are_clocks_ready() {
             return;
         }
-        context.nap(seen, LOOK).await;
+        context.sleep_until_alert(seen, LOOK).await;
     }
 }
 
@@ -109,7 +109,7 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
     let is_set = |clock: &&SeenClock| {
         let planned = context.plan.devices.iter().find(|device| device.station == clock.station);
         clock.has_clock
-            && planned.is_some_and(|device| lock(&context.line).has_clock_set(device.id))
+            && planned.is_some_and(|device| lock(&context.device_table).has_clock_set(device.id))
     };
     let source = match one {
         None => None,
@@ -129,7 +129,9 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
     };
     let setting: Vec<_> = (context.plan.devices.iter())
         .filter(|device| one.is_none_or(|one| one == device.id))
-        .filter(|device| matches!(lock(&context.line).found(device.id), Found::There { .. }))
+        .filter(|device| {
+            matches!(lock(&context.device_table).found(device.id), Reachability::There { .. })
+        })
         .filter_map(|device| {
             let station = device.station;
             let clock = clocks.iter().find(|clock| clock.has_clock && clock.station == station)?;
@@ -141,17 +143,17 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
         })
         .collect();
     for (id, set) in setting {
-        // Who does not answer is found out by its keeper.
+        // Who does not answer is found out by its supervisor.
         if set.await.is_ok() {
-            lock(&context.line).set_clock(id);
+            lock(&context.device_table).set_clock(id);
         }
     }
     // The cycle follows from now on.
     let planned = context.plan.devices.iter().find(|device| device.station == reference);
-    let mut line = lock(&context.line);
-    line.set_reference_clock(reference, planned.map(|device| device.id));
-    line.set_clock_epoch(epoch);
-    drop(line);
+    let mut device_table = lock(&context.device_table);
+    device_table.set_reference_clock(reference, planned.map(|device| device.id));
+    device_table.set_clock_epoch(epoch);
+    drop(device_table);
     Ok(reference)
 }
 
@@ -176,7 +178,7 @@ async fn open_ring(context: &Context) -> Result<Option<(Target, DlControl)>, Clo
 
 /// Sets the clock of one SubDevice that came back without it.
 pub(super) async fn set_one(context: &Context, id: DeviceId) {
-    if !wanted(&context.plan) || lock(&context.line).has_clock_set(id) {
+    if !wanted(&context.plan) || lock(&context.device_table).has_clock_set(id) {
         return;
     }
     let outcome = set(context, Some(id)).await;

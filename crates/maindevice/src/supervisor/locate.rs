@@ -16,17 +16,17 @@ use linesman_proto::state::AlState;
 use super::align::align;
 use super::by_alias;
 use super::times::Phase;
-use super::{Context, Found, find, lose};
+use super::{Context, Reachability, find, lose};
 use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::{Wire, lock};
-use crate::procedure::look::{self, LookError};
-use crate::procedure::scan::Identified;
+use crate::procedure::read_only_scan::{self, ReadOnlyScanError};
+use crate::procedure::scan::ScanCache;
 use crate::procedure::{address, sii};
 
 /// One controller on the line.
 #[derive(Clone, Copy)]
-struct Seen {
+struct FoundController {
     position: Position,
     /// How it is addressed as long as it has no station address.
     place: Target,
@@ -40,37 +40,37 @@ struct Seen {
 /// address that it still has.
 ///
 /// # Errors
-/// [`LookError`] when the line is silent.
+/// [`ReadOnlyScanError`] when the line is silent.
 pub(super) async fn from_scratch(
     context: &Context,
-    identified: Option<&Identified>,
-) -> Result<(), LookError> {
-    locate(context, true, identified).await
+    scan_cache: Option<&ScanCache>,
+) -> Result<(), ReadOnlyScanError> {
+    locate(context, true, scan_cache).await
 }
 
 /// Looks for those that are not there.
 ///
 /// # Errors
-/// [`LookError`] when the line is silent.
-pub(super) async fn again(context: &Context) -> Result<(), LookError> {
+/// [`ReadOnlyScanError`] when the line is silent.
+pub(super) async fn again(context: &Context) -> Result<(), ReadOnlyScanError> {
     locate(context, false, None).await
 }
 
 async fn locate(
     context: &Context,
     from_scratch: bool,
-    identified: Option<&Identified>,
-) -> Result<(), LookError> {
+    scan_cache: Option<&ScanCache>,
+) -> Result<(), ReadOnlyScanError> {
     let wire = &context.wire;
     let began = wire.now();
-    let (places, _) = look::places(wire, context.network).await?;
+    let (places, _) = read_only_scan::places(wire, context.network).await?;
     let mut who = vec![None; places.len()];
-    if let Some(identified) = identified {
+    if let Some(scan_cache) = scan_cache {
         let now = wire.now();
         let stations = stations(wire, &places).await;
         let uses = uses(&stations);
         let alone = |station: &StationAddress| uses.get(station) == Some(&1);
-        let asked = |station: &StationAddress| identified.who(*station, now);
+        let asked = |station: &StationAddress| scan_cache.who(*station, now);
         who = stations.iter().map(|one| asked(one).filter(|_| alone(one))).collect();
     }
     if from_scratch {
@@ -103,9 +103,9 @@ async fn locate(
         let planned = planned.get(&station).copied();
         planned.filter(|_| unique && station.0 != 0 && !from_scratch)
     };
-    let seen: Vec<Seen> = (stations.iter().zip(places).zip(who).zip(0..))
+    let seen: Vec<FoundController> = (stations.iter().zip(places).zip(who).zip(0..))
         .filter(|(((station, _), _), _)| !anywhere.contains(station))
-        .map(|(((station, place), identity), at)| Seen {
+        .map(|(((station, place), identity), at)| FoundController {
             position: Position(at),
             place,
             known: known(*station),
@@ -128,7 +128,7 @@ async fn locate(
         first_seen = end + 1;
     }
     for device in &context.plan.devices {
-        if lock(&context.line).found(device.id) == Found::Unknown {
+        if lock(&context.device_table).found(device.id) == Reachability::Unknown {
             lose(context, device.id);
         }
     }
@@ -158,18 +158,18 @@ async fn stations(wire: &Wire, places: &[Target]) -> Vec<StationAddress> {
 }
 
 /// Identifies unknown controllers, of which the plan has these.
-async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usize>) {
+async fn stretch(context: &Context, seen: &[FoundController], planned: std::ops::Range<usize>) {
     let planned: Vec<DeviceId> = (context.plan.devices[planned].iter())
         .filter(|device| by_alias::alias_of(device).is_none())
         .map(|device| device.id)
-        .filter(|id| !matches!(lock(&context.line).found(*id), Found::There { .. }))
+        .filter(|id| !matches!(lock(&context.device_table).found(*id), Reachability::There { .. }))
         .collect();
     if seen.is_empty() {
         return;
     }
     let reading: Vec<_> = (seen.iter())
         .map(|seen| {
-            let (wire, Seen { place, identity, .. }) = (context.wire.clone(), *seen);
+            let (wire, FoundController { place, identity, .. }) = (context.wire.clone(), *seen);
             context.wire.spawn(async move {
                 match identity {
                     Some(identity) => Ok(identity),
@@ -197,7 +197,7 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
     for (at, found) in identities.iter().enumerate() {
         let is_known =
             paired.contains(&at) || by_alias::is_one(context, seen[at].place, found).await;
-        if !is_known && lock(&context.line).add_stranger(None, *found) {
+        if !is_known && lock(&context.device_table).add_stranger(None, *found) {
             let (position, found) = (seen[at].position, *found);
             context.wire.emit(Event::UnplannedDevice { position, found });
         }
@@ -212,7 +212,7 @@ async fn stretch(context: &Context, seen: &[Seen], planned: std::ops::Range<usiz
                 let wire = context.wire.clone();
                 giving.push(wire.spawn(async move { give_address(&context, place, id).await }));
             }
-            Some(mismatch) if lock(&context.line).add_stranger(Some(id), found) => {
+            Some(mismatch) if lock(&context.device_table).add_stranger(Some(id), found) => {
                 let expected = context.plan.devices[id.index()].identity;
                 context.wire.emit(Event::WrongDevice { id, mismatch, expected, found });
             }

@@ -1,23 +1,23 @@
 //! Bringing every SubDevice to its target, and keeping it there.
 //!
 //! [`locate`] finds the SubDevices of the plan on the line and gives them their addresses; one
-//! [`keeper`] per SubDevice drives it to its target, watches it, and drives it again when it fell
-//! out; [`supervise`] starts them and looks for those that are lost. [`mod@line`] is what they know,
+//! [`device_supervisor`] per SubDevice drives it to its target, watches it, and drives it again when it fell
+//! out; [`supervise`] starts them and looks for those that are lost. [`mod@device_table`] is what they know,
 //! [`rounds`] finds out for all of them at once where they do not read by themselves.
 
 mod align;
 mod by_alias;
 mod clocks;
 pub(crate) mod counters;
-mod drive;
-pub(crate) mod gates;
-pub(crate) mod keeper;
-pub(crate) mod line;
+pub(crate) mod device_supervisor;
+pub(crate) mod device_table;
 mod locate;
+pub(crate) mod loop_control;
 mod modules;
 mod rounds;
 mod shortest_cycle;
 mod start_up;
+mod state_change;
 pub(crate) mod times;
 mod watched_clock;
 
@@ -33,45 +33,50 @@ use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::{Wire, lock};
 use crate::options::{Options, Polling};
-use crate::procedure::look::AL_LEN;
-use crate::procedure::scan::Identified;
+use crate::procedure::read_only_scan::AL_LEN;
+use crate::procedure::scan::ScanCache;
 
-pub(crate) use line::{Found, Line, Nap, ReferenceClock};
+pub(crate) use device_table::{AlertSleep, DeviceTable, Reachability, ReferenceClock};
 pub use start_up::StartUpError;
 pub use times::{BringUpTimes, DeviceTimes, Phase};
 
-/// What keepers share.
+/// State that the SubDevice supervisors share.
 #[derive(Clone)]
 pub(crate) struct Context {
     pub(crate) wire: Wire,
     pub(crate) network: Network,
     pub(crate) plan: Arc<Plan>,
-    pub(crate) line: Arc<Mutex<Line>>,
+    pub(crate) device_table: Arc<Mutex<DeviceTable>>,
     pub(crate) options: Arc<Options>,
-    pub(crate) mailboxes: crate::mailbox::Queues,
-    /// Rounds in which not all was as wanted: after each all keepers look.
+    pub(crate) mailboxes: crate::mailbox::MailboxQueues,
+    /// Rounds in which not all was as wanted: after each all supervisors look.
     pub(crate) bad_rounds: Arc<AtomicU64>,
 }
 
 impl Context {
     /// Sleeps until the next alert after `seen`, at most `span`.
-    pub(crate) fn nap(&self, seen: u64, span: Span) -> Nap {
-        Nap { line: Arc::clone(&self.line), seen, sleep: self.wire.sleep(span), place: None }
+    pub(crate) fn sleep_until_alert(&self, seen: u64, span: Span) -> AlertSleep {
+        AlertSleep {
+            device_table: Arc::clone(&self.device_table),
+            seen,
+            sleep: self.wire.sleep(span),
+            place: None,
+        }
     }
 
     /// Notes how long a phase of the whole network took that began then.
     pub(crate) fn note(&self, phase: Phase, began: Instant) {
-        lock(&self.line).note_network_time(phase, self.wire.now().since(began));
+        lock(&self.device_table).note_network_time(phase, self.wire.now().since(began));
     }
 
     pub(crate) fn alerts(&self) -> u64 {
-        lock(&self.line).alerts()
+        lock(&self.device_table).alerts()
     }
 
     /// Waits until lost SubDevices are to be looked for.
     async fn until_search(&self, seen: u64) {
         match self.options.polling {
-            Polling::EachDevice => self.nap(seen, SEARCH_INTERVAL).await,
+            Polling::EachDevice => self.sleep_until_alert(seen, SEARCH_INTERVAL).await,
             Polling::Rounds(_) | Polling::Nothing => {
                 self.wire.sleep(self.options.watch_interval).await;
             }
@@ -80,7 +85,7 @@ impl Context {
 
     /// Whether all that is left to do is to exchange process data.
     fn is_left_alone(&self) -> bool {
-        self.options.polling == Polling::Nothing && lock(&self.line).all_have_been_reached()
+        self.options.polling == Polling::Nothing && lock(&self.device_table).all_have_been_reached()
     }
 }
 
@@ -93,10 +98,10 @@ pub(crate) const CALM: Span = Span::ms(5);
 
 /// Runs a network according to its plan; does not end as long as anybody is to be looked for. Who a scan has just
 /// identified need not be asked again.
-pub(crate) async fn supervise(context: Context, identified: Option<Identified>) {
-    lock(&context.line).begin_times(context.wire.now());
+pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
+    lock(&context.device_table).begin_times(context.wire.now());
     context.wire.forget_places();
-    while locate::from_scratch(&context, identified.as_ref()).await.is_err() {
+    while locate::from_scratch(&context, scan_cache.as_ref()).await.is_err() {
         // The whole line is silent.
         for device in &context.plan.devices {
             lose(&context, device.id);
@@ -107,11 +112,11 @@ pub(crate) async fn supervise(context: Context, identified: Option<Identified>) 
         let setting = context.clone();
         context.wire.spawn(async move { clocks::set_all(&setting).await });
     } else {
-        lock(&context.line).set_clocks_ready();
+        lock(&context.device_table).set_clocks_ready();
     }
     for device in &context.plan.devices {
-        // Who is not there yet has its keeper, too: it waits.
-        context.wire.spawn(keeper::keep(context.clone(), device.id));
+        // Who is not there yet has its supervisor, too: it waits.
+        context.wire.spawn(device_supervisor::supervise_device(context.clone(), device.id));
         if device.mailbox.is_some() {
             context.wire.spawn(crate::mailbox::serve_mailbox(context.clone(), device.id));
         }
@@ -128,7 +133,7 @@ pub(crate) async fn supervise(context: Context, identified: Option<Identified>) 
             continue;
         }
         context.wire.sleep(CALM).await;
-        let responding = lock(&context.line).responding();
+        let responding = lock(&context.device_table).responding();
         if responding != placed_at && placed_at.is_some() {
             // Places may have moved: who has nothing but its place is looked for anew.
             for device in context.plan.devices.iter().filter(|device| is_by_place(device)) {
@@ -142,7 +147,7 @@ pub(crate) async fn supervise(context: Context, identified: Option<Identified>) 
         let now = context.wire.now();
         if responding != located_at || now >= thorough_at {
             thorough_at = now + THOROUGH_INTERVAL;
-            // A silent line is found out by the keepers; the next round tries again.
+            // A silent line is found out by the supervisors; the next round tries again.
             if locate::again(&context).await.is_ok() {
                 located_at = responding;
             }
@@ -152,18 +157,18 @@ pub(crate) async fn supervise(context: Context, identified: Option<Identified>) 
 
 /// Whether all are there, and as many answer as the last time.
 fn is_calm(context: &Context, answered: Option<WorkingCounter>) -> bool {
-    let line = lock(&context.line);
-    line.responding() == answered && line.are_all_there()
+    let device_table = lock(&context.device_table);
+    device_table.responding() == answered && device_table.are_all_there()
 }
 
 /// Asks those that are lost at their addresses. Returns whether any is still lost.
 async fn search(context: &Context) -> bool {
-    if lock(&context.line).are_all_there() {
+    if lock(&context.device_table).are_all_there() {
         return false;
     }
     by_alias::locate(context).await;
     let lost: Vec<_> = (context.plan.devices.iter())
-        .filter(|device| lock(&context.line).found(device.id) == Found::Lost)
+        .filter(|device| lock(&context.device_table).found(device.id) == Reachability::Lost)
         .filter(|device| !is_by_place(device))
         .collect();
     let asked: Vec<_> = (lost.iter())
@@ -174,7 +179,8 @@ async fn search(context: &Context) -> bool {
             (device.id, context.wire.submit(request))
         })
         .collect();
-    let is_lost = |device: &DevicePlan| lock(&context.line).found(device.id) == Found::Lost;
+    let is_lost =
+        |device: &DevicePlan| lock(&context.device_table).found(device.id) == Reachability::Lost;
     let mut missing = context.plan.devices.iter().any(|one| is_by_place(one) && is_lost(one));
     for (id, reply) in asked {
         match reply.await {
@@ -192,20 +198,20 @@ fn is_by_place(device: &DevicePlan) -> bool {
 
 /// A SubDevice does not answer.
 pub(crate) fn lose(context: &Context, id: DeviceId) {
-    let before = lock(&context.line).set_found(id, Found::Lost);
-    if before != Found::Lost {
+    let before = lock(&context.device_table).set_found(id, Reachability::Lost);
+    if before != Reachability::Lost {
         context.wire.emit(Event::DeviceLost { id });
-        lock(&context.line).alert();
+        lock(&context.device_table).alert();
     }
 }
 
 /// A SubDevice answers.
 pub(crate) fn find(context: &Context, id: DeviceId, restarted: bool) {
-    let before = lock(&context.line).set_found(id, Found::There { restarted });
-    if before == Found::Lost {
+    let before = lock(&context.device_table).set_found(id, Reachability::There { restarted });
+    if before == Reachability::Lost {
         context.wire.emit(Event::DeviceBack { id, restarted });
     }
-    lock(&context.line).alert();
+    lock(&context.device_table).alert();
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Rounds: AL status of all SubDevices by one broadcast read, and their error counters, at intervals.
 //!
 //! Most MainDevices watch a line so: only when the states together are not as they should be, or fewer answer than
-//! there are, they read each SubDevice, which the keepers do here.
+//! there are, they read each SubDevice, which the supervisors do here.
 
 use std::sync::atomic::Ordering;
 
@@ -9,7 +9,7 @@ use linesman_config::plan::DevicePlan;
 use linesman_proto::register::{self, ErrorCounters};
 use linesman_proto::state::AlState;
 
-use super::{Context, Found};
+use super::{Context, Reachability};
 use crate::event::Event;
 use crate::exchange::{Reply, Target};
 use crate::executor::lock;
@@ -28,10 +28,10 @@ pub(super) async fn make(context: Context, rounds: Rounds) {
         context.wire.sleep(context.options.watch_interval).await;
         let status = register::AL_STATUS;
         let read = context.wire.read(Target::All, status.address, status.len).await;
-        let wanted = lock(&context.line).all_wanted();
+        let wanted = lock(&context.device_table).all_wanted();
         if !read.is_ok_and(|reply| is_as_wanted(&reply, &wanted)) {
             context.bad_rounds.fetch_add(1, Ordering::Relaxed);
-            lock(&context.line).alert();
+            lock(&context.device_table).alert();
         }
         match rounds.counters {
             CounterPoll::None => {}
@@ -55,8 +55,9 @@ fn is_as_wanted(reply: &Reply, wanted: &[AlState]) -> bool {
 
 /// Reads error counters of all that are there, and tells those that have changed.
 async fn counters(context: &Context, len: u16, known: &mut [Option<ErrorCounters>]) {
-    let is_there =
-        |device: &&DevicePlan| matches!(lock(&context.line).found(device.id), Found::There { .. });
+    let is_there = |device: &&DevicePlan| {
+        matches!(lock(&context.device_table).found(device.id), Reachability::There { .. })
+    };
     let there = context.plan.devices.iter().filter(is_there);
     let read = |device: &DevicePlan| {
         let target = Target::Station(device.station);

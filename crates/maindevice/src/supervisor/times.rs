@@ -1,4 +1,4 @@
-//! What bringing up took how long: for the network, and for each SubDevice and step.
+//! Times of bringing up: for the network, and for each SubDevice and step.
 
 use std::fmt;
 

@@ -26,7 +26,7 @@ pub(super) struct WatchedClock {
 }
 
 /// What is being read of a clock.
-pub(super) struct Look {
+pub(super) struct ClockReading {
     is_reference: bool,
     asked_at: Instant,
 }
@@ -37,11 +37,12 @@ impl WatchedClock {
         &self,
         context: &Context,
         device: &DevicePlan,
-    ) -> Option<impl Future<Output = (Look, Result<Reply, ExchangeError>)> + Send + 'static> {
-        let line = lock(&context.line);
-        let is_reference = line.reference_clock()? == device.station;
-        let is_set = line.has_clock_set(device.id);
-        drop(line);
+    ) -> Option<impl Future<Output = (ClockReading, Result<Reply, ExchangeError>)> + Send + 'static>
+    {
+        let device_table = lock(&context.device_table);
+        let is_reference = device_table.reference_clock()? == device.station;
+        let is_set = device_table.has_clock_set(device.id);
+        drop(device_table);
         let follows = device.settings.clock.is_some_and(|clock| clock.assign_activate != 0);
         if !is_set || !(is_reference || follows) {
             return None;
@@ -50,7 +51,7 @@ impl WatchedClock {
             true => register::SYSTEM_TIME,
             false => register::SYSTEM_TIME_DIFFERENCE,
         };
-        let look = Look { is_reference, asked_at: context.wire.now() };
+        let look = ClockReading { is_reference, asked_at: context.wire.now() };
         let read =
             context.wire.read(Target::Station(device.station), register.address, register.len);
         Some(async move { (look, read.await) })
@@ -61,7 +62,7 @@ impl WatchedClock {
         &mut self,
         context: &Context,
         device: &DevicePlan,
-        (look, reply): (Look, Result<Reply, ExchangeError>),
+        (look, reply): (ClockReading, Result<Reply, ExchangeError>),
     ) {
         let Some(reply) = reply.ok().filter(Reply::answered) else { return };
         let (wire, id) = (&context.wire, device.id);

@@ -1,4 +1,4 @@
-//! What is known of one SubDevice.
+//! Status of one SubDevice.
 
 use std::collections::VecDeque;
 

@@ -10,7 +10,7 @@
 mod counters;
 mod device;
 mod entry;
-mod standing;
+mod network_status;
 mod wording;
 
 use std::collections::VecDeque;
@@ -26,7 +26,7 @@ use crate::event::Event;
 pub use counters::CounterTotals;
 pub use device::{AbnormalChange, WatchedDevice};
 pub use entry::{EntryKind, LogEntry, Severity};
-pub use standing::Standing;
+pub use network_status::NetworkStatus;
 
 /// So many entries wait for somebody who fetches them; older ones are dropped and counted.
 const WAITING_ENTRIES: usize = 10_000;
@@ -37,7 +37,7 @@ const LOST_TOGETHER: Span = Span::ms(20);
 #[derive(Debug)]
 pub struct Watch {
     plan: Arc<Plan>,
-    standing: Standing,
+    network_status: NetworkStatus,
     /// SubDevices that got lost and were not told of yet, and since when.
     lost: Vec<DeviceId>,
     lost_at: Instant,
@@ -50,7 +50,7 @@ impl Watch {
     #[must_use]
     pub fn new(plan: Arc<Plan>) -> Self {
         Self {
-            standing: Standing::new(&plan),
+            network_status: NetworkStatus::new(&plan),
             plan,
             lost: Vec::new(),
             lost_at: Instant::ZERO,
@@ -63,8 +63,8 @@ impl Watch {
 
     /// How the network stands.
     #[must_use]
-    pub fn standing(&self) -> &Standing {
-        &self.standing
+    pub fn network_status(&self) -> &NetworkStatus {
+        &self.network_status
     }
 
     /// The plan that is watched.
@@ -91,8 +91,8 @@ impl Watch {
             self.lost.push(*id);
         }
         // The wording may need what was before.
-        let entries = wording::of(now, event, &self.plan, &self.standing);
-        self.standing.handle_event(now, event);
+        let entries = wording::of(now, event, &self.plan, &self.network_status);
+        self.network_status.handle_event(now, event);
         for entry in entries {
             self.push(entry);
         }
@@ -104,14 +104,14 @@ impl Watch {
             Path::A => NetworkState::LINK_ERROR,
             Path::B => NetworkState::REDUNDANCY_LINK_ERROR,
         };
-        if self.standing.set(bit, !carrier) {
+        if self.network_status.set(bit, !carrier) {
             self.push(wording::carrier(now, card, carrier));
         }
     }
 
     /// The card took a frame, or did not.
     pub fn handle_send_failure(&mut self, failing: bool) {
-        self.standing.set(NetworkState::OUT_OF_SEND_RESOURCES, failing);
+        self.network_status.set(NetworkState::OUT_OF_SEND_RESOURCES, failing);
     }
 
     /// Time has passed: what was waited with is told.
@@ -135,7 +135,7 @@ impl Watch {
     /// All error counters and change counters of the list begin at 0 again. Nothing is written to
     /// the SubDevices: other tools go on as they were, and no count is lost.
     pub fn clear(&mut self) {
-        self.standing.clear();
+        self.network_status.clear();
     }
 
     // ---- what goes out ----

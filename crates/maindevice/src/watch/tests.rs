@@ -154,7 +154,7 @@ fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
         ),
         "{lines:?}"
     );
-    let device = watch.standing().device(DeviceId(2)).unwrap();
+    let device = watch.network_status().device(DeviceId(2)).unwrap();
     assert_eq!(device.state().to_string(), "ERR SAFEOP");
     assert_eq!((device.abnormal_changes(), device.presence_changes()), (1, 1));
     assert_eq!(device.history().next().unwrap().code, AlStatusCode(0x001B));
@@ -165,7 +165,7 @@ fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
 fn the_change_counters_begin_at_nought_and_one() {
     let mut watch = watch();
     let changes = |watch: &Watch| {
-        let device = watch.standing().device(DeviceId(3)).unwrap();
+        let device = watch.network_status().device(DeviceId(3)).unwrap();
         (device.abnormal_changes(), device.presence_changes())
     };
     // Not found at first, then found: that is how each start looks.
@@ -186,8 +186,9 @@ fn the_change_counters_begin_at_nought_and_one() {
 #[test]
 fn state_words_follow_from_plan_and_ports() {
     let mut watch = watch();
-    let text =
-        |watch: &Watch, id| watch.standing().device(DeviceId(id)).unwrap().state().to_string();
+    let text = |watch: &Watch, id| {
+        watch.network_status().device(DeviceId(id)).unwrap().state().to_string()
+    };
     assert_eq!(text(&watch, 0), "INIT NO_COMM", "nobody has seen it");
     for id in 0..7 {
         watch.handle_event(at(0), &state(id, AlState::Op, false, 0));
@@ -199,7 +200,7 @@ fn state_words_follow_from_plan_and_ports() {
     assert_eq!(text(&watch, 0), "OP LNK_MIS LNK_ADD B C");
     watch.handle_event(at(2), &links(0, &[Port::A]));
     assert_eq!(text(&watch, 0), "OP LNK_MIS B");
-    assert_eq!(watch.standing().device(DeviceId(0)).unwrap().state().0, 0x2408);
+    assert_eq!(watch.network_status().device(DeviceId(0)).unwrap().state().0, 0x2408);
     watch.handle_event(at(3), &state(6, AlState::Init, true, 0x0014));
     let refused = Event::Refused {
         id: DeviceId(6),
@@ -217,7 +218,7 @@ fn state_words_follow_from_plan_and_ports() {
     };
     watch.handle_event(at(4), &stranger);
     assert_eq!(text(&watch, 6), "ERR INIT VPRS INIT_ERR");
-    assert_eq!(watch.standing().device(DeviceId(6)).unwrap().state().0, 0x0071);
+    assert_eq!(watch.network_status().device(DeviceId(6)).unwrap().state().0, 0x0071);
 }
 
 // proves: PLC-07 partial: from events
@@ -227,12 +228,12 @@ fn the_network_word_sums_up() {
     for id in 0..7 {
         watch.handle_event(at(0), &state(id, AlState::Op, false, 0));
     }
-    assert_eq!(watch.standing().network_state().to_string(), "OK");
+    assert_eq!(watch.network_status().network_state().to_string(), "OK");
     watch.handle_event(at(1), &state(4, AlState::SafeOp, true, 0x001B));
-    assert_eq!(watch.standing().network_state().0, 0x0C00);
+    assert_eq!(watch.network_status().network_state().0, 0x0C00);
     watch.handle_carrier(at(2), Path::A, false);
     watch.handle_event(at(2), &Event::Ring { intact: false });
-    assert_eq!(watch.standing().network_state().0, 0x0C09);
+    assert_eq!(watch.network_status().network_state().0, 0x0C09);
     watch.handle_carrier(at(3), Path::A, true);
     watch.handle_event(at(3), &Event::Ring { intact: true });
     watch.handle_event(at(3), &Event::OutputsWithheld { task: 0 });
@@ -242,11 +243,11 @@ fn the_network_word_sums_up() {
     };
     watch.handle_event(at(3), &clock(Span::us(2), true));
     watch.handle_send_failure(true);
-    assert_eq!(watch.standing().network_state().0, 0x1C30);
+    assert_eq!(watch.network_status().network_state().0, 0x1C30);
     watch.handle_event(at(4), &clock(Span::ns(300), false));
-    assert_eq!(watch.standing().network_state().0, 0x0C30);
+    assert_eq!(watch.network_status().network_state().0, 0x0C30);
     assert_eq!(
-        watch.standing().device(DeviceId(2)).unwrap().clock_difference(),
+        watch.network_status().device(DeviceId(2)).unwrap().clock_difference(),
         Some(Span::ns(300))
     );
 }
@@ -259,7 +260,7 @@ fn counters_are_summed_up_through_clears_and_restarts() {
     values[0] = 200;
     watch.handle_event(at(0), &counters(values));
     let count = |watch: &Watch| {
-        let totals = watch.standing().device(DeviceId(1)).unwrap().counters();
+        let totals = watch.network_status().device(DeviceId(1)).unwrap().counters();
         (totals.count(ErrorCounter::InvalidFrame(Port::A)).unwrap(), totals.is_lower_bound())
     };
     assert_eq!(count(&watch), (0, false), "what the power-on brought counts for nothing");
@@ -284,7 +285,7 @@ fn counters_are_summed_up_through_clears_and_restarts() {
     values[0] = 4;
     watch.handle_event(at(5), &counters(values));
     assert_eq!(count(&watch).0, 3);
-    let totals = watch.standing().device(DeviceId(1)).unwrap().counters();
+    let totals = watch.network_status().device(DeviceId(1)).unwrap().counters();
     assert_eq!(totals.at_port(Port::A), Some(3));
     assert_eq!(totals.registers().unwrap().value(ErrorCounter::InvalidFrame(Port::A)), Some(4));
 }

@@ -1,4 +1,4 @@
-//! What happened, in the words that engineers know from the vendor's message window.
+//! Wording of log entries, in the words that engineers know from the vendor's message window.
 //!
 //! Reference: the message texts of the sources (`facts` 3.2): state change aborted, abnormal state
 //! change, communication interrupted and re-established, SDO abort, frames missed.
@@ -9,12 +9,17 @@ use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
 use linesman_proto::time::Instant;
 
-use super::{EntryKind, LogEntry, Severity, Standing};
+use super::{EntryKind, LogEntry, NetworkStatus, Severity};
 use crate::event::Event;
 
-/// The entries for an event; `standing` is that before it.
+/// The entries for an event; `network_status` is that before it.
 #[allow(clippy::wildcard_enum_match_arm, reason = "answers are told by whoever asked")]
-pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -> Vec<LogEntry> {
+pub(super) fn of(
+    at: Instant,
+    event: &Event,
+    plan: &Plan,
+    network_status: &NetworkStatus,
+) -> Vec<LogEntry> {
     let about = |id: DeviceId, severity, kind, text: String| LogEntry {
         at,
         severity,
@@ -74,7 +79,8 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
             "the ring is open: frames come back to the card that sent them".into(),
         )],
         Event::Links { id, status } => {
-            let Some(before) = standing.device(*id).and_then(super::WatchedDevice::links) else {
+            let Some(before) = network_status.device(*id).and_then(super::WatchedDevice::links)
+            else {
                 return Vec::new();
             };
             let change = |port| {
@@ -94,7 +100,7 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
             vec![about(*id, Severity::Info, EntryKind::Link, text)]
         }
         Event::Counters { id, counters } | Event::CountersCleared { id, counters } => {
-            let rises = standing.counters(*id).map(|known| known.rises(counters));
+            let rises = network_status.counters(*id).map(|known| known.rises(counters));
             let rises = rises.unwrap_or_default();
             let texts = rises.iter().map(|(counter, rise)| format!("{counter} +{rise}"));
             let texts: Vec<_> = texts.collect();
@@ -108,7 +114,8 @@ pub(super) fn of(at: Instant, event: &Event, plan: &Plan, standing: &Standing) -
             vec![about(*id, severity, EntryKind::Counter, text)]
         }
         Event::ClockDifference { id, difference, window, apart } => {
-            let before = standing.device(*id).is_some_and(super::WatchedDevice::is_clock_apart);
+            let before =
+                network_status.device(*id).is_some_and(super::WatchedDevice::is_clock_apart);
             let (severity, how) = match (before, *apart) {
                 (false, true) => (Severity::Warning, "has left the sync window"),
                 (true, false) => (Severity::Info, "is within the sync window again"),

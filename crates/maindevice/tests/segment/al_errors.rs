@@ -97,7 +97,7 @@ fn a_sync_signal_without_a_cycle_is_refused() {
 
 // proves: SW-04 partial: 0x001A from frames that come too late, 0x001B from frames that do not come, 0x002C from a SYNC0 that is gone
 #[test]
-fn what_goes_wrong_in_op_is_an_abnormal_change() {
+fn fault_in_op_is_an_abnormal_change() {
     let from = "abnormal state change (from OP to SAFEOP)";
     let jitter = FaultEntry::new(FaultName::HostJitter)
         .with("delays_per_s", 2_000.0)

@@ -102,7 +102,7 @@ fn an_abort_says_what_and_why() {
 }
 
 #[test]
-fn who_has_no_mailbox_says_so() {
+fn device_without_mailbox_reports_no_mailbox() {
     let mut bench = Bench::new(PLANT);
     bench.start(AlState::Op);
     let error = upload(&mut bench, "K1", 0x1018, 1).unwrap_err();

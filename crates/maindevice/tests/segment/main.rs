@@ -7,8 +7,8 @@ mod al_errors;
 mod bench;
 mod clocks;
 mod described;
-mod gates;
 mod library;
+mod loop_control;
 mod mailbox;
 #[allow(clippy::disallowed_macros, reason = "it prints a table for people")]
 mod many;

@@ -70,9 +70,9 @@ fn a_look_writes_nothing_and_reads_the_counters() {
     let mut bench = Bench::new(PLANT);
     let device = bench.id("T2");
     bench.segment.set_counter(device, ErrorCounter::InvalidFrame(Port::A), 17);
-    bench.device.look(bench.now);
-    assert!(bench.run_until(Span::s(1), |event| matches!(event, Event::Looked(_))));
-    let Some((_, Event::Looked(look))) = bench.events.pop() else { panic!() };
+    bench.device.read_only_scan(bench.now);
+    assert!(bench.run_until(Span::s(1), |event| matches!(event, Event::ReadOnlyScanned(_))));
+    let Some((_, Event::ReadOnlyScanned(look))) = bench.events.pop() else { panic!() };
     assert_eq!(look.devices.len(), 6);
     let counters = look.devices[2].counters.unwrap();
     assert_eq!(counters.value(ErrorCounter::InvalidFrame(Port::A)), Some(17));
@@ -153,13 +153,13 @@ fn identifying(pause: Span, without_power: Option<&str>) -> Span {
 const ASKED: Span = Span::us(1_360);
 
 #[test]
-fn who_was_scanned_a_moment_ago_is_not_asked_again() {
+fn recently_scanned_subdevice_is_not_asked_again() {
     let at_once = identifying(Span::ms(1), None);
     assert!(at_once < ASKED, "{at_once}");
 }
 
 #[test]
-fn who_was_scanned_long_ago_or_has_lost_its_address_is_asked_again() {
+fn subdevice_scanned_long_ago_or_without_address_is_asked_again() {
     let later = identifying(Span::s(2), None);
     assert!(later >= ASKED, "{later}");
     let without_power = identifying(Span::ms(800), Some("T3"));

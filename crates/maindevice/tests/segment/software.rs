@@ -60,7 +60,7 @@ fn complete_access_gives_subindex_0_two_bytes() {
 
 // proves: SW-10 partial: complete access unsupported
 #[test]
-fn who_has_no_complete_access_says_so() {
+fn device_without_complete_access_refuses_it() {
     let mut bench = running();
     let error = get(&mut bench, "A1", ObjectAddress::new(0x1018, 0), true).unwrap_err();
     assert!(error.to_string().contains("0x06010004 Complete access not supported"), "{error}");

@@ -1,5 +1,5 @@
-//! What a MainDevice knows of a network that it runs: mailboxes by their mapped bits, error counters
-//! through clears, state words.
+//! Status of a running network: mailboxes by their mapped bits, error counters through clears,
+//! state words.
 
 use crate::bench::Bench;
 use crate::mailbox::{PLANT, upload};
@@ -104,13 +104,13 @@ fn no_count_is_lost_when_counters_are_cleared_while_they_rise() {
     bench.run_for(Span::ms(500));
     let hits = bench.segment.truth().faults()[0].symbol_errors;
     assert!(hits > 300, "more than a register can hold: {hits}");
-    let standing = bench.device.standing().unwrap();
-    let totals = standing.device(id).unwrap().counters();
+    let status = bench.device.network_status().unwrap();
+    let totals = status.device(id).unwrap().counters();
     assert_eq!(totals.count(ErrorCounter::PhysicalLayer(Port::A)), Some(hits));
     assert!(!totals.is_lower_bound(), "we cleared them ourselves");
     let registers = totals.registers().unwrap();
     assert!(registers.value(ErrorCounter::PhysicalLayer(Port::A)) < Some(255));
-    assert_eq!(standing.error_sums().nth(id.index()), Some(totals.sum()));
+    assert_eq!(status.error_sums().nth(id.index()), Some(totals.sum()));
     assert!(bench.segment.audit().is_empty());
 }
 

@@ -1,4 +1,4 @@
-//! What a frame costs: bytes, time on the wire, share of a cycle.
+//! Size of a frame: bytes, time on the wire, share of a cycle.
 //!
 //! Size = 14 (Ethernet) + 2 (EtherCAT) + the sum over datagrams of 12 + data. On the wire at 100
 //! Mbit/s a byte takes 80 ns, and preamble, check sequence and gap add 24 bytes; a frame shorter

@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_off_is_said() {
+    fn cut_off_message_is_an_error() {
         assert_eq!(Message::parse(&[0; 5]), Err(MailboxError::HeaderCutOff { len: 5 }));
         assert_eq!(
             Message::parse(&[4, 0, 0, 0, 0, 3, 1, 2, 3]),

@@ -1,4 +1,4 @@
-//! What an entry of the register table says: address, rights, fields, meaning.
+//! Entry of the register table: address, rights, fields, meaning.
 //!
 //! Reference: S2 1.3 and chapter 2, whose columns these are. The constructors are `const`, so that
 //! the table is data of the program and costs nothing at start.

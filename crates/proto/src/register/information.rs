@@ -1,4 +1,4 @@
-//! What a controller says about itself: type, size, ports, features (0x0000 to 0x0009).
+//! Information of a controller about itself: type, size, ports, features (0x0000 to 0x0009).
 //!
 //! Reference: S2 2.1.
 

@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn what_switches_it_off() {
+    fn sync_manager_is_inactive_without_activation_or_length() {
         let on = SyncManagerConfig::enabled(RegisterAddress(0x1000), 8, SmControl::INPUTS);
         assert!(on.is_active());
         assert!(!SyncManagerConfig { activate: SmActivate(0), ..on }.is_active());

@@ -1,4 +1,4 @@
-//! From an [`Image`] to bytes; behind [`Image::build`].
+//! Conversion of an [`Image`] to bytes; behind [`Image::build`].
 //!
 //! Reference: ETG.1000.6 §5.4, ETG.2010.
 

@@ -1,4 +1,4 @@
-//! What a MainDevice wants to know from an image, without walking the categories itself.
+//! Lookup of what a MainDevice needs from an image, without walking the categories itself.
 //!
 //! Nothing here allocates. Where a category is there more than once, the first counts for Strings,
 //! General, FMMU and SyncManagers; PDOs and operation modes of all are taken together.

@@ -1,4 +1,4 @@
-//! What the fixed words say about the mailbox: where it lies, how big it is, what it speaks.
+//! Mailbox in the fixed words: position, size, protocols.
 //!
 //! Reference: ETG.1000.6 §5.4, words 0x14..=0x1C. "Receive" and "send" are the SubDevice's view, as
 //! in the specification: what it receives is what the MainDevice writes (SyncManager 0).

@@ -1,4 +1,4 @@
-//! What can be odd about an image without making it unreadable, and when it cannot be judged.
+//! Oddities of an image that leave it readable, and errors that do not.
 //!
 //! Images of real devices are cut off, lack their end marker, point at texts that are not there. A
 //! MainDevice that refused them would refuse working devices, so each oddity is noted with the word

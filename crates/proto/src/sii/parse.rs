@@ -1,4 +1,4 @@
-//! From bytes to an [`Image`]; behind [`Image::parse`].
+//! Conversion of bytes to an [`Image`]; behind [`Image::parse`].
 //!
 //! Reference: ETG.1000.6 §5.4, ETG.2010. The order of the code is the order of the image.
 

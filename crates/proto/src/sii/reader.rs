@@ -1,4 +1,4 @@
-//! Which words of an EEPROM to read next, so that only its used part crosses the wire.
+//! Reader of an EEPROM: the words to read next, so that only its used part crosses the wire.
 //!
 //! A controller hands out 4 or 8 bytes per command (register 0x0502), and each command has to be
 //! written, waited for and fetched; an EK1100 uses 238 bytes of its 2,048. [`Reader`] does no I/O:

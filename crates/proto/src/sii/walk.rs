@@ -1,4 +1,4 @@
-//! From category header to category header: the rules by which both parser and reader walk an
+//! Walk from category header to category header: the rules by which both parser and reader walk an
 //! image, and where they stop.
 
 use super::word::{self, WordAddress};

@@ -1,4 +1,4 @@
-//! Which way a frame goes: tree, check order, delays.
+//! Way of a frame through the line: tree, check order, delays.
 //!
 //! [`wiring`] names ends and links and says what happens inside one controller; [`tree`] is the
 //! line as a tree, built from a description; [`mod@derive`] finds that tree from what a scan or a

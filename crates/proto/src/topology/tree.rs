@@ -486,7 +486,7 @@ mod tests {
     }
 
     #[test]
-    fn what_hangs_behind_port_a_of_a_reversed_controller_is_processed_before_it() {
+    fn controllers_behind_port_a_of_a_reversed_controller_are_processed_before_it() {
         let wired = [FIRST, Wired { entry: B, ..on(0, B) }, on(1, A), on(1, C), on(1, D)];
         let tree = Tree::from_wiring(&wired, None).unwrap();
         assert_eq!(tree.reached(), [0, 1, 3, 2, 4]);

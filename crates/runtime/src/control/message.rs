@@ -1,4 +1,4 @@
-//! What is asked of a running segment, and what it answers: lines of JSON.
+//! Requests to a running segment and its answers: lines of JSON.
 
 use linesman_config::fault::FaultName;
 use linesman_sim::segment_file::FaultEntry;

@@ -1,10 +1,10 @@
-//! A running segment from outside: faults, inputs, what happened, how it goes; asked for through a
-//! socket in the file system.
+//! Control of a running segment from outside, through a socket in the file system: faults, inputs,
+//! events, status.
 //!
-//! What can be asked is in [`message`]; the socket itself is that of [`desk`](crate::desk).
+//! What can be asked is in [`message`]; the socket itself is that of [`control_socket`](crate::control_socket).
 
+mod apply;
 pub mod message;
-mod obey;
 mod signals;
 
 use std::io::{self, BufReader, Lines};
@@ -12,31 +12,31 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::Duration;
 
-use linesman_link::socket::Bell;
+use linesman_link::socket::WakeHandle;
 use serde::de::DeserializeOwned;
 
+pub(crate) use self::apply::apply;
 use self::message::{Answer, Faults, Request};
-pub(crate) use self::obey::obey;
-pub use crate::desk::DeskWatch;
-use crate::desk::{Asked, Desk, Protocol, ask_line, ask_lines};
-use crate::journal::Reading;
+pub use crate::control_socket::ControlSocketWatch;
+use crate::control_socket::{Asked, ControlSocket, Protocol, ask_line, ask_lines};
+use crate::truth_writer::TruthReader;
 
 /// The socket of a segment that runs. It is removed at the end.
-pub struct Control(Desk<Faulting>);
+pub struct Control(ControlSocket<SegmentProtocol>);
 
 /// What a segment is asked.
-pub(crate) struct Faulting(Reading);
+pub(crate) struct SegmentProtocol(TruthReader);
 
-impl Protocol for Faulting {
+impl Protocol for SegmentProtocol {
     type Request = Request;
-    type Given = Answer;
+    type Reply = Answer;
     type Answer = Answer;
     const WHO: &'static str = "segment";
     const EXAMPLE: &'static str = "{\"do\":\"list\"}";
     const PATIENCE: Duration = Duration::from_secs(2);
 
-    fn answer(&self, given: Answer) -> Answer {
-        given
+    fn answer(&self, reply: Answer) -> Answer {
+        reply
     }
 
     fn refusal(&self, why: String) -> Answer {
@@ -53,23 +53,23 @@ impl Protocol for Faulting {
 }
 
 impl Control {
-    /// Begins to listen at `path`. What an earlier run left there is replaced. `bell` wakes the
+    /// Begins to listen at `path`. What an earlier run left there is replaced. `wake_handle` wakes the
     /// thread that calls [`Control::poll`]; `reading` tells what happened.
     ///
     /// # Errors
     /// When somebody listens there already, something else is there, or the system refuses.
-    pub fn open(path: &Path, bell: Bell, reading: Reading) -> io::Result<Self> {
-        Desk::open(path, bell, Faulting(reading)).map(Self)
+    pub fn open(path: &Path, wake_handle: WakeHandle, reading: TruthReader) -> io::Result<Self> {
+        ControlSocket::open(path, wake_handle, SegmentProtocol(reading)).map(Self)
     }
 
     /// For whoever tells that nobody can ask any more.
     #[must_use]
-    pub fn watch(&self) -> DeskWatch {
+    pub fn watch(&self) -> ControlSocketWatch {
         self.0.watch()
     }
 
     /// The next request.
-    pub(crate) fn poll(&self) -> Option<Asked<Faulting>> {
+    pub(crate) fn poll(&self) -> Option<Asked<SegmentProtocol>> {
         self.0.poll()
     }
 }
@@ -80,7 +80,7 @@ impl Control {
 /// When nobody listens there, or the answer cannot be read; what the segment itself refuses is in
 /// the answer.
 pub fn ask<T: DeserializeOwned>(path: &Path, request: &Request) -> io::Result<T> {
-    let line = ask_line(path, request, Faulting::PATIENCE)?;
+    let line = ask_line(path, request, SegmentProtocol::PATIENCE)?;
     serde_json::from_str(&line).map_err(|error| {
         // A refusal is always of the same form.
         let refusal = serde_json::from_str::<Faults>(&line).ok().and_then(|faults| faults.error);

@@ -1,4 +1,4 @@
-//! Which entries of the event log somebody wants to see.
+//! Filter of the entries of the event log.
 
 use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::{EntryKind, Severity};

@@ -13,8 +13,8 @@ use std::time::Duration;
 use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::LogEntry;
 
-use super::super::kept_file::KeptFile;
 use super::super::part::guard;
+use super::super::watched_file::WatchedFile;
 use super::store::{EventLog, EventLogError, LoggedFinding, StoredEntry};
 
 /// So many entries may be on their way to the thread.
@@ -37,7 +37,7 @@ pub struct WriterReport {
     pub failure: Option<String>,
 }
 
-enum Order {
+enum WriterOrder {
     Entry(Box<StoredEntry>),
     End(UnixTime),
 }
@@ -46,7 +46,7 @@ enum Order {
 #[derive(Debug)]
 pub struct EventLogWriter {
     run: i64,
-    orders: SyncSender<Order>,
+    orders: SyncSender<WriterOrder>,
     thread: Option<JoinHandle<()>>,
     report: Arc<Mutex<WriterReport>>,
 }
@@ -67,12 +67,12 @@ impl EventLogWriter {
         let (orders, receiver) = sync_channel(ON_THE_WAY);
         let report = Arc::new(Mutex::new(WriterReport::default()));
         let shared = Arc::clone(&report);
-        let (path, file) = (log.path().to_owned(), KeptFile::at(log.path()));
+        let (path, file) = (log.path().to_owned(), WatchedFile::at(log.path()));
         let thread = thread::Builder::new().name("event-log".into()).spawn(move || {
             let report = Arc::clone(&shared);
-            let keeper = Keeper { log, run, file, waiting: VecDeque::new(), report };
+            let log_thread = LogThread { log, run, file, waiting: VecDeque::new(), report };
             let worked =
-                guard("the event log", "nothing more is logged", || keeper.work(&receiver));
+                guard("the event log", "nothing more is logged", || log_thread.work(&receiver));
             if let Err(failure) = worked {
                 lock(&shared).failure = Some(failure.to_string());
             }
@@ -99,7 +99,7 @@ impl EventLogWriter {
         let (device_no, device_name) = (device.map(|id| id.no()), device_name.map(str::to_owned));
         let run = self.run;
         let entry = StoredEntry { run, at, severity, kind, device_no, device_name, text, finding };
-        match self.orders.try_send(Order::Entry(Box::new(entry))) {
+        match self.orders.try_send(WriterOrder::Entry(Box::new(entry))) {
             Ok(()) => {}
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
                 lock(&self.report).dropped += 1;
@@ -116,7 +116,7 @@ impl EventLogWriter {
     /// Writes what is left, notes the end of the run, and ends the thread.
     pub fn finish(mut self, ended: UnixTime) -> WriterReport {
         // The thread may be gone; then the report says what is lost.
-        let _ = self.orders.send(Order::End(ended));
+        let _ = self.orders.send(WriterOrder::End(ended));
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -124,26 +124,26 @@ impl EventLogWriter {
     }
 }
 
-struct Keeper {
+struct LogThread {
     log: EventLog,
     run: i64,
-    file: KeptFile,
+    file: WatchedFile,
     waiting: VecDeque<StoredEntry>,
     report: Arc<Mutex<WriterReport>>,
 }
 
-impl Keeper {
-    fn work(mut self, orders: &Receiver<Order>) {
+impl LogThread {
+    fn work(mut self, orders: &Receiver<WriterOrder>) {
         let mut pause = GATHER;
         loop {
             match orders.recv_timeout(pause) {
-                Ok(Order::Entry(entry)) => {
+                Ok(WriterOrder::Entry(entry)) => {
                     self.keep(*entry);
                     // Gather what comes with it.
                     while let Ok(order) = orders.try_recv() {
                         match order {
-                            Order::Entry(entry) => self.keep(*entry),
-                            Order::End(ended) => return self.end(Some(ended)),
+                            WriterOrder::Entry(entry) => self.keep(*entry),
+                            WriterOrder::End(ended) => return self.end(Some(ended)),
                         }
                     }
                     if pause == RETRY {
@@ -151,7 +151,7 @@ impl Keeper {
                     }
                     pause = self.flush();
                 }
-                Ok(Order::End(ended)) => return self.end(Some(ended)),
+                Ok(WriterOrder::End(ended)) => return self.end(Some(ended)),
                 Err(RecvTimeoutError::Timeout) => pause = self.flush(),
                 Err(RecvTimeoutError::Disconnected) => return self.end(None),
             }

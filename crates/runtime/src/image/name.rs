@@ -1,4 +1,4 @@
-//! From the name of a variable to its place.
+//! Lookup of the place of a variable by its name.
 
 use linesman_config::plan::{DevicePlan, Plan, Variable};
 use linesman_proto::sii::Direction;

@@ -1,7 +1,7 @@
 //! A report made of what is planned, what has happened and how it is now.
 
 use linesman_config::plan::{DevicePlan, Plan};
-use linesman_maindevice::watch::{CounterTotals, Standing, WatchedDevice};
+use linesman_maindevice::watch::{CounterTotals, NetworkStatus, WatchedDevice};
 use linesman_maindevice::{FrameStatus, Statistics};
 use linesman_proto::address::{DeviceId, Position};
 use linesman_proto::port::Port;
@@ -21,11 +21,11 @@ use super::snapshot::Snapshot;
 /// A line that is driven; counts of frames begin at `base`.
 pub(super) fn driven(
     plan: &Plan,
-    standing: &Standing,
+    status: &NetworkStatus,
     snapshot: &Snapshot,
     base: &Statistics,
 ) -> OnlineReport {
-    let mut report = known(plan, standing, snapshot.now);
+    let mut report = known(plan, status, snapshot.now);
     report.driven = true;
     report.responding = snapshot.responding.map(|count| count.0);
     for (device, planned) in report.devices.iter_mut().zip(&plan.devices) {
@@ -69,17 +69,17 @@ pub(super) fn odd(counts: &Statistics, base: &Statistics) -> OddFrames {
 }
 
 /// What is known of a line, whoever drives it.
-pub(super) fn known(plan: &Plan, standing: &Standing, now: Instant) -> OnlineReport {
-    let word = standing.network_state();
-    let devices = plan.devices.iter().zip(standing.devices());
+pub(super) fn known(plan: &Plan, status: &NetworkStatus, now: Instant) -> OnlineReport {
+    let word = status.network_state();
+    let devices = plan.devices.iter().zip(status.devices());
     OnlineReport {
         schema: SCHEMA.to_owned(),
         time_ns: now.as_nanos(),
         state: Word { word: word.0, text: word.to_string() },
         planned: plan.devices.len() as u32,
-        present: standing.present() as u32,
-        responding: standing.responding().map(|count| count.0),
-        clock: standing
+        present: status.present() as u32,
+        responding: status.responding().map(|count| count.0),
+        clock: status
             .network_time()
             .map(|(id, ahead_ns)| OnlineClock { reference: id.no(), ahead_ns }),
         devices: devices.map(|(planned, watched)| device(plan, planned, watched)).collect(),
@@ -200,7 +200,7 @@ fn add_data(device: &mut OnlineDevice, planned: &DevicePlan, snapshot: &Snapshot
         errors: trouble.map_or(0, |(_, errors, _)| *errors),
         standing: standing
             .map(|error| MailboxTrouble {
-                protocol: error.failure.errand.protocol().to_string(),
+                protocol: error.failure.operation.protocol().to_string(),
                 at_ns: error.at.as_nanos(),
                 text: error.failure.to_string(),
             })

@@ -1,4 +1,5 @@
-//! What only the thread that drives a line knows, taken quickly: nothing is worded there.
+//! Snapshot of what only the thread that drives a line knows, taken quickly: nothing is worded
+//! there.
 
 use linesman_config::plan::Plan;
 use linesman_maindevice::mailbox::ProtocolError;

@@ -1,4 +1,4 @@
-//! What devices the files of a folder describe, kept on disk between runs.
+//! Index of the devices that the files of a folder describe, kept on disk between runs.
 //!
 //! To find a device among hundreds of files all of them would have to be read. What was seen in a file
 //! is believed again as long as the file is the same: length, time of its last change, time at which

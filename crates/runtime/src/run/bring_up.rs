@@ -1,4 +1,4 @@
-//! What bringing a line up took, step by step: for the network, and for each SubDevice.
+//! Report of bringing a line up, step by step: for the network, and for each SubDevice.
 
 use linesman_config::plan::Plan;
 use linesman_maindevice::{BringUpTimes, Phase};

@@ -1,7 +1,7 @@
-//! What the application sees of a cycle, and does in it.
+//! Interface of the application to a cycle.
 
 use linesman_config::plan::Plan;
-use linesman_maindevice::watch::Standing;
+use linesman_maindevice::watch::NetworkStatus;
 use linesman_maindevice::{FrameStatus, MainDevice, Quality, Statistics};
 use linesman_proto::address::DeviceId;
 use linesman_proto::state::{DeviceState, NetworkState};
@@ -137,20 +137,20 @@ impl Io<'_> {
     /// (PLC-04 to PLC-06). 8 is OP and nothing wrong.
     #[must_use]
     pub fn state(&self, id: DeviceId) -> DeviceState {
-        let known = self.main.standing().and_then(|standing| standing.device(id));
+        let known = self.main.network_status().and_then(|status| status.device(id));
         known.map_or(UNKNOWN, |device| device.state())
     }
 
     /// The state word of the network (PLC-07); 0 when all is well.
     #[must_use]
     pub fn network_state(&self) -> NetworkState {
-        self.main.standing().map_or_else(NetworkState::default, Standing::network_state)
+        self.main.network_status().map_or_else(NetworkState::default, NetworkStatus::network_state)
     }
 
     /// How many SubDevices are there, of those that are planned (PLC-08).
     #[must_use]
     pub fn present(&self) -> usize {
-        self.main.standing().map_or(0, Standing::present)
+        self.main.network_status().map_or(0, NetworkStatus::present)
     }
 
     /// How a frame of a task went the last time.

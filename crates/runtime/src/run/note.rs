@@ -1,4 +1,4 @@
-//! What a run tells while it lasts, and why it cannot be run.
+//! Notes of a run while it lasts, and errors that end it.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What a run asks of the host, and what it got.
+//! Real-time requests of a run to the host, and what was granted.
 //!
 //! A cycle needs to go before other programs, a CPU of its own, and memory that is there. None of it
 //! is needed to run at all: without the rights the cycle is as steady as the host lets it be, and the
@@ -27,7 +27,7 @@ impl Default for RealTime {
 
 /// What was granted.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Granted {
+pub struct GrantedRealTime {
     /// The priority.
     pub priority: Option<u8>,
     /// The CPU.
@@ -41,9 +41,9 @@ pub struct Granted {
 impl RealTime {
     /// Asks for it, for the calling thread.
     #[must_use]
-    pub fn ask(self) -> Granted {
+    pub fn ask(self) -> GrantedRealTime {
         tighten_timers();
-        let mut granted = Granted::default();
+        let mut granted = GrantedRealTime::default();
         if self.lock_memory {
             match lock_memory() {
                 Ok(()) => granted.memory = true,

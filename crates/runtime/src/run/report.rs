@@ -1,4 +1,4 @@
-//! How a run went, as JSON and for people.
+//! Report of a run, as JSON and for people.
 
 use linesman_config::plan::Plan;
 use linesman_diagnosis::Diagnosis;
@@ -7,7 +7,7 @@ use linesman_proto::time::{Instant, Span};
 use serde::{Deserialize, Serialize};
 
 use super::bring_up::BringUpReport;
-use super::real_time::Granted;
+use super::real_time::GrantedRealTime;
 use crate::serve::lateness::LatenessReport;
 
 /// Name and version of the format.
@@ -130,8 +130,8 @@ pub struct HostReport {
     pub refused: Vec<String>,
 }
 
-impl From<&Granted> for HostReport {
-    fn from(granted: &Granted) -> Self {
+impl From<&GrantedRealTime> for HostReport {
+    fn from(granted: &GrantedRealTime) -> Self {
         Self {
             priority: granted.priority,
             cpu: granted.cpu,

@@ -1,4 +1,4 @@
-//! Before a run, or by itself: what is there?
+//! Scan before a run, or by itself.
 
 use linesman_config::inventory::Inventory;
 use linesman_diagnosis::{FrameSeen, HostObservation};
@@ -6,9 +6,9 @@ use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::time::{Instant, Span};
 
 use super::note::RunError;
-use crate::drive::{Audience, Driver};
-use crate::line::Line;
+use crate::drive::{Driver, DriverHooks};
 use crate::stop::Stop;
+use crate::transport::Transport;
 
 /// How long a scan of a line of usual length may take: one of a thousand SubDevices takes some
 /// seconds.
@@ -18,7 +18,7 @@ pub const PATIENCE: Span = Span::s(60);
 ///
 /// # Errors
 /// When it does not answer, the scan is not done after `patience`, or the interface fails.
-pub fn scan<L: Line>(line: L, patience: Span, stop: &Stop) -> Result<Inventory, RunError> {
+pub fn scan<L: Transport>(line: L, patience: Span, stop: &Stop) -> Result<Inventory, RunError> {
     let settings = line.options();
     let mut driver = Driver::new(line, settings);
     let mut scanning = Scanning { begun: false, result: None };
@@ -41,7 +41,7 @@ struct Scanning {
     result: Option<Result<Inventory, RunError>>,
 }
 
-impl Audience for Scanning {
+impl DriverHooks for Scanning {
     fn frame(&mut self, _: &FrameSeen<'_>) {}
 
     fn host(&mut self, _: &HostObservation) {}

@@ -1,4 +1,4 @@
-//! The application of a line is another program, which sees the process image in a file.
+//! Application in another program, which sees the process image in a file.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! What the diagnosis sees of a running line, without holding up the cycle.
+//! Tap of the diagnosis on a running line, which does not hold up the cycle.
 //!
 //! Frames are kept in a log that was laid out beforehand, which has room for one more at any time: a
 //! frame that is sent is built there, one that comes back is received there, and neither is copied. A
@@ -34,7 +34,7 @@ const OLD: Span = Span::ms(50);
 const PAUSE: Span = Span::ms(5);
 
 /// Frames and what the host noticed, in order of time.
-pub struct Log {
+pub struct TapLog {
     /// The entries one behind the other, and how many bytes they take.
     bytes: Box<[u8; ROOM]>,
     len: usize,
@@ -43,7 +43,7 @@ pub struct Log {
     missed: u64,
 }
 
-impl Log {
+impl TapLog {
     fn new() -> Self {
         // Not on the stack.
         let bytes = vec![0; ROOM].into_boxed_slice().try_into();
@@ -75,7 +75,7 @@ impl Log {
 
     /// The frame there, so many bytes, is one more entry.
     #[inline]
-    fn keep(&mut self, passed: &Passed, len: usize) {
+    fn keep(&mut self, passed: &FrameSummary, len: usize) {
         let Some(head) = self.bytes.get_mut(self.len..).and_then(<[u8]>::first_chunk_mut) else {
             return;
         };
@@ -88,7 +88,7 @@ impl Log {
         let mut rest = &self.bytes[..self.len];
         std::iter::from_fn(move || {
             let (head, behind) = rest.split_first_chunk()?;
-            let (passed, len) = Passed::read(head);
+            let (passed, len) = FrameSummary::read(head);
             rest = behind.get(len..)?;
             Some(FrameSeen {
                 network: Network::default(),
@@ -118,7 +118,7 @@ impl Log {
 
 /// What is known of a frame that passed, without its bytes.
 #[derive(Clone, Copy, Debug)]
-pub struct Passed {
+pub struct FrameSummary {
     /// When, as [`FrameSeen::time`].
     pub time: Instant,
     /// Its number, as [`FrameSeen::number`].
@@ -138,7 +138,7 @@ const BY_A: u64 = 1 << 34;
 const BY_B: u64 = 1 << 35;
 const TRUNCATED: u64 = 1 << 36;
 
-impl Passed {
+impl FrameSummary {
     /// Notes it before the frame, which has so many bytes.
     #[inline]
     fn write(&self, len: usize, head: &mut [u8; HEAD]) {
@@ -159,7 +159,7 @@ impl Passed {
         }
     }
 
-    /// What [`Passed::write`] has noted, and the length of the frame.
+    /// What [`FrameSummary::write`] has noted, and the length of the frame.
     fn read(head: &[u8; HEAD]) -> (Self, usize) {
         let mut words = head.as_chunks().0.iter().map(|word| u64::from_le_bytes(*word));
         let mut word = || words.next().unwrap_or(0);
@@ -184,11 +184,11 @@ impl Passed {
 
 /// The end in the cycle.
 pub struct Tap {
-    log: Log,
+    log: TapLog,
     /// When the log is handed over although it is not full, if there is anything in it.
     due: Instant,
-    full: SyncSender<Log>,
-    empty: Receiver<Log>,
+    full: SyncSender<TapLog>,
+    empty: Receiver<TapLog>,
     /// There was no empty log; none is asked for before.
     full_until: Instant,
     /// Frames that were left out.
@@ -198,15 +198,15 @@ pub struct Tap {
     /// Wait for the other side rather than leave anything out.
     waits: bool,
     /// Behind `full`, so that it rings once more when that is gone.
-    bell: Bell,
+    waker: ThreadWaker,
 }
 
 /// Wakes the thread that judges when there is a log for it. A channel would do that, too, but under a
 /// lock, for which the cycle would have to wait.
-struct Bell(Arc<OnceLock<Thread>>);
+struct ThreadWaker(Arc<OnceLock<Thread>>);
 
-impl Bell {
-    fn ring(&self) {
+impl ThreadWaker {
+    fn wake(&self) {
         // Either it finds what was sent before this, or its name is found behind it.
         fence(Ordering::SeqCst);
         if let Some(thread) = self.0.get() {
@@ -215,17 +215,17 @@ impl Bell {
     }
 }
 
-impl Drop for Bell {
+impl Drop for ThreadWaker {
     fn drop(&mut self) {
-        self.ring();
+        self.wake();
     }
 }
 
 /// The end of the thread that judges. Two threads cannot ask at once (it cannot be shared), and it must not be
 /// handed on once it was asked: see [`Listener::next`].
 pub struct Listener {
-    full: Receiver<Log>,
-    empty: SyncSender<Log>,
+    full: Receiver<TapLog>,
+    empty: SyncSender<TapLog>,
     /// Its thread, from when it first asks.
     thread: Arc<OnceLock<Thread>>,
 }
@@ -238,11 +238,11 @@ pub fn tap(waits: bool) -> (Tap, Listener) {
     let (to_cycle, empty) = mpsc::sync_channel(LOGS + 1);
     for _ in 0..LOGS {
         // There is room for all of them.
-        let _ = to_cycle.try_send(Log::new());
+        let _ = to_cycle.try_send(TapLog::new());
     }
     let thread = Arc::default();
     let tap = Tap {
-        log: Log::new(),
+        log: TapLog::new(),
         due: Instant::ZERO,
         full_until: Instant::ZERO,
         full,
@@ -250,7 +250,7 @@ pub fn tap(waits: bool) -> (Tap, Listener) {
         left_out: 0,
         nowhere: Box::new([0; FRAME_ROOM]),
         waits,
-        bell: Bell(Arc::clone(&thread)),
+        waker: ThreadWaker(Arc::clone(&thread)),
     };
     (tap, Listener { full: from_cycle, empty: to_cycle, thread })
 }
@@ -263,7 +263,7 @@ impl Tap {
         self.room(frame.time)[..len].copy_from_slice(&frame.bytes[..len]);
         let FrameSeen { time, number, path, direction, .. } = *frame;
         let truncated = frame.truncated || len < frame.bytes.len();
-        self.keep(&Passed { time, number, path, direction, truncated }, len);
+        self.keep(&FrameSummary { time, number, path, direction, truncated }, len);
     }
 
     /// Room for a frame that passes about `now`. [`Tap::keep`] says that it did, else it is as if
@@ -278,7 +278,7 @@ impl Tap {
 
     /// The frame that was written into [`Tap::room`] has passed; it has so many bytes.
     #[inline]
-    pub fn keep(&mut self, passed: &Passed, len: usize) {
+    pub fn keep(&mut self, passed: &FrameSummary, len: usize) {
         if self.log.is_full() {
             return self.leave_out();
         }
@@ -339,7 +339,7 @@ impl Tap {
         next.clear();
         let log = std::mem::replace(&mut self.log, next);
         match self.full.try_send(log) {
-            Ok(()) => self.bell.ring(),
+            Ok(()) => self.waker.wake(),
             // As many logs as there is room for: it cannot be full, so nobody judges any more.
             Err(TrySendError::Full(log) | TrySendError::Disconnected(log)) => {
                 self.left_out += log.frames().count() as u64;
@@ -354,7 +354,7 @@ impl Tap {
 impl Drop for Tap {
     fn drop(&mut self) {
         // Nobody may listen any more.
-        let _ = self.full.try_send(std::mem::replace(&mut self.log, Log::new()));
+        let _ = self.full.try_send(std::mem::replace(&mut self.log, TapLog::new()));
     }
 }
 
@@ -363,7 +363,7 @@ impl Listener {
     ///
     /// It must always be the same thread that asks: the first one is noted as the one to be woken, and another
     /// would sleep for ever.
-    pub fn next(&self, done: Option<Log>) -> Option<Log> {
+    pub fn next(&self, done: Option<TapLog>) -> Option<TapLog> {
         if let Some(done) = done {
             // The run may have ended.
             let _ = self.empty.try_send(done);

@@ -1,4 +1,4 @@
-//! How late a host was: a distribution of times that takes little room however long a run lasts.
+//! Lateness of a host: a distribution of times that takes little room however long a run lasts.
 
 use hdrhistogram::Histogram;
 use linesman_proto::time::Span;

@@ -18,7 +18,7 @@ use linesman_link::error::LinkError;
 use linesman_link::interface::CardLock;
 use linesman_link::real_time::sched_fifo;
 use linesman_link::socket::{
-    Batch, Bell, RawSocket, Ready, Reception, SocketOptions, Waitable, Waker, wait_any,
+    Batch, RawSocket, Ready, Reception, SocketOptions, Waitable, WakeHandle, Waker, wait_any,
 };
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
@@ -26,9 +26,9 @@ use linesman_sim::segment::Segment;
 
 use self::lateness::Lateness;
 use self::report::{Frames, Host, SCHEMA, Status};
-use crate::control::{Control, obey};
-use crate::journal::Journal;
+use crate::control::{Control, apply};
 use crate::stop::Stop;
+use crate::truth_writer::TruthWriter;
 use crate::wiring::Wiring;
 
 /// Frames fetched in one call.
@@ -58,11 +58,11 @@ pub struct Server {
 
 /// Who has a say in a segment that runs, and who writes down what happens.
 #[derive(Default)]
-pub struct Beside {
+pub struct ServeControls {
     /// Faults and inputs from outside.
     pub control: Option<Control>,
     /// What really happened.
-    pub journal: Option<Journal>,
+    pub truth_writer: Option<TruthWriter>,
 }
 
 /// What was counted so far.
@@ -113,12 +113,12 @@ impl Server {
 
     /// What wakes it: to look at the wish to stop, or at what is asked for.
     #[must_use]
-    pub fn bell(&self) -> Bell {
-        self.waker.bell()
+    pub fn wake_handle(&self) -> WakeHandle {
+        self.waker.wake_handle()
     }
 
     /// Answers until `until` or `stop`, and suffers what it is asked for. Whoever sets `stop` or
-    /// asks rings [`Server::bell`].
+    /// asks rings [`Server::wake_handle`].
     ///
     /// # Errors
     /// When an interface vanished, or the kernel refuses something else. What was served so far
@@ -127,7 +127,7 @@ impl Server {
         &mut self,
         until: Instant,
         stop: &Stop,
-        beside: &mut Beside,
+        beside: &mut ServeControls,
     ) -> Result<(), LinkError> {
         tighten_timers();
         // A line never waits for other programs. Without the right it is late at times, as the
@@ -145,14 +145,14 @@ impl Server {
             {
                 nap = SOON;
                 while let Some(asked) = control.poll() {
-                    let answer = obey(now, &asked.request, self);
-                    self.tell(&mut beside.journal);
+                    let answer = apply(now, &asked.request, self);
+                    self.tell(&mut beside.truth_writer);
                     asked.give(answer);
                 }
             }
             self.wiring.carry(self.segment.signals_mut());
             let sent = self.send(now)?;
-            self.tell(&mut beside.journal);
+            self.tell(&mut beside.truth_writer);
             if stop.is_set() || now >= until {
                 return Ok(());
             }
@@ -212,9 +212,9 @@ impl Server {
     }
 
     /// Hands on what happened.
-    fn tell(&mut self, journal: &mut Option<Journal>) {
-        if let Some(journal) = journal {
-            journal.take(&mut self.segment);
+    fn tell(&mut self, truth_writer: &mut Option<TruthWriter>) {
+        if let Some(truth_writer) = truth_writer {
+            truth_writer.take(&mut self.segment);
         }
     }
 

@@ -1,4 +1,4 @@
-//! What a segment on real interfaces tells of itself, and of the host that carries it.
+//! Report of a segment on real interfaces, and of the host that carries it.
 
 use serde::{Deserialize, Serialize};
 

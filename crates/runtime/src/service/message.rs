@@ -1,4 +1,4 @@
-//! What a running MainDevice is asked, and what it answers: lines of JSON.
+//! Requests to a running MainDevice and its answers: lines of JSON.
 
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer};

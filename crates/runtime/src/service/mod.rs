@@ -2,7 +2,7 @@
 //! system.
 //!
 //! What can be asked is in [`message`]: a [`Service`] of the MainDevice with the number of a
-//! SubDevice. [`ask`] is for whoever asks; the run takes requests from its [`ServiceDesk`] between two
+//! SubDevice. [`ask`] is for whoever asks; the run takes requests from its [`ServiceSocket`] between two
 //! frames, gives them to the MainDevice, and answers when that is done. Neither waits for the other,
 //! and the cycle waits for nobody.
 
@@ -13,28 +13,28 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::Duration;
 
-use linesman_link::socket::Bell;
+use linesman_link::socket::WakeHandle;
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_maindevice::{MainDevice, Statistics};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 
 use self::message::{Answer, Asked as AskedService, Request};
-pub use crate::desk::DeskWatch;
-use crate::desk::{Asked, Desk, Protocol, ask_line};
-use crate::online::{Board, Rates, Snapshot};
+pub use crate::control_socket::ControlSocketWatch;
+use crate::control_socket::{Asked, ControlSocket, Protocol, ask_line};
+use crate::online::{OnlineState, Rates, Snapshot};
 use crate::run::report::RunReport;
 
 /// How long a service may take: a file of a slow SubDevice.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// What a MainDevice is asked.
-struct Serving {
-    board: Board,
+struct ServiceProtocol {
+    online: OnlineState,
 }
 
 /// What the thread that runs the line gives.
-enum Given {
+enum ServiceReply {
     Answer(Box<Answer>),
     /// The line as it is now.
     Snapshot(Box<Snapshot>),
@@ -48,27 +48,27 @@ enum Given {
     },
 }
 
-impl Protocol for Serving {
+impl Protocol for ServiceProtocol {
     type Request = Request;
-    type Given = Given;
+    type Reply = ServiceReply;
     type Answer = Answer;
     const WHO: &'static str = "MainDevice";
     const EXAMPLE: &'static str = "{\"do\":\"status\"}";
     const PATIENCE: Duration = PATIENCE;
 
-    fn answer(&self, given: Given) -> Answer {
-        match given {
-            Given::Answer(answer) => *answer,
-            Given::Snapshot(snapshot) => {
-                self.board.report(&snapshot).map_or_else(too_early, Answer::online)
+    fn answer(&self, reply: ServiceReply) -> Answer {
+        match reply {
+            ServiceReply::Answer(answer) => *answer,
+            ServiceReply::Snapshot(snapshot) => {
+                self.online.report(&snapshot).map_or_else(too_early, Answer::online)
             }
-            Given::Errors => self.board.error_sums().map_or_else(too_early, Answer::errors),
-            Given::Clear { errors, frames } => {
+            ServiceReply::Errors => self.online.error_sums().map_or_else(too_early, Answer::errors),
+            ServiceReply::Clear { errors, frames } => {
                 if errors {
-                    self.board.clear_errors();
+                    self.online.clear_errors();
                 }
                 if let Some(statistics) = frames {
-                    self.board.clear_frames(statistics);
+                    self.online.clear_frames(statistics);
                 }
                 Answer::done()
             }
@@ -91,28 +91,28 @@ fn too_early() -> Answer {
 const NOT_UP: &str = "the line is not up yet. Do: ask again";
 
 /// The socket of a MainDevice that runs. It is removed at the end.
-pub struct ServiceDesk {
-    desk: Desk<Serving>,
+pub struct ServiceSocket {
+    socket: ControlSocket<ServiceProtocol>,
     /// Services that are being done, and who waits for them.
-    pending: Vec<(ServiceTicket, Asked<Serving>)>,
+    pending: Vec<(ServiceTicket, Asked<ServiceProtocol>)>,
     rates: Rates,
 }
 
-impl ServiceDesk {
-    /// Begins to listen at `path`. What an earlier run left there is replaced. `bell` wakes the thread
-    /// that calls [`ServiceDesk::turn`]; `board` knows what has happened.
+impl ServiceSocket {
+    /// Begins to listen at `path`. What an earlier run left there is replaced. `wake_handle` wakes the thread
+    /// that calls [`ServiceSocket::turn`]; `online` knows what has happened.
     ///
     /// # Errors
     /// When somebody listens there already, something else is there, or the system refuses.
-    pub fn open(path: &Path, bell: Bell, board: Board) -> io::Result<Self> {
-        let desk = Desk::open(path, bell, Serving { board })?;
-        Ok(Self { desk, pending: Vec::new(), rates: Rates::default() })
+    pub fn open(path: &Path, wake_handle: WakeHandle, online: OnlineState) -> io::Result<Self> {
+        let socket = ControlSocket::open(path, wake_handle, ServiceProtocol { online })?;
+        Ok(Self { socket, pending: Vec::new(), rates: Rates::default() })
     }
 
     /// For whoever tells that nobody can ask any more.
     #[must_use]
-    pub fn watch(&self) -> DeskWatch {
-        self.desk.watch()
+    pub fn watch(&self) -> ControlSocketWatch {
+        self.socket.watch()
     }
 
     /// Takes what is asked for. `report` tells how the run goes.
@@ -123,20 +123,20 @@ impl ServiceDesk {
         report: impl Fn(&MainDevice) -> RunReport,
     ) {
         self.rates.turn(now, || main.statistics());
-        while let Some(asked) = self.desk.poll() {
+        while let Some(asked) = self.socket.poll() {
             match asked.request.clone() {
                 Request::Status => asked.answer(Answer::status(report(main))),
                 Request::Online => {
                     let snapshot = Snapshot::of(main, now, &self.rates);
-                    asked.give(Given::Snapshot(Box::new(snapshot)));
+                    asked.give(ServiceReply::Snapshot(Box::new(snapshot)));
                 }
-                Request::Errors => asked.give(Given::Errors),
+                Request::Errors => asked.give(ServiceReply::Errors),
                 Request::Clear { errors, frames } => {
                     if errors {
                         main.clear_counts();
                     }
                     let frames = frames.then(|| main.statistics());
-                    asked.give(Given::Clear { errors, frames });
+                    asked.give(ServiceReply::Clear { errors, frames });
                 }
                 Request::Serve { no, service } => match prepared(main, no, service) {
                     Ok((id, service)) => {
@@ -162,9 +162,9 @@ impl ServiceDesk {
     }
 }
 
-impl Asked<Serving> {
+impl Asked<ServiceProtocol> {
     fn answer(self, answer: Answer) {
-        self.give(Given::Answer(Box::new(answer)));
+        self.give(ServiceReply::Answer(Box::new(answer)));
     }
 }
 

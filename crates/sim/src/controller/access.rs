@@ -1,4 +1,5 @@
-//! From an address to the bytes behind it: what a datagram may read and write.
+//! Access of a datagram to memory: the bytes behind an address, and the rights to read and write
+//! them.
 //!
 //! Read first: S1 1.3 on working counters, 3.4 (shadow buffer), 8 (SyncManager), 17.3 (write
 //! protection). An access succeeds as soon as one of its bytes does. Up to 0x0EFF there are

@@ -19,7 +19,7 @@ use super::kind::ControllerKind;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
 use super::phy::Phys;
-use super::posted::Queue;
+use super::port_event::Queue;
 use super::shadow::Shadow;
 use super::sii::Sii;
 use super::sync_manager::{self, SyncManagers};
@@ -86,12 +86,12 @@ pub(super) struct Core {
     pub(super) latched: Option<u64>,
     /// Ports that take the time of the next frame which comes in after an instant.
     pub(super) latch_waits: PortMap<Option<Instant>>,
-    pub(super) passing: Passing,
+    pub(super) passing: FrameProgress,
 }
 
 /// What the frame that passes the processing unit has done so far, beside its writes.
 #[derive(Clone, Copy, Default, Debug)]
-pub(super) struct Passing {
+pub(super) struct FrameProgress {
     /// When its first bit came.
     pub(super) began: Instant,
     /// Its number in the segment.
@@ -154,7 +154,7 @@ impl Core {
             entered: PortMap([(u64::MAX, Instant::ZERO); 4]),
             latched: None,
             latch_waits: PortMap::default(),
-            passing: Passing::default(),
+            passing: FrameProgress::default(),
             hardware,
         }
     }

@@ -10,11 +10,11 @@ use linesman_proto::time::{Instant, Span};
 
 use super::clock::{LocalClock, SyncSignal};
 use super::core::Core;
-use super::direct::Sampling;
+use super::fast_path::Sampling;
 use super::kind::ControllerKind;
 use super::pdi::Pdi;
-use super::phy::PhyAct;
-use super::posted::{Happening, PortEvent};
+use super::phy::PhyAction;
+use super::port_event::{PortEvent, QueuedEvent};
 use super::sii::Outcome;
 use crate::device::{Firmware, Signals};
 use crate::frame::WireFrame;
@@ -26,7 +26,7 @@ const SHORTEST_NAP: Span = Span::us(1);
 /// What becomes of a frame behind the processing unit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[must_use]
-pub enum Verdict {
+pub enum Forwarding {
     /// It goes on.
     Forward,
     /// It ends here: a frame that circulates, or one without EtherCAT where those are not wanted.
@@ -207,8 +207,8 @@ impl Controller {
         let core = &mut self.core;
         match due {
             Due::Port => {
-                if let Some((_, happening)) = core.queue.pop_until(at) {
-                    core.happens(happening, at);
+                if let Some((_, event)) = core.queue.pop_until(at) {
+                    core.happens(event, at);
                 }
             }
             Due::Loops => core.change_loops(),
@@ -277,7 +277,7 @@ impl Controller {
 
     /// The wire tells what a port sees; it happens when [`Controller::advance`] reaches `at`.
     pub fn post(&mut self, at: Instant, event: PortEvent) {
-        self.core.queue.push(at, Happening::Posted(event));
+        self.core.queue.push(at, QueuedEvent::Posted(event));
         if self.powered {
             self.next = self.next.min(at);
         }
@@ -328,9 +328,9 @@ impl Controller {
         at: Instant,
         frame: &mut WireFrame,
         signals: &mut Signals,
-    ) -> Verdict {
+    ) -> Forwarding {
         if !self.powered {
-            return Verdict::Destroy;
+            return Forwarding::Destroy;
         }
         self.advance(at, signals);
         if self.samples && !self.core.processor_stuck {
@@ -343,13 +343,13 @@ impl Controller {
 
     /// Whether PHYs are going to do something to their links.
     #[inline]
-    pub(crate) fn has_phy_acts(&self) -> bool {
-        self.core.phys.has_acts()
+    pub(crate) fn has_phy_actions(&self) -> bool {
+        self.core.phys.has_actions()
     }
 
     /// What PHYs were told to do to their links, and when they do it; each is told once.
-    pub(crate) fn take_phy_acts(&mut self) -> Vec<(Instant, Port, PhyAct)> {
-        self.core.phys.take_acts()
+    pub(crate) fn take_phy_actions(&mut self) -> Vec<(Instant, Port, PhyAction)> {
+        self.core.phys.take_actions()
     }
 
     /// Whether the controller itself closes a port that sees too many bad symbols: enhanced link

@@ -1,5 +1,5 @@
-//! Which registers a type of controller has: the register table, less what this segment does not
-//! do.
+//! Registers that a type of controller has: the register table, less what this segment does not
+//! implement.
 //!
 //! What is not named here is not there: a read or write of it adds nothing to the working counter,
 //! as in a controller that lacks it. Reference: S2 1.3, column "availability".

@@ -1,5 +1,5 @@
-//! What all controllers of one kind share: what they are made of, and what may be done to their
-//! registers. On a line of thousands it is there once.
+//! Properties that all controllers of one kind share: hardware and register rights. A line of
+//! thousands holds them once.
 
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};

@@ -6,7 +6,7 @@
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{DlControl, DlStatus, LoopMode, PortState};
 
-use super::posted::{Happening, PortEvent};
+use super::port_event::{PortEvent, QueuedEvent};
 use crate::hardware::{Hardware, PortKind};
 
 /// All ports with links, modes and loops.
@@ -92,11 +92,11 @@ impl Loops {
     }
 
     /// What happens at a port changes its loop.
-    pub(super) fn apply(&mut self, happening: Happening) {
-        match happening {
-            Happening::Posted(PortEvent::Link { port, up }) => self.set_link(port, up),
-            Happening::GoodFrame(port) => self.open[port] |= self.waits_for_frame(port),
-            Happening::Posted(PortEvent::Count { .. }) => {}
+    pub(super) fn apply(&mut self, event: QueuedEvent) {
+        match event {
+            QueuedEvent::Posted(PortEvent::Link { port, up }) => self.set_link(port, up),
+            QueuedEvent::GoodFrame(port) => self.open[port] |= self.waits_for_frame(port),
+            QueuedEvent::Posted(PortEvent::Count { .. }) => {}
         }
     }
 

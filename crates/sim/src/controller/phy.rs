@@ -42,7 +42,7 @@ const PARTNER: u16 = 0x45E1;
 
 /// What a PHY does to its link, because it was told to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum PhyAct {
+pub enum PhyAction {
     /// It drops the link and makes a new one.
     Restart,
     /// It falls asleep.
@@ -58,7 +58,7 @@ pub(super) struct Phys {
     running: Option<Running>,
     write_enabled: bool,
     /// For the wires: what PHYs are going to do to their links, and when.
-    acts: Vec<(Instant, Port, PhyAct)>,
+    actions: Vec<(Instant, Port, PhyAction)>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -99,12 +99,12 @@ impl Phy {
     }
 
     /// Takes a value, and says what becomes of the link.
-    fn write(&mut self, register: u8, value: u16) -> Option<PhyAct> {
+    fn write(&mut self, register: u8, value: u16) -> Option<PhyAction> {
         match register {
             0 if value & RESET != 0 => {
                 let asleep = self.control & POWER_DOWN != 0;
                 *self = Self::new();
-                Some(if asleep { PhyAct::Wake } else { PhyAct::Restart })
+                Some(if asleep { PhyAction::Wake } else { PhyAction::Restart })
             }
             0 => {
                 let before = self.control;
@@ -113,10 +113,10 @@ impl Phy {
                 let changed = before ^ self.control;
                 if changed & POWER_DOWN != 0 {
                     let sleeps = self.control & POWER_DOWN != 0;
-                    return Some(if sleeps { PhyAct::Sleep } else { PhyAct::Wake });
+                    return Some(if sleeps { PhyAction::Sleep } else { PhyAction::Wake });
                 }
                 let anew = value & RESTART != 0 || changed & LINK_SETTINGS != 0;
-                (anew && self.control & POWER_DOWN == 0).then_some(PhyAct::Restart)
+                (anew && self.control & POWER_DOWN == 0).then_some(PhyAction::Restart)
             }
             4 => {
                 self.advertised = value;
@@ -130,7 +130,12 @@ impl Phy {
 impl Phys {
     pub(super) fn new(hardware: &Hardware) -> Self {
         let phy = |port| (hardware.ports[port] == PortKind::Mii).then_some(Phy::new());
-        Self { phys: PortMap::from_fn(phy), running: None, write_enabled: false, acts: Vec::new() }
+        Self {
+            phys: PortMap::from_fn(phy),
+            running: None,
+            write_enabled: false,
+            actions: Vec::new(),
+        }
     }
 
     /// When the running command ends.
@@ -149,12 +154,12 @@ impl Phys {
         }
     }
 
-    pub(super) fn take_acts(&mut self) -> Vec<(Instant, Port, PhyAct)> {
-        std::mem::take(&mut self.acts)
+    pub(super) fn take_actions(&mut self) -> Vec<(Instant, Port, PhyAction)> {
+        std::mem::take(&mut self.actions)
     }
 
-    pub(super) fn has_acts(&self) -> bool {
-        !self.acts.is_empty()
+    pub(super) fn has_actions(&self) -> bool {
+        !self.actions.is_empty()
     }
 
     /// The frame has ended: write enable was for it alone.
@@ -200,9 +205,9 @@ impl Phys {
         if let (Some(port), Some(value)) = (port, write) {
             // What the PHY does to its link is told ahead: the wires must know before it is.
             if let Some(phy) = &mut self.phys[port]
-                && let Some(act) = phy.write(register, value)
+                && let Some(action) = phy.write(register, value)
             {
-                self.acts.push((done_at, port, act));
+                self.actions.push((done_at, port, action));
             }
         }
         self.running = Some(Running { done_at, port, register, write });

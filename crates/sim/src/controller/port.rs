@@ -1,4 +1,4 @@
-//! What happens at the ports: links come and go, loops open and close, counters count.
+//! Ports: links come and go, loops open and close, counters count.
 //!
 //! Read first: S1 chapter 3 (loops) and 14 (error counters); S2 2.4 and 2.9.
 
@@ -10,7 +10,7 @@ use linesman_proto::time::{Instant, Span};
 use super::core::Core;
 use super::loops::Loops;
 use super::memory::Rights;
-use super::posted::{CountKind, Happening, PortEvent};
+use super::port_event::{CountKind, PortEvent, QueuedEvent};
 use crate::frame::WireFrame;
 use crate::hardware::PortKind;
 
@@ -18,20 +18,20 @@ use crate::hardware::PortKind;
 const TEMPORARY_LOOPS: Span = Span::s(1);
 
 impl Core {
-    pub(super) fn happens(&mut self, happening: Happening, when: Instant) {
-        match happening {
-            Happening::Posted(PortEvent::Count { port, kind }) => self.count(port, kind, when),
-            Happening::Posted(PortEvent::Link { port, up }) => {
+    pub(super) fn happens(&mut self, event: QueuedEvent, when: Instant) {
+        match event {
+            QueuedEvent::Posted(PortEvent::Count { port, kind }) => self.count(port, kind, when),
+            QueuedEvent::Posted(PortEvent::Link { port, up }) => {
                 if !up {
                     self.count(port, CountKind::LostLink, when);
                     self.phys.link_lost(port);
                 }
-                self.loops.apply(happening);
+                self.loops.apply(event);
                 self.refresh_phy_status();
                 self.refresh_dl_status();
             }
-            Happening::GoodFrame(_) => {
-                self.loops.apply(happening);
+            QueuedEvent::GoodFrame(_) => {
+                self.loops.apply(event);
                 self.refresh_dl_status();
             }
         }
@@ -119,11 +119,11 @@ impl Core {
         .flatten()
         .filter(|(at, _)| *at <= when)
         .peekable();
-        for (at, happening) in self.queue.until(when) {
+        for (at, event) in self.queue.until(when) {
             while let Some((_, control)) = rewrites.next_if(|(rewrite, _)| *rewrite < at) {
                 loops.rewrite(control);
             }
-            loops.apply(happening);
+            loops.apply(event);
         }
         for (_, control) in rewrites {
             loops.rewrite(control);
@@ -170,7 +170,7 @@ impl Core {
         }
         self.latch_entry(port, frame.number, when);
         if self.loops.waits_for_frame(port) && frame.damage.is_intact() {
-            self.queue.push(when + frame.duration(), Happening::GoodFrame(port));
+            self.queue.push(when + frame.duration(), QueuedEvent::GoodFrame(port));
         }
     }
 }

@@ -11,9 +11,9 @@ use linesman_proto::port::Port;
 use linesman_proto::register::{self as r, DlControl, EcatEvents, Features, FmmuConfig};
 use linesman_proto::time::Instant;
 
-use super::core::{Core, Passing};
-use super::esc::Verdict;
-use super::posted::CountKind;
+use super::core::{Core, FrameProgress};
+use super::esc::Forwarding;
+use super::port_event::CountKind;
 use super::rx_code::UnitError;
 use crate::frame::WireFrame;
 
@@ -52,7 +52,7 @@ impl Header {
 
 impl Core {
     /// Executes the datagrams of a frame whose first bit enters at `when`.
-    pub(super) fn process(&mut self, when: Instant, frame: &mut WireFrame) -> Verdict {
+    pub(super) fn process(&mut self, when: Instant, frame: &mut WireFrame) -> Forwarding {
         let destroys_foreign = DlControl(self.memory.u32(&r::DL_CONTROL)).destroys_foreign_frames();
         let Some((wrapping, header_at)) = ethernet::locate(&frame.bytes) else {
             return self.pass_foreign(destroys_foreign, frame);
@@ -69,7 +69,7 @@ impl Core {
         match kind {
             Some(FrameType::Datagrams) => {}
             Some(FrameType::NetworkVariables | FrameType::Mailbox | FrameType::Other(_)) => {
-                return Verdict::Forward;
+                return Forwarding::Forward;
             }
             None => {
                 self.begin(when, frame.number);
@@ -80,7 +80,7 @@ impl Core {
         if closes_ring && frame.bytes.get(first_at + 7).is_some_and(|byte| byte & CIRCULATED != 0) {
             self.count(Port::A, CountKind::ProcessingUnitError, when);
             self.note_unit_error(Port::A, UnitError::Circulating);
-            return Verdict::Destroy;
+            return Forwarding::Destroy;
         }
         self.begin(when, frame.number);
         let whole = self.walk(&mut frame.bytes[first_at..], closes_ring);
@@ -90,20 +90,20 @@ impl Core {
     /// A frame with datagrams begins to pass.
     #[inline]
     pub(super) fn begin(&mut self, when: Instant, number: u64) {
-        self.passing = Passing { began: when, number, ..Passing::default() };
+        self.passing = FrameProgress { began: when, number, ..FrameProgress::default() };
     }
 
     /// A frame without EtherCAT in it, or a piece of one.
-    fn pass_foreign(&mut self, destroys: bool, frame: &WireFrame) -> Verdict {
+    fn pass_foreign(&mut self, destroys: bool, frame: &WireFrame) -> Forwarding {
         if !destroys {
-            return Verdict::Forward;
+            return Forwarding::Forward;
         }
         // Of a damaged frame nobody can say what it was; the wire has counted it.
         if frame.damage.is_intact() {
             self.count(Port::A, CountKind::ProcessingUnitError, Instant::ZERO);
             self.note_unit_error(Port::A, UnitError::Foreign);
         }
-        Verdict::Destroy
+        Forwarding::Destroy
     }
 
     /// Walks the datagrams; false when the frame ends before they do.
@@ -323,7 +323,7 @@ impl Core {
     }
 
     /// The frame has passed. If it was good, what it wrote and touched takes effect at its end.
-    fn finish(&mut self, when: Instant, frame: &mut WireFrame, whole: bool) -> Verdict {
+    fn finish(&mut self, when: Instant, frame: &mut WireFrame, whole: bool) -> Forwarding {
         let intact = frame.damage.is_intact();
         if intact && !whole {
             // The unit finds out that the frame ends too early, and marks it as bad (S1 14.1).
@@ -333,7 +333,7 @@ impl Core {
             frame.damage.marked = true;
         }
         self.settle(when + frame.duration(), intact && whole);
-        Verdict::Forward
+        Forwarding::Forward
     }
 
     /// The frame that was passing ended at `end`: what it did counts if it was good.

@@ -1,4 +1,4 @@
-//! What written registers ask for, once the frame that wrote them was good.
+//! Effects of written registers, once the frame that wrote them was good.
 //!
 //! Reference: S1 3.4; the registers in S2. Most registers simply hold what was written; this file
 //! names those that do something.

@@ -10,7 +10,7 @@ use linesman_proto::time::Instant;
 
 use super::core::Core;
 use super::memory::Rights;
-use super::posted::CountKind;
+use super::port_event::CountKind;
 
 const IDLE_SYMBOL: u8 = 0x30;
 const SYMBOL_IN_FRAME: u8 = 0x40;

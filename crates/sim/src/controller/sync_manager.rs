@@ -78,12 +78,12 @@ struct SyncManager {
     next: usize,
     /// The last session was not written in order.
     violated: bool,
-    passing: Passing,
+    passing: FrameAccess,
 }
 
 /// What the frame that is passing has done so far.
 #[derive(Clone, Copy, Default, Debug)]
-struct Passing {
+struct FrameAccess {
     touched: bool,
     open_before: bool,
     next_before: usize,
@@ -340,11 +340,11 @@ impl SyncManager {
     fn ask(&mut self, at: usize, end: usize, write: bool) -> (usize, Grant) {
         let until = end.min(self.end());
         if !self.passing.touched {
-            self.passing = Passing {
+            self.passing = FrameAccess {
                 touched: true,
                 open_before: self.open,
                 next_before: self.next,
-                ..Passing::default()
+                ..FrameAccess::default()
             };
         }
         match self.kind {
@@ -415,7 +415,7 @@ impl SyncManager {
         self.open
     }
 
-    fn settle(&mut self, passing: Passing) -> Settled {
+    fn settle(&mut self, passing: FrameAccess) -> Settled {
         self.violated = passing.violated || (self.violated && !passing.started);
         let written = passing.done && !self.is_read();
         if passing.started {

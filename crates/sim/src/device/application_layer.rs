@@ -1,4 +1,4 @@
-//! How a SubDevice answers AL control: states, errors, acknowledgement.
+//! Application layer of a SubDevice: states, errors and acknowledgement through AL control.
 //!
 //! Read first: ETG.1000.6, EtherCAT state machine; [`respond`] is its table.
 //! What a device checks before it enters a state is its own affair: here is what all have in common.

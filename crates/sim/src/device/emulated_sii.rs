@@ -10,7 +10,7 @@ use linesman_proto::time::{Instant, Span};
 use super::application_layer::Refusal;
 use super::firmware::{Firmware, SampleAgain};
 use super::signal::{SignalId, Signals};
-use super::trouble::Trouble;
+use super::software_fault::SoftwareFault;
 use crate::controller::{Pdi, SiiRequest, SyncSignal};
 
 /// How long the processor takes for a request: an interrupt and a copy.
@@ -139,8 +139,8 @@ impl Firmware for EmulatedSii {
         self.inner.has_mailbox()
     }
 
-    fn trouble(&mut self, trouble: Trouble, begins: bool) {
-        self.inner.trouble(trouble, begins);
+    fn software_fault(&mut self, software_fault: SoftwareFault, begins: bool) {
+        self.inner.software_fault(software_fault, begins);
     }
 
     fn reboot(&mut self, now: Instant, pdi: &mut Pdi<'_>) {

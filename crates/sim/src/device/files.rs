@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn who_may_read_what() {
+    fn files_are_readable_by_password_and_state() {
         use AlState::{Boot, PreOp};
         type Case<'a> = (&'a str, u32, AlState, Result<&'a [u8], u32>);
         let table: [Case<'_>; 9] = [
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn who_may_write_what() {
+    fn files_are_writable_by_password_and_state() {
         use AlState::{Boot, Op, PreOp};
         let table: [(&str, u32, AlState, Result<usize, u32>); 7] = [
             ("settings.txt", 0, Op, Ok(64)),

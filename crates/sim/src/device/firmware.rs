@@ -1,4 +1,4 @@
-//! The seam between a controller and what is behind it.
+//! Interface between a controller and the firmware behind it.
 //!
 //! The controller calls; firmware answers through the [`Pdi`] it is handed. Everything happens at
 //! an instant that is an argument, so that the same frames at the same times give the same bytes.
@@ -10,7 +10,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
 use super::signal::{SignalId, Signals};
-use super::trouble::Trouble;
+use super::software_fault::SoftwareFault;
 use crate::controller::{Pdi, SyncSignal};
 
 /// When inputs are to be sampled again.
@@ -107,8 +107,8 @@ pub trait Firmware: Debug + Send {
     }
 
     /// Its software misbehaves from now on, or no longer. It outlives a restart. Faults go through
-    /// [`Controller::trouble`](crate::controller::Controller::trouble).
-    fn trouble(&mut self, _trouble: Trouble, _begins: bool) {}
+    /// [`Controller::software_fault`](crate::controller::Controller::software_fault).
+    fn software_fault(&mut self, _fault: SoftwareFault, _begins: bool) {}
 
     /// The processor crashed and has started anew, without its controller: registers stay, what the
     /// software knew is forgotten.

@@ -1,4 +1,4 @@
-//! What a device of a segment is: a type of the library, or one that is made from data.
+//! Kind of a device of a segment: a type of the library, or one that is made from data.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What is behind a controller: processors with their software, and signals between devices.
+//! Devices behind controllers: processors with their software, and signals between devices.
 //!
 //! [`firmware`] is the seam: a [`Firmware`] sees its controller through
 //! [`Pdi`](crate::controller::Pdi) and other devices through [`Signals`]. [`emulated`] is the
@@ -21,7 +21,7 @@ pub mod library;
 pub mod mailbox;
 pub mod processor;
 pub mod signal;
-pub mod trouble;
+pub mod software_fault;
 
 pub use application_layer::Refusal;
 pub use described::DescribedType;
@@ -30,7 +30,7 @@ pub use emulated_sii::{EMULATION_TIME, EmulatedSii};
 pub use firmware::{Firmware, NoFirmware, SampleAgain};
 pub use kind::DeviceKind;
 pub use signal::{SignalId, Signals};
-pub use trouble::{Mismatch, Trouble, Troubles};
+pub use software_fault::{Mismatch, SoftwareFault, SoftwareFaults};
 
 #[cfg(test)]
 mod tests;

@@ -3,12 +3,12 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::{Envelope, HITS, Shower, frame_hits};
+use super::source::{Envelope, HITS, PoissonErrors, frame_hits};
 use super::{Kind, Parameter, PlaceRule, Shape};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::CableDegraded,
-    place: PlaceRule::Lines,
+    place: PlaceRule::Directions,
     parameters: &[
         Parameter {
             key: "hits_per_s",
@@ -27,13 +27,19 @@ pub(super) const KIND: Kind = Kind {
         let period = start.milliseconds("movement_ms");
         let mut stream = start.stream.clone();
         if let Some(count) = start.values.whole("hits") {
-            return Ok(frame_hits(count, interval, &start.target.lines, &mut stream));
+            return Ok(frame_hits(count, interval, &start.target.directions, &mut stream));
         }
         let envelope = match period.as_nanos() {
             0 => Envelope::Constant,
             _ => Envelope::Swell { period, phase: stream.fraction() },
         };
         let rate = start.number("hits_per_s");
-        Ok(Box::new(Shower::new(start.target.lines, rate, envelope, start.from, stream)))
+        Ok(Box::new(PoissonErrors::new(
+            start.target.directions,
+            rate,
+            envelope,
+            start.from,
+            stream,
+        )))
     },
 };

@@ -7,7 +7,7 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::wire::{Change, TimingChange};
 
@@ -39,6 +39,6 @@ pub(super) const KIND: Kind = Kind {
         };
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
-        Ok(Listed::boxed(nodes.map(|node| (from, Change::Timing { node, change }))))
+        Ok(ListedChanges::boxed(nodes.map(|node| (from, Change::Timing { node, change }))))
     },
 };

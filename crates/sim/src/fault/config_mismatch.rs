@@ -3,9 +3,9 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
-use crate::device::{Mismatch, Trouble};
+use crate::device::{Mismatch, SoftwareFault};
 use crate::wire::{Change, SoftwareChange};
 
 pub(super) const KIND: Kind = Kind {
@@ -26,8 +26,8 @@ pub(super) const KIND: Kind = Kind {
             Some("modules") => Mismatch::Modules,
             Some(_) | None => Mismatch::ProcessData,
         };
-        let change = SoftwareChange::Begin(Trouble::Mismatch(what));
+        let change = SoftwareChange::Begin(SoftwareFault::Mismatch(what));
         let (from, nodes) = (start.from, start.target.nodes.into_iter());
-        Ok(Listed::boxed(nodes.map(|node| (from, Change::Software { node, change }))))
+        Ok(ListedChanges::boxed(nodes.map(|node| (from, Change::Software { node, change }))))
     },
 };

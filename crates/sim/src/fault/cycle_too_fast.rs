@@ -6,7 +6,7 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::wire::{Change, TimingChange};
 
@@ -22,6 +22,6 @@ pub(super) const KIND: Kind = Kind {
         let change = TimingChange::SlowDown(Span::ns((start.number("needs_us") * 1e3) as u64));
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
-        Ok(Listed::boxed(nodes.map(|node| (from, Change::Timing { node, change }))))
+        Ok(ListedChanges::boxed(nodes.map(|node| (from, Change::Timing { node, change }))))
     },
 };

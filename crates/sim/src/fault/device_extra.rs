@@ -5,7 +5,7 @@ use linesman_config::attachment::Attachment;
 use linesman_config::fault::FaultName;
 
 use super::error::FaultError;
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape, parameter};
 use crate::segment_file::FaultEntry;
 
@@ -29,7 +29,7 @@ pub(super) const KIND: Kind = Kind {
             shape: Shape::Whole { low: 1, high: u32::MAX, default: None },
         },
     ],
-    start: |_| Ok(Listed::boxed([])),
+    start: |_| Ok(ListedChanges::boxed([])),
 };
 
 /// A device that was not planned.

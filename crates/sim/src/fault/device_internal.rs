@@ -4,7 +4,7 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Instant;
 
-use super::source::{Listed, flip, part, spread};
+use super::source::{ListedChanges, flip, part, spread};
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
 use crate::wire::{Change, Source};
@@ -29,7 +29,7 @@ pub(super) const KIND: Kind = Kind {
         let mut stream = start.stream.clone();
         // Of a device with several controllers it is the first.
         let Some(node) = start.target.nodes.first().copied() else {
-            return Ok(Listed::boxed([]));
+            return Ok(ListedChanges::boxed([]));
         };
         if let Some(count) = start.values.whole("hits") {
             let instants = spread(count, interval, &mut stream);
@@ -37,7 +37,7 @@ pub(super) const KIND: Kind = Kind {
                 let (part, flip) = (part(&mut stream), flip(&mut stream));
                 (at, Change::Glitch { node, part, flip })
             });
-            return Ok(Listed::boxed(glitches.collect::<Vec<_>>()));
+            return Ok(ListedChanges::boxed(glitches.collect::<Vec<_>>()));
         }
         let rate_per_s = start.number("hits_per_s");
         Ok(Box::new(Glitches { node, rate_per_s, at: start.from, stream }))

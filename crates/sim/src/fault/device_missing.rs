@@ -3,7 +3,7 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, PlaceRule};
 use crate::segment_file::FaultEntry;
 
@@ -11,7 +11,7 @@ pub(super) const KIND: Kind = Kind {
     name: FaultName::DeviceMissing,
     place: PlaceRule::Device,
     parameters: &[],
-    start: |_| Ok(Listed::boxed([])),
+    start: |_| Ok(ListedChanges::boxed([])),
 };
 
 /// The device that an entry leaves out; `None` for entries of another kind.

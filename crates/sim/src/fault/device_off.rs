@@ -3,7 +3,7 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, PlaceRule};
 use crate::wire::Change;
 
@@ -13,6 +13,8 @@ pub(super) const KIND: Kind = Kind {
     parameters: &[],
     start: |start| {
         let from = start.from;
-        Ok(Listed::boxed(start.target.nodes.into_iter().map(|node| (from, Change::Off { node }))))
+        Ok(ListedChanges::boxed(
+            start.target.nodes.into_iter().map(|node| (from, Change::Off { node })),
+        ))
     },
 };

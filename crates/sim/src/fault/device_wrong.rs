@@ -4,7 +4,7 @@
 use linesman_config::fault::FaultName;
 
 use super::error::FaultError;
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape, parameter};
 use crate::segment_file::FaultEntry;
 
@@ -23,7 +23,7 @@ pub(super) const KIND: Kind = Kind {
             shape: Shape::Whole { low: 0, high: u32::MAX, default: None },
         },
     ],
-    start: |_| Ok(Listed::boxed([])),
+    start: |_| Ok(ListedChanges::boxed([])),
 };
 
 /// What sits there instead.

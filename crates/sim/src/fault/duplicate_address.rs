@@ -8,7 +8,7 @@
 use linesman_config::fault::FaultName;
 
 use super::error::FaultError;
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape, parameter};
 use crate::segment_file::FaultEntry;
 use crate::wire::Change;
@@ -31,13 +31,13 @@ pub(super) const KIND: Kind = Kind {
     ],
     start: |start| {
         if start.values.text("which") == Some("alias") {
-            return Ok(Listed::boxed([]));
+            return Ok(ListedChanges::boxed([]));
         }
         let [like, node] = start.target.nodes[..] else {
             return Err(start.error("both devices must be there".to_owned()));
         };
         let from = start.from;
-        Ok(Listed::boxed([(from, Change::Readdress { node, like })]))
+        Ok(ListedChanges::boxed([(from, Change::Readdress { node, like })]))
     },
 };
 

@@ -7,7 +7,7 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::wire::Change;
 
@@ -38,6 +38,6 @@ pub(super) const KIND: Kind = Kind {
             }
         }
         changes.sort_by_key(|(at, _)| *at);
-        Ok(Listed::boxed(changes))
+        Ok(ListedChanges::boxed(changes))
     },
 };

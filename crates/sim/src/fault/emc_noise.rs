@@ -6,14 +6,14 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
-use super::source::{HITS, Listed, flip, frame_hit, spread};
+use super::source::{HITS, ListedChanges, flip, frame_hit, spread};
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
-use crate::wire::{Change, Line, Source};
+use crate::wire::{Change, DirectedLink, Source};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::EmcNoise,
-    place: PlaceRule::ManyLines,
+    place: PlaceRule::ManyDirections,
     parameters: &[
         Parameter {
             key: "hits_per_s",
@@ -43,16 +43,17 @@ pub(super) const KIND: Kind = Kind {
         let bursts_per_s = start.number("bursts_per_s");
         if let Some(count) = start.values.whole(HITS.key) {
             let rhythm = (burst, bursts_per_s);
-            let lines = &start.target.lines;
-            let hits = in_bursts(count, start.interval(), rhythm, lines, &mut stream);
-            let hits = hits.into_iter().map(|(at, line)| (at, frame_hit(line, &mut stream)));
-            return Ok(Listed::boxed(hits));
+            let directions = &start.target.directions;
+            let hits = in_bursts(count, start.interval(), rhythm, directions, &mut stream);
+            let hits =
+                hits.into_iter().map(|(at, direction)| (at, frame_hit(direction, &mut stream)));
+            return Ok(ListedChanges::boxed(hits));
         }
         let per_burst = start.number("hits_per_s") / bursts_per_s;
-        let lines = start.target.lines;
-        let rate_in_burst = per_burst / burst.as_secs_f64() * lines.len() as f64;
+        let directions = start.target.directions;
+        let rate_in_burst = per_burst / burst.as_secs_f64() * directions.len() as f64;
         Ok(Box::new(Bursts {
-            lines,
+            directions,
             bursts_per_s,
             burst,
             rate_in_burst,
@@ -72,11 +73,11 @@ fn in_bursts(
     count: u32,
     (from, to): (Instant, Instant),
     (burst, bursts_per_s): (Span, f64),
-    lines: &[Line],
+    directions: &[DirectedLink],
     stream: &mut Stream,
-) -> Vec<(Instant, Line)> {
-    let of_line = (burst.as_nanos() / FRAME_EVERY.as_nanos()).max(1);
-    let most = of_line.saturating_mul(lines.len().max(1) as u64);
+) -> Vec<(Instant, DirectedLink)> {
+    let of_direction = (burst.as_nanos() / FRAME_EVERY.as_nanos()).max(1);
+    let most = of_direction.saturating_mul(directions.len().max(1) as u64);
     let least = u64::from(count).div_ceil(most).max(1) as f64;
     let bursts = (to.since(from).as_secs_f64() * bursts_per_s).round();
     // A burst in which nobody is hit makes no difference: there are no more of them than hits.
@@ -87,9 +88,9 @@ fn in_bursts(
     let mut hits = Vec::with_capacity(count as usize);
     for (index, begin) in (0..).zip(begins) {
         let share = |index: u64| (index * u64::from(count) / u64::from(bursts)) as u32;
-        let first = stream.below(lines.len().max(1) as u64) as usize;
+        let first = stream.below(directions.len().max(1) as u64) as usize;
         let instants = spread(share(index + 1) - share(index), (begin, begin + burst), stream);
-        let in_turn = lines.iter().cycle().skip(first).copied();
+        let in_turn = directions.iter().cycle().skip(first).copied();
         hits.extend(instants.into_iter().zip(in_turn));
     }
     hits.sort_by_key(|(at, _)| *at);
@@ -98,7 +99,7 @@ fn in_bursts(
 
 #[derive(Debug)]
 struct Bursts {
-    lines: Vec<Line>,
+    directions: Vec<DirectedLink>,
     bursts_per_s: f64,
     burst: Span,
     /// On all lines together.
@@ -111,14 +112,14 @@ struct Bursts {
 
 impl Source for Bursts {
     fn next_change(&mut self) -> Option<(Instant, Change)> {
-        if self.rate_in_burst <= 0.0 || self.lines.is_empty() {
+        if self.rate_in_burst <= 0.0 || self.directions.is_empty() {
             return None;
         }
         loop {
             self.at += self.stream.wait(self.rate_in_burst);
             if self.at < self.until {
-                let line = *self.stream.pick(&self.lines)?;
-                return Some((self.at, Change::Hit { line, flip: flip(&mut self.stream) }));
+                let direction = *self.stream.pick(&self.directions)?;
+                return Some((self.at, Change::Hit { direction, flip: flip(&mut self.stream) }));
             }
             if self.at == Instant::MAX {
                 return None;
@@ -137,8 +138,8 @@ mod tests {
     #[test]
     fn a_number_of_hits_keeps_to_the_bursts() {
         let (from, to) = (Instant::ZERO + Span::s(1), Instant::ZERO + Span::s(3));
-        let lines = [(0, true), (0, false), (3, true)];
-        let lines = lines.map(|(link, downstream)| Line { link, downstream });
+        let directions = [(0, true), (0, false), (3, true)];
+        let directions = directions.map(|(link, downstream)| DirectedLink { link, downstream });
         for (seed, count, burst, bursts_per_s, bursts) in [
             (1, 1, Span::ms(5), 10.0, 1),
             (2, 7, Span::ms(5), 10.0, 7),
@@ -149,12 +150,13 @@ mod tests {
             (6, 500, Span::us(400), 10.0, 167),
         ] {
             let mut stream = Seed(seed).stream("bursts");
-            let hits = in_bursts(count, (from, to), (burst, bursts_per_s), &lines, &mut stream);
+            let hits =
+                in_bursts(count, (from, to), (burst, bursts_per_s), &directions, &mut stream);
             assert_eq!(hits.len(), count as usize);
             assert!(hits.is_sorted_by_key(|(at, _)| *at));
             assert!(hits.iter().all(|(at, _)| (from..to).contains(at)));
             // No more groups than bursts, none longer than a burst; in each the lines are hit equally.
-            let mut groups: Vec<Vec<(Instant, Line)>> = Vec::new();
+            let mut groups: Vec<Vec<(Instant, DirectedLink)>> = Vec::new();
             for hit in hits {
                 match groups.last_mut().filter(|group| hit.0.since(group[0].0) < burst) {
                     Some(group) => group.push(hit),
@@ -165,8 +167,10 @@ mod tests {
             let most = (burst.as_nanos() / FRAME_EVERY.as_nanos()).max(1) as usize;
             // Two bursts may follow each other closely.
             for group in &groups {
-                let of = |line: &Line| group.iter().filter(|(_, on)| on == line).count();
-                assert!(lines.iter().all(|line| of(line) <= 2 * most), "{group:?}");
+                let of = |direction: &DirectedLink| {
+                    group.iter().filter(|(_, on)| on == direction).count()
+                };
+                assert!(directions.iter().all(|direction| of(direction) <= 2 * most), "{group:?}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Why a fault cannot be injected.
+//! Errors of faults that cannot be injected.
 
 use linesman_config::fault::FaultName;
 

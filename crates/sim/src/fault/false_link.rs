@@ -8,13 +8,13 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::wire::Change;
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::FalseLink,
-    place: PlaceRule::Lines,
+    place: PlaceRule::Directions,
     parameters: &[Parameter {
         key: "far",
         meaning: "Whether the far end shows a link, too, or has lost it; only the near one is deceived then.",
@@ -22,16 +22,20 @@ pub(super) const KIND: Kind = Kind {
     }],
     start: |start| {
         let from = start.from;
-        let mut changes: Vec<_> =
-            start.target.lines.iter().map(|line| (from, Change::Swallow { line: *line })).collect();
+        let mut changes: Vec<_> = start
+            .target
+            .directions
+            .iter()
+            .map(|direction| (from, Change::Swallow { direction: *direction }))
+            .collect();
         if start.values.text("far") == Some("without-link") {
             // The line that goes to the far end: away from the MainDevice, or the one that was named.
-            let line = match start.target.lines.as_slice() {
-                [line] => Some(*line),
-                lines => lines.iter().find(|line| line.downstream).copied(),
+            let direction = match start.target.directions.as_slice() {
+                [direction] => Some(*direction),
+                directions => directions.iter().find(|direction| direction.downstream).copied(),
             };
-            changes.extend(line.map(|line| (from, Change::Break { line })));
+            changes.extend(direction.map(|direction| (from, Change::Break { direction })));
         }
-        Ok(Listed::boxed(changes))
+        Ok(ListedChanges::boxed(changes))
     },
 };

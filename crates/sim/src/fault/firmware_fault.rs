@@ -8,9 +8,9 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
-use crate::device::Trouble;
+use crate::device::SoftwareFault;
 use crate::wire::{Change, SoftwareChange, Source};
 
 pub(super) const KIND: Kind = Kind {
@@ -57,16 +57,16 @@ pub(super) const KIND: Kind = Kind {
                 let nodes = start.target.nodes;
                 return Ok(Box::new(Crashes { nodes, boot, every, at: start.from, next: 0 }));
             }
-            Some("inputs-frozen") => &[SoftwareChange::Begin(Trouble::FrozenApplication)],
-            Some("state-machine-dead") => &[SoftwareChange::Begin(Trouble::DeafToRequests)],
+            Some("inputs-frozen") => &[SoftwareChange::Begin(SoftwareFault::FrozenApplication)],
+            Some("state-machine-dead") => &[SoftwareChange::Begin(SoftwareFault::DeafToRequests)],
             Some("memory-blocked") => {
-                &[SoftwareChange::Begin(Trouble::LockedBuffers), SoftwareChange::Hang]
+                &[SoftwareChange::Begin(SoftwareFault::LockedBuffers), SoftwareChange::Hang]
             }
             Some(_) | None => &[SoftwareChange::Hang],
         };
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
-        Ok(Listed::boxed(nodes.flat_map(move |node| {
+        Ok(ListedChanges::boxed(nodes.flat_map(move |node| {
             changes.iter().map(move |change| (from, Change::Software { node, change: *change }))
         })))
     },

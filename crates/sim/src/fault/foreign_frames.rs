@@ -11,7 +11,7 @@ use linesman_proto::time::Instant;
 
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
-use crate::wire::{Change, Line, Source, Stranger};
+use crate::wire::{Change, DirectedLink, ForeignSender, Source};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::ForeignFrames,
@@ -30,31 +30,37 @@ pub(super) const KIND: Kind = Kind {
     ],
     start: |start| {
         let what = match start.values.text("protocol") {
-            Some("arp") => &[Stranger::Arp][..],
-            Some("ipv4") => &[Stranger::Ipv4],
-            Some("lldp") => &[Stranger::Lldp],
-            Some(_) | None => &[Stranger::Arp, Stranger::Ipv4, Stranger::Lldp],
+            Some("arp") => &[ForeignSender::Arp][..],
+            Some("ipv4") => &[ForeignSender::Ipv4],
+            Some("lldp") => &[ForeignSender::Lldp],
+            Some(_) | None => &[ForeignSender::Arp, ForeignSender::Ipv4, ForeignSender::Lldp],
         };
-        let (line, rate_per_s) =
-            (start.target.lines.first().copied(), start.number("frames_per_s"));
-        Ok(Box::new(Foreign { line, what, rate_per_s, at: start.from, stream: start.stream }))
+        let (direction, rate_per_s) =
+            (start.target.directions.first().copied(), start.number("frames_per_s"));
+        Ok(Box::new(ForeignTraffic {
+            direction,
+            what,
+            rate_per_s,
+            at: start.from,
+            stream: start.stream,
+        }))
     },
 };
 
 #[derive(Debug)]
-struct Foreign {
-    line: Option<Line>,
-    what: &'static [Stranger],
+struct ForeignTraffic {
+    direction: Option<DirectedLink>,
+    what: &'static [ForeignSender],
     rate_per_s: f64,
     at: Instant,
     stream: Stream,
 }
 
-impl Source for Foreign {
+impl Source for ForeignTraffic {
     fn next_change(&mut self) -> Option<(Instant, Change)> {
-        let line = self.line?;
+        let direction = self.direction?;
         self.at += self.stream.wait(self.rate_per_s);
         let what = *self.stream.pick(self.what)?;
-        (self.at != Instant::MAX).then_some((self.at, Change::Stranger { line, what }))
+        (self.at != Instant::MAX).then_some((self.at, Change::ForeignSender { direction, what }))
     }
 }

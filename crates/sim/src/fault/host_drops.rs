@@ -8,7 +8,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::address::Path;
 use linesman_proto::time::Instant;
 
-use super::source::{Listed, spread};
+use super::source::{ListedChanges, spread};
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
 use crate::wire::{Change, Source};
@@ -34,7 +34,9 @@ pub(super) const KIND: Kind = Kind {
         let card = start.target.cards.first().copied().unwrap_or(Path::A);
         if let Some(count) = start.values.whole("hits") {
             let instants = spread(count, interval, &mut stream);
-            return Ok(Listed::boxed(instants.into_iter().map(|at| (at, Change::Drop { card }))));
+            return Ok(ListedChanges::boxed(
+                instants.into_iter().map(|at| (at, Change::Drop { card })),
+            ));
         }
         let rate_per_s = start.number("drops_per_s");
         Ok(Box::new(Drops { card, rate_per_s, at: start.from, stream }))

@@ -8,7 +8,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
-use super::source::{Listed, spread};
+use super::source::{ListedChanges, spread};
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
 use crate::wire::{Change, Source};
@@ -41,17 +41,17 @@ pub(super) const KIND: Kind = Kind {
         if let Some(count) = start.values.whole("hits") {
             let by = Span::ns((delay_us * 1e3) as u64);
             let instants = spread(count, interval, &mut stream);
-            return Ok(Listed::boxed(
+            return Ok(ListedChanges::boxed(
                 instants.into_iter().map(|at| (at, Change::Delay { card, by })),
             ));
         }
         let rate_per_s = start.number("delays_per_s");
-        Ok(Box::new(Uneven { card, rate_per_s, delay_us, at: start.from, stream }))
+        Ok(Box::new(HostJitter { card, rate_per_s, delay_us, at: start.from, stream }))
     },
 };
 
 #[derive(Debug)]
-struct Uneven {
+struct HostJitter {
     card: Path,
     rate_per_s: f64,
     delay_us: f64,
@@ -59,7 +59,7 @@ struct Uneven {
     stream: Stream,
 }
 
-impl Source for Uneven {
+impl Source for HostJitter {
     fn next_change(&mut self) -> Option<(Instant, Change)> {
         self.at += self.stream.wait(self.rate_per_s);
         let by = self.stream.wait(1e6 / self.delay_us).min(Span::s(1));

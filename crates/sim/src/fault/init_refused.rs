@@ -3,7 +3,7 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::state::{AlState, AlStatusCode};
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::device::Refusal;
 use crate::wire::Change;
@@ -37,6 +37,6 @@ pub(super) const KIND: Kind = Kind {
         let from = start.from;
         // Of a device with several controllers it is the first.
         let node = start.target.nodes.into_iter().take(1);
-        Ok(Listed::boxed(node.map(|node| (from, Change::Refuse { node, refusal }))))
+        Ok(ListedChanges::boxed(node.map(|node| (from, Change::Refuse { node, refusal }))))
     },
 };

@@ -44,7 +44,7 @@ pub(super) const KIND: Kind = Kind {
         if least > most {
             return Err(start.error("`least_us` must not be more than `late_us`".to_owned()));
         }
-        Ok(Box::new(Lateness {
+        Ok(Box::new(LateFrames {
             paths: start.target.cards.clone(),
             least,
             most,
@@ -57,7 +57,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 #[derive(Debug)]
-struct Lateness {
+struct LateFrames {
     paths: Vec<Path>,
     least: u64,
     most: u64,
@@ -67,7 +67,7 @@ struct Lateness {
     stream: Stream,
 }
 
-impl Source for Lateness {
+impl Source for LateFrames {
     fn next_change(&mut self) -> Option<(Instant, Change)> {
         let path = self.paths.first().copied()?;
         let late = self.stream.chance(self.share);

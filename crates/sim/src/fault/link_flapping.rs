@@ -8,14 +8,14 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
 use crate::wire::{Change, Source};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::LinkFlapping,
-    place: PlaceRule::Lines,
+    place: PlaceRule::Directions,
     parameters: &[
         Parameter {
             key: "openings_per_s",
@@ -30,7 +30,7 @@ pub(super) const KIND: Kind = Kind {
     ],
     start: |start| {
         let Some((opens, closes)) = start.target.breaks().next() else {
-            return Ok(Listed::boxed([]));
+            return Ok(ListedChanges::boxed([]));
         };
         Ok(Box::new(Flapping {
             opens,

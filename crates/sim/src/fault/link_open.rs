@@ -12,15 +12,15 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, PlaceRule};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::LinkOpen,
-    place: PlaceRule::Lines,
+    place: PlaceRule::Directions,
     parameters: &[],
     start: |start| {
         let from = start.from;
-        Ok(Listed::boxed(start.target.breaks().map(|(open, _)| (from, open))))
+        Ok(ListedChanges::boxed(start.target.breaks().map(|(open, _)| (from, open))))
     },
 };

@@ -7,10 +7,10 @@ use linesman_proto::mailbox::ErrorReplyCode;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::ObjectIndex;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
-use crate::device::Trouble;
-use crate::device::trouble::{RefusedWith, SdoRefusals};
+use crate::device::SoftwareFault;
+use crate::device::software_fault::{RefusedWith, SdoRefusals};
 use crate::seed::Seed;
 use crate::wire::{Change, SoftwareChange};
 
@@ -64,9 +64,9 @@ pub(super) const KIND: Kind = Kind {
         let share_ppm = (start.number("share") * 1e6).round() as u32;
         let seed = Seed(start.stream.number());
         let refusals = SdoRefusals { answer, first, last, share_ppm, seed };
-        let change = SoftwareChange::Begin(Trouble::RefusesSdo(refusals));
+        let change = SoftwareChange::Begin(SoftwareFault::RefusesSdo(refusals));
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
-        Ok(Listed::boxed(nodes.map(|node| (from, Change::Software { node, change }))))
+        Ok(ListedChanges::boxed(nodes.map(|node| (from, Change::Software { node, change }))))
     },
 };

@@ -3,9 +3,9 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
-use crate::device::Trouble;
+use crate::device::SoftwareFault;
 use crate::wire::{Change, SoftwareChange};
 
 pub(super) const KIND: Kind = Kind {
@@ -18,9 +18,9 @@ pub(super) const KIND: Kind = Kind {
     }],
     start: |start| {
         let change =
-            SoftwareChange::Begin(Trouble::SlowMailbox { by: start.milliseconds("by_ms") });
+            SoftwareChange::Begin(SoftwareFault::SlowMailbox { by: start.milliseconds("by_ms") });
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
-        Ok(Listed::boxed(nodes.map(|node| (from, Change::Software { node, change }))))
+        Ok(ListedChanges::boxed(nodes.map(|node| (from, Change::Software { node, change }))))
     },
 };

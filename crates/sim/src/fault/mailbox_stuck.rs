@@ -6,9 +6,9 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
-use crate::device::Trouble;
+use crate::device::SoftwareFault;
 use crate::wire::{Change, SoftwareChange};
 
 pub(super) const KIND: Kind = Kind {
@@ -20,16 +20,16 @@ pub(super) const KIND: Kind = Kind {
         shape: Shape::Word { words: &["requests", "answers", "both"] },
     }],
     start: |start| {
-        let troubles: &[Trouble] = match start.values.text("side") {
-            Some("answers") => &[Trouble::MailboxNotFilled],
-            Some("both") => &[Trouble::MailboxNotRead, Trouble::MailboxNotFilled],
-            Some(_) | None => &[Trouble::MailboxNotRead],
+        let software_faults: &[SoftwareFault] = match start.values.text("side") {
+            Some("answers") => &[SoftwareFault::MailboxNotFilled],
+            Some("both") => &[SoftwareFault::MailboxNotRead, SoftwareFault::MailboxNotFilled],
+            Some(_) | None => &[SoftwareFault::MailboxNotRead],
         };
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
-        Ok(Listed::boxed(nodes.flat_map(|node| {
-            troubles.iter().map(move |trouble| {
-                let change = SoftwareChange::Begin(*trouble);
+        Ok(ListedChanges::boxed(nodes.flat_map(|node| {
+            software_faults.iter().map(move |software_fault| {
+                let change = SoftwareChange::Begin(*software_fault);
                 (from, Change::Software { node, change })
             })
         })))

@@ -8,7 +8,7 @@
 use linesman_config::fault::FaultName;
 
 use super::ports_swapped::OUT_PORTS;
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 
 pub(super) const KIND: Kind = Kind {
@@ -19,5 +19,5 @@ pub(super) const KIND: Kind = Kind {
         meaning: "The port that the MainDevice is plugged into; the one that leads on by cable unless said.",
         shape: Shape::Word { words: OUT_PORTS },
     }],
-    start: |_| Ok(Listed::boxed([])),
+    start: |_| Ok(ListedChanges::boxed([])),
 };

@@ -1,4 +1,4 @@
-//! What can go wrong: one file per kind of fault.
+//! Fault catalogue of the segment: one file per kind of fault.
 //!
 //! A [`Kind`] says where its fault can be, which parameters it takes, and makes a
 //! [`Source`]: the changes it makes to the world, one after the other, from
@@ -60,15 +60,15 @@ use linesman_proto::time::{Instant, Span};
 pub use error::FaultError;
 pub use manual::manual;
 pub use parameter::{Parameter, Shape};
+pub(crate) use place::FaultContext;
 pub use place::PlaceRule;
-pub(crate) use place::Scene;
 pub(crate) use running::{Running, Step};
 
 pub(crate) use device_extra::extra;
 pub(crate) use device_missing::missing_device;
 pub(crate) use device_wrong::{Replacement, replacement};
 pub(crate) use duplicate_address::duplicate_alias;
-pub(crate) use ports_swapped::{Turned, turned};
+pub(crate) use ports_swapped::{SwappedPorts, swapped_ports};
 
 use crate::seed::{Seed, Stream};
 use crate::segment_file::FaultEntry;
@@ -204,7 +204,7 @@ impl Start<'_> {
 
 /// What a fault is made from, each time that it comes.
 #[derive(Debug)]
-pub(crate) struct Plot {
+pub(crate) struct FaultTemplate {
     label: String,
     kind: &'static Kind,
     target: Target,
@@ -214,7 +214,7 @@ pub(crate) struct Plot {
     stream: String,
 }
 
-impl Plot {
+impl FaultTemplate {
     /// Its changes when it comes for the `nth` time, from 0.
     fn source(&self, nth: u32, window: Window) -> Result<Box<dyn Source>, FaultError> {
         let stream = match nth {
@@ -237,7 +237,7 @@ impl Plot {
 pub(crate) struct Planned {
     pub(crate) name: FaultName,
     pub(crate) places: Vec<Place>,
-    plot: Plot,
+    template: FaultTemplate,
     windows: Windows,
     source: Box<dyn Source>,
 }
@@ -245,7 +245,7 @@ pub(crate) struct Planned {
 impl Planned {
     /// Lets it run.
     pub(crate) fn run(self, id: FaultId) -> Running {
-        Running::new(id, Some(self.plot), self.windows, self.source)
+        Running::new(id, Some(self.template), self.windows, self.source)
     }
 }
 
@@ -254,13 +254,13 @@ impl Planned {
 pub(crate) fn plan(
     label: &str,
     entry: &FaultEntry,
-    scene: &Scene<'_>,
+    context: &FaultContext<'_>,
     earliest: Instant,
     seed: Seed,
     stream: &str,
 ) -> Result<Planned, FaultError> {
     let kind = known_kind(label, entry)?;
-    let target = place::resolve(label, kind, entry, scene)?;
+    let target = place::resolve(label, kind, entry, context)?;
     let (mut schedule, mut parameters) = (entry.schedule.clone(), entry.parameters.clone());
     // What a kind takes itself is its own.
     if kind.parameters.iter().any(|parameter| parameter.key == "every_ms")
@@ -273,9 +273,9 @@ pub(crate) fn plan(
     let windows = schedule::windows(label, entry, &schedule, earliest, times)?;
     let (places, name) = (target.places.clone(), kind.name);
     let (label, stream) = (label.to_owned(), stream.to_owned());
-    let plot = Plot { label, kind, target, values, seed, stream };
-    let source = plot.source(0, windows.first())?;
-    Ok(Planned { name, places, plot, windows, source })
+    let template = FaultTemplate { label, kind, target, values, seed, stream };
+    let source = template.source(0, windows.first())?;
+    Ok(Planned { name, places, template, windows, source })
 }
 
 fn known_kind(label: &str, entry: &FaultEntry) -> Result<&'static Kind, FaultError> {

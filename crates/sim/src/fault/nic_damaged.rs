@@ -23,8 +23,8 @@ pub(super) const KIND: Kind = Kind {
     ],
     start: |start| {
         // The line to the card, then the one from it.
-        let line = usize::from(start.values.text("part") == Some("transmitter"));
-        let lines = start.target.lines.get(line).copied().into_iter().collect();
-        Ok(steady(&start, lines))
+        let direction = usize::from(start.values.text("part") == Some("transmitter"));
+        let directions = start.target.directions.get(direction).copied().into_iter().collect();
+        Ok(steady(&start, directions))
     },
 };

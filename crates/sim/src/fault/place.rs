@@ -1,4 +1,4 @@
-//! Where a fault is: from what was written to lines, links, controllers and cards.
+//! Place of a fault: resolves what was written to link directions, links, controllers and cards.
 
 mod rule;
 
@@ -16,10 +16,10 @@ use crate::hardware::PortKind;
 use crate::segment_file::{FaultEntry, Supply};
 use crate::truth::Place;
 use crate::wire::world::World;
-use crate::wire::{Change, Line};
+use crate::wire::{Change, DirectedLink};
 
 /// What places are looked up in.
-pub(crate) struct Scene<'a> {
+pub(crate) struct FaultContext<'a> {
     /// By identity, devices that are missing included.
     pub(crate) names: &'a [String],
     pub(crate) nodes: &'a BTreeMap<DeviceId, usize>,
@@ -34,7 +34,7 @@ pub(crate) struct Scene<'a> {
     pub(crate) supplies: &'a [Supply],
 }
 
-impl Scene<'_> {
+impl FaultContext<'_> {
     /// A node and all that it feeds over the E-bus.
     fn with_fed(&self, node: usize) -> Vec<usize> {
         let mut fed = vec![node];
@@ -60,7 +60,7 @@ impl Scene<'_> {
 pub(crate) struct Target {
     /// For the truth log.
     pub(super) places: Vec<Place>,
-    pub(super) lines: Vec<Line>,
+    pub(super) directions: Vec<DirectedLink>,
     pub(super) links: Vec<usize>,
     pub(super) nodes: Vec<usize>,
     /// Cards of the MainDevice.
@@ -80,12 +80,12 @@ pub(super) struct Current {
 impl Target {
     /// What interrupts each place and makes it whole: both directions of a link, or one of them.
     pub(super) fn breaks(&self) -> impl Iterator<Item = (Change, Change)> {
-        let one = match self.lines.as_slice() {
-            [line] => Some(*line),
+        let one = match self.directions.as_slice() {
+            [direction] => Some(*direction),
             _ => None,
         };
         self.links.iter().map(move |link| match one {
-            Some(line) => (Change::Break { line }, Change::Mend { line }),
+            Some(direction) => (Change::Break { direction }, Change::Mend { direction }),
             None => (Change::Open { link: *link }, Change::Close { link: *link }),
         })
     }
@@ -96,7 +96,7 @@ enum Written {
     /// Both directions.
     Both(usize),
     /// One direction.
-    One(Line),
+    One(DirectedLink),
     /// A card.
     Card(Path),
 }
@@ -105,9 +105,9 @@ pub(super) fn resolve(
     label: &str,
     kind: &Kind,
     entry: &FaultEntry,
-    scene: &Scene<'_>,
+    context: &FaultContext<'_>,
 ) -> Result<Target, FaultError> {
-    let finder = Finder { label, kind, scene };
+    let finder = Finder { label, kind, context };
     finder.refuse_other_keys(entry)?;
     match kind.place {
         PlaceRule::Device | PlaceRule::Devices => finder.devices(entry),
@@ -116,24 +116,24 @@ pub(super) fn resolve(
         PlaceRule::Processor | PlaceRule::Mailbox => finder.software(entry),
         PlaceRule::DeviceOrCard if entry.device.is_some() => finder.devices(entry),
         PlaceRule::Card | PlaceRule::DeviceOrCard => finder.card(entry),
-        PlaceRule::RingLink if !is_ring(scene.tree) => Err(FaultError::Combination {
+        PlaceRule::RingLink if !is_ring(context.tree) => Err(FaultError::Combination {
             entry: label.to_owned(),
             kind: kind.name,
             what: "this line is no ring: give it `[ring]` with `closes_at`".to_owned(),
         }),
         PlaceRule::RingLink | PlaceRule::Entrance if entry.at.is_none() => {
             let card = if kind.place == PlaceRule::RingLink { Path::B } else { Path::A };
-            let Some(link) = scene.tree.link_at(End::MainDevice(card)) else {
+            let Some(link) = context.tree.link_at(End::MainDevice(card)) else {
                 return Err(finder.error(format!("nothing is plugged into card {card}")));
             };
             Ok(finder.at_card(link, card))
         }
         PlaceRule::Link
-        | PlaceRule::Lines
-        | PlaceRule::ManyLines
-        | PlaceRule::Line
+        | PlaceRule::Directions
+        | PlaceRule::ManyDirections
+        | PlaceRule::Direction
         | PlaceRule::RingLink
-        | PlaceRule::Entrance => finder.lines(entry),
+        | PlaceRule::Entrance => finder.directions(entry),
     }
 }
 
@@ -145,7 +145,7 @@ fn is_ring(tree: &Tree) -> bool {
 struct Finder<'a> {
     label: &'a str,
     kind: &'a Kind,
-    scene: &'a Scene<'a>,
+    context: &'a FaultContext<'a>,
 }
 
 impl Finder<'_> {
@@ -175,7 +175,7 @@ impl Finder<'_> {
     fn devices(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
         let fed = match &entry.supply {
             None => &[][..],
-            Some(name) => match self.scene.supplies.iter().find(|known| known.name == *name) {
+            Some(name) => match self.context.supplies.iter().find(|known| known.name == *name) {
                 Some(supply) => supply.devices.as_slice(),
                 None => return Err(self.error(format!("no supply is called `{name}`"))),
             },
@@ -187,8 +187,8 @@ impl Finder<'_> {
                 known == name
                     || known.strip_prefix(name.as_str()).is_some_and(|rest| rest.starts_with('/'))
             };
-            let known = self.scene.names.iter().zip(0u32..);
-            let ids: Vec<DeviceId> = match self.scene.groups.get(name) {
+            let known = self.context.names.iter().zip(0u32..);
+            let ids: Vec<DeviceId> = match self.context.groups.get(name) {
                 Some(members) => members.clone(),
                 None => known
                     .filter(|(known, _)| of_device(known))
@@ -198,9 +198,9 @@ impl Finder<'_> {
             if ids.is_empty() {
                 return Err(self.error(self.no_device(name)));
             }
-            for node in ids.iter().filter_map(|id| self.scene.nodes.get(id)) {
+            for node in ids.iter().filter_map(|id| self.context.nodes.get(id)) {
                 if self.kind.place == PlaceRule::Devices {
-                    target.nodes.extend(self.scene.with_fed(*node));
+                    target.nodes.extend(self.context.with_fed(*node));
                 } else {
                     target.nodes.push(*node);
                 }
@@ -219,11 +219,11 @@ impl Finder<'_> {
     fn feed(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
         let mut target = self.devices(entry)?;
         let first = target.nodes.first().copied();
-        target.nodes = first.map_or(Vec::new(), |feed| self.scene.with_fed(feed));
+        target.nodes = first.map_or(Vec::new(), |feed| self.context.with_fed(feed));
         target.currents = target
             .nodes
             .iter()
-            .map(|node| Current { node: *node, ma: self.scene.ebus_ma[*node] })
+            .map(|node| Current { node: *node, ma: self.context.ebus_ma[*node] })
             .collect();
         Ok(target)
     }
@@ -249,7 +249,7 @@ impl Finder<'_> {
         let mut target = self.devices(entry)?;
         let needs_mailbox = self.kind.place == PlaceRule::Mailbox;
         target.nodes.retain(|node| {
-            let firmware = self.scene.world.nodes[*node].controller.firmware();
+            let firmware = self.context.world.nodes[*node].controller.firmware();
             if needs_mailbox { firmware.has_mailbox() } else { firmware.has_processor() }
         });
         if target.nodes.is_empty() {
@@ -261,7 +261,7 @@ impl Finder<'_> {
     }
 
     fn no_device(&self, name: &str) -> String {
-        let near = nearest(name, self.scene.names.iter().map(String::as_str));
+        let near = nearest(name, self.context.names.iter().map(String::as_str));
         let near = near.map_or(String::new(), |near| format!(" (did you mean `{near}`?)"));
         format!("no device is called `{name}`{near}")
     }
@@ -277,12 +277,12 @@ impl Finder<'_> {
             },
             Some(_) => return Err(self.error("more than one place is given".to_owned())),
         };
-        let Some(link) = self.scene.tree.link_at(End::MainDevice(path)) else {
+        let Some(link) = self.context.tree.link_at(End::MainDevice(path)) else {
             return Err(self.error(format!("nothing is plugged into card {path}")));
         };
         Ok(Target {
             places: vec![Place::Host(path)],
-            lines: self.lines_at_card(link, path),
+            directions: self.directions_at_card(link, path),
             cards: vec![path],
             links: vec![link],
             nodes: Vec::new(),
@@ -292,28 +292,28 @@ impl Finder<'_> {
 
     /// The link at a card, and the line that leaves it.
     fn at_card(&self, link: usize, path: Path) -> Target {
-        let world = self.scene.world;
-        let leaves = self.lines_at_card(link, path).pop();
+        let world = self.context.world;
+        let leaves = self.directions_at_card(link, path).pop();
         let place = match (self.kind.place, leaves) {
-            (PlaceRule::Entrance, Some(line)) => world.line_place(line),
+            (PlaceRule::Entrance, Some(direction)) => world.direction_place(direction),
             (_, _) => world.link_place(link),
         };
-        let lines = leaves.into_iter().collect();
-        Target { places: vec![place], lines, links: vec![link], ..Target::default() }
+        let directions = leaves.into_iter().collect();
+        Target { places: vec![place], directions, links: vec![link], ..Target::default() }
     }
 
     /// The line that arrives at the card, then the one that leaves it.
-    fn lines_at_card(&self, link: usize, path: Path) -> Vec<Line> {
-        let card_is_upstream = self.scene.tree.links()[link].upstream == End::MainDevice(path);
+    fn directions_at_card(&self, link: usize, path: Path) -> Vec<DirectedLink> {
+        let card_is_upstream = self.context.tree.links()[link].upstream == End::MainDevice(path);
         vec![
-            Line { link, downstream: !card_is_upstream },
-            Line { link, downstream: card_is_upstream },
+            DirectedLink { link, downstream: !card_is_upstream },
+            DirectedLink { link, downstream: card_is_upstream },
         ]
     }
 
-    fn lines(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
+    fn directions(&self, entry: &FaultEntry) -> Result<Target, FaultError> {
         let given = entry.at.as_ref().map_or(&[][..], |at| at.as_slice());
-        let several = self.kind.place == PlaceRule::ManyLines;
+        let several = self.kind.place == PlaceRule::ManyDirections;
         if given.is_empty() {
             return Err(self.error("no place is given".to_owned()));
         }
@@ -326,20 +326,20 @@ impl Finder<'_> {
                 (Written::One(_), PlaceRule::Link | PlaceRule::RingLink) => {
                     return Err(self.error(format!("`{at}` is one direction")));
                 }
-                (Written::Both(_), PlaceRule::Line | PlaceRule::Entrance) => {
+                (Written::Both(_), PlaceRule::Direction | PlaceRule::Entrance) => {
                     return Err(self.error(format!("`{at}` is both directions")));
                 }
                 (Written::Card(path), _) => {
                     return Err(self.error(format!("nothing is plugged into card {path}")));
                 }
-                (Written::One(line), _) => {
-                    target.places.push(self.scene.world.line_place(line));
-                    target.lines.push(line);
-                    target.links.push(line.link);
+                (Written::One(direction), _) => {
+                    target.places.push(self.context.world.direction_place(direction));
+                    target.directions.push(direction);
+                    target.links.push(direction.link);
                 }
                 (Written::Both(link), _) => {
-                    target.places.push(self.scene.world.link_place(link));
-                    target.lines.extend(Line::both(link));
+                    target.places.push(self.context.world.link_place(link));
+                    target.directions.extend(DirectedLink::both(link));
                     target.links.push(link);
                 }
             }
@@ -356,8 +356,8 @@ impl Finder<'_> {
         for (from, to) in parts('>') {
             if let (Some(from), Some(to)) = (self.end(from), self.end(to)) {
                 let link = self.link_between(at, from, to)?;
-                let downstream = self.scene.tree.links()[link].upstream == from;
-                return Ok(Written::One(Line { link, downstream }));
+                let downstream = self.context.tree.links()[link].upstream == from;
+                return Ok(Written::One(DirectedLink { link, downstream }));
             }
         }
         for (one, other) in parts('-') {
@@ -371,7 +371,7 @@ impl Finder<'_> {
             {
                 Ok(Written::Card(path))
             }
-            Some(end) => match self.scene.tree.link_at(end) {
+            Some(end) => match self.context.tree.link_at(end) {
                 Some(link) => Ok(Written::Both(link)),
                 None => Err(self.error(format!("no link is plugged in at `{at}`"))),
             },
@@ -383,25 +383,25 @@ impl Finder<'_> {
         match text.parse().ok()? {
             Attachment::MainDevice(path) => Some(End::MainDevice(path)),
             Attachment::Device { name, port } => {
-                let id = self.scene.names.iter().position(|known| *known == name)?;
-                let node = self.scene.nodes.get(&DeviceId(id as u32))?;
+                let id = self.context.names.iter().position(|known| *known == name)?;
+                let node = self.context.nodes.get(&DeviceId(id as u32))?;
                 Some(End::Controller(*node, port))
             }
         }
     }
 
     fn link_between(&self, at: &str, from: End, to: End) -> Result<usize, FaultError> {
-        let link = self.scene.tree.link_at(from);
-        let link = link.filter(|_| self.scene.tree.opposite(from) == Some(to));
+        let link = self.context.tree.link_at(from);
+        let link = link.filter(|_| self.context.tree.opposite(from) == Some(to));
         link.ok_or_else(|| {
             let name = |end: End| match end {
                 End::MainDevice(path) => Attachment::MainDevice(path).to_string(),
                 End::Controller(node, port) => {
-                    let id = self.scene.world.id(node).index();
-                    format!("{}.{port}", self.scene.names[id])
+                    let id = self.context.world.id(node).index();
+                    format!("{}.{port}", self.context.names[id])
                 }
             };
-            let opposite = self.scene.tree.opposite(from);
+            let opposite = self.context.tree.opposite(from);
             let is = opposite.map_or("nothing".to_owned(), name);
             self.error(format!("`{at}` is no link: {} is wired to {is}", name(from)))
         })
@@ -411,7 +411,7 @@ impl Finder<'_> {
         let name = at.rsplit_once('.').map_or(at, |(name, _)| name);
         let first = name.split(['>', '-']).next().unwrap_or(name);
         let first = first.rsplit_once('.').map_or(first, |(name, _)| name);
-        if self.scene.names.iter().any(|known| known == first) {
+        if self.context.names.iter().any(|known| known == first) {
             format!("`{at}` is no place")
         } else {
             self.no_device(first)

@@ -10,7 +10,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::port::Port;
 
 use super::error::FaultError;
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape, parameter};
 use crate::segment_file::FaultEntry;
 
@@ -25,12 +25,12 @@ pub(super) const KIND: Kind = Kind {
         meaning: "The port that the incoming cable is plugged into; the one that leads on by cable unless said.",
         shape: Shape::Word { words: OUT_PORTS },
     }],
-    start: |_| Ok(Listed::boxed([])),
+    start: |_| Ok(ListedChanges::boxed([])),
 };
 
 /// A device that is entered by another port than planned.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Turned {
+pub(crate) struct SwappedPorts {
     /// The device; `None` for the first of the line.
     pub(crate) device: Option<String>,
     /// The port it is entered by, if that was said.
@@ -40,7 +40,10 @@ pub(crate) struct Turned {
 }
 
 /// What an entry turns round; `None` for entries of another kind.
-pub(crate) fn turned(label: &str, entry: &FaultEntry) -> Result<Option<Turned>, FaultError> {
+pub(crate) fn swapped_ports(
+    label: &str,
+    entry: &FaultEntry,
+) -> Result<Option<SwappedPorts>, FaultError> {
     let kinds = [&KIND, &super::maindevice_wrong_port::KIND];
     let Some(kind) = kinds.into_iter().find(|kind| kind.name.name() == entry.kind) else {
         return Ok(None);
@@ -48,5 +51,5 @@ pub(crate) fn turned(label: &str, entry: &FaultEntry) -> Result<Option<Turned>, 
     let values = parameter::read(label, kind, &entry.parameters)?;
     let port = values.text("port").filter(|text| *text != OUT_PORTS[0]);
     let port = port.and_then(|text| Port::from_letter(text.chars().next()?));
-    Ok(Some(Turned { device: entry.device.clone(), port, kind: kind.name }))
+    Ok(Some(SwappedPorts { device: entry.device.clone(), port, kind: kind.name }))
 }

@@ -11,10 +11,10 @@ use super::{Kind, PlaceRule};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::ReceiverDamaged,
-    place: PlaceRule::Line,
+    place: PlaceRule::Direction,
     parameters: PORT_CIRCUIT,
     start: |start| {
-        let lines = start.target.lines.clone();
-        Ok(steady(&start, lines))
+        let directions = start.target.directions.clone();
+        Ok(steady(&start, directions))
     },
 };

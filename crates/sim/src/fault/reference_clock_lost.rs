@@ -7,7 +7,7 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::controller::LocalClock;
 use crate::wire::{Change, TimingChange};
@@ -29,6 +29,6 @@ pub(super) const KIND: Kind = Kind {
         let from = start.from;
         // Of a device with several controllers it is the first.
         let node = start.target.nodes.into_iter().take(1);
-        Ok(Listed::boxed(node.map(|node| (from, Change::Timing { node, change }))))
+        Ok(ListedChanges::boxed(node.map(|node| (from, Change::Timing { node, change }))))
     },
 };

@@ -6,7 +6,7 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, PlaceRule};
 use crate::wire::Change;
 
@@ -16,6 +16,8 @@ pub(super) const KIND: Kind = Kind {
     parameters: &[],
     start: |start| {
         let from = start.from;
-        Ok(Listed::boxed(start.target.links.into_iter().map(|link| (from, Change::Open { link }))))
+        Ok(ListedChanges::boxed(
+            start.target.links.into_iter().map(|link| (from, Change::Open { link })),
+        ))
     },
 };

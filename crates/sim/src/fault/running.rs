@@ -2,7 +2,7 @@
 
 use linesman_proto::time::Instant;
 
-use super::Plot;
+use super::FaultTemplate;
 use super::schedule::{Window, Windows};
 use crate::truth::FaultId;
 use crate::wire::{Change, Source};
@@ -12,7 +12,7 @@ use crate::wire::{Change, Source};
 pub(crate) struct Running {
     pub(crate) id: FaultId,
     /// What the windows behind the first are made from.
-    plot: Option<Plot>,
+    template: Option<FaultTemplate>,
     windows: Windows,
     present: Window,
     /// How many windows there were before the present one.
@@ -42,14 +42,14 @@ impl Running {
     /// A fault whose first window's changes come from `source`.
     pub(crate) fn new(
         id: FaultId,
-        plot: Option<Plot>,
+        template: Option<FaultTemplate>,
         mut windows: Windows,
         mut source: Box<dyn Source>,
     ) -> Self {
         let first = windows.first();
         let present = windows.next().unwrap_or(first);
         let next = source.next_change();
-        Self { id, plot, windows, present, nth: 0, source, begun: false, healed_at: None, next }
+        Self { id, template, windows, present, nth: 0, source, begun: false, healed_at: None, next }
     }
 
     /// Heals it at an instant, unless it ends before.
@@ -75,9 +75,9 @@ impl Running {
     }
 
     /// When it sends a frame of its own next, as far as is known.
-    pub(crate) fn next_stranger(&self) -> Option<Instant> {
+    pub(crate) fn next_foreign_frame(&self) -> Option<Instant> {
         match self.next {
-            Some((at, Change::Stranger { .. })) if at < self.end() => Some(at),
+            Some((at, Change::ForeignSender { .. })) if at < self.end() => Some(at),
             Some(_) | None => None,
         }
     }
@@ -105,7 +105,8 @@ impl Running {
     fn come_again(&mut self) -> bool {
         let Some(window) = self.windows.next() else { return false };
         self.nth += 1;
-        let source = self.plot.as_ref().and_then(|plot| plot.source(self.nth, window).ok());
+        let source =
+            self.template.as_ref().and_then(|template| template.source(self.nth, window).ok());
         let Some(source) = source else { return false };
         (self.present, self.source, self.begun) = (window, source, false);
         self.next = self.source.next_change();

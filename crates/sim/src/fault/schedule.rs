@@ -1,4 +1,4 @@
-//! When a fault comes and goes: its windows of time, one after the other.
+//! Schedule of a fault: its windows of time, one after the other.
 
 use linesman_proto::time::{Instant, Span};
 

@@ -10,7 +10,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
 use super::{Kind, Parameter, PlaceRule, Shape};
-use crate::wire::{Change, Line, Source, Stranger};
+use crate::wire::{Change, DirectedLink, ForeignSender, Source};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::SecondMainDevice,
@@ -29,31 +29,31 @@ pub(super) const KIND: Kind = Kind {
     ],
     start: |start| {
         let does = match start.values.text("does") {
-            Some("init") => |nth| Stranger::State { control: 0x01, nth },
-            Some("preop") => |nth| Stranger::State { control: 0x02, nth },
-            Some("clear-counters") => |nth| Stranger::ClearCounters { nth },
-            Some(_) | None => |nth| Stranger::Scan { nth },
+            Some("init") => |nth| ForeignSender::State { control: 0x01, nth },
+            Some("preop") => |nth| ForeignSender::State { control: 0x02, nth },
+            Some("clear-counters") => |nth| ForeignSender::ClearCounters { nth },
+            Some(_) | None => |nth| ForeignSender::Scan { nth },
         };
         let every = Span::ns((1e9 / start.number("frames_per_s").max(0.01)) as u64);
-        let line = start.target.lines.first().copied();
-        Ok(Box::new(Second { line, does, every, from: start.from, nth: 0 }))
+        let direction = start.target.directions.first().copied();
+        Ok(Box::new(SecondMainDevice { direction, does, every, from: start.from, nth: 0 }))
     },
 };
 
 #[derive(Debug)]
-struct Second {
-    line: Option<Line>,
-    does: fn(u32) -> Stranger,
+struct SecondMainDevice {
+    direction: Option<DirectedLink>,
+    does: fn(u32) -> ForeignSender,
     every: Span,
     from: Instant,
     nth: u32,
 }
 
-impl Source for Second {
+impl Source for SecondMainDevice {
     fn next_change(&mut self) -> Option<(Instant, Change)> {
-        let (line, nth) = (self.line?, self.nth);
+        let (direction, nth) = (self.direction?, self.nth);
         self.nth = self.nth.wrapping_add(1);
         let at = self.from + self.every * u64::from(nth);
-        Some((at, Change::Stranger { line, what: (self.does)(nth) }))
+        Some((at, Change::ForeignSender { direction, what: (self.does)(nth) }))
     }
 }

@@ -6,7 +6,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Parameter, Shape, Start};
 use crate::seed::Stream;
-use crate::wire::{Change, Line, Source};
+use crate::wire::{Change, DirectedLink, Source};
 
 /// For kinds that destroy symbols: an exact number of spoiled frames instead of a rate.
 pub(super) const HITS: Parameter = Parameter {
@@ -27,26 +27,26 @@ pub(super) const PORT_CIRCUIT: &[Parameter] = &[
 
 /// Damage that always acts, whatever is moved or switched: `hits` spoiled frames if so many were
 /// asked for, else `hits_per_s` destroyed symbols.
-pub(super) fn steady(start: &Start<'_>, lines: Vec<Line>) -> Box<dyn Source> {
+pub(super) fn steady(start: &Start<'_>, directions: Vec<DirectedLink>) -> Box<dyn Source> {
     let mut stream = start.stream.clone();
     if let Some(count) = start.values.whole(HITS.key) {
-        return frame_hits(count, start.interval(), &lines, &mut stream);
+        return frame_hits(count, start.interval(), &directions, &mut stream);
     }
     let rate = start.number("hits_per_s");
-    Box::new(Shower::new(lines, rate, Envelope::Constant, start.from, stream))
+    Box::new(PoissonErrors::new(directions, rate, Envelope::Constant, start.from, stream))
 }
 
 /// A few changes that are known from the start.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Listed(pub(super) VecDeque<(Instant, Change)>);
+pub(super) struct ListedChanges(pub(super) VecDeque<(Instant, Change)>);
 
-impl Listed {
+impl ListedChanges {
     pub(super) fn boxed(changes: impl IntoIterator<Item = (Instant, Change)>) -> Box<dyn Source> {
         Box::new(Self(changes.into_iter().collect()))
     }
 }
 
-impl Source for Listed {
+impl Source for ListedChanges {
     fn next_change(&mut self) -> Option<(Instant, Change)> {
         self.0.pop_front()
     }
@@ -89,8 +89,8 @@ impl Envelope {
 
 /// Symbol errors that come by chance, on each of some lines for itself.
 #[derive(Clone, Debug)]
-pub(super) struct Shower {
-    lines: Vec<Line>,
+pub(super) struct PoissonErrors {
+    directions: Vec<DirectedLink>,
     /// Mean rate of all lines together.
     rate_per_s: f64,
     envelope: Envelope,
@@ -99,21 +99,21 @@ pub(super) struct Shower {
     stream: Stream,
 }
 
-impl Shower {
+impl PoissonErrors {
     /// `rate_per_s` is the mean of each line.
     pub(super) fn new(
-        lines: Vec<Line>,
+        directions: Vec<DirectedLink>,
         rate_per_s: f64,
         envelope: Envelope,
         from: Instant,
         stream: Stream,
     ) -> Self {
-        let rate_per_s = rate_per_s * lines.len() as f64;
-        Self { lines, rate_per_s, envelope, from, at: from, stream }
+        let rate_per_s = rate_per_s * directions.len() as f64;
+        Self { directions, rate_per_s, envelope, from, at: from, stream }
     }
 }
 
-impl Source for Shower {
+impl Source for PoissonErrors {
     fn next_change(&mut self) -> Option<(Instant, Change)> {
         let peak = self.rate_per_s * self.envelope.peak();
         if peak <= 0.0 {
@@ -126,10 +126,10 @@ impl Source for Shower {
                 return None;
             }
             let kept = self.stream.chance(self.envelope.share(self.at.since(self.from)));
-            let line = *self.stream.pick(&self.lines)?;
+            let direction = *self.stream.pick(&self.directions)?;
             let flip = flip(&mut self.stream);
             if kept {
-                return Some((self.at, Change::Hit { line, flip }));
+                return Some((self.at, Change::Hit { direction, flip }));
             }
         }
     }
@@ -160,18 +160,18 @@ pub(super) fn spread(
 pub(super) fn frame_hits(
     count: u32,
     interval: (Instant, Instant),
-    lines: &[Line],
+    directions: &[DirectedLink],
     stream: &mut Stream,
 ) -> Box<dyn Source> {
     let instants = spread(count, interval, stream);
     let hits = instants.into_iter().filter_map(|at| {
-        let line = *stream.pick(lines)?;
-        Some((at, frame_hit(line, stream)))
+        let direction = *stream.pick(directions)?;
+        Some((at, frame_hit(direction, stream)))
     });
-    Listed::boxed(hits.collect::<Vec<_>>())
+    ListedChanges::boxed(hits.collect::<Vec<_>>())
 }
 
 /// A hit in the frame that passes a line next.
-pub(super) fn frame_hit(line: Line, stream: &mut Stream) -> Change {
-    Change::FrameHit { line, part: part(stream), flip: flip(stream) }
+pub(super) fn frame_hit(direction: DirectedLink, stream: &mut Stream) -> Change {
+    Change::FrameHit { direction, part: part(stream), flip: flip(stream) }
 }

@@ -4,7 +4,7 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::wire::Change;
 
@@ -25,6 +25,6 @@ pub(super) const KIND: Kind = Kind {
             .map(|node| (from + Span::ns(stream.below(spread + 1)), Change::Off { node }))
             .collect();
         changes.sort_by_key(|(at, _)| *at);
-        Ok(Listed::boxed(changes))
+        Ok(ListedChanges::boxed(changes))
     },
 };

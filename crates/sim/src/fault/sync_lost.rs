@@ -8,7 +8,7 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::wire::{Change, TimingChange};
 
@@ -27,6 +27,6 @@ pub(super) const KIND: Kind = Kind {
             Some("bounces") => TimingChange::BounceSync,
             _ => TimingChange::CutSync,
         };
-        Ok(Listed::boxed(nodes.map(move |node| (from, Change::Timing { node, change }))))
+        Ok(ListedChanges::boxed(nodes.map(move |node| (from, Change::Timing { node, change }))))
     },
 };

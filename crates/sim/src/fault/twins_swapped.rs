@@ -4,12 +4,12 @@
 
 use linesman_config::fault::FaultName;
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, PlaceRule};
 
 pub(super) const KIND: Kind = Kind {
     name: FaultName::TwinsSwapped,
     place: PlaceRule::Pair,
     parameters: &[],
-    start: |_| Ok(Listed::boxed([])),
+    start: |_| Ok(ListedChanges::boxed([])),
 };

@@ -11,7 +11,7 @@ use linesman_proto::address::Path;
 use linesman_proto::register::WatchdogTime;
 use linesman_proto::time::{Instant, Span};
 
-use super::source::Listed;
+use super::source::ListedChanges;
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::truth::Place;
 use crate::wire::{Change, Source};
@@ -48,7 +48,7 @@ pub(super) const KIND: Kind = Kind {
         let time = Some(WatchdogTime(ticks));
         let from = start.from;
         let nodes = start.target.nodes.into_iter();
-        Ok(Listed::boxed(nodes.map(|node| (from, Change::Watchdog { node, time }))))
+        Ok(ListedChanges::boxed(nodes.map(|node| (from, Change::Watchdog { node, time }))))
     },
 };
 

@@ -1,4 +1,4 @@
-//! From a file to a segment.
+//! Construction of a segment from its file.
 
 use std::collections::BTreeSet;
 
@@ -11,8 +11,8 @@ use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
 
-use super::turn::turn;
-use super::{DeviceInfo, Segment, exchange, identification, signal_wires};
+use super::port_swap::swap_ports;
+use super::{DeviceInfo, Segment, build_deviations, identification, signal_wires};
 use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
@@ -96,7 +96,7 @@ pub(super) struct Placed {
 
 pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
     file.check()?;
-    let file = &exchange::with_extras(file)?;
+    let file = &build_deviations::with_extras(file)?;
     let planned = segment_file::expand(file)?;
     let names: Vec<String> = planned.iter().map(|controller| controller.name.clone()).collect();
     let ids = (0u32..).map(DeviceId);
@@ -109,15 +109,15 @@ pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
         if let Some(replacement) = fault::replacement(&label, entry)? {
             replace(&label, file, &mut placed, &replacement)?;
         }
-        exchange::swap(&label, &mut placed, entry)?;
+        build_deviations::swap(&label, &mut placed, entry)?;
         if let Some((alias, devices)) = fault::duplicate_alias(&label, entry)? {
-            exchange::share_alias(&mut placed, alias, &devices);
+            build_deviations::share_alias(&mut placed, alias, &devices);
         }
         if let Some(device) = fault::missing_device(entry) {
             remove(&mut placed, device, &mut ring);
         }
-        if let Some(turned) = fault::turned(&label, entry)? {
-            turn(&label, &mut placed, &turned, &mut ring)?;
+        if let Some(swapped_ports) = fault::swapped_ports(&label, entry)? {
+            swap_ports(&label, &mut placed, &swapped_ports, &mut ring)?;
         }
     }
     assemble(file, placed, ring, names)
@@ -176,7 +176,7 @@ fn assemble(
         made.push(controller);
         devices.push(DeviceInfo { outputs, inputs });
     }
-    exchange::move_wiring(&placed, &mut devices);
+    build_deviations::move_wiring(&placed, &mut devices);
     signal_wires::lay(file, &names, &placed, &devices, &mut signals)?;
     let cable_m: Vec<f64> = tree
         .links()
@@ -206,7 +206,7 @@ fn assemble(
         supplies: file.supplies.clone(),
         ebus_ma: placed.iter().map(current).collect(),
         fed_anew: placed.iter().map(|one| one.planned.fed_anew).collect(),
-        groups: exchange::groups(file, &placed),
+        groups: build_deviations::groups(file, &placed),
         seed,
         ..Segment::of_world(&file.name, tree, world, devices, names)
     };
@@ -245,7 +245,7 @@ fn schedule(
         Effect::SwappedDevice
     } else if let Some((address, _)) = fault::duplicate_alias(label, entry)? {
         Effect::SharedAddress { address }
-    } else if fault::turned(label, entry)?.is_some() {
+    } else if fault::swapped_ports(label, entry)?.is_some() {
         Effect::WrongPort
     } else {
         return Ok(());

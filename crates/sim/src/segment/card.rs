@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use linesman_proto::time::{Instant, Span};
 
-use super::late::Lateness;
+use super::tx_delay::TxDelay;
 use crate::truth::FaultId;
 
 /// What a card's driver tells: carrier and counters since the start of the run.
@@ -61,7 +61,7 @@ pub(crate) struct Card {
     /// When it sends nothing, and whose doing that is.
     silent: Vec<(Instant, Instant, FaultId)>,
     /// How late its frames leave.
-    pub(super) lateness: Lateness,
+    pub(super) tx_delay: TxDelay,
     /// Changes of the carrier that are known, in the order of time.
     carrier: Vec<(Instant, bool)>,
     /// The carrier that the kernel has told of by itself, and when.
@@ -80,7 +80,7 @@ impl Default for Card {
             link_up: Span::ms(1_600),
             counts: HostPort::default(),
             silent: Vec::new(),
-            lateness: Lateness::default(),
+            tx_delay: TxDelay::default(),
             carrier: Vec::new(),
             told: (false, Instant::ZERO),
             drops: VecDeque::new(),
@@ -129,13 +129,13 @@ impl Card {
     }
 
     /// From one instant to another it sends nothing.
-    pub(crate) fn hush(&mut self, from: Instant, until: Instant, fault: FaultId) {
+    pub(crate) fn mute(&mut self, from: Instant, until: Instant, fault: FaultId) {
         self.silent.retain(|(_, end, _)| *end > from);
         self.silent.push((from, until, fault));
     }
 
     /// A fault is over: it sends again.
-    pub(crate) fn speak(&mut self, at: Instant, fault: FaultId) {
+    pub(crate) fn unmute(&mut self, at: Instant, fault: FaultId) {
         for (_, until, by) in &mut self.silent {
             if *by == fault {
                 *until = at.min(*until);

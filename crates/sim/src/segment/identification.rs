@@ -12,35 +12,35 @@ use crate::device::Signals;
 use crate::device::library::Built;
 
 /// What is still to be done once there is a controller.
-pub(super) struct Rest(Option<(RegisterAddress, u16)>);
+pub(super) struct PendingNumber(Option<(RegisterAddress, u16)>);
 
 /// Sets the number of a device that is built. A device that answers through AL control answers 0 when
 /// no number is given.
-pub(super) fn set(built: &mut Built, id: Option<u16>, signals: &mut Signals) -> Rest {
+pub(super) fn set(built: &mut Built, id: Option<u16>, signals: &mut Signals) -> PendingNumber {
     if id.is_none() && !built.firmware.has_processor() {
-        return Rest(None);
+        return PendingNumber(None);
     }
     let way = Image::parse(&built.sii)
         .ok()
         .and_then(|image| image.general().map(General::identification))
         .unwrap_or(Identification::None);
     if way == Identification::AlStatus && built.firmware.identify(id.unwrap_or(0), signals) {
-        return Rest(None);
+        return PendingNumber(None);
     }
-    let Some(id) = id else { return Rest(None) };
+    let Some(id) = id else { return PendingNumber(None) };
     match way {
         Identification::Memory(at) => {
             let taken = built.firmware.identify(id, signals);
-            Rest((!taken).then_some((at, id)))
+            PendingNumber((!taken).then_some((at, id)))
         }
         Identification::AlStatus | Identification::None => {
             set_alias(&mut built.sii, id);
-            Rest(None)
+            PendingNumber(None)
         }
     }
 }
 
-impl Rest {
+impl PendingNumber {
     /// Does it.
     pub(super) fn finish(self, controller: &mut Controller) {
         if let Some((at, id)) = self.0 {

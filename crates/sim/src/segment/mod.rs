@@ -6,15 +6,15 @@
 
 mod arrivals;
 mod build;
+mod build_deviations;
 pub(crate) mod card;
-mod exchange;
+mod from_controllers;
 mod identification;
-mod late;
 pub mod plug;
-mod ready;
-mod shown;
+mod port_swap;
 mod signal_wires;
-mod turn;
+mod tx_capture;
+mod tx_delay;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,7 +27,7 @@ use linesman_proto::topology::Tree;
 pub use build::BuildError;
 pub use card::{FrameTally, HostPort};
 pub use plug::PlugError;
-pub use shown::Outgoing;
+pub use tx_capture::Outgoing;
 
 use self::arrivals::Arrivals;
 use crate::controller::{Controller, WatchdogKind};
@@ -37,7 +37,7 @@ use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
 use crate::segment_file::{FaultEntry, SegmentFile, Supply};
 use crate::truth::{self, AuditedCounter, Effect, FaultId, Place, TruthLog, Unexplained};
-use crate::wire::walk::{Outcome, Traveller};
+use crate::wire::walk::{FrameInTransit, Outcome};
 use crate::wire::world::World;
 
 /// Buffers kept for frames to come.
@@ -80,13 +80,13 @@ pub struct Segment {
     arrivals: Arrivals,
     /// Nodes whose cable was pulled, and the open link that this is.
     unplugged: BTreeMap<usize, FaultId>,
-    /// Numbers of frames among them that strangers sent.
+    /// Numbers of frames among them that foreign senders sent.
     strange: BTreeSet<u64>,
     spare: Vec<Vec<u8>>,
     /// Frames that leave later.
-    waiting: late::Waiting,
+    waiting: tx_delay::DelayedFrames,
     /// Frames that go out, for who listens.
-    shown: shown::Shown,
+    tx_capture: tx_capture::TxCapture,
     tally: FrameTally,
 }
 
@@ -121,7 +121,7 @@ impl Segment {
     }
 
     /// A frame leaves its card, which may have been shown to who listens before.
-    fn send(&mut self, now: Instant, path: Path, frame: &[u8], was_shown: bool) {
+    fn send(&mut self, now: Instant, path: Path, frame: &[u8], was_captured: bool) {
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
         bytes.extend_from_slice(frame);
@@ -132,9 +132,9 @@ impl Segment {
         let duration = frame.duration();
         self.world.look_ahead(now, duration);
         self.world.advance(now);
-        self.fetch_strangers();
-        if !was_shown && frame.bytes.len() <= MAX_LEN {
-            self.show(now, path, given);
+        self.fetch_foreign_frames();
+        if !was_captured && frame.bytes.len() <= MAX_LEN {
+            self.capture(now, path, given);
         }
         let card = &mut self.world.cards[path.index()];
         if frame.bytes.len() > MAX_LEN || !card.has_carrier(now) {
@@ -152,33 +152,33 @@ impl Segment {
         card.counts.tx_frames += 1;
         self.tally.sent += 1;
         // Another's frame may be on the line.
-        let leaves = self.world.behind_strangers(path, now);
+        let leaves = self.world.behind_foreign_frames(path, now);
         if leaves > now {
             self.world.look_ahead(leaves, duration);
         }
         let card = &mut self.world.cards[path.index()];
         card.sent_until = leaves + duration;
-        card.lateness.sends(leaves, duration);
-        let mut traveller = Traveller::new(frame);
-        match self.world.carry(path, leaves, &mut traveller) {
-            Outcome::Arrived(path, at) => self.arrivals.push(at, path, traveller.frame),
+        card.tx_delay.sends(leaves, duration);
+        let mut in_transit = FrameInTransit::new(frame);
+        match self.world.carry(path, leaves, &mut in_transit) {
+            Outcome::Arrived(path, at) => self.arrivals.push(at, path, in_transit.frame),
             Outcome::Vanished => {
                 self.tally.vanished += 1;
-                self.recycle(traveller.frame.bytes);
+                self.recycle(in_transit.frame.bytes);
             }
         }
     }
 
-    /// Frames of strangers arrive as all others do.
+    /// Frames of foreign senders arrive as all others do.
     #[inline]
-    fn fetch_strangers(&mut self) {
-        if self.world.strangers_came_back() {
-            self.take_strangers();
+    fn fetch_foreign_frames(&mut self) {
+        if self.world.foreign_frames_came_back() {
+            self.take_foreign_frames();
         }
     }
 
-    fn take_strangers(&mut self) {
-        for (at, path, frame) in self.world.take_strangers() {
+    fn take_foreign_frames(&mut self) {
+        for (at, path, frame) in self.world.take_foreign_frames() {
             self.strange.insert(frame.number);
             self.arrivals.push(at, path, frame);
         }
@@ -233,11 +233,11 @@ impl Segment {
     }
 
     /// When the next frame arrives, of those on their way, when one leaves a card that is late, or
-    /// when a stranger sends one. What else happens in the segment needs no call at its time: it is
+    /// when a foreign sender sends one. What else happens in the segment needs no call at its time: it is
     /// made up for, in its order, by the next one.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let due = [self.arrivals.next_at(), self.next_leaves(), self.world.next_stranger()];
+        let due = [self.arrivals.next_at(), self.next_leaves(), self.world.next_foreign_frame()];
         due.into_iter().flatten().min()
     }
 
@@ -246,7 +246,7 @@ impl Segment {
         self.now = self.now.max(now);
         self.send_kept_back(self.now);
         self.world.advance(self.now);
-        self.fetch_strangers();
+        self.fetch_foreign_frames();
         for card in &mut self.world.cards {
             card.settle(self.now);
         }
@@ -256,13 +256,13 @@ impl Segment {
     /// as is usual. Nothing that can be seen depends on it but the time it takes: this is for those
     /// who want to see that.
     pub fn set_walks_always(&mut self, always: bool) {
-        self.world.direct.forbidden = always;
+        self.world.fast_path.forbidden = always;
     }
 
     /// How many frames needed no walk so far.
     #[must_use]
     pub fn frames_without_walk(&self) -> u64 {
-        self.world.direct.frames
+        self.world.fast_path.frames
     }
 
     // ---- faults ----
@@ -288,7 +288,7 @@ impl Segment {
         entry: &FaultEntry,
         earliest: Instant,
     ) -> Result<FaultId, FaultError> {
-        let scene = fault::Scene {
+        let context = fault::FaultContext {
             names: &self.names,
             nodes: &self.nodes,
             tree: &self.tree,
@@ -300,7 +300,7 @@ impl Segment {
         };
         let number = self.world.truth.faults().len();
         let stream = format!("fault {number} {}", entry.kind);
-        let planned = fault::plan(label, entry, &scene, earliest, self.seed, &stream)?;
+        let planned = fault::plan(label, entry, &context, earliest, self.seed, &stream)?;
         let id = self.world.truth.declare(planned.name, planned.places.clone());
         self.world.running.push(planned.run(id));
         Ok(id)
@@ -429,7 +429,7 @@ impl Segment {
     pub fn audit(&mut self) -> Vec<Unexplained> {
         self.world.enter_expiries();
         let nodes = self.world.nodes.iter();
-        let shown = nodes.flat_map(|node| {
+        let tx_capture = nodes.flat_map(|node| {
             let id = node.controller.id();
             let counters = node.controller.error_counters();
             let counters: Vec<_> = counters.iter().collect();
@@ -445,7 +445,7 @@ impl Segment {
             });
             errors.chain(watchdogs).map(move |(counter, value)| (id, counter, value))
         });
-        self.world.truth.audit(shown)
+        self.world.truth.audit(tx_capture)
     }
 
     /// Gives a counter a value, as history does. Nothing for a device that is not there.

@@ -1,4 +1,4 @@
-//! How the clock of a device misbehaves, beside being too fast or too slow.
+//! Misbehaviour of a device's clock, beside being too fast or too slow.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
-//! From devices to controllers: most devices have one, a large junction has three; a device that is
-//! repeated is there many times.
+//! Expansion of devices to controllers: most devices have one, a large junction has three; a device
+//! that is repeated is there many times.
 
 use std::collections::BTreeMap;
 

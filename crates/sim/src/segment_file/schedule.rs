@@ -1,4 +1,4 @@
-//! How often a fault comes, as a file says it.
+//! Schedule of a fault as a file writes it.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! Where a device keeps its SII: key `sii` of a device.
+//! Storage of a device's SII: key `sii` of a device.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! From a segment to its file.
+//! Writing the file of a segment.
 
 use std::fmt::Write as _;
 

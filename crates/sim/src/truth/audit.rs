@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_without_an_entry_is_found() {
+    fn counter_that_moves_without_an_entry_is_found() {
         let mut log = TruthLog::default();
         assert_eq!(audit(&mut log, 0), []);
         log.may_move(DEVICE, COUNTER, Cause::Fault(FaultId(0)));

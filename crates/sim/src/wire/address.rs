@@ -1,9 +1,9 @@
-//! Addresses that a controller was given by somebody else than the MainDevice.
+//! Station addresses that somebody else than the MainDevice gave to a controller.
 
 use linesman_proto::address::StationAddress;
 use linesman_proto::time::Instant;
 
-use super::node::Act;
+use super::node::NodeAction;
 use super::world::World;
 use crate::truth::{Effect, FaultId, Place};
 
@@ -12,7 +12,7 @@ impl World {
     pub(super) fn readdress(&mut self, at: Instant, fault: FaultId, node: usize, like: usize) {
         let StationAddress(address) = self.nodes[like].controller.station_address();
         self.nodes[node].address_by = Some(fault);
-        self.nodes[node].act_at(at, Act::Address(Some(StationAddress(address))));
+        self.nodes[node].act_at(at, NodeAction::Address(Some(StationAddress(address))));
         for one in [like, node] {
             let place = Place::Device(self.id(one));
             self.truth.effect(at, Some(fault), place, Effect::SharedAddress { address });
@@ -24,7 +24,7 @@ impl World {
     pub(super) fn release_addresses(&mut self, at: Instant, fault: FaultId) {
         for node in self.nodes.iter_mut().filter(|node| node.address_by == Some(fault)) {
             node.address_by = None;
-            node.act_at(at, Act::Address(None));
+            node.act_at(at, NodeAction::Address(None));
         }
     }
 }

@@ -6,9 +6,9 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::End;
 
-use super::change::{Change, Line};
-use super::link::{Ambush, Hit};
-use super::node::{Act, Glitch};
+use super::change::{Change, DirectedLink};
+use super::link::{ArmedFrameError, Hit};
+use super::node::{Glitch, NodeAction};
 use super::world::World;
 use crate::controller::{CountKind, PortEvent};
 use crate::device::Refusal;
@@ -17,11 +17,12 @@ use crate::truth::{Cause, Effect, FaultId, Place};
 impl World {
     pub(super) fn apply(&mut self, at: Instant, fault: FaultId, change: Change) {
         match change {
-            Change::Hit { line, flip } => self.hit(at, fault, line, flip),
-            Change::FrameHit { line, part, flip } => {
-                let ambush = Ambush { from: at, part, flip, fault };
-                self.links[line.link].noise[usize::from(line.downstream)].push_ambush(ambush);
-                self.is_noisy(line.link);
+            Change::Hit { direction, flip } => self.hit(at, fault, direction, flip),
+            Change::FrameHit { direction, part, flip } => {
+                let frame_error = ArmedFrameError { from: at, part, flip, fault };
+                self.links[direction.link].noise[usize::from(direction.downstream)]
+                    .arm_frame_error(frame_error);
+                self.is_noisy(direction.link);
             }
             Change::Open { link } => {
                 self.way_changes(at);
@@ -38,28 +39,34 @@ impl World {
                     self.signal_changed(link, at);
                 }
             }
-            Change::Break { line } => {
+            Change::Break { direction } => {
                 self.way_changes(at);
-                self.links[line.link].pair[usize::from(line.downstream)].break_at(at, fault);
-                self.signal_changed(line.link, at);
+                self.links[direction.link].pair[usize::from(direction.downstream)]
+                    .break_at(at, fault);
+                self.signal_changed(direction.link, at);
             }
-            Change::Mend { line } => {
+            Change::Mend { direction } => {
                 self.way_changes(at);
-                self.links[line.link].pair[usize::from(line.downstream)].mend_at(at, fault);
-                self.signal_changed(line.link, at);
+                self.links[direction.link].pair[usize::from(direction.downstream)]
+                    .mend_at(at, fault);
+                self.signal_changed(direction.link, at);
             }
-            Change::Swallow { line } => {
+            Change::Swallow { direction } => {
                 self.way_changes(at);
-                self.links[line.link].passage[usize::from(line.downstream)].break_at(at, fault);
+                self.links[direction.link].passage[usize::from(direction.downstream)]
+                    .break_at(at, fault);
             }
-            Change::Carry { line } => {
+            Change::Carry { direction } => {
                 self.way_changes(at);
-                self.links[line.link].passage[usize::from(line.downstream)].mend_at(at, fault);
+                self.links[direction.link].passage[usize::from(direction.downstream)]
+                    .mend_at(at, fault);
             }
             Change::Early { link, blind } => {
                 self.links[link].early = blind.map(|blind| (blind, fault));
             }
-            Change::Stranger { line, what } => self.strangers.push(at, fault, line, what),
+            Change::ForeignSender { direction, what } => {
+                self.foreign_senders.push(at, fault, direction, what)
+            }
             Change::Delay { card, by } => self.cards[card.index()].delay_next(at, by, fault),
             Change::Drop { card } => self.cards[card.index()].drop_next(at, fault),
             Change::Off { node } => {
@@ -69,7 +76,7 @@ impl World {
                 let place = Place::Device(self.id(node));
                 self.truth.effect(at, Some(fault), place, Effect::PowerLost);
                 if was_on {
-                    self.nodes[node].act_at(at, Act::Off);
+                    self.nodes[node].act_at(at, NodeAction::Off);
                     self.supply_changed(node, at);
                 }
             }
@@ -79,7 +86,7 @@ impl World {
                 if self.nodes[node].power.is_whole() {
                     let place = Place::Device(self.id(node));
                     self.truth.effect(at, Some(fault), place, Effect::PowerBack);
-                    self.nodes[node].act_at(at, Act::On);
+                    self.nodes[node].act_at(at, NodeAction::On);
                     self.supply_changed(node, at);
                 }
             }
@@ -94,7 +101,7 @@ impl World {
             Change::Late { path, by } => self.make_late(at, fault, path, by),
             Change::Refuse { node, refusal } => {
                 self.nodes[node].refused_by = refusal.map(|_| fault);
-                self.nodes[node].act_at(at, Act::Refuse(refusal));
+                self.nodes[node].act_at(at, NodeAction::Refuse(refusal));
                 if let Some(Refusal { code, .. }) = refusal {
                     let place = Place::Device(self.id(node));
                     let effect = Effect::StateRefused { code: code.0 };
@@ -106,30 +113,30 @@ impl World {
 
     fn supply_changed(&mut self, node: usize, at: Instant) {
         let links = self.nodes[node].leaving.0;
-        for line in links.into_iter().flatten() {
-            self.signal_changed(line.link, at);
+        for direction in links.into_iter().flatten() {
+            self.signal_changed(direction.link, at);
         }
     }
 
     /// A symbol is destroyed. Without a signal there is none to destroy.
-    pub(super) fn hit(&mut self, at: Instant, fault: FaultId, line: Line, flip: u8) {
-        let link = &mut self.links[line.link];
-        if !link.receives[usize::from(line.downstream)] {
+    pub(super) fn hit(&mut self, at: Instant, fault: FaultId, direction: DirectedLink, flip: u8) {
+        let link = &mut self.links[direction.link];
+        if !link.receives[usize::from(direction.downstream)] {
             return;
         }
-        link.noise[usize::from(line.downstream)].push_hit(Hit { at, flip, fault });
-        self.is_noisy(line.link);
-        self.symbol_error(at, Cause::Fault(fault), line);
+        link.noise[usize::from(direction.downstream)].push_hit(Hit { at, flip, fault });
+        self.is_noisy(direction.link);
+        self.symbol_error(at, Cause::Fault(fault), direction);
     }
 
     /// The receiver of a line sees a symbol that it cannot decode.
-    pub(super) fn symbol_error(&mut self, at: Instant, cause: Cause, line: Line) {
-        self.truth.effect(at, cause.fault(), self.line_place(line), Effect::SymbolError);
-        let (_, to) = self.links[line.link].from_to(line.downstream);
+    pub(super) fn symbol_error(&mut self, at: Instant, cause: Cause, direction: DirectedLink) {
+        self.truth.effect(at, cause.fault(), self.direction_place(direction), Effect::SymbolError);
+        let (_, to) = self.links[direction.link].from_to(direction.downstream);
         if let End::Controller(node, port) = to {
             self.post(node, at, cause, PortEvent::Count { port, kind: CountKind::SymbolError });
             if self.nodes[node].controller.has_enhanced_link_detection(port) {
-                self.watch_symbols(at, cause, line);
+                self.watch_symbols(at, cause, direction);
             }
         }
     }

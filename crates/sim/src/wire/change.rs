@@ -1,4 +1,4 @@
-//! What can be done to the world, and who does it.
+//! Changes of the world, and the faults that make them.
 
 use std::fmt::Debug;
 
@@ -7,21 +7,21 @@ use linesman_proto::register::WatchdogTime;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::route::Direction;
 
+use super::foreign_sender::ForeignSender;
 use super::software::SoftwareChange;
-use super::stranger::Stranger;
 use super::timing::TimingChange;
 use crate::device::Refusal;
 
 /// One direction of a link: a line that symbols travel along.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub struct Line {
+pub struct DirectedLink {
     /// Index of the link.
     pub link: usize,
     /// Whether it carries away from card A.
     pub downstream: bool,
 }
 
-impl Line {
+impl DirectedLink {
     /// Both directions of a link, downstream first.
     #[must_use]
     pub const fn both(link: usize) -> [Self; 2] {
@@ -30,7 +30,7 @@ impl Line {
 
     /// Which way it carries.
     #[must_use]
-    pub const fn direction(self) -> Direction {
+    pub const fn route_direction(self) -> Direction {
         if self.downstream { Direction::Downstream } else { Direction::Upstream }
     }
 }
@@ -41,14 +41,14 @@ pub enum Change {
     /// A symbol is destroyed on a line. What that means depends on what is on it.
     Hit {
         /// Where.
-        line: Line,
+        direction: DirectedLink,
         /// What it does to the byte it falls into: never 0.
         flip: u8,
     },
     /// The next frame on a line is hit, somewhere inside.
     FrameHit {
         /// Where.
-        line: Line,
+        direction: DirectedLink,
         /// How far into the frame, in 1/65536 of its bytes.
         part: u16,
         /// What it does to the byte it falls into: never 0.
@@ -67,22 +67,22 @@ pub enum Change {
     /// One direction of a link breaks: a pair of wires or a fibre. Its receiver has no signal.
     Break {
         /// Which.
-        line: Line,
+        direction: DirectedLink,
     },
     /// It is whole again.
     Mend {
         /// Which.
-        line: Line,
+        direction: DirectedLink,
     },
     /// A line swallows every frame from now on, while both ends keep their link.
     Swallow {
         /// Which.
-        line: Line,
+        direction: DirectedLink,
     },
     /// It carries frames again.
     Carry {
         /// Which.
-        line: Line,
+        direction: DirectedLink,
     },
     /// A link shows up so long before it carries frames, or no longer does.
     Early {
@@ -91,12 +91,12 @@ pub enum Change {
         /// How long, each time it comes up.
         blind: Option<Span>,
     },
-    /// A stranger sends a frame along a line, as if through a switch at its begin.
-    Stranger {
+    /// A foreign sender puts a frame onto a link direction, as if through a switch at its begin.
+    ForeignSender {
         /// Which.
-        line: Line,
+        direction: DirectedLink,
         /// What it sends.
-        what: Stranger,
+        what: ForeignSender,
     },
     /// A card keeps the next frame back before it sends it.
     Delay {

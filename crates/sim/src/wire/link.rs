@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
-use super::history::History;
+use super::outage_history::OutageHistory;
 use crate::hardware::PortKind;
 use crate::truth::{Cause, FaultId};
 
@@ -24,7 +24,7 @@ pub(super) struct Hit {
 
 /// A hit that waits for a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Ambush {
+pub(super) struct ArmedFrameError {
     pub(super) from: Instant,
     pub(super) part: u16,
     pub(super) flip: u8,
@@ -37,7 +37,7 @@ pub(super) struct Noise {
     /// In the order of time.
     hits: VecDeque<Hit>,
     /// In the order of time.
-    ambushes: VecDeque<Ambush>,
+    frame_errors: VecDeque<ArmedFrameError>,
 }
 
 impl Noise {
@@ -46,18 +46,18 @@ impl Noise {
         self.hits.insert(self.hits.len() - behind, hit);
     }
 
-    pub(super) fn push_ambush(&mut self, ambush: Ambush) {
-        self.ambushes.push_back(ambush);
+    pub(super) fn arm_frame_error(&mut self, frame_error: ArmedFrameError) {
+        self.frame_errors.push_back(frame_error);
     }
 
     #[inline]
     pub(super) fn is_quiet(&self) -> bool {
-        self.hits.is_empty() && self.ambushes.is_empty()
+        self.hits.is_empty() && self.frame_errors.is_empty()
     }
 
     /// Whether a frame that is at the receiver from `from` until before `to` meets anything.
     pub(super) fn strikes(&self, from: Instant, to: Instant) -> bool {
-        let waits = self.ambushes.front().is_some_and(|ambush| ambush.from <= from);
+        let waits = self.frame_errors.front().is_some_and(|frame_error| frame_error.from <= from);
         waits || self.hits(from, to).next().is_some()
     }
 
@@ -68,14 +68,14 @@ impl Noise {
     }
 
     /// What waits for a frame that begins at `from`, if anything does. It strikes once.
-    pub(super) fn strike(&mut self, from: Instant) -> Option<Ambush> {
-        let ready = self.ambushes.front().is_some_and(|ambush| ambush.from <= from);
-        if ready { self.ambushes.pop_front() } else { None }
+    pub(super) fn strike(&mut self, from: Instant) -> Option<ArmedFrameError> {
+        let ready = self.frame_errors.front().is_some_and(|frame_error| frame_error.from <= from);
+        if ready { self.frame_errors.pop_front() } else { None }
     }
 
     /// A fault is over: what still waits for a frame goes with it.
     pub(super) fn disarm(&mut self, fault: FaultId) {
-        self.ambushes.retain(|ambush| ambush.fault != fault);
+        self.frame_errors.retain(|frame_error| frame_error.fault != fault);
     }
 
     /// Forgets hits before an instant.
@@ -138,14 +138,14 @@ pub struct Link {
     /// What it is made of between its ends.
     pub medium: Medium,
     /// The contact: both directions.
-    pub contact: History,
+    pub contact: OutageHistory,
     /// A pair of wires or a fibre by itself, upstream line first: broken, its receiver has no signal.
-    pub pair: [History; 2],
+    pub pair: [OutageHistory; 2],
     /// Upstream line first: broken, it swallows frames although both ends have a link.
-    pub passage: [History; 2],
+    pub passage: [OutageHistory; 2],
     /// How long it shows up before it carries frames, each time, and whose doing that is.
     pub(super) early: Option<(Span, FaultId)>,
-    /// By [`Line::downstream`](super::Line): upstream line first.
+    /// By [`DirectedLink::downstream`](super::DirectedLink): upstream line first.
     pub(super) noise: [Noise; 2],
     /// Upstream end first.
     pub(super) ends: [EndState; 2],
@@ -171,9 +171,9 @@ impl Link {
             kind,
             transit,
             medium: Medium::Direct,
-            contact: History::default(),
-            pair: [History::default(), History::default()],
-            passage: [History::default(), History::default()],
+            contact: OutageHistory::default(),
+            pair: [OutageHistory::default(), OutageHistory::default()],
+            passage: [OutageHistory::default(), OutageHistory::default()],
             early: None,
             noise: [Noise::default(), Noise::default()],
             ends: [EndState::Down; 2],
@@ -227,17 +227,17 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_strikes_once_and_goes_with_its_fault() {
+    fn armed_frame_error_strikes_once_and_goes_with_its_fault() {
         let mut noise = Noise::default();
-        let wait = |from, fault| Ambush {
+        let wait = |from, fault| ArmedFrameError {
             from: Instant::from_nanos(from),
             part: 0,
             flip: 1,
             fault: FaultId(fault),
         };
-        noise.push_ambush(wait(5, 1));
-        noise.push_ambush(wait(7, 2));
-        noise.push_ambush(wait(8, 1));
+        noise.arm_frame_error(wait(5, 1));
+        noise.arm_frame_error(wait(7, 2));
+        noise.arm_frame_error(wait(8, 1));
         assert_eq!(noise.strike(Instant::from_nanos(4)), None);
         assert_eq!(noise.strike(Instant::from_nanos(20)), Some(wait(5, 1)));
         noise.disarm(FaultId(2));

@@ -8,22 +8,22 @@ use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::WatchdogTime;
 use linesman_proto::time::{Instant, Span};
 
-use super::change::Line;
-use super::history::History;
+use super::change::DirectedLink;
 use super::nodes::Entry;
-use super::software::Held;
-use super::timing::HeldTiming;
+use super::outage_history::OutageHistory;
+use super::software::ActiveSoftwareChange;
+use super::timing::ActiveTimingChange;
 use crate::controller::Controller;
-use crate::device::{Refusal, Signals, Trouble};
+use crate::device::{Refusal, Signals, SoftwareFault};
 use crate::truth::FaultId;
 
 /// What happens to a controller and cannot be posted to it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Act {
+pub(super) enum NodeAction {
     Off,
     On,
     Refuse(Option<Refusal>),
-    Trouble { trouble: Trouble, begins: bool },
+    SoftwareFault { software_fault: SoftwareFault, begins: bool },
     Hang(bool),
     Reboot,
     Watchdog(Option<WatchdogTime>),
@@ -51,8 +51,8 @@ pub(super) struct Glitch {
 pub(crate) struct Node {
     pub(crate) controller: Controller,
     /// The line that leaves by each port.
-    pub(super) leaving: PortMap<Option<Line>>,
-    pub(super) power: History,
+    pub(super) leaving: PortMap<Option<DirectedLink>>,
+    pub(super) power: OutageHistory,
     pub(super) glitches: VecDeque<Glitch>,
     /// Whose doing it is that the device refuses a state.
     pub(super) refused_by: Option<FaultId>,
@@ -64,11 +64,11 @@ pub(crate) struct Node {
     /// Its address before, and the one it was given.
     former_address: Option<[StationAddress; 2]>,
     /// What faults have done to its software.
-    pub(super) software: Vec<Held>,
+    pub(super) software: Vec<ActiveSoftwareChange>,
     /// What faults have done to its clock and deadlines.
-    pub(super) timing: Vec<HeldTiming>,
+    pub(super) timing: Vec<ActiveTimingChange>,
     /// In the order of time.
-    acts: VecDeque<(Instant, Act)>,
+    acts: VecDeque<(Instant, NodeAction)>,
     /// What the book of all nodes keeps of it.
     pub(super) entry: Entry,
     /// The last frame that had a datagram for it.
@@ -80,7 +80,7 @@ impl Node {
         Self {
             controller,
             leaving: PortMap::default(),
-            power: History::default(),
+            power: OutageHistory::default(),
             glitches: VecDeque::new(),
             refused_by: None,
             watchdog_by: None,
@@ -95,7 +95,7 @@ impl Node {
         }
     }
 
-    pub(super) fn act_at(&mut self, at: Instant, act: Act) {
+    pub(super) fn act_at(&mut self, at: Instant, act: NodeAction) {
         self.acts.push_back((at, act));
     }
 
@@ -106,25 +106,27 @@ impl Node {
             self.acts.pop_front();
             self.controller.advance(at, signals);
             match act {
-                Act::Off => self.controller.power_off(at),
-                Act::On => self.controller.power_on(at),
-                Act::Refuse(refusal) => self.controller.refuse(at, refusal),
-                Act::Trouble { trouble, begins } => self.controller.trouble(at, trouble, begins),
-                Act::Hang(hangs) => self.controller.set_processor_stuck(at, hangs),
-                Act::Watchdog(time) => {
+                NodeAction::Off => self.controller.power_off(at),
+                NodeAction::On => self.controller.power_on(at),
+                NodeAction::Refuse(refusal) => self.controller.refuse(at, refusal),
+                NodeAction::SoftwareFault { software_fault, begins } => {
+                    self.controller.software_fault(at, software_fault, begins)
+                }
+                NodeAction::Hang(hangs) => self.controller.set_processor_stuck(at, hangs),
+                NodeAction::Watchdog(time) => {
                     self.set_watchdog(at, time);
                 }
-                Act::Reboot => self.controller.reboot_processor(at, signals),
-                Act::Drift { ppb, ramp_ppb_per_s, ramp } => {
+                NodeAction::Reboot => self.controller.reboot_processor(at, signals),
+                NodeAction::Drift { ppb, ramp_ppb_per_s, ramp } => {
                     self.controller.set_drift(at, ppb, ramp_ppb_per_s, ramp);
                 }
-                Act::RestoreDrift => self.controller.restore_drift(at),
-                Act::RestartClock => self.controller.restart_clock(at),
-                Act::CutSync(cut) => self.controller.cut_sync(cut),
-                Act::BounceSync(bounces) => self.controller.bounce_sync(bounces),
-                Act::SlowDown(takes) => self.controller.slow_down(takes),
-                Act::Report(emergency) => self.controller.report(at, emergency),
-                Act::Address(address) => self.set_address(address),
+                NodeAction::RestoreDrift => self.controller.restore_drift(at),
+                NodeAction::RestartClock => self.controller.restart_clock(at),
+                NodeAction::CutSync(cut) => self.controller.cut_sync(cut),
+                NodeAction::BounceSync(bounces) => self.controller.bounce_sync(bounces),
+                NodeAction::SlowDown(takes) => self.controller.slow_down(takes),
+                NodeAction::Report(emergency) => self.controller.report(at, emergency),
+                NodeAction::Address(address) => self.set_address(address),
             }
         }
         self.controller.advance(now, signals);

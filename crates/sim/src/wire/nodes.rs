@@ -1,5 +1,5 @@
-//! All controllers in their places, and a book of what the wire must know of them: when something
-//! is due where, who answers to which name.
+//! All controllers in their places, with the data that the fast path needs of them: due times,
+//! addresses, routes.
 //!
 //! Whoever changes a node wakes it by that ([`IndexMut`], [`Nodes::iter_mut`]); before the book is
 //! asked, the entries of all that woke are made anew. So nobody who changes a controller needs to
@@ -11,11 +11,11 @@ use linesman_proto::address::Path;
 use linesman_proto::port::Port;
 use linesman_proto::time::{Instant, Span};
 
-use super::calendar::Calendar;
-use super::direct::Passed;
-use super::directory::Directory;
+use super::address_directory::AddressDirectory;
+use super::fast_path::FastFrame;
 use super::node::Node;
-use crate::controller::{Controller, Manner};
+use super::timer_queue::TimerQueue;
+use crate::controller::{Controller, FastPathInfo};
 use crate::device::SignalId;
 
 /// All nodes of a segment, by their index in the tree.
@@ -25,13 +25,13 @@ pub(crate) struct Nodes {
     /// Nodes whose entries are to be made anew.
     woken: Vec<u32>,
     /// When something is due at a node.
-    due: Calendar,
+    due: TimerQueue,
     /// When something is due that can lead frames another way.
-    ways: Calendar,
+    ways: TimerQueue,
     /// By card: the frames that find something to do at a node.
-    departures: [Option<Departures>; 2],
+    departures: [Option<DepartureTimers>; 2],
     /// Who answers to what.
-    pub(super) directory: Directory,
+    pub(super) address_directory: AddressDirectory,
     /// Signals on which what a device samples depends, and its node; sorted.
     listeners: Vec<(SignalId, u32)>,
 }
@@ -39,8 +39,8 @@ pub(crate) struct Nodes {
 /// For each node on the way of a frame: if it leaves its card at this instant or later, something is
 /// to be done at the node as it comes by. On a long line that is long after it has left.
 #[derive(Debug)]
-struct Departures {
-    calendar: Calendar,
+struct DepartureTimers {
+    timer_queue: TimerQueue,
     /// From the card to the node, for those on the way.
     after: Vec<Option<Span>>,
 }
@@ -49,7 +49,7 @@ struct Departures {
 #[derive(Clone, Default, Debug)]
 pub(super) struct Entry {
     awake: bool,
-    pub(super) manner: Manner,
+    pub(super) fast_path_info: FastPathInfo,
     /// What the directory has of its FMMUs.
     pub(super) mapped: Vec<(u64, u64)>,
 }
@@ -66,10 +66,10 @@ impl Nodes {
         let mut nodes = Self {
             all: controllers.into_iter().map(Node::new).collect(),
             woken: Vec::new(),
-            due: Calendar::new(count),
-            ways: Calendar::new(count),
+            due: TimerQueue::new(count),
+            ways: TimerQueue::new(count),
             departures: [None, None],
-            directory: Directory::default(),
+            address_directory: AddressDirectory::default(),
             listeners,
         };
         nodes.wake_all();
@@ -82,7 +82,7 @@ impl Nodes {
         self.all.iter_mut()
     }
 
-    /// A node whose manner is not going to change: what becomes due is told by
+    /// A node whose fast-path information is not going to change: what becomes due is told by
     /// [`Nodes::reschedule`].
     #[inline]
     pub(super) fn quietly(&mut self, node: usize) -> &mut Node {
@@ -117,9 +117,9 @@ impl Nodes {
             let index = index as usize;
             let node = &mut self.all[index];
             node.entry.awake = false;
-            let manner = node.manner();
-            if manner != node.entry.manner {
-                self.directory.change(index, node, manner);
+            let fast_path_info = node.fast_path_info();
+            if fast_path_info != node.entry.fast_path_info {
+                self.address_directory.change(index, node, fast_path_info);
             }
             self.reschedule(index);
         }
@@ -184,7 +184,8 @@ impl Nodes {
         for (node, span) in way {
             after[node as usize] = Some(span);
         }
-        let mut departures = Departures { calendar: Calendar::new(self.all.len()), after };
+        let mut departures =
+            DepartureTimers { timer_queue: TimerQueue::new(self.all.len()), after };
         for (index, node) in self.all.iter().enumerate() {
             departures.bring_forward(index as u32, node.next_event().min(node.next_sample()));
         }
@@ -200,22 +201,22 @@ impl Nodes {
     #[inline]
     pub(super) fn may_meet(&self, card: Path, at: Instant) -> bool {
         let departures = self.departures[card.index()].as_ref();
-        departures.is_some_and(|known| known.calendar.first_until(at).is_some())
+        departures.is_some_and(|routes| routes.timer_queue.first_until(at).is_some())
     }
 
     /// Takes the nodes out at which something is to be done when a frame comes by that leaves a card
     /// at `at`, in no order. The book must be settled.
     pub(super) fn met_by(&mut self, card: Path, at: Instant, taken: &mut Vec<u32>) {
         let Some(departures) = &mut self.departures[card.index()] else { return };
-        while let Some(index) = departures.calendar.first_until(at) {
+        while let Some(index) = departures.timer_queue.first_until(at) {
             let node = &self.all[index as usize];
             let turn = node.next_event().min(node.next_sample());
             let leaves = departures.leaves(index, turn);
             if leaves > at {
-                departures.calendar.put_off(index, leaves);
+                departures.timer_queue.put_off(index, leaves);
                 continue;
             }
-            departures.calendar.put_off(index, Instant::MAX);
+            departures.timer_queue.put_off(index, Instant::MAX);
             taken.push(index);
         }
     }
@@ -224,7 +225,7 @@ impl Nodes {
     pub(super) fn note_entries(
         &mut self,
         entries: impl Iterator<Item = (u32, Port, Span)>,
-        frame: Passed,
+        frame: FastFrame,
     ) {
         for (node, port, after) in entries {
             let controller = &mut self.all[node as usize].controller;
@@ -245,7 +246,7 @@ impl Nodes {
     }
 }
 
-impl Departures {
+impl DepartureTimers {
     /// The first departure whose frame is at a node at `turn` or later.
     #[inline]
     fn leaves(&self, index: u32, turn: Instant) -> Instant {
@@ -259,7 +260,7 @@ impl Departures {
     fn bring_forward(&mut self, index: u32, turn: Instant) {
         let leaves = self.leaves(index, turn);
         if leaves != Instant::MAX {
-            self.calendar.bring_forward(index, leaves);
+            self.timer_queue.bring_forward(index, leaves);
         }
     }
 }
@@ -291,14 +292,21 @@ impl IndexMut<usize> for Nodes {
 
 impl Node {
     /// What the wire must know of it.
-    fn manner(&self) -> Manner {
-        let manner = self.controller.manner();
-        Manner { meddles: manner.meddles || !self.glitches.is_empty(), ..manner }
+    fn fast_path_info(&self) -> FastPathInfo {
+        let fast_path_info = self.controller.fast_path_info();
+        FastPathInfo {
+            acts_on_all_frames: fast_path_info.acts_on_all_frames || !self.glitches.is_empty(),
+            ..fast_path_info
+        }
     }
 
     /// From when on a frame that comes by samples something new.
     #[inline]
     pub(super) fn next_sample(&self) -> Instant {
-        if self.entry.manner.samples { self.controller.wants_sample() } else { Instant::MAX }
+        if self.entry.fast_path_info.samples {
+            self.controller.wants_sample()
+        } else {
+            Instant::MAX
+        }
     }
 }

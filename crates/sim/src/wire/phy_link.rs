@@ -7,12 +7,12 @@
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
-use super::change::Line;
-use super::due::Due;
-use super::history::History;
+use super::change::DirectedLink;
 use super::link::EndState;
+use super::link_event::LinkEvent;
+use super::outage_history::OutageHistory;
 use super::world::World;
-use crate::controller::PhyAct;
+use crate::controller::PhyAction;
 use crate::truth::Cause;
 
 /// So many bad symbols ...
@@ -22,9 +22,9 @@ const WINDOW: Span = Span::us(10);
 
 impl World {
     /// A receiver with enhanced link detection saw a bad symbol.
-    pub(super) fn watch_symbols(&mut self, at: Instant, cause: Cause, line: Line) {
-        let link = &mut self.links[line.link];
-        let end = usize::from(line.downstream);
+    pub(super) fn watch_symbols(&mut self, at: Instant, cause: Cause, direction: DirectedLink) {
+        let link = &mut self.links[direction.link];
+        let end = usize::from(direction.downstream);
         let seen = &mut link.bad_symbols[end];
         seen.push_back(at);
         if seen.len() > MOST_BAD_SYMBOLS {
@@ -34,29 +34,30 @@ impl World {
             && seen.front().is_some_and(|first| at.since(*first) <= WINDOW);
         if too_many && link.ends[end] == EndState::Up {
             seen.clear();
-            self.drop_link(line.link, end, cause, at);
+            self.drop_link(direction.link, end, cause, at);
         }
     }
 
     /// What the MainDevice wrote to PHYs of a controller is on its way.
-    pub(super) fn take_phy_acts(&mut self, node: usize) {
-        for (at, port, act) in self.nodes[node].controller.take_phy_acts() {
-            let Some(line) = self.nodes[node].leaving[port] else { continue };
+    pub(super) fn take_phy_actions(&mut self, node: usize) {
+        for (at, port, act) in self.nodes[node].controller.take_phy_actions() {
+            let Some(direction) = self.nodes[node].leaving[port] else { continue };
             // The line leaves by its sender: that is this end.
-            let end = usize::from(!line.downstream);
-            self.agenda.push(at.max(self.horizon), Due::Phy { link: line.link, end, act });
+            let end = usize::from(!direction.downstream);
+            self.link_events
+                .push(at.max(self.horizon), LinkEvent::Phy { link: direction.link, end, act });
         }
     }
 
-    pub(super) fn phy_acts(&mut self, link: usize, end: usize, act: PhyAct, at: Instant) {
+    pub(super) fn phy_action(&mut self, link: usize, end: usize, act: PhyAction, at: Instant) {
         match act {
-            PhyAct::Restart => self.drop_link(link, end, Cause::Content, at),
-            PhyAct::Sleep => {
+            PhyAction::Restart => self.drop_link(link, end, Cause::Content, at),
+            PhyAction::Sleep => {
                 self.links[link].asleep[end] = true;
                 self.links[link].dropped.get_or_insert(Cause::Content);
                 self.signal_changed(link, at);
             }
-            PhyAct::Wake => {
+            PhyAction::Wake => {
                 self.links[link].asleep[end] = false;
                 self.links[link].dropped.get_or_insert(Cause::Content);
                 self.signal_changed(link, at);
@@ -77,14 +78,14 @@ impl World {
         let epochs = link.epochs;
         self.end_lost(index, end, at);
         self.begins_to_lose(index, 1 - end, at);
-        self.agenda.push(at + self.link_up_time(index), Due::Up { link: index, epochs });
+        self.link_events.push(at + self.link_up_time(index), LinkEvent::Up { link: index, epochs });
     }
 
     /// Why a link is as it is: a PHY dropped it, or somebody broke it.
     pub(super) fn cause_of_link(&self, index: usize, at: Instant) -> Cause {
         let link = &self.links[index];
         let whole = link.contact.is_whole()
-            && link.pair.iter().all(History::is_whole)
+            && link.pair.iter().all(OutageHistory::is_whole)
             && link.both_ends().into_iter().all(|end| match end {
                 End::MainDevice(_) => true,
                 End::Controller(node, _) => self.nodes[node].power.is_whole(),

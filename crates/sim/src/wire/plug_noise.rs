@@ -5,7 +5,7 @@
 
 use linesman_proto::time::Span;
 
-use super::change::Line;
+use super::change::DirectedLink;
 use crate::seed::Stream;
 
 /// How long a link is noisy when it comes up.
@@ -25,16 +25,16 @@ impl PlugNoise {
     }
 
     /// Hits on both lines of a link: where, how long after it came up, what they do to a byte.
-    pub(super) fn draw(&mut self, link: usize) -> Vec<(Line, Span, u8)> {
+    pub(super) fn draw(&mut self, link: usize) -> Vec<(DirectedLink, Span, u8)> {
         if self.mean <= 0.0 {
             return Vec::new();
         }
         let mut hits = Vec::new();
         let rate_per_s = self.mean / LASTS.as_secs_f64();
-        for line in Line::both(link) {
+        for direction in DirectedLink::both(link) {
             let mut after = self.stream.wait(rate_per_s);
             while after < LASTS {
-                hits.push((line, after, self.stream.between(1, 255) as u8));
+                hits.push((direction, after, self.stream.between(1, 255) as u8));
                 after += self.stream.wait(rate_per_s);
             }
         }

@@ -1,12 +1,12 @@
-//! The way of a frame that meets nothing but controllers at rest: whom it passes, and when.
+//! Route of an undisturbed frame: the controllers that it passes, and when.
 
 use linesman_proto::address::Path;
 use linesman_proto::port::Port;
 use linesman_proto::time::Span;
 use linesman_proto::topology::End;
 
-use super::change::Line;
-use super::history::History;
+use super::change::DirectedLink;
+use super::outage_history::OutageHistory;
 use super::world::World;
 
 /// No place on a route.
@@ -60,8 +60,8 @@ impl Route {
     }
 
     /// When the first bit is at the receiver of a line, behind its leaving the card.
-    pub(super) fn crossing(&self, line: Line) -> Option<Span> {
-        let after = self.crossings[line.link][usize::from(line.downstream)];
+    pub(super) fn crossing(&self, direction: DirectedLink) -> Option<Span> {
+        let after = self.crossings[direction.link][usize::from(direction.downstream)];
         (after != NEVER).then_some(Span::ns(after))
     }
 }
@@ -70,7 +70,7 @@ impl World {
     /// The way of a frame from a card as links and loops are now; `None` when it does not come to a
     /// card, or meets a controller that does something with frames of no concern to it.
     pub(super) fn find_route(&self, card: Path) -> Option<Route> {
-        let mut line = self.leaving[card.index()]?;
+        let mut direction = self.leaving[card.index()]?;
         let mut after = Span::ZERO;
         let mut route = Route {
             visits: Vec::with_capacity(self.nodes.len()),
@@ -83,15 +83,15 @@ impl World {
         };
         // A way that comes by a line again runs in a circle.
         for _ in 0..2 * self.links.len() {
-            let link = &self.links[line.link];
-            let (_, to) = link.from_to(line.downstream);
-            let direction = usize::from(line.downstream);
-            let ways = [&link.contact, &link.pair[direction], &link.passage[direction]];
-            if !ways.into_iter().all(History::is_whole) {
+            let link = &self.links[direction.link];
+            let (_, to) = link.from_to(direction.downstream);
+            let side = usize::from(direction.downstream);
+            let ways = [&link.contact, &link.pair[side], &link.passage[side]];
+            if !ways.into_iter().all(OutageHistory::is_whole) {
                 return None;
             }
             after += link.transit;
-            route.crossings[line.link][usize::from(line.downstream)] = after.as_nanos();
+            route.crossings[direction.link][usize::from(direction.downstream)] = after.as_nanos();
             let (node, port) = match to {
                 End::Controller(node, port) => (node, port),
                 End::MainDevice(path) => {
@@ -101,7 +101,7 @@ impl World {
                 }
             };
             route.entries.push((node as u32, port, after));
-            (line, after) = self.lead_on(node, port, after, &mut route)?;
+            (direction, after) = self.lead_on(node, port, after, &mut route)?;
         }
         None
     }
@@ -113,11 +113,11 @@ impl World {
         port: Port,
         after: Span,
         route: &mut Route,
-    ) -> Option<(Line, Span)> {
+    ) -> Option<(DirectedLink, Span)> {
         let here = &self.nodes[node];
-        let manner = &here.entry.manner;
-        let is_open = |port: Port| manner.open >> port.index() & 1 != 0;
-        if manner.meddles || !here.power.is_whole() || !is_open(port) {
+        let fast_path_info = &here.entry.fast_path_info;
+        let is_open = |port: Port| fast_path_info.open >> port.index() & 1 != 0;
+        if fast_path_info.acts_on_all_frames || !here.power.is_whole() || !is_open(port) {
             return None;
         }
         let timing = here.controller.hardware().timing;
@@ -131,7 +131,7 @@ impl World {
                 }
                 route.places[node] = place;
                 route.visits.push(Visit { node: node as u32, after });
-                route.marks_source |= manner.marks_source;
+                route.marks_source |= fast_path_info.marks_source;
                 takes = timing.process;
             }
             stop = stop.next();

@@ -1,18 +1,18 @@
-//! What faults do to the software of a device.
+//! Effects of faults on the software of a device.
 
 use linesman_proto::mailbox::coe::{Emergency, ErrorRegister};
 use linesman_proto::time::Instant;
 
-use super::node::Act;
+use super::node::NodeAction;
 use super::world::World;
-use crate::device::Trouble;
+use crate::device::SoftwareFault;
 use crate::truth::{Effect, FaultId, Place};
 
 /// Something that happens to the software of a device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SoftwareChange {
     /// It misbehaves from now on.
-    Begin(Trouble),
+    Begin(SoftwareFault),
     /// Its processor stops: nothing is served any more.
     Hang,
     /// Its processor has started anew by itself, without the controller: it is in INIT and says so.
@@ -25,14 +25,14 @@ pub enum SoftwareChange {
 
 /// What a fault has done to the software of a device and lets go when it ends.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Held {
+pub(super) struct ActiveSoftwareChange {
     by: FaultId,
-    what: HeldWhat,
+    what: ActiveChangeKind,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum HeldWhat {
-    Trouble(Trouble),
+enum ActiveChangeKind {
+    SoftwareFault(SoftwareFault),
     Hang,
     Emergency(Emergency),
 }
@@ -47,13 +47,15 @@ impl World {
         change: SoftwareChange,
     ) {
         let held = match change {
-            SoftwareChange::Begin(trouble) => Some(HeldWhat::Trouble(trouble)),
-            SoftwareChange::Hang => Some(HeldWhat::Hang),
-            SoftwareChange::Report(emergency) => Some(HeldWhat::Emergency(emergency)),
+            SoftwareChange::Begin(software_fault) => {
+                Some(ActiveChangeKind::SoftwareFault(software_fault))
+            }
+            SoftwareChange::Hang => Some(ActiveChangeKind::Hang),
+            SoftwareChange::Report(emergency) => Some(ActiveChangeKind::Emergency(emergency)),
             SoftwareChange::Reboot | SoftwareChange::ReportOnce(_) => None,
         };
         let effect = match change {
-            SoftwareChange::Begin(trouble) => Effect::Misbehaves(trouble),
+            SoftwareChange::Begin(software_fault) => Effect::Misbehaves(software_fault),
             SoftwareChange::Hang => Effect::ProcessorStopped,
             SoftwareChange::Reboot => Effect::ProcessorRestarted,
             SoftwareChange::Report(emergency) | SoftwareChange::ReportOnce(emergency) => {
@@ -61,21 +63,23 @@ impl World {
             }
         };
         let act = match change {
-            SoftwareChange::Begin(trouble) => Act::Trouble { trouble, begins: true },
-            SoftwareChange::Hang => Act::Hang(true),
-            SoftwareChange::Reboot => Act::Reboot,
+            SoftwareChange::Begin(software_fault) => {
+                NodeAction::SoftwareFault { software_fault, begins: true }
+            }
+            SoftwareChange::Hang => NodeAction::Hang(true),
+            SoftwareChange::Reboot => NodeAction::Reboot,
             SoftwareChange::Report(emergency) | SoftwareChange::ReportOnce(emergency) => {
-                Act::Report(emergency)
+                NodeAction::Report(emergency)
             }
         };
         let held_by = &mut self.nodes[node].software;
         if change == SoftwareChange::Reboot {
-            held_by.retain(|held| held.by != fault || held.what != HeldWhat::Hang);
+            held_by.retain(|held| held.by != fault || held.what != ActiveChangeKind::Hang);
         }
         if let Some(what) = held {
             // Of emergencies that repeat each other one is taken back.
-            let held = Held { by: fault, what };
-            if !(matches!(what, HeldWhat::Emergency(_)) && held_by.contains(&held)) {
+            let held = ActiveSoftwareChange { by: fault, what };
+            if !(matches!(what, ActiveChangeKind::Emergency(_)) && held_by.contains(&held)) {
                 held_by.push(held);
             }
         }
@@ -90,21 +94,24 @@ impl World {
             let node = &mut self.nodes[node];
             let (ended, rest) = node.software.drain(..).partition(|held| held.by == fault);
             node.software = rest;
-            for held in Vec::<Held>::from_iter::<Vec<Held>>(ended) {
+            for held in Vec::<ActiveSoftwareChange>::from_iter::<Vec<ActiveSoftwareChange>>(ended) {
                 match held.what {
-                    HeldWhat::Trouble(trouble) => {
-                        node.act_at(at, Act::Trouble { trouble, begins: false });
+                    ActiveChangeKind::SoftwareFault(software_fault) => {
+                        node.act_at(
+                            at,
+                            NodeAction::SoftwareFault { software_fault, begins: false },
+                        );
                     }
-                    HeldWhat::Hang => {
-                        if !node.software.iter().any(|other| other.what == HeldWhat::Hang) {
-                            node.act_at(at, Act::Hang(false));
+                    ActiveChangeKind::Hang => {
+                        if !node.software.iter().any(|other| other.what == ActiveChangeKind::Hang) {
+                            node.act_at(at, NodeAction::Hang(false));
                             let runs = Effect::ProcessorRuns;
                             self.truth.effect(at, Some(fault), place, runs);
                         }
                     }
-                    HeldWhat::Emergency(_) => {
+                    ActiveChangeKind::Emergency(_) => {
                         let gone = Emergency { code: 0, register: ErrorRegister(0), data: [0; 5] };
-                        node.act_at(at, Act::Report(gone));
+                        node.act_at(at, NodeAction::Report(gone));
                         let sent = Effect::EmergencySent { code: 0 };
                         self.truth.effect(at, Some(fault), place, sent);
                     }

@@ -1,10 +1,10 @@
-//! Clocks and deadlines: quartzes that run away, SYNC signals that do not arrive, work that takes too
+//! Timing faults: quartzes that run away, SYNC signals that do not arrive, work that takes too
 //! long, frames that leave late.
 
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
-use super::node::Act;
+use super::node::NodeAction;
 use super::world::World;
 use crate::controller::LocalClock;
 use crate::truth::{Effect, FaultId, Place};
@@ -33,13 +33,13 @@ pub enum TimingChange {
 
 /// What a fault holds and what is given back at its end.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct HeldTiming {
+pub(super) struct ActiveTimingChange {
     by: FaultId,
-    what: What,
+    what: TimingKind,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum What {
+enum TimingKind {
     Speed,
     Sync,
     Bounce,
@@ -61,19 +61,23 @@ impl World {
                 } else {
                     Effect::ClockDrifts { ppb }
                 };
-                (Some(What::Speed), Act::Drift { ppb, ramp_ppb_per_s, ramp }, effect)
+                (Some(TimingKind::Speed), NodeAction::Drift { ppb, ramp_ppb_per_s, ramp }, effect)
             }
-            TimingChange::RestartClock => (None, Act::RestartClock, Effect::ClockRestarted),
-            TimingChange::CutSync => (Some(What::Sync), Act::CutSync(true), Effect::SyncCut),
+            TimingChange::RestartClock => (None, NodeAction::RestartClock, Effect::ClockRestarted),
+            TimingChange::CutSync => {
+                (Some(TimingKind::Sync), NodeAction::CutSync(true), Effect::SyncCut)
+            }
             TimingChange::BounceSync => {
-                (Some(What::Bounce), Act::BounceSync(true), Effect::SyncBounces)
+                (Some(TimingKind::Bounce), NodeAction::BounceSync(true), Effect::SyncBounces)
             }
-            TimingChange::SlowDown(takes) => {
-                (Some(What::Work), Act::SlowDown(Some(takes)), Effect::WorkTakes { takes })
-            }
+            TimingChange::SlowDown(takes) => (
+                Some(TimingKind::Work),
+                NodeAction::SlowDown(Some(takes)),
+                Effect::WorkTakes { takes },
+            ),
         };
         if let Some(what) = what {
-            self.nodes[node].timing.push(HeldTiming { by: fault, what });
+            self.nodes[node].timing.push(ActiveTimingChange { by: fault, what });
         }
         self.nodes[node].act_at(at, act);
         self.truth.effect(at, Some(fault), Place::Device(self.id(node)), effect);
@@ -96,17 +100,18 @@ impl World {
                 continue;
             }
             let mut given_back = Vec::new();
-            for what in [What::Speed, What::Sync, What::Bounce, What::Work] {
-                let mine = HeldTiming { by: fault, what };
+            for what in [TimingKind::Speed, TimingKind::Sync, TimingKind::Bounce, TimingKind::Work]
+            {
+                let mine = ActiveTimingChange { by: fault, what };
                 let is_held = node.timing.contains(&mine);
                 let by_others =
                     node.timing.iter().any(|held| held.what == what && held.by != fault);
                 if is_held && !by_others {
                     let (act, effect) = match what {
-                        What::Speed => (Act::RestoreDrift, Effect::ClockRestored),
-                        What::Sync => (Act::CutSync(false), Effect::SyncBack),
-                        What::Bounce => (Act::BounceSync(false), Effect::SyncBack),
-                        What::Work => (Act::SlowDown(None), Effect::WorkRestored),
+                        TimingKind::Speed => (NodeAction::RestoreDrift, Effect::ClockRestored),
+                        TimingKind::Sync => (NodeAction::CutSync(false), Effect::SyncBack),
+                        TimingKind::Bounce => (NodeAction::BounceSync(false), Effect::SyncBack),
+                        TimingKind::Work => (NodeAction::SlowDown(None), Effect::WorkRestored),
                     };
                     node.act_at(at, act);
                     given_back.push(effect);

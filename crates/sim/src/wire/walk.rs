@@ -14,9 +14,9 @@ use linesman_proto::register::{self as r, ErrorCounter};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
-use super::change::Line;
+use super::change::DirectedLink;
 use super::world::World;
-use crate::controller::{CountKind, PortEvent, Verdict};
+use crate::controller::{CountKind, Forwarding, PortEvent};
 use crate::frame::{PREAMBLE_LEN, WireFrame};
 use crate::truth::{Cause, Effect, FaultId, Place};
 
@@ -26,30 +26,30 @@ const MOST_STOPS: usize = 16;
 
 /// A frame on its way, and who is to blame for its state.
 #[derive(Debug)]
-pub(crate) struct Traveller {
+pub(crate) struct FrameInTransit {
     pub(crate) frame: WireFrame,
     /// Who spoiled it first.
     pub(crate) spoiled_by: Option<FaultId>,
     /// A processing unit marked it for what its sender put into it.
     pub(crate) refused: bool,
     /// Who sent it, if not the MainDevice.
-    pub(crate) stranger: Option<FaultId>,
+    pub(crate) foreign_sender: Option<FaultId>,
 }
 
-impl Traveller {
+impl FrameInTransit {
     /// A frame that leaves a card.
     pub(crate) const fn new(frame: WireFrame) -> Self {
-        Self { frame, spoiled_by: None, refused: false, stranger: None }
+        Self { frame, spoiled_by: None, refused: false, foreign_sender: None }
     }
 
-    /// A frame that a stranger sends.
-    pub(crate) const fn of(frame: WireFrame, stranger: FaultId) -> Self {
-        Self { frame, spoiled_by: None, refused: false, stranger: Some(stranger) }
+    /// A frame that a foreign sender sends.
+    pub(crate) const fn of(frame: WireFrame, foreign_sender: FaultId) -> Self {
+        Self { frame, spoiled_by: None, refused: false, foreign_sender: Some(foreign_sender) }
     }
 
     /// Whose content it is.
     fn content(&self) -> Cause {
-        self.stranger.map_or(Cause::Content, Cause::Fault)
+        self.foreign_sender.map_or(Cause::Content, Cause::Fault)
     }
 
     /// Why a receiver finds it damaged.
@@ -83,9 +83,14 @@ enum Crossing {
 
 impl World {
     /// Sends a frame off by a card at `at`, port by port.
-    pub(crate) fn walk(&mut self, card: Path, at: Instant, traveller: &mut Traveller) -> Outcome {
+    pub(crate) fn walk(
+        &mut self,
+        card: Path,
+        at: Instant,
+        in_transit: &mut FrameInTransit,
+    ) -> Outcome {
         match self.leaving[card.index()] {
-            Some(line) => self.walk_from(line, at, traveller),
+            Some(direction) => self.walk_from(direction, at, in_transit),
             None => Outcome::Vanished,
         }
     }
@@ -93,42 +98,43 @@ impl World {
     /// Sends a frame along a line at `at`.
     pub(super) fn walk_from(
         &mut self,
-        line: Line,
+        direction: DirectedLink,
         at: Instant,
-        traveller: &mut Traveller,
+        in_transit: &mut FrameInTransit,
     ) -> Outcome {
-        let (mut line, mut at) = (line, at);
+        let (mut direction, mut at) = (direction, at);
         let mut made_anew = false;
         // Every line twice in each direction is more than any frame can do.
         for _ in 0..4 * self.links.len() {
-            let Crossing::Through { at: arrives, spoiled } = self.cross(line, at, traveller) else {
+            let Crossing::Through { at: arrives, spoiled } = self.cross(direction, at, in_transit)
+            else {
                 return Outcome::Vanished;
             };
-            let (_, to) = self.links[line.link].from_to(line.downstream);
+            let (_, to) = self.links[direction.link].from_to(direction.downstream);
             let (node, port) = match to {
                 End::Controller(node, port) => (node, port),
                 End::MainDevice(path) => {
-                    return Outcome::Arrived(path, arrives + traveller.frame.duration());
+                    return Outcome::Arrived(path, arrives + in_transit.frame.duration());
                 }
             };
             if made_anew {
-                self.symbol_error(arrives, traveller.cause(), line);
+                self.symbol_error(arrives, in_transit.cause(), direction);
             }
             let Some((left_by, left_at)) =
-                self.pass(node, port, line, arrives, spoiled || made_anew, traveller)
+                self.pass(node, port, direction, arrives, spoiled || made_anew, in_transit)
             else {
                 return Outcome::Vanished;
             };
             let Some(next) = self.nodes[node].leaving[left_by] else {
                 // A loop that stands open by hand, or port A as the last way out, with no plug.
-                self.lost(left_at, None, Place::Device(self.id(node)), traveller);
+                self.lost(left_at, None, Place::Device(self.id(node)), in_transit);
                 return Outcome::Vanished;
             };
             let counting = self.nodes[node].controller.hardware().counting;
-            made_anew = counting.remakes_symbol_errors && !traveller.frame.damage.is_intact();
-            (line, at) = (next, left_at);
+            made_anew = counting.remakes_symbol_errors && !in_transit.frame.damage.is_intact();
+            (direction, at) = (next, left_at);
         }
-        self.lost(at, None, self.line_place(line), traveller);
+        self.lost(at, None, self.direction_place(direction), in_transit);
         Outcome::Vanished
     }
 
@@ -136,29 +142,34 @@ impl World {
 
     /// Carries a frame along a line. Its first bit enters at `at`.
     #[inline]
-    fn cross(&mut self, line: Line, at: Instant, traveller: &mut Traveller) -> Crossing {
-        let link = &self.links[line.link];
+    fn cross(
+        &mut self,
+        direction: DirectedLink,
+        at: Instant,
+        in_transit: &mut FrameInTransit,
+    ) -> Crossing {
+        let link = &self.links[direction.link];
         let arrives = at + link.transit;
-        let duration = traveller.frame.duration();
+        let duration = in_transit.frame.duration();
         let mut spoiled = false;
         // The contact lies half way.
         let contact = at + Span::ns(link.transit.as_nanos() / 2);
-        if let Some((cut, fault)) = self.first_silence(line, contact, contact + duration) {
-            let whole = traveller.frame.byte_at(cut.since(contact));
-            self.lost(cut, Some(fault), self.line_place(line), traveller);
+        if let Some((cut, fault)) = self.first_silence(direction, contact, contact + duration) {
+            let whole = in_transit.frame.byte_at(cut.since(contact));
+            self.lost(cut, Some(fault), self.direction_place(direction), in_transit);
             match whole {
                 Some(bytes) if cut > contact => {
-                    traveller.frame.bytes.truncate(bytes);
-                    traveller.frame.damage.cut_off = true;
-                    traveller.spoiled_by.get_or_insert(fault);
+                    in_transit.frame.bytes.truncate(bytes);
+                    in_transit.frame.damage.cut_off = true;
+                    in_transit.spoiled_by.get_or_insert(fault);
                     spoiled = true;
                 }
                 Some(_) | None => return Crossing::Lost,
             }
         }
-        let noise = &self.links[line.link].noise[usize::from(line.downstream)];
+        let noise = &self.links[direction.link].noise[usize::from(direction.downstream)];
         if !noise.is_quiet() {
-            match self.disturb(line, arrives, duration, traveller) {
+            match self.disturb(direction, arrives, duration, in_transit) {
                 Some(hit) => spoiled |= hit,
                 None => return Crossing::Lost,
             }
@@ -169,45 +180,45 @@ impl World {
     /// What noise does to a frame: whether it was spoiled; `None` when it is no frame any more.
     fn disturb(
         &mut self,
-        line: Line,
+        direction: DirectedLink,
         arrives: Instant,
         duration: Span,
-        traveller: &mut Traveller,
+        in_transit: &mut FrameInTransit,
     ) -> Option<bool> {
-        let place = self.line_place(line);
-        let noise = &mut self.links[line.link].noise[usize::from(line.downstream)];
-        let ambush = noise.strike(arrives);
+        let place = self.direction_place(direction);
+        let noise = &mut self.links[direction.link].noise[usize::from(direction.downstream)];
+        let frame_error = noise.strike(arrives);
         let hits: Vec<_> = noise.hits(arrives, arrives + duration).collect();
         let mut spoiled = false;
         let mut starts = true;
         for hit in hits {
             let offset = hit.at.since(arrives);
             starts &= !is_start_delimiter(offset);
-            self.spoil(hit.at, offset, hit.flip, hit.fault, place, traveller);
+            self.spoil(hit.at, offset, hit.flip, hit.fault, place, in_transit);
             spoiled = true;
         }
-        if let Some(ambush) = ambush {
-            let bytes = traveller.frame.bytes.len() as u64;
-            let byte = PREAMBLE_LEN as u64 + bytes * u64::from(ambush.part) / (1 << 16);
+        if let Some(frame_error) = frame_error {
+            let bytes = in_transit.frame.bytes.len() as u64;
+            let byte = PREAMBLE_LEN as u64 + bytes * u64::from(frame_error.part) / (1 << 16);
             let offset = Span::ns(byte * BYTE_NS);
-            self.symbol_error(arrives + offset, Cause::Fault(ambush.fault), line);
+            self.symbol_error(arrives + offset, Cause::Fault(frame_error.fault), direction);
             let at = arrives + offset;
-            self.spoil(at, offset, ambush.flip, ambush.fault, place, traveller);
+            self.spoil(at, offset, frame_error.flip, frame_error.fault, place, in_transit);
             spoiled = true;
         }
         if !starts {
             // Without its start delimiter nobody takes it for a frame.
-            self.miss_start(line, arrives + duration, traveller);
+            self.miss_start(direction, arrives + duration, in_transit);
             return None;
         }
         Some(spoiled)
     }
 
     /// A receiver sees a frame without a start: some count it, none passes it on.
-    fn miss_start(&mut self, line: Line, end: Instant, traveller: &Traveller) {
-        let fault = traveller.spoiled_by;
-        self.lost(end, fault, self.line_place(line), traveller);
-        let (_, to) = self.links[line.link].from_to(line.downstream);
+    fn miss_start(&mut self, direction: DirectedLink, end: Instant, in_transit: &FrameInTransit) {
+        let fault = in_transit.spoiled_by;
+        self.lost(end, fault, self.direction_place(direction), in_transit);
+        let (_, to) = self.links[direction.link].from_to(direction.downstream);
         match to {
             End::MainDevice(_) => {}
             End::Controller(node, port) => {
@@ -228,20 +239,26 @@ impl World {
         flip: u8,
         fault: FaultId,
         place: Place,
-        traveller: &mut Traveller,
+        in_transit: &mut FrameInTransit,
     ) {
-        let frame = &mut traveller.frame;
+        let frame = &mut in_transit.frame;
         if let Some(byte) = frame.byte_at(offset).and_then(|byte| frame.bytes.get_mut(byte)) {
             *byte ^= flip;
         }
         frame.damage.fcs_bad = true;
-        traveller.spoiled_by.get_or_insert(fault);
+        in_transit.spoiled_by.get_or_insert(fault);
         let effect = Effect::FrameSpoiled { frame: frame.number };
         self.truth.effect(at, Some(fault), place, effect);
     }
 
-    fn lost(&mut self, at: Instant, fault: Option<FaultId>, place: Place, traveller: &Traveller) {
-        let effect = Effect::FrameLost { frame: traveller.frame.number };
+    fn lost(
+        &mut self,
+        at: Instant,
+        fault: Option<FaultId>,
+        place: Place,
+        in_transit: &FrameInTransit,
+    ) {
+        let effect = Effect::FrameLost { frame: in_transit.frame.number };
         self.truth.effect(at, fault, place, effect);
     }
 
@@ -253,26 +270,26 @@ impl World {
         &mut self,
         node: usize,
         port: Port,
-        line: Line,
+        direction: DirectedLink,
         at: Instant,
         spoiled: bool,
-        traveller: &mut Traveller,
+        in_transit: &mut FrameInTransit,
     ) -> Option<(Port, Instant)> {
         let here = &mut self.nodes[node];
         if port == Port::A {
             here.touch(at, &mut self.signals);
         }
         if let Some((_, fault)) = here.power.first_break(at, at + Span::ns(1)) {
-            self.lost(at, Some(fault), Place::Device(self.id(node)), traveller);
+            self.lost(at, Some(fault), Place::Device(self.id(node)), in_transit);
             return None;
         }
-        here.controller.enters(at, port, &traveller.frame);
-        if !traveller.frame.damage.is_intact() {
-            self.receive_damaged(node, port, at, spoiled, traveller);
+        here.controller.enters(at, port, &in_transit.frame);
+        if !in_transit.frame.damage.is_intact() {
+            self.receive_damaged(node, port, at, spoiled, in_transit);
         }
         if !self.nodes[node].is_open_at(port, at) {
-            let fault = self.blame(line.link, at);
-            self.lost(at, fault, self.line_place(line), traveller);
+            let fault = self.blame(direction.link, at);
+            self.lost(at, fault, self.direction_place(direction), in_transit);
             return None;
         }
         let timing = self.nodes[node].controller.hardware().timing;
@@ -280,8 +297,8 @@ impl World {
         let mut stop = port;
         for _ in 0..MOST_STOPS {
             if stop == Port::A {
-                if self.process(node, at, traveller) == Verdict::Destroy {
-                    self.lost(at, traveller.spoiled_by, Place::Device(self.id(node)), traveller);
+                if self.process(node, at, in_transit) == Forwarding::Destroy {
+                    self.lost(at, in_transit.spoiled_by, Place::Device(self.id(node)), in_transit);
                     return None;
                 }
                 processed = true;
@@ -290,11 +307,11 @@ impl World {
             if self.nodes[node].is_open_at(stop, at) {
                 let takes = if processed { timing.process } else { timing.forward };
                 let leaves = at + takes;
-                self.glitch(node, leaves, traveller);
+                self.glitch(node, leaves, in_transit);
                 return Some((stop, leaves));
             }
         }
-        self.lost(at, None, Place::Device(self.id(node)), traveller);
+        self.lost(at, None, Place::Device(self.id(node)), in_transit);
         None
     }
 
@@ -305,45 +322,45 @@ impl World {
         port: Port,
         at: Instant,
         spoiled: bool,
-        traveller: &mut Traveller,
+        in_transit: &mut FrameInTransit,
     ) {
         let forwarded = self.nodes[node].controller.hardware().counting.forwarded;
-        let damage = &mut traveller.frame.damage;
+        let damage = &mut in_transit.frame.damage;
         let kind = if damage.marked && !spoiled && forwarded {
             CountKind::ForwardedError
         } else {
             CountKind::InvalidFrame
         };
         damage.marked = true;
-        let end = at + traveller.frame.duration();
-        self.post(node, end, traveller.cause(), PortEvent::Count { port, kind });
+        let end = at + in_transit.frame.duration();
+        self.post(node, end, in_transit.cause(), PortEvent::Count { port, kind });
     }
 
-    fn process(&mut self, node: usize, at: Instant, traveller: &mut Traveller) -> Verdict {
-        let intact = traveller.frame.damage.is_intact();
+    fn process(&mut self, node: usize, at: Instant, in_transit: &mut FrameInTransit) -> Forwarding {
+        let intact = in_transit.frame.damage.is_intact();
         if !intact {
-            let end = at + traveller.frame.duration();
+            let end = at + in_transit.frame.duration();
             let kind = CountKind::ProcessingUnitError;
             let event = PortEvent::Count { port: Port::A, kind };
-            self.post(node, end, traveller.cause(), event);
+            self.post(node, end, in_transit.cause(), event);
         }
         let errors = r::PROCESSING_UNIT_ERROR_COUNTER.address;
         self.nodes[node].touch(at, &mut self.signals);
         let controller = &mut self.nodes[node].controller;
         let before = controller.register(errors);
-        let verdict = controller.process(at, &mut traveller.frame, &mut self.signals);
-        if controller.has_phy_acts() {
-            self.take_phy_acts(node);
+        let verdict = controller.process(at, &mut in_transit.frame, &mut self.signals);
+        if controller.has_phy_actions() {
+            self.take_phy_actions(node);
         }
         let controller = &mut self.nodes[node].controller;
         // At 255 the counter stands still, and the frame is marked all the same.
-        let marked = intact && !traveller.frame.damage.is_intact();
+        let marked = intact && !in_transit.frame.damage.is_intact();
         if marked || controller.register(errors) > before {
             let id = controller.id();
-            self.truth.may_move(id, ErrorCounter::ProcessingUnit, traveller.content());
-            traveller.refused = true;
-            let effect = Effect::ContentRefused { frame: traveller.frame.number };
-            let by = traveller.spoiled_by.or(traveller.stranger);
+            self.truth.may_move(id, ErrorCounter::ProcessingUnit, in_transit.content());
+            in_transit.refused = true;
+            let effect = Effect::ContentRefused { frame: in_transit.frame.number };
+            let by = in_transit.spoiled_by.or(in_transit.foreign_sender);
             self.truth.effect(at, by, Place::Device(id), effect);
         }
         verdict
@@ -351,16 +368,16 @@ impl World {
 
     /// A fault inside spoils the frame before it is coded: whoever receives it finds it first.
     #[inline]
-    fn glitch(&mut self, node: usize, at: Instant, traveller: &mut Traveller) {
+    fn glitch(&mut self, node: usize, at: Instant, in_transit: &mut FrameInTransit) {
         if self.nodes[node].glitches.is_empty() {
             return;
         }
         if let Some(glitch) = self.nodes[node].strike(at) {
-            let bytes = traveller.frame.bytes.len() as u64;
+            let bytes = in_transit.frame.bytes.len() as u64;
             let byte = PREAMBLE_LEN as u64 + bytes * u64::from(glitch.part) / (1 << 16);
             let offset = Span::ns(byte * BYTE_NS);
             let place = Place::Device(self.id(node));
-            self.spoil(at + offset, offset, glitch.flip, glitch.fault, place, traveller);
+            self.spoil(at + offset, offset, glitch.flip, glitch.fault, place, in_transit);
         }
     }
 }

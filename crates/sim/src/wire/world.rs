@@ -4,13 +4,13 @@ use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
-use super::change::{Change, Line};
-use super::direct::Direct;
-use super::due::Agenda;
+use super::change::{Change, DirectedLink};
+use super::fast_path::FastPath;
+use super::foreign_sender::ForeignSenders;
 use super::link::{CABLE_NS_PER_M, Link, Noise};
+use super::link_event::LinkEvents;
 use super::nodes::Nodes;
 use super::plug_noise::PlugNoise;
-use super::stranger::Strangers;
 use crate::controller::Controller;
 use crate::device::Signals;
 use crate::fault::Running;
@@ -32,23 +32,23 @@ pub(crate) struct World {
     pub(crate) cards: [Card; 2],
     pub(crate) signals: Signals,
     pub(crate) truth: TruthLog,
-    pub(super) agenda: Agenda,
+    pub(super) link_events: LinkEvents,
     pub(crate) running: Vec<Running>,
     /// The line that leaves each card.
-    pub(super) leaving: [Option<Line>; 2],
+    pub(super) leaving: [Option<DirectedLink>; 2],
     /// All changes up to here are made; what is injected begins later.
     pub(crate) horizon: Instant,
     /// An upper bound of the time that a frame of no length takes through all of it, twice.
     round: Span,
     pub(crate) frames: u64,
     pub(crate) plug_noise: PlugNoise,
-    pub(super) strangers: Strangers,
+    pub(super) foreign_senders: ForeignSenders,
     /// Links on which something lies in wait.
     pub(super) noisy: Vec<usize>,
     /// The last instant, so far as is known, at which a link or a supply changed.
     pub(super) changed_at: Instant,
     /// What frames can be spared of the walk.
-    pub(crate) direct: Direct,
+    pub(crate) fast_path: FastPath,
 }
 
 impl World {
@@ -67,17 +67,17 @@ impl World {
             cards: [Card::default(), Card::default()],
             signals,
             truth: TruthLog::default(),
-            agenda: Agenda::default(),
+            link_events: LinkEvents::default(),
             running: Vec::new(),
             leaving: [None; 2],
             horizon: Instant::ZERO,
             round: Span::ZERO,
             frames: 0,
             plug_noise: PlugNoise::new(0.0, Seed(0).stream("plug noise")),
-            strangers: Strangers::default(),
+            foreign_senders: ForeignSenders::default(),
             noisy: Vec::new(),
             changed_at: Instant::ZERO,
-            direct: Direct::default(),
+            fast_path: FastPath::default(),
         };
         for (index, wired) in tree.links().iter().enumerate() {
             world.plug(*wired, index, cable_m.get(index).copied().unwrap_or(0.0));
@@ -108,11 +108,11 @@ impl World {
             .unwrap_or(PortKind::Mii);
         let transit = self.ports(wired.upstream, wired.downstream, kind) + cable;
         self.links.push(Link::new(wired.upstream, wired.downstream, kind, transit));
-        for line in Line::both(index) {
-            let (from, _) = self.links[index].from_to(line.downstream);
+        for direction in DirectedLink::both(index) {
+            let (from, _) = self.links[index].from_to(direction.downstream);
             match from {
-                End::MainDevice(path) => self.leaving[path.index()] = Some(line),
-                End::Controller(node, port) => self.nodes[node].leaving[port] = Some(line),
+                End::MainDevice(path) => self.leaving[path.index()] = Some(direction),
+                End::Controller(node, port) => self.nodes[node].leaving[port] = Some(direction),
             }
         }
     }
@@ -142,10 +142,10 @@ impl World {
             End::MainDevice(path) => self.leaving[path.index()] = None,
             End::Controller(node, port) => self.nodes[node].leaving[port] = None,
         }
-        let line = Some(Line { link, downstream: true });
+        let direction = Some(DirectedLink { link, downstream: true });
         match upstream {
-            End::MainDevice(path) => self.leaving[path.index()] = line,
-            End::Controller(node, port) => self.nodes[node].leaving[port] = line,
+            End::MainDevice(path) => self.leaving[path.index()] = direction,
+            End::Controller(node, port) => self.nodes[node].leaving[port] = direction,
         }
         self.links[link].upstream = upstream;
         self.links[link].transit = self.ports(upstream, downstream, kind) + Span::ns(cable);
@@ -178,8 +178,8 @@ impl World {
     }
 
     /// The place of a line in the truth log.
-    pub(crate) fn line_place(&self, line: Line) -> Place {
-        let (from, to) = self.links[line.link].from_to(line.downstream);
+    pub(crate) fn direction_place(&self, direction: DirectedLink) -> Place {
+        let (from, to) = self.links[direction.link].from_to(direction.downstream);
         Place::Direction(self.name_end(from), self.name_end(to))
     }
 
@@ -193,32 +193,32 @@ impl World {
             self.horizon = self.horizon.max(until);
             return;
         }
-        self.strangers_until(now);
+        self.send_foreign_frames_until(now);
         self.change_until(until);
         if !self.noisy.is_empty() {
             self.forget_noise(now - MEMORY);
         }
     }
 
-    /// Whether nothing is going to change, no stranger sends and no noise lies in wait.
+    /// Whether nothing is going to change, no foreign sender sends and no noise lies in wait.
     #[inline]
     fn is_uneventful(&self) -> bool {
         self.running.is_empty()
-            && self.agenda.is_empty()
+            && self.link_events.is_empty()
             && self.noisy.is_empty()
-            && self.strangers.next_at().is_none()
+            && self.foreign_senders.next_at().is_none()
     }
 
-    /// Strangers send what they send until `now`: each frame as if somebody looked at its time, so
+    /// Foreign senders send what they send until `now`: each frame as if somebody looked at its time, so
     /// that it is all the same who looks and when.
     #[inline]
-    fn strangers_until(&mut self, now: Instant) {
-        /// Longer than the frame of any stranger.
+    fn send_foreign_frames_until(&mut self, now: Instant) {
+        /// Longer than the frame of any foreign sender.
         const FRAME: Span = Span::us(20);
-        while let Some(at) = self.next_stranger().filter(|at| *at <= now) {
+        while let Some(at) = self.next_foreign_frame().filter(|at| *at <= now) {
             self.change_until(at + self.round + FRAME);
             self.touch_due(at);
-            self.let_strangers_send(at);
+            self.send_foreign_frames(at);
         }
     }
 
@@ -226,8 +226,8 @@ impl World {
         let links = &mut self.links;
         self.noisy.retain(|link| {
             let noise = &mut links[*link].noise;
-            for line in &mut *noise {
-                line.forget(before);
+            for direction in &mut *noise {
+                direction.forget(before);
             }
             !noise.iter().all(Noise::is_quiet)
         });
@@ -246,7 +246,7 @@ impl World {
         if self.is_uneventful() {
             self.horizon = self.horizon.max(now);
         } else {
-            self.strangers_until(now);
+            self.send_foreign_frames_until(now);
             self.change_until(now);
         }
         self.touch_due(now);
@@ -255,7 +255,7 @@ impl World {
     /// Makes all changes up to and at an instant.
     #[inline]
     fn change_until(&mut self, until: Instant) {
-        if !self.running.is_empty() || !self.agenda.is_empty() {
+        if !self.running.is_empty() || !self.link_events.is_empty() {
             self.make_changes(until);
         }
         self.horizon = self.horizon.max(until);
@@ -263,14 +263,14 @@ impl World {
 
     fn make_changes(&mut self, until: Instant) {
         loop {
-            let due = self.agenda.next_at().filter(|at| *at <= until);
+            let due = self.link_events.next_at().filter(|at| *at <= until);
             let fault = self.next_fault().filter(|(at, _)| *at <= until);
             match (due, fault) {
                 (None, None) => break,
                 (Some(at), Some((fault_at, index))) if fault_at < at => self.run_fault(index),
                 (None, Some((_, index))) => self.run_fault(index),
                 (Some(_), _) => {
-                    if let Some((at, due)) = self.agenda.pop() {
+                    if let Some((at, due)) = self.link_events.pop() {
                         self.serve(at, due);
                     }
                 }
@@ -313,7 +313,7 @@ impl World {
         for card in &mut self.cards {
             card.disarm(fault);
         }
-        self.strangers.disarm(fault);
+        self.foreign_senders.disarm(fault);
     }
 
     /// A fault is over: everything it holds is let go.
@@ -323,14 +323,14 @@ impl World {
                 self.apply(at, fault, Change::Close { link });
             }
             // The signal first: what was in between is still there, and keeps the link of the end that had it.
-            for line in Line::both(link) {
-                if self.links[link].pair[usize::from(line.downstream)].is_held_by(fault) {
-                    self.apply(at, fault, Change::Mend { line });
+            for direction in DirectedLink::both(link) {
+                if self.links[link].pair[usize::from(direction.downstream)].is_held_by(fault) {
+                    self.apply(at, fault, Change::Mend { direction });
                 }
             }
-            for line in Line::both(link) {
-                if self.links[link].passage[usize::from(line.downstream)].is_held_by(fault) {
-                    self.apply(at, fault, Change::Carry { line });
+            for direction in DirectedLink::both(link) {
+                if self.links[link].passage[usize::from(direction.downstream)].is_held_by(fault) {
+                    self.apply(at, fault, Change::Carry { direction });
                 }
             }
             if self.links[link].early.is_some_and(|(_, by)| by == fault) {
@@ -378,16 +378,16 @@ impl World {
     /// The first instant of a span at which a line carries nothing, and by whose doing.
     pub(super) fn first_silence(
         &self,
-        line: Line,
+        direction: DirectedLink,
         from: Instant,
         to: Instant,
     ) -> Option<(Instant, FaultId)> {
-        let link = &self.links[line.link];
-        let (sender, _) = link.from_to(line.downstream);
-        let direction = usize::from(line.downstream);
+        let link = &self.links[direction.link];
+        let (sender, _) = link.from_to(direction.downstream);
+        let side = usize::from(direction.downstream);
         let contact = link.contact.first_break(from, to);
-        let pair = link.pair[direction].first_break(from, to);
-        let passage = link.passage[direction].first_break(from, to);
+        let pair = link.pair[side].first_break(from, to);
+        let passage = link.passage[side].first_break(from, to);
         let sender = sender.node().and_then(|node| self.nodes[node].power.first_break(from, to));
         [contact, pair, passage, sender].into_iter().flatten().min()
     }

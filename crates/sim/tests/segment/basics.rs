@@ -1,5 +1,5 @@
-//! What makes a line: ports, loops, the place of the processing unit, addresses, working counters; with
-//! frames from outside, as a MainDevice sees it.
+//! Basics of a line: ports, loops, the place of the processing unit, addresses, working counters;
+//! with frames from outside, as a MainDevice sees it.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! What is built in otherwise than planned, addresses that two have, currents that are not supplied.
+//! Deviations from the plan, addresses that two share, currents that are not supplied.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::DeviceId;

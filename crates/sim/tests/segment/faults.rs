@@ -1,4 +1,4 @@
-//! What each fault does to frames and counters.
+//! Effects of each fault on frames and counters.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{Path, RegisterAddress};
@@ -302,7 +302,7 @@ fn a_brown_out_forgets_address_and_counters() {
 }
 
 #[test]
-fn what_feeds_a_coupler_feeds_its_terminals() {
+fn brown_out_of_a_coupler_restarts_its_terminals() {
     let mut bench = Bench::plant();
     bench.send(Command::Bwr, at(0, 0x0010), &[1, 0x10]);
     bench.inject(&FaultEntry::new(FaultName::BrownOut).device("K6"));
@@ -486,7 +486,7 @@ fn a_schedule_lets_a_fault_come_again_and_again() {
 }
 
 #[test]
-fn what_is_healed_does_not_come_again() {
+fn healed_fault_does_not_come_again() {
     let mut bench = Bench::plant();
     let mut entry = FaultEntry::new(FaultName::LinkOpen).at("T4.B-T5.A");
     entry.schedule.every_ms = Some(100.0);

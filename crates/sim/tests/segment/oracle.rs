@@ -295,7 +295,7 @@ fn inject(pair: &mut Pair, stream: &mut Stream, file: &SegmentFile, running: &mu
 // proves: ESC-07 partial: the way that is not walked shows what the walk does
 #[test]
 #[allow(clippy::disallowed_methods, reason = "how many seeds is for whoever runs it to say")]
-fn what_is_not_walked_comes_to_the_same_as_the_walk() {
+fn fast_path_equals_the_walk() {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
     let first = number("LINESMAN_ORACLE_FIRST").unwrap_or(0);
     let seeds = number("LINESMAN_ORACLE_SEEDS").unwrap_or(10_000);

@@ -31,11 +31,11 @@ pub(crate) fn any_fault(file: &SegmentFile, stream: &mut Stream) -> FaultEntry {
     let (near, far) = (device.on.to_string(), format!("{}.A", device.name));
     let entry = FaultEntry::new(kind.name);
     match kind.place {
-        PlaceRule::Link | PlaceRule::Lines | PlaceRule::ManyLines => {
+        PlaceRule::Link | PlaceRule::Directions | PlaceRule::ManyDirections => {
             entry.at(format!("{near}-{far}"))
         }
-        PlaceRule::Line if stream.chance(0.5) => entry.at(format!("{near}>{far}")),
-        PlaceRule::Line => entry.at(format!("{far}>{near}")),
+        PlaceRule::Direction if stream.chance(0.5) => entry.at(format!("{near}>{far}")),
+        PlaceRule::Direction => entry.at(format!("{far}>{near}")),
         PlaceRule::Device
         | PlaceRule::Devices
         | PlaceRule::Feed
@@ -138,13 +138,13 @@ fn two_segments_in_one_process_know_nothing_of_each_other() {
 #[test]
 fn devices_may_be_written_in_any_order() {
     let file = SegmentFile::parse(PLANT).unwrap();
-    let mut turned = file.clone();
-    turned.devices.reverse();
-    let mut bench = Bench::of(&turned);
+    let mut reversed = file.clone();
+    reversed.devices.reverse();
+    let mut bench = Bench::of(&reversed);
     assert_eq!(bench.count(), Some(8));
     assert_eq!(bench.segment.name(linesman_proto::address::DeviceId(0)), "K8");
     let on = Attachment::MainDevice(Path::A);
-    assert_eq!(turned.devices.last().map(|device| &device.on), Some(&on));
+    assert_eq!(reversed.devices.last().map(|device| &device.on), Some(&on));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What foreign MainDevices take for granted, and other emulators got wrong: each a test on frames.
+//! Assumptions of foreign MainDevices that other emulators got wrong: each a test on frames.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::LogicalAddress;

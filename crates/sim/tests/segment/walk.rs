@@ -1,4 +1,4 @@
-//! What a healthy line does.
+//! Behaviour of a healthy line.
 
 use linesman_proto::address::Path;
 use linesman_proto::command::Command;

@@ -1,4 +1,4 @@
-//! Which SubDevices share a datagram.
+//! Groups of SubDevices that share a datagram.
 
 use linesman_proto::frame::MAX_DATAGRAM_DATA;
 use linesman_proto::sii::Direction;

@@ -100,7 +100,7 @@ fn a_device_without_lrw_gets_lwr_and_lrd() {
 }
 
 #[test]
-fn what_no_datagram_can_carry_is_refused() {
+fn process_data_longer_than_a_datagram_are_refused() {
     let devices = [planned(vec![manager(2, Direction::Outputs, 0x1100, 1_487)], false)];
     let error = Plan::build(&devices, line(1), &PlanOptions::default()).unwrap_err();
     assert!(matches!(error, PlanError::TooMuchProcessData { len: 1_487, .. }));

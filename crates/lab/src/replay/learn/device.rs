@@ -1,4 +1,4 @@
-//! What is known of one device.
+//! Knowledge of one device.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 

@@ -1,4 +1,4 @@
-//! How long something took that was asked for and then polled: between the last poll that still saw
+//! Latency of something that was requested and then polled: between the last poll that still saw
 //! the old and the first that saw the new.
 
 use linesman_proto::time::{Instant, Span};

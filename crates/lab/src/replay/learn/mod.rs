@@ -1,4 +1,4 @@
-//! What a recording tells of the devices that answered.
+//! Knowledge that a recording gives of the devices that answered.
 //!
 //! The first value of each register that no request had written before is the value at the start.
 //! Where the recording begins in the middle of a run, station addresses that are used without having

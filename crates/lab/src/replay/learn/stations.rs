@@ -1,4 +1,4 @@
-//! Which device has which station address, as the recording goes on.
+//! Station addresses of the devices, as the recording goes on.
 
 use std::collections::BTreeMap;
 

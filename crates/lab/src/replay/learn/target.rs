@@ -1,4 +1,4 @@
-//! Whom a datagram reaches.
+//! Target of a datagram: the devices that it reaches.
 
 /// Whom a datagram reaches.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,4 +1,4 @@
-//! Which controller each device has: the one that answers as the recording shows.
+//! Choice of each device's controller: the one that answers as the recording shows.
 //!
 //! The recording rarely tells the type of a controller, but always how many answered an access to a
 //! register. Of the controllers there are, the ones are taken with which these numbers come out, or

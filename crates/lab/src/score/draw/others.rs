@@ -1,4 +1,4 @@
-//! Faults that are no damage: settings, places, computers, strangers.
+//! Random faults that are no damage: settings, places, computers, foreign senders.
 
 use linesman_config::fault::FaultName::*;
 use linesman_proto::topology::End;
@@ -48,7 +48,7 @@ impl Drawer<'_, '_> {
 
     pub(super) fn built_in(&mut self) -> Option<Drawn> {
         let (device, id) = self.any_device()?;
-        let above = self.offer.ground.tree.upstream(id.index());
+        let above = self.offer.outline.tree.upstream(id.index());
         let entry = match self.name {
             // The first one that is entered by its OUT port is `maindevice-wrong-port`.
             PortsSwapped if matches!(above, Some(End::MainDevice(_))) => return None,

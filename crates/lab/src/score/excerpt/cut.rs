@@ -8,7 +8,7 @@ use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Stream;
 
-use super::super::tape::TapedFrame;
+use super::super::recorder::RecordedFrame;
 
 /// Lengths that recorders are set to.
 const SNAPS: [usize; 4] = [40, 64, 96, 128];
@@ -48,14 +48,14 @@ const COPY: Span = Span::us(2);
 
 impl Cut {
     /// One that leaves all of a recording.
-    pub(super) fn none(frames: &[TapedFrame]) -> Self {
-        let time = |frame: Option<&TapedFrame>| frame.map_or(Instant::ZERO, |frame| frame.time);
+    pub(super) fn none(frames: &[RecordedFrame]) -> Self {
+        let time = |frame: Option<&RecordedFrame>| frame.map_or(Instant::ZERO, |frame| frame.time);
         let (from, to) = (time(frames.first()), time(frames.last()));
         Self { from, to, one_way: None, snap: None, lost_reads: 0.0 }
     }
 
     /// Draws one for a recording.
-    pub(super) fn draw(frames: &[TapedFrame], stream: &mut Stream) -> Self {
+    pub(super) fn draw(frames: &[RecordedFrame], stream: &mut Stream) -> Self {
         let first = frames.first().map_or(Instant::ZERO, |frame| frame.time);
         let last = frames.last().map_or(Instant::ZERO, |frame| frame.time);
         let whole = last.since(first).as_nanos();
@@ -80,7 +80,11 @@ impl Cut {
     }
 
     /// The frames that are left.
-    pub(super) fn apply(&self, frames: &[TapedFrame], stream: &mut Stream) -> Vec<TapedFrame> {
+    pub(super) fn apply(
+        &self,
+        frames: &[RecordedFrame],
+        stream: &mut Stream,
+    ) -> Vec<RecordedFrame> {
         let mut recorder =
             LostReads { stream, share: self.lost_reads, hidden: Vec::new(), latest: None };
         let mut left = Vec::new();
@@ -113,7 +117,7 @@ struct LostReads<'a> {
 
 impl LostReads<'_> {
     /// Whether an exchange is lost, with its request and its return.
-    fn loses(&mut self, frame: &TapedFrame) -> bool {
+    fn loses(&mut self, frame: &RecordedFrame) -> bool {
         let Ok(view) = FrameView::parse(&frame.bytes) else { return false };
         // What is written stays: a lost read is one of many, a lost order is what the line is told.
         let is_kept =

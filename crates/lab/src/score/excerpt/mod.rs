@@ -19,7 +19,7 @@ use super::case::{Case, CaseKind, ScoreOptions};
 use super::judge::alarms;
 use super::listen::leaves_a_state;
 use super::play::play_taped;
-use super::tape::{Tape, TapedFrame};
+use super::recorder::{RecordedFrame, SharedRecording};
 use super::trace;
 
 pub use super::trace::Trace;
@@ -133,14 +133,14 @@ pub fn excerpt_frames(
 }
 
 /// A case with its recording and its truth.
-struct Taped {
+struct RecordedCase {
     case: Case,
-    frames: Vec<TapedFrame>,
+    frames: Vec<RecordedFrame>,
     truth: TruthLog,
     project: Option<Project>,
 }
 
-fn taped(seed: u64, options: &ExcerptOptions) -> Option<Taped> {
+fn taped(seed: u64, options: &ExcerptOptions) -> Option<RecordedCase> {
     let score =
         ScoreOptions { healthy: options.healthy, fault: options.fault, ..ScoreOptions::default() };
     for attempt in 0..8 {
@@ -148,16 +148,19 @@ fn taped(seed: u64, options: &ExcerptOptions) -> Option<Taped> {
         if case.kind == CaseKind::Healthy && !options.healthy {
             return None;
         }
-        let tape = Tape::default();
-        let Ok((_, truth, project)) = play_taped(&case, &score, &tape) else { continue };
-        let recording = std::mem::take(&mut *tape.lock().unwrap_or_else(PoisonError::into_inner));
+        let shared_recording = SharedRecording::default();
+        let Ok((_, truth, project)) = play_taped(&case, &score, &shared_recording) else {
+            continue;
+        };
+        let recording =
+            std::mem::take(&mut *shared_recording.lock().unwrap_or_else(PoisonError::into_inner));
         let frames = recording.frames;
-        return Some(Taped { case, frames, truth, project });
+        return Some(RecordedCase { case, frames, truth, project });
     }
     None
 }
 
-fn judge(taped: &Taped, cut: Cut, frames: &[TapedFrame]) -> ExcerptReport {
+fn judge(taped: &RecordedCase, cut: Cut, frames: &[RecordedFrame]) -> ExcerptReport {
     let setup = Setup {
         project: taped.project.clone(),
         input: InputKind::Recorded,

@@ -9,13 +9,13 @@ use linesman_sim::truth::FaultRecord;
 
 use super::super::judge::alarms;
 use super::super::play::Play;
-use super::super::tape::Recording;
+use super::super::recorder::Recording;
 use super::super::trace;
 use super::join::Joins;
 use super::judge::judge_listener;
 use super::play::Listener;
 use super::{HealthyListened, HealthySaid, Heard, Listeners, Pair};
-use crate::verdict::judge::Company;
+use crate::verdict::judge::FaultContext;
 use crate::verdict::{Naming, Scene, Truth};
 
 /// Who joins a healthy run listens for the last part of it: two of three.
@@ -32,8 +32,8 @@ impl Play<'_> {
 
     /// What listeners say of the run so far, in which nothing was wrong; `None` where nobody listens.
     pub(in crate::score) fn healthy_listened(&self) -> Option<HealthyListened> {
-        let tape = self.tape.as_ref()?;
-        let recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let shared_recording = self.shared_recording.as_ref()?;
+        let recording = shared_recording.lock().unwrap_or_else(PoisonError::into_inner);
         let now = self.lab.now();
         let late = self.late();
         let said = |(from, with_project)| {
@@ -62,8 +62,8 @@ impl Play<'_> {
 
     /// What listeners hear of the run so far, beside a fault or on a healthy line.
     pub(in crate::score) fn heard(&self, record: Option<&FaultRecord>) -> Vec<Heard> {
-        let Some(tape) = &self.tape else { return Vec::new() };
-        let recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(shared_recording) = &self.shared_recording else { return Vec::new() };
+        let recording = shared_recording.lock().unwrap_or_else(PoisonError::into_inner);
         let joins = record.map(|record| self.joins(record));
         let joined = match joins {
             None => [None, None, Some(("late", Some(self.late())))],
@@ -89,8 +89,8 @@ impl Play<'_> {
         all: &[Truth],
         scene: &Scene<'_>,
     ) -> Option<Listeners> {
-        let tape = self.tape.as_ref()?;
-        let recording = tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let shared_recording = self.shared_recording.as_ref()?;
+        let recording = shared_recording.lock().unwrap_or_else(PoisonError::into_inner);
         let joins = self.joins(record);
         let judging = Judging {
             play: self,
@@ -98,7 +98,7 @@ impl Play<'_> {
             truth,
             all,
             scene,
-            company: Company::of(self.lab.truth(), record),
+            context: FaultContext::of(self.lab.truth(), record),
         };
         Some(Listeners {
             start: judging.pair(None),
@@ -115,7 +115,7 @@ struct Judging<'a, 'p> {
     truth: &'a Truth,
     all: &'a [Truth],
     scene: &'a Scene<'a>,
-    company: Company,
+    context: FaultContext,
 }
 
 impl Judging<'_, '_> {
@@ -140,7 +140,7 @@ impl Judging<'_, '_> {
                 self.truth,
                 self.all,
                 &scene,
-                self.company,
+                self.context,
                 naming,
                 &traces,
             )
@@ -162,12 +162,17 @@ mod tests {
             for seed in 1..13 {
                 let case = Case::draw(seed, 0, &options);
                 let Ok(play) = Play::calm(&case, &options) else { panic!("seed {seed}") };
-                let tape = play.tape.as_ref().map(|tape| tape.lock().unwrap().clone()).unwrap();
+                let shared_recording = play
+                    .shared_recording
+                    .as_ref()
+                    .map(|shared_recording| shared_recording.lock().unwrap().clone())
+                    .unwrap();
                 for from in [None, Some(play.up + Span::ms(100))] {
-                    let range = play.listener(&tape, false).hears(from, play.lab.now());
-                    let heard = &tape.frames[range];
+                    let range = play.listener(&shared_recording, false).hears(from, play.lab.now());
+                    let heard = &shared_recording.frames[range];
                     assert!(heard.len() > 100, "{habit}, seed {seed}");
-                    let traces = trace::heard(&tape.frames, heard, case.cycle, from.is_none());
+                    let traces =
+                        trace::heard(&shared_recording.frames, heard, case.cycle, from.is_none());
                     assert_eq!(traces, [], "{habit}, seed {seed}, {from:?}");
                 }
             }

@@ -7,7 +7,7 @@ use linesman_proto::time::Span;
 use super::super::judge::{Judged, alarms, judge};
 use super::super::trace::Trace;
 use super::{Listened, Outcome};
-use crate::verdict::judge::{Company, is_left_open, may_be};
+use crate::verdict::judge::{FaultContext, is_left_open, may_be};
 use crate::verdict::{Match, Naming, Scene, Truth};
 
 /// What lost frames may be, where nothing but the frames is known.
@@ -29,7 +29,7 @@ pub(in crate::score) fn judge_listener(
     truth: &Truth,
     all: &[Truth],
     scene: &Scene<'_>,
-    company: Company,
+    context: FaultContext,
     naming: Naming<'_>,
     traces: &[Trace],
 ) -> Listened {
@@ -49,7 +49,7 @@ pub(in crate::score) fn judge_listener(
             verdict: None,
         };
     };
-    let mut judged = judge(diagnosis, truth, all, scene, (company, 1), naming);
+    let mut judged = judge(diagnosis, truth, all, scene, (context, 1), naming);
     let first = diagnosis.findings.first();
     let is_quiet = alarms(diagnosis).is_empty();
     let outcome = if judged.fits.place.is_right() {

@@ -14,7 +14,7 @@ pub(super) mod tally;
 use linesman_diagnosis::report::Verdict;
 
 use super::judge::Judged;
-use super::tape::TapedFrame;
+use super::recorder::RecordedFrame;
 
 pub(super) use join::leaves_a_state;
 
@@ -72,7 +72,7 @@ pub struct Heard {
     /// When it joined: `start`, `during`, `after`, or `late` on a healthy line.
     pub joined: &'static str,
     /// What passed the cards of the MainDevice from then on.
-    pub frames: Vec<TapedFrame>,
+    pub frames: Vec<RecordedFrame>,
 }
 
 /// What listeners said of a healthy line: alarms, and whether it was called healthy.

@@ -7,7 +7,7 @@ use linesman_diagnosis::{Engine, InputKind, Setup};
 use linesman_proto::address::{Network, Path};
 use linesman_proto::time::{Instant, Span};
 
-use super::super::tape::{Recording, TapedFrame};
+use super::super::recorder::{RecordedFrame, Recording};
 
 /// The longest time between two looks at the clock.
 const NAP: Span = Span::ms(100);
@@ -43,7 +43,7 @@ impl Listener<'_> {
         until: Instant,
     ) -> Option<Diagnosis> {
         let range = self.hears(from, until);
-        let mut hearing = Hearing {
+        let mut hearing = ListenerRun {
             engine: None,
             // Who is there from before the first frame has been told of the link before, in vain.
             carriers: [None; 2],
@@ -85,7 +85,7 @@ impl Listener<'_> {
 }
 
 /// A listener at work.
-struct Hearing {
+struct ListenerRun {
     engine: Option<Engine>,
     /// Whether each card has a link, as far as that was observed.
     carriers: [Option<bool>; 2],
@@ -97,8 +97,8 @@ struct Hearing {
     now: Instant,
 }
 
-impl Hearing {
-    fn take(&mut self, listener: &Listener<'_>, frame: &TapedFrame, number: u64) {
+impl ListenerRun {
+    fn take(&mut self, listener: &Listener<'_>, frame: &RecordedFrame, number: u64) {
         self.sees_own |= frame.is_sent;
         let direction = match frame.is_sent {
             true => Direction::Sent,

@@ -1,4 +1,4 @@
-//! What listeners beside the MainDevice of a score said, as programs read it.
+//! Report of the listeners beside the MainDevice of a score, as programs read it.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Adding up what listeners said.
+//! Tally of the answers of listeners.
 
 use std::collections::BTreeMap;
 

@@ -6,7 +6,7 @@ use linesman_proto::port::Port;
 use linesman_proto::register::{ClearGroup, ErrorCounter, ErrorCounters, table};
 use linesman_proto::time::Span;
 
-use crate::command::service::{Session, Trouble};
+use crate::command::service::{ServiceError, Session};
 use crate::failure::Failure;
 
 /// What one SubDevice's counters read at one time.
@@ -34,18 +34,18 @@ pub(crate) struct Samples {
 
 impl Samples {
     /// Clears all error counters of all SubDevices.
-    pub(crate) fn clear(&mut self, session: &mut Session) -> Result<(), Trouble> {
+    pub(crate) fn clear(&mut self, session: &mut Session) -> Result<(), ServiceError> {
         let ids: Vec<DeviceId> = session.devices().iter().map(|known| known.id).collect();
         for id in ids {
             for group in ClearGroup::ALL {
                 let (address, data) = (group.address(), vec![0]);
                 match session.ask(id, Service::WriteRegister { address, data }) {
                     // Not every controller has every counter.
-                    Ok(_) | Err(Trouble::Refused(_)) => {}
-                    Err(Trouble::Failed(failure)) if group == ClearGroup::Rx => {
-                        return Err(Trouble::Failed(failure));
+                    Ok(_) | Err(ServiceError::Refused(_)) => {}
+                    Err(ServiceError::Failed(failure)) if group == ClearGroup::Rx => {
+                        return Err(ServiceError::Failed(failure));
                     }
-                    Err(Trouble::Failed(_)) => {}
+                    Err(ServiceError::Failed(_)) => {}
                 }
             }
         }

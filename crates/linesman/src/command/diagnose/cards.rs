@@ -1,14 +1,14 @@
-//! A line that nobody drives: reads again and again, and sees what changes.
+//! Diagnosis of a line that nobody drives: reads again and again, and sees what changes.
 
 use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, InputKind, Setup};
 use linesman_link::clock::HostClock;
 use linesman_maindevice::{Event, MainDevice, ProbeRequest, Target};
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Audience, Driver};
+use linesman_runtime::drive::{Driver, DriverHooks};
 use linesman_runtime::record::Recorder;
 
 use super::Session;
-use crate::command::driven;
+use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Progress};
@@ -27,8 +27,8 @@ pub(super) fn run(
     session: Session,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    driven::refuse(names)?;
-    let stop = driven::stop()?;
+    line_access::refuse(names)?;
+    let stop = line_access::stop()?;
     let clock = HostClock::start();
     let until = session.until(LASTS);
     let mut driver = Driver::open(names, clock)?;
@@ -42,7 +42,7 @@ pub(super) fn run(
         ..session.setup.clone()
     };
     let recorder = session.recorder(clock.started_at(), names)?;
-    let mut looking = Looking {
+    let mut looking = CardPoll {
         engine: Engine::new(setup),
         session,
         recorder,
@@ -52,7 +52,7 @@ pub(super) fn run(
         frames: 0,
     };
     let result = driver.run(until, &stop, &mut looking);
-    let Looking { engine, mut session, recorder, frames, mut progress, output, .. } = looking;
+    let CardPoll { engine, mut session, recorder, frames, mut progress, output, .. } = looking;
     progress.clear();
     session.end_recording(recorder, output);
     let complete = match result {
@@ -68,7 +68,7 @@ pub(super) fn run(
 }
 
 /// Looks again and again.
-struct Looking<'a> {
+struct CardPoll<'a> {
     engine: Engine,
     session: Session,
     recorder: Option<Recorder>,
@@ -89,7 +89,7 @@ enum Next {
     Wait,
 }
 
-impl Audience for Looking<'_> {
+impl DriverHooks for CardPoll<'_> {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.frames += 1;
         if let Some(recorder) = &mut self.recorder {
@@ -105,7 +105,10 @@ impl Audience for Looking<'_> {
     fn event(&mut self, now: Instant, event: Event, _: &mut MainDevice) {
         let is_done = matches!(
             event,
-            Event::Looked(_) | Event::LookFailed(_) | Event::Scanned(_) | Event::ScanFailed(_)
+            Event::ReadOnlyScanned(_)
+                | Event::ReadOnlyScanFailed(_)
+                | Event::Scanned(_)
+                | Event::ScanFailed(_)
         );
         if is_done {
             self.next = Next::LookAt(now + LOOK_EVERY);
@@ -139,7 +142,7 @@ impl Audience for Looking<'_> {
             }
             Next::LookAt(at) if at <= now => {
                 self.next = Next::Wait;
-                main.look(now);
+                main.read_only_scan(now);
             }
             Next::LookAt(_) | Next::Wait => {}
         }

@@ -7,12 +7,12 @@ use linesman_link::error::LinkError;
 use linesman_link::interface::find;
 use linesman_proto::address::Network;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::asking::Asking;
-use linesman_runtime::listen::{Ears, Heard, TapCounts};
+use linesman_runtime::listen::{CardListener, ListenEvent, TapCounts};
+use linesman_runtime::question_socket::QuestionSocket;
 use linesman_runtime::record::Recorder;
 
-use super::{Session, asking};
-use crate::command::driven;
+use super::{Session, questions};
+use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Progress};
@@ -32,11 +32,11 @@ pub(super) fn run(
     session: Session,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let clock = HostClock::start();
     let until = session.until(if questions.is_some() { ASKING_LASTS } else { LASTS });
-    let mut ears = Ears::open(names, clock)?;
-    let asking = questions.map(|setup| asking::open(names, clock, setup)).transpose()?;
+    let mut card_listener = CardListener::open(names, clock)?;
+    let asking = questions.map(|setup| questions::open(names, clock, setup)).transpose()?;
     let recorder = session.recorder(clock.started_at(), names)?;
     let mut listening =
         Listening { session, clock, recorder, engine: None, asking, frames: 0, is_local: false };
@@ -44,7 +44,7 @@ pub(super) fn run(
     let mut lost = None;
     while !stop.is_set() && clock.now() < until && !output.is_closed() {
         let deadline = until.min(clock.now() + NAP).min(listening.deadline());
-        let heard = listening.hear(&mut ears, deadline, output);
+        let heard = listening.hear(&mut card_listener, deadline, output);
         match heard.and_then(|()| listening.ask(names, output)) {
             Ok(None) => {}
             Ok(Some(refused)) => {
@@ -72,7 +72,7 @@ pub(super) fn run(
         engine.note_asking(asking.report());
     }
     if !is_local && lost.is_none() {
-        tell_of_tap(&mut ears, names, output);
+        tell_of_tap(&mut card_listener, names, output);
     }
     let complete = lost.is_none();
     if let Some(error) = lost {
@@ -88,7 +88,7 @@ struct Listening {
     clock: HostClock,
     recorder: Option<Recorder>,
     engine: Option<Engine>,
-    asking: Option<Asking>,
+    asking: Option<QuestionSocket>,
     frames: u64,
     /// Whether this computer drives the line: then the counters of its card are about the line.
     is_local: bool,
@@ -99,19 +99,19 @@ impl Listening {
     fn deadline(&self) -> Instant {
         // Before the first frame there is nothing to be asked.
         let asking = self.asking.as_ref().filter(|_| self.engine.is_some());
-        asking.map_or(Instant::MAX, Asking::deadline)
+        asking.map_or(Instant::MAX, QuestionSocket::deadline)
     }
 
     fn hear(
         &mut self,
-        ears: &mut Ears,
+        card_listener: &mut CardListener,
         deadline: Instant,
         output: &mut Output,
     ) -> Result<(), LinkError> {
         let Self { session, clock, recorder, engine, asking, frames, is_local } = self;
-        ears.hear(deadline, |heard| {
+        card_listener.hear(deadline, |heard| {
             match heard {
-                Heard::Frame(frame) => {
+                ListenEvent::Frame(frame) => {
                     *frames += 1;
                     if let Some(recorder) = recorder {
                         recorder.frame(&frame);
@@ -126,12 +126,12 @@ impl Listening {
                         asking.frame(&frame);
                     }
                 }
-                Heard::Host(observation) => {
+                ListenEvent::Host(observation) => {
                     if let Some(engine) = engine {
                         engine.handle_host(&observation);
                     }
                 }
-                Heard::Missed(count, at) => {
+                ListenEvent::Missed(count, at) => {
                     if let Some(engine) = engine {
                         engine.handle_missed(Network::default(), count, at);
                     }
@@ -155,15 +155,15 @@ impl Listening {
     /// Sends the question that is due. Gives why nothing is asked at all beside this MainDevice, if that is so.
     fn ask(&mut self, names: &[String], output: &Output) -> Result<Option<Failure>, LinkError> {
         match (&mut self.asking, &mut self.engine) {
-            (Some(asking), Some(engine)) => asking::turn(asking, engine, names, output),
+            (Some(asking), Some(engine)) => questions::turn(asking, engine, names, output),
             (_, None) | (None, _) => Ok(None),
         }
     }
 }
 
 /// Says of a card that only listens that what it dropped is no matter of the MainDevice's card.
-fn tell_of_tap(ears: &mut Ears, names: &[String], output: &Output) {
-    let Ok(counts) = ears.tap_counts() else { return };
+fn tell_of_tap(card_listener: &mut CardListener, names: &[String], output: &Output) {
+    let Ok(counts) = card_listener.tap_counts() else { return };
     if counts == TapCounts::default() {
         return;
     }

@@ -11,7 +11,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment_file::SegmentFile;
 
 use super::Session;
-use crate::command::driven;
+use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -36,7 +36,7 @@ pub(super) fn run(
 ) -> Result<Status, Failure> {
     let file = files::segment_file(path)?;
     let until = session.until(lasts(&file));
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let source = session.setup.source.clone();
     let options = LabOptions { target, active, source, ..LabOptions::default() };
     let mut lab = Lab::new(&file, options).map_err(|error| files::in_file(path, &error))?;

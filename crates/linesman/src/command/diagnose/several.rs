@@ -5,7 +5,7 @@ use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
 use serde::Serialize;
 
-use super::{Arguments, Session, driven, file, status};
+use super::{Arguments, Session, file, line_access, status};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::files::Planned;
@@ -40,7 +40,7 @@ struct FileReport {
 }
 
 /// A file that was looked at.
-struct Looked {
+struct JudgedFile {
     name: String,
     result: Result<(Diagnosis, Names), Failure>,
 }
@@ -49,16 +49,16 @@ struct Looked {
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let selectors = selectors(arguments)?;
     let project = arguments.project.as_deref().map(Planned::open).transpose()?;
-    let stop = driven::stop()?;
+    let stop = line_access::stop()?;
     let mut all = Vec::new();
     for (selector, name) in selectors.iter().zip(&arguments.places) {
         let result = judge(selector, arguments, project.clone(), &stop, output);
-        all.push(Looked { name: name.clone(), result });
+        all.push(JudgedFile { name: name.clone(), result });
     }
-    let worst = all.iter().map(Looked::status).max_by_key(|status| weight(*status));
+    let worst = all.iter().map(JudgedFile::status).max_by_key(|status| weight(*status));
     if arguments.json {
         let (schema, tool) = ("linesman.diagnoses/1".to_owned(), version::tool());
-        let files = all.into_iter().map(Looked::report).collect();
+        let files = all.into_iter().map(JudgedFile::report).collect();
         output.json(&Diagnoses { schema, tool, files });
     } else {
         output.text(&text(&all, output));
@@ -118,7 +118,7 @@ fn not_looked_at(selector: &Selector) -> Failure {
     Failure::new(format!("{selector}: the command was ended before"), "judge it again")
 }
 
-impl Looked {
+impl JudgedFile {
     fn status(&self) -> Status {
         self.result.as_ref().map_or(Status::NotJudged, |(diagnosis, _)| status(diagnosis))
     }
@@ -142,7 +142,7 @@ const fn weight(status: Status) -> u8 {
     }
 }
 
-fn text(all: &[Looked], output: &Output) -> String {
+fn text(all: &[JudgedFile], output: &Output) -> String {
     let paint = output.paint();
     let mut table = Table::new(&["verdict", "file", "findings", "the worst of them"], paint);
     for looked in all {

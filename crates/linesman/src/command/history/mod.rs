@@ -14,7 +14,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 
 use super::sdo::{download, upload};
-use super::service::{Place, Session, Trouble, end};
+use super::service::{ServiceError, ServiceTarget, Session, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -32,7 +32,7 @@ const FIRST_MESSAGE: u8 = 6;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    pub(crate) place: Place,
+    pub(crate) place: ServiceTarget,
     /// Only messages that nobody has acknowledged
     #[arg(long)]
     only_new: bool,
@@ -119,11 +119,13 @@ fn read(
     id: DeviceId,
     texts: &Texts,
     arguments: &Arguments,
-) -> Result<Report, Trouble> {
+) -> Result<Report, ServiceError> {
     let at = |subindex| ObjectAddress { index: ObjectIndex::DIAGNOSIS_HISTORY, subindex };
     let number = |session: &mut Session, subindex| {
         let bytes = upload(session, id, at(subindex), false)?;
-        Ok::<u16, Trouble>(bytes.iter().take(2).rev().fold(0, |n, byte| n << 8 | u16::from(*byte)))
+        Ok::<u16, ServiceError>(
+            bytes.iter().take(2).rev().fold(0, |n, byte| n << 8 | u16::from(*byte)),
+        )
     };
     let [count, maximum, newest, acknowledged, new, flags] =
         [0, MAXIMUM, NEWEST, ACKNOWLEDGED, NEW, FLAGS].map(|subindex| number(session, subindex));
@@ -137,7 +139,7 @@ fn read(
         match upload(session, id, at(subindex), false) {
             Ok(bytes) => report.push(subindex, is_new, &bytes, texts),
             // A slot that was never used.
-            Err(Trouble::Refused(refusal)) if refusal.abort_code().is_some() => {}
+            Err(ServiceError::Refused(refusal)) if refusal.abort_code().is_some() => {}
             Err(trouble) => return Err(trouble),
         }
     }

@@ -1,4 +1,4 @@
-//! How late a cycle begins on this computer, against the rule that jitter of 20 % of the cycle is
+//! Lateness of cycle begins on this computer, against the rule that jitter of 20 % of the cycle is
 //! doubtful, and of 30 % bad: synchronisation errors are likely then (SYN-31).
 
 use linesman_diagnosis::rule::jitter::Verdict;

@@ -8,7 +8,7 @@ use linesman_lab::habit::Habit;
 use linesman_lab::score::report::{GroupReport, SideReport};
 use linesman_lab::score::{Perturbation, Rate, ScoreOptions, ScoreReport, Tally, run_case};
 
-use super::{heard, listened, on_all_processors, seeds};
+use super::{listener_captures, listener_tables, on_all_processors, seeds};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Progress, Table};
@@ -54,7 +54,7 @@ pub(crate) struct Arguments {
 /// number of them.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     if let Some(directory) = &arguments.record {
-        heard::create(directory, arguments.habit)?;
+        listener_captures::create(directory, arguments.habit)?;
     }
     let mut written = Ok(());
     let options = ScoreOptions {
@@ -75,7 +75,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         |case| {
             tally.add(&case);
             if let (Some(directory), Ok(())) = (&arguments.record, &written) {
-                written = heard::write(directory, &case);
+                written = listener_captures::write(directory, &case);
             }
             done += 1;
             progress.show(|| format!("{done} of {}", count(total, "seed")));
@@ -104,7 +104,7 @@ fn show(report: &ScoreReport, list: bool, output: &mut Output) {
     ));
     if let Some(report) = &report.listened {
         output.line("");
-        listened::show(report, list, output);
+        listener_tables::show(report, list, output);
     }
     output.line("");
     let mut table = Table::new(

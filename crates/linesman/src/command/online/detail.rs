@@ -5,7 +5,7 @@ use linesman_runtime::online::report::{Count, OnlineDevice, OnlineIdentity, Onli
 use linesman_config::inventory::label;
 use linesman_proto::address::DeviceId;
 
-use crate::command::service::{self, Called};
+use crate::command::service::{self, DeviceNames};
 use crate::failure::Failure;
 use crate::output::{Output, Table};
 use crate::text::quantity::{count, time};
@@ -13,7 +13,7 @@ use crate::text::quantity::{count, time};
 /// The SubDevice that a word means, as in the commands for one of them.
 pub(super) fn find<'a>(report: &'a OnlineReport, word: &str) -> Result<&'a OnlineDevice, Failure> {
     let called = |device: &'a OnlineDevice| {
-        Some(Called {
+        Some(DeviceNames {
             id: DeviceId::from_no(device.no)?,
             station: device.station,
             alias: 0,
@@ -21,7 +21,7 @@ pub(super) fn find<'a>(report: &'a OnlineReport, word: &str) -> Result<&'a Onlin
             type_name: &device.r#type,
         })
     };
-    let all: Vec<Called<'_>> = report.devices.iter().filter_map(called).collect();
+    let all: Vec<DeviceNames<'_>> = report.devices.iter().filter_map(called).collect();
     let id = service::find(&all, &report.on, word)?;
     let found = report.devices.iter().find(|device| device.no == id.no());
     found.ok_or_else(|| Failure::new(format!("{}: `{word}` is not there", report.on), ""))

@@ -1,4 +1,4 @@
-//! Which writes need consent: all but those of which nothing is known that they could harm.
+//! Consent to writes: all but those of which nothing is known that they could harm.
 //!
 //! A register is written at once, whatever the line is doing; a wrong one closes a port, moves process
 //! data or takes a SubDevice out of OP. What is only counted, masked or kept for users may be written

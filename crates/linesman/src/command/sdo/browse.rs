@@ -9,7 +9,7 @@ use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use super::dictionary::Dictionary;
 use super::report::{EntryReport, ListReport, ListedObject};
 use super::upload;
-use crate::command::service::{Session, Trouble};
+use crate::command::service::{ServiceError, Session};
 
 /// How much of each object is asked for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -28,7 +28,7 @@ pub(super) fn list(
     id: DeviceId,
     list: ListKind,
     depth: Depth,
-) -> Result<ListReport, Trouble> {
+) -> Result<ListReport, ServiceError> {
     let bytes = session.bytes(id, Service::Mailbox(MailboxRequest::ObjectList { list }))?;
     let indices: Vec<ObjectIndex> =
         ObjectList::parse(&bytes).map(|list| list.indices().collect()).unwrap_or_default();
@@ -45,7 +45,7 @@ pub(super) fn info(
     id: DeviceId,
     index: ObjectIndex,
     subindex: Option<u8>,
-) -> Result<ListReport, Trouble> {
+) -> Result<ListReport, ServiceError> {
     // Asked for by itself, so that a refusal is told and not passed over.
     session.bytes(id, Service::Mailbox(MailboxRequest::DescribeObject { index }))?;
     let object = object(session, id, index, subindex, Depth::Values)?;
@@ -58,7 +58,7 @@ fn object(
     index: ObjectIndex,
     only: Option<u8>,
     depth: Depth,
-) -> Result<ListedObject, Trouble> {
+) -> Result<ListedObject, ServiceError> {
     let mut dictionary = Dictionary::new(session, id);
     let about = dictionary.object(index)?;
     let mut listed = ListedObject::new(index, about.as_ref());
@@ -79,7 +79,7 @@ fn object(
         if depth == Depth::Values {
             match upload(dictionary.session, id, address, false) {
                 Ok(data) => report.holds(&data, &entry),
-                Err(Trouble::Refused(refusal)) => report.refused(&refusal),
+                Err(ServiceError::Refused(refusal)) => report.refused(&refusal),
                 Err(trouble) => return Err(trouble),
             }
         }

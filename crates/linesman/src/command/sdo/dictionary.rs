@@ -1,4 +1,4 @@
-//! What a SubDevice tells about its objects, asked for once each.
+//! Dictionary of a SubDevice as it describes it, asked for once each.
 
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::Service;
@@ -8,7 +8,7 @@ use linesman_proto::mailbox::coe::information::{
 };
 use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex};
 
-use crate::command::service::{Session, Trouble};
+use crate::command::service::{ServiceError, Session};
 
 /// What an object is.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -58,7 +58,10 @@ impl<'a> Dictionary<'a> {
     }
 
     /// What an object is; `None` when the SubDevice does not say.
-    pub(crate) fn object(&mut self, index: ObjectIndex) -> Result<Option<ObjectAbout>, Trouble> {
+    pub(crate) fn object(
+        &mut self,
+        index: ObjectIndex,
+    ) -> Result<Option<ObjectAbout>, ServiceError> {
         let answer = self.ask(MailboxRequest::DescribeObject { index })?;
         Ok(answer.and_then(|bytes| {
             let told = ObjectDescription::parse(&bytes).ok()?;
@@ -72,7 +75,10 @@ impl<'a> Dictionary<'a> {
     }
 
     /// What an entry is; `None` when the SubDevice does not say.
-    pub(crate) fn entry(&mut self, object: ObjectAddress) -> Result<Option<EntryAbout>, Trouble> {
+    pub(crate) fn entry(
+        &mut self,
+        object: ObjectAddress,
+    ) -> Result<Option<EntryAbout>, ServiceError> {
         let values = ValueInfo(
             ValueInfo::UNIT | ValueInfo::DEFAULT | ValueInfo::MINIMUM | ValueInfo::MAXIMUM,
         );
@@ -94,13 +100,13 @@ impl<'a> Dictionary<'a> {
     }
 
     /// `None` when it is refused: a SubDevice need not tell of its objects, nor of all of them.
-    fn ask(&mut self, request: MailboxRequest) -> Result<Option<Vec<u8>>, Trouble> {
+    fn ask(&mut self, request: MailboxRequest) -> Result<Option<Vec<u8>>, ServiceError> {
         if self.silent {
             return Ok(None);
         }
         match self.session.bytes(self.id, Service::Mailbox(request)) {
             Ok(bytes) => Ok(Some(bytes)),
-            Err(Trouble::Refused(refusal)) => {
+            Err(ServiceError::Refused(refusal)) => {
                 // Not even the service is known: then for no object.
                 self.silent = refusal.abort_code().is_none();
                 Ok(None)

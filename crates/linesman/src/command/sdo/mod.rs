@@ -15,7 +15,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::information::{ListKind, ObjectCode};
 use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex};
 
-use super::service::{Place, Session, Trouble, end};
+use super::service::{ServiceError, ServiceTarget, Session, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::Output;
@@ -26,7 +26,7 @@ use report::{ObjectReport, ReadReport};
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    pub(crate) place: Place,
+    pub(crate) place: ServiceTarget,
     #[command(subcommand)]
     action: Action,
     /// JSON: schema linesman.sdo/1 or linesman.objects/1; linesman.refusal/1 when it is refused
@@ -174,7 +174,7 @@ fn act(
     id: DeviceId,
     arguments: &Arguments,
     output: &mut Output,
-) -> Result<(), Trouble> {
+) -> Result<(), ServiceError> {
     let json = arguments.json;
     match &arguments.action {
         Action::Read { object, data_type, complete } => {
@@ -230,7 +230,7 @@ pub(crate) fn upload(
     id: DeviceId,
     object: ObjectAddress,
     complete: bool,
-) -> Result<Vec<u8>, Trouble> {
+) -> Result<Vec<u8>, ServiceError> {
     session.bytes(id, Service::Mailbox(MailboxRequest::Upload { object, complete }))
 }
 
@@ -241,7 +241,7 @@ pub(crate) fn download(
     object: ObjectAddress,
     complete: bool,
     data: Vec<u8>,
-) -> Result<(), Trouble> {
+) -> Result<(), ServiceError> {
     session.ask(id, Service::Mailbox(MailboxRequest::Download { object, complete, data })).map(drop)
 }
 
@@ -251,7 +251,7 @@ fn read(
     wanted: Wanted,
     data_type: Option<DataType>,
     complete: bool,
-) -> Result<ReadReport, Trouble> {
+) -> Result<ReadReport, ServiceError> {
     let device = session.report(id);
     let mut dictionary = Dictionary::new(session, id);
     let object = wanted.entry();
@@ -276,7 +276,7 @@ fn read(
         let data = match upload(dictionary.session, id, object, false) {
             Ok(data) => data,
             // Lists have gaps, and entries that can only be written.
-            Err(Trouble::Refused(refusal))
+            Err(ServiceError::Refused(refusal))
                 if wanted.subindex.is_none() && last > 0 && refusal.abort_code().is_some() =>
             {
                 objects.push(ObjectReport::refused(object, entry, &refusal));
@@ -296,7 +296,7 @@ fn write(
     text: &str,
     data_type: Option<DataType>,
     complete: bool,
-) -> Result<(ReadReport, Vec<u8>), Trouble> {
+) -> Result<(ReadReport, Vec<u8>), ServiceError> {
     let (device, object) = (session.report(id), wanted.entry());
     let mut dictionary = Dictionary::new(session, id);
     let wrong = |reason: String| Failure::new(reason, "say its data type with --type");

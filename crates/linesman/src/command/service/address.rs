@@ -1,10 +1,10 @@
-//! Which SubDevice a word means: `3`, `0x1003`, `alias:7`, `position:2`, `Term 4`, `EL3204`, or as it
-//! is called in every answer, `Term 4 (EL3104)`.
+//! Address of a SubDevice as a word: `3`, `0x1003`, `alias:7`, `position:2`, `Term 4`, `EL3204`, or
+//! as it is called in every answer, `Term 4 (EL3104)`.
 
 use linesman_config::inventory::label;
 use linesman_proto::address::DeviceId;
 
-use super::known::Known;
+use super::known::KnownDevice;
 use crate::failure::Failure;
 
 /// Most SubDevices that are named where a word means none of them.
@@ -12,7 +12,7 @@ const MOST_NAMED: usize = 6;
 
 /// What a SubDevice is known by.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Called<'a> {
+pub(crate) struct DeviceNames<'a> {
     pub(crate) id: DeviceId,
     /// 0 for none.
     pub(crate) station: u16,
@@ -24,8 +24,8 @@ pub(crate) struct Called<'a> {
     pub(crate) type_name: &'a str,
 }
 
-impl<'a> From<&'a Known> for Called<'a> {
-    fn from(known: &'a Known) -> Self {
+impl<'a> From<&'a KnownDevice> for DeviceNames<'a> {
+    fn from(known: &'a KnownDevice) -> Self {
         Self {
             id: known.id,
             station: known.station,
@@ -36,15 +36,19 @@ impl<'a> From<&'a Known> for Called<'a> {
     }
 }
 
-impl Called<'_> {
+impl DeviceNames<'_> {
     fn label(&self) -> String {
         label(self.id, self.name, self.type_name)
     }
 }
 
 /// The SubDevice that a word means.
-pub(crate) fn find(devices: &[Called<'_>], place: &str, word: &str) -> Result<DeviceId, Failure> {
-    let is = |condition: &dyn Fn(&Called<'_>) -> bool| -> Vec<DeviceId> {
+pub(crate) fn find(
+    devices: &[DeviceNames<'_>],
+    place: &str,
+    word: &str,
+) -> Result<DeviceId, Failure> {
+    let is = |condition: &dyn Fn(&DeviceNames<'_>) -> bool| -> Vec<DeviceId> {
         devices.iter().filter(|one| condition(one)).map(|one| one.id).collect()
     };
     // As answers write it, quotation marks and all.
@@ -72,7 +76,7 @@ pub(crate) fn find(devices: &[Called<'_>], place: &str, word: &str) -> Result<De
     match found[..] {
         [one] => Ok(one),
         [] => {
-            let named = devices.iter().take(MOST_NAMED).map(Called::label).collect::<Vec<_>>();
+            let named = devices.iter().take(MOST_NAMED).map(DeviceNames::label).collect::<Vec<_>>();
             let more = devices.len().saturating_sub(MOST_NAMED);
             let more = if more == 0 { String::new() } else { format!(", and {more} more") };
             let count = devices.len();
@@ -94,14 +98,14 @@ pub(crate) fn find(devices: &[Called<'_>], place: &str, word: &str) -> Result<De
 
 /// Those that are called so in answers, now or by earlier versions, else those of that type; whatever
 /// the case of the letters.
-fn called(devices: &[Called<'_>], word: &str) -> Vec<DeviceId> {
-    let is = |condition: &dyn Fn(&Called<'_>) -> bool| -> Vec<DeviceId> {
+fn called(devices: &[DeviceNames<'_>], word: &str) -> Vec<DeviceId> {
+    let is = |condition: &dyn Fn(&DeviceNames<'_>) -> bool| -> Vec<DeviceId> {
         devices.iter().filter(|one| condition(one)).map(|one| one.id).collect()
     };
     let same = |text: &str| !text.is_empty() && text.eq_ignore_ascii_case(word);
     // Where the type is not known, the name in front of one is enough.
     let name = word.strip_suffix(')').and_then(|word| word.rsplit_once(" (")).map(|(name, _)| name);
-    let ways: [&dyn Fn(&Called<'_>) -> bool; 6] = [
+    let ways: [&dyn Fn(&DeviceNames<'_>) -> bool; 6] = [
         &|one| same(&one.label()),
         &|one| one.type_name.is_empty() && name.is_some_and(|name| name == one.name),
         &|one| same(&format!("SubDevice {}", one.id.no())),
@@ -132,7 +136,7 @@ mod tests {
 
     #[test]
     fn every_way_to_call_a_subdevice_is_understood() {
-        let one = |no: u32, name, type_name| Called {
+        let one = |no: u32, name, type_name| DeviceNames {
             id: DeviceId(no - 1),
             station: 0x1000 + no as u16,
             alias: if no == 2 { 7 } else { 0 },

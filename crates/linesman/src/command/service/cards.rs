@@ -1,4 +1,4 @@
-//! A line on real cards: listen first, scan, then serve.
+//! Service client of a line on real cards: listen first, scan, then serve.
 
 use std::collections::VecDeque;
 
@@ -9,11 +9,11 @@ use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, Servi
 use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Audience, Driver};
+use linesman_runtime::drive::{Driver, DriverHooks};
 use linesman_runtime::stop::Stop;
 
-use super::{Line, NotDone};
-use crate::command::driven;
+use super::{ServiceClient, ServiceRefused};
+use crate::command::line_access;
 use crate::failure::Failure;
 
 /// A scan of a thousand SubDevices takes a few seconds.
@@ -22,17 +22,17 @@ const SCAN_PATIENCE: Span = Span::s(60);
 const SERVICE_PATIENCE: Span = Span::s(24 * 3_600);
 
 /// A line on cards.
-pub(super) struct Cards {
+pub(super) struct CardClient {
     driver: Driver,
     stop: Stop,
-    asking: Asking,
+    pending: PendingCommand,
     name: String,
 }
 
 /// Opens and scans the line.
-pub(super) fn open(names: &[String]) -> Result<(Cards, Inventory), Failure> {
-    driven::refuse(names)?;
-    let stop = driven::stop()?;
+pub(super) fn open(names: &[String]) -> Result<(CardClient, Inventory), Failure> {
+    line_access::refuse(names)?;
+    let stop = line_access::stop()?;
     let clock = HostClock::start();
     let driver = Driver::open(names, clock)?;
     let setup = Setup {
@@ -42,11 +42,11 @@ pub(super) fn open(names: &[String]) -> Result<(Cards, Inventory), Failure> {
         clock: "host, monotonic".to_owned(),
         ..Setup::default()
     };
-    let asking = Asking::new(Engine::new(setup));
-    let mut cards = Cards { driver, stop, asking, name: names.join("+") };
-    cards.asking.order = Some(Order::Scan);
+    let pending = PendingCommand::new(Engine::new(setup));
+    let mut cards = CardClient { driver, stop, pending, name: names.join("+") };
+    cards.pending.order = Some(ClientOrder::Scan);
     cards.run(SCAN_PATIENCE)?;
-    let inventory = match cards.asking.scanned.take() {
+    let inventory = match cards.pending.scanned.take() {
         Some(Ok(inventory)) => inventory,
         Some(Err(failure)) => {
             let reason = format!("{}: {}", cards.name, failure.reason);
@@ -54,15 +54,15 @@ pub(super) fn open(names: &[String]) -> Result<(Cards, Inventory), Failure> {
         }
         None => return Err(cards.interrupted()),
     };
-    cards.asking.order = Some(Order::Attend(Box::new(super::plan(&inventory))));
+    cards.pending.order = Some(ClientOrder::Attend(Box::new(super::plan(&inventory))));
     Ok((cards, inventory))
 }
 
-impl Cards {
+impl CardClient {
     fn run(&mut self, patience: Span) -> Result<(), Failure> {
         let until = self.driver.clock().now() + patience;
-        self.asking.done = false;
-        self.driver.run(until, &self.stop, &mut self.asking)?;
+        self.pending.done = false;
+        self.driver.run(until, &self.stop, &mut self.pending)?;
         Ok(())
     }
 
@@ -72,16 +72,16 @@ impl Cards {
     }
 }
 
-impl Line for Cards {
+impl ServiceClient for CardClient {
     fn ask(
         &mut self,
         id: DeviceId,
         service: Service,
-    ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
-        self.asking.service = Some((id, service));
+    ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure> {
+        self.pending.service = Some((id, service));
         self.run(SERVICE_PATIENCE)?;
-        let served = self.asking.served.take().ok_or_else(|| self.interrupted())?;
-        Ok(served.map_err(|failure| NotDone::from(&failure)))
+        let served = self.pending.served.take().ok_or_else(|| self.interrupted())?;
+        Ok(served.map_err(|failure| ServiceRefused::from(&failure)))
     }
 
     fn wait(&mut self, span: Span) -> Result<bool, Failure> {
@@ -90,26 +90,26 @@ impl Line for Cards {
     }
 
     fn diagnosis(&mut self) -> Option<Diagnosis> {
-        let engine = &mut self.asking.engine;
+        let engine = &mut self.pending.engine;
         engine.finish(self.driver.clock().now(), true);
         Some(engine.diagnosis())
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
-        self.asking.emergencies.drain(..).collect()
+        self.pending.emergencies.drain(..).collect()
     }
 }
 
-enum Order {
+enum ClientOrder {
     Scan,
     Attend(Box<linesman_config::plan::Plan>),
 }
 
 /// Gives one command at a time and waits for its end.
-struct Asking {
+struct PendingCommand {
     /// Judges all frames.
     engine: Engine,
-    order: Option<Order>,
+    order: Option<ClientOrder>,
     service: Option<(DeviceId, Service)>,
     ticket: Option<ServiceTicket>,
     done: bool,
@@ -118,7 +118,7 @@ struct Asking {
     emergencies: VecDeque<(DeviceId, String)>,
 }
 
-impl Asking {
+impl PendingCommand {
     fn new(engine: Engine) -> Self {
         Self {
             engine,
@@ -133,7 +133,7 @@ impl Asking {
     }
 }
 
-impl Audience for Asking {
+impl DriverHooks for PendingCommand {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.engine.handle_frame(frame);
     }
@@ -146,7 +146,7 @@ impl Audience for Asking {
         if let Event::Scanned(inventory) = event {
             (self.scanned, self.done) = (Some(Ok(*inventory)), true);
         } else if let Event::ScanFailed(error) = event {
-            (self.scanned, self.done) = (Some(Err(driven::nobody(&error))), true);
+            (self.scanned, self.done) = (Some(Err(line_access::nobody(&error))), true);
         } else if let Event::Emergency { id, emergency } = event {
             self.emergencies.push_back((id, emergency.to_string()));
         } else if let Event::Served { ticket, result, .. } = event
@@ -160,8 +160,8 @@ impl Audience for Asking {
         self.engine.handle_timeout(now);
         match self.order.take() {
             // It looks, with nothing but reads, before it writes.
-            Some(Order::Scan) => main.scan(now),
-            Some(Order::Attend(plan)) => main.attend(now, *plan),
+            Some(ClientOrder::Scan) => main.scan(now),
+            Some(ClientOrder::Attend(plan)) => main.attend(now, *plan),
             None => {}
         }
         if let Some((id, service)) = self.service.take() {

@@ -1,4 +1,4 @@
-//! What is known of the SubDevices of a line before one of them is served.
+//! Known SubDevices of a line before one of them is served.
 
 use linesman_config::inventory::{FoundDevice, Inventory, label};
 use linesman_proto::address::DeviceId;
@@ -8,7 +8,7 @@ use super::DeviceReport;
 
 /// A SubDevice.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Known {
+pub(crate) struct KnownDevice {
     /// Who it is within this run.
     pub(crate) id: DeviceId,
     /// Its station address.
@@ -29,7 +29,7 @@ pub(crate) struct Known {
     pub(crate) boot: bool,
 }
 
-impl Known {
+impl KnownDevice {
     /// `Term 4 (EL3104)`, or `SubDevice 4 (EL3104)` where it has no name.
     pub(crate) fn label(&self) -> String {
         label(self.id, self.name.as_deref().unwrap_or_default(), &self.type_name)
@@ -47,8 +47,8 @@ impl Known {
 }
 
 /// All SubDevices that a scan found, with their names by index where there are any.
-pub(super) fn all(inventory: &Inventory, names: &[String]) -> Vec<Known> {
-    let known = |found: &FoundDevice| Known {
+pub(super) fn all(inventory: &Inventory, names: &[String]) -> Vec<KnownDevice> {
+    let known = |found: &FoundDevice| KnownDevice {
         id: found.id,
         station: found.station.0,
         alias: found.alias.0,

@@ -5,13 +5,13 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::register::AlStatus;
 use linesman_proto::state::{AlState, StateValue};
 
-use super::{Session, Trouble};
+use super::{ServiceError, Session};
 use crate::failure::Failure;
 use crate::output::Output;
 
 /// A SubDevice that was taken to another state for a command.
 #[derive(Debug)]
-pub(crate) struct Opened {
+pub(crate) struct OpenedMailbox {
     id: DeviceId,
     /// Where it was; `None` when it stayed there.
     back_to: Option<AlState>,
@@ -19,7 +19,7 @@ pub(crate) struct Opened {
 
 impl Session {
     /// The state of a SubDevice.
-    pub(crate) fn state(&mut self, id: DeviceId) -> Result<AlStatus, Trouble> {
+    pub(crate) fn state(&mut self, id: DeviceId) -> Result<AlStatus, ServiceError> {
         match self.ask(id, Service::State)? {
             ServiceAnswer::State { status, .. } => Ok(status),
             ServiceAnswer::Done | ServiceAnswer::Data(_) | ServiceAnswer::Written { .. } => {
@@ -33,7 +33,7 @@ impl Session {
         &mut self,
         id: DeviceId,
         output: &Output,
-    ) -> Result<Opened, Trouble> {
+    ) -> Result<OpenedMailbox, ServiceError> {
         let label = self.label(id);
         if self.known(id).is_none_or(|known| !known.mailbox) {
             let reason = format!("{label} has no mailbox: it has no objects and no files");
@@ -43,7 +43,7 @@ impl Session {
         let status = self.state(id)?;
         match status.state() {
             StateValue::Known(AlState::PreOp | AlState::SafeOp | AlState::Op) => {
-                Ok(Opened { id, back_to: None })
+                Ok(OpenedMailbox { id, back_to: None })
             }
             StateValue::Known(AlState::Init) if !status.error() => {
                 output.warn(&format!(
@@ -51,7 +51,7 @@ impl Session {
                      back to INIT"
                 ));
                 self.ask(id, Service::Enter(AlState::PreOp))?;
-                Ok(Opened { id, back_to: Some(AlState::Init) })
+                Ok(OpenedMailbox { id, back_to: Some(AlState::Init) })
             }
             StateValue::Known(AlState::Init | AlState::Boot) | StateValue::Unknown(_) => {
                 let reason = format!("{label} is in {status}, where it takes no such messages");
@@ -66,11 +66,15 @@ impl Session {
     }
 
     /// Takes a SubDevice to BOOT, and said so.
-    pub(crate) fn open_boot(&mut self, id: DeviceId, output: &Output) -> Result<Opened, Trouble> {
+    pub(crate) fn open_boot(
+        &mut self,
+        id: DeviceId,
+        output: &Output,
+    ) -> Result<OpenedMailbox, ServiceError> {
         let label = self.label(id);
         let status = self.state(id)?;
         if status.state() == StateValue::Known(AlState::Boot) {
-            return Ok(Opened { id, back_to: None });
+            return Ok(OpenedMailbox { id, back_to: None });
         }
         let was = status.state().state().unwrap_or(AlState::Init);
         // OP needs outputs, which nobody sends here unless the line is driven.
@@ -81,16 +85,16 @@ impl Session {
             "{label} is taken from {status} to BOOT for this, then {way} to {back_to}"
         ));
         self.ask(id, Service::Enter(AlState::Boot))?;
-        Ok(Opened { id, back_to: Some(back_to) })
+        Ok(OpenedMailbox { id, back_to: Some(back_to) })
     }
 
     /// Takes a SubDevice back to where it was, whatever has become of the command.
     pub(crate) fn close<T>(
         &mut self,
-        opened: Opened,
-        outcome: Result<T, Trouble>,
+        opened: OpenedMailbox,
+        outcome: Result<T, ServiceError>,
         output: &Output,
-    ) -> Result<T, Trouble> {
+    ) -> Result<T, ServiceError> {
         for emergency in self.emergencies() {
             output.warn(&format!("emergency of {emergency}"));
         }

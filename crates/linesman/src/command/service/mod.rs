@@ -1,4 +1,4 @@
-//! What the commands for single SubDevices share: a line that is served without being driven.
+//! Common part of the commands for single SubDevices: a line that is served without being driven.
 
 mod address;
 mod cards;
@@ -18,21 +18,21 @@ use linesman_proto::time::Span;
 use linesman_runtime::selector::Selector;
 use serde::Serialize;
 
-use crate::command::driven;
+use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::hint;
 use crate::output::Output;
 use crate::version;
 
-pub(crate) use address::{Called, find};
-pub(crate) use known::Known;
+pub(crate) use address::{DeviceNames, find};
+pub(crate) use known::KnownDevice;
 pub(crate) use refusal::{Refusal, Report as RefusalReport};
 pub(crate) use socket::{is_one as is_socket, silent};
 
 /// Where the line is, and whom the service is for.
 #[derive(clap::Args, Debug)]
-pub(crate) struct Place {
+pub(crate) struct ServiceTarget {
     /// Where the line is: eth0, eth0+eth1 (a ring), sim:plant.toml, or the socket of `run --control`; or
     /// esi:FILE.xml#TYPE for a device as its maker describes it, without the device (DEVICE: offline)
     #[arg(value_name = "WHERE")]
@@ -44,13 +44,13 @@ pub(crate) struct Place {
 }
 
 /// A line whose SubDevices can be asked.
-pub(crate) trait Line {
+pub(crate) trait ServiceClient {
     /// Does one service, to its end.
     fn ask(
         &mut self,
         id: DeviceId,
         service: Service,
-    ) -> Result<Result<ServiceAnswer, NotDone>, Failure>;
+    ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure>;
     /// Lets time pass. `false` when the user ended it.
     fn wait(&mut self, span: Span) -> Result<bool, Failure>;
     /// What is wrong with the line, by all frames since it was opened; `None` where they were not seen.
@@ -61,14 +61,14 @@ pub(crate) trait Line {
 
 /// A service that was not done.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct NotDone {
+pub(crate) struct ServiceRefused {
     /// Why, with what to do.
     told: Failure,
     /// The SubDevice's own code, if it has said no itself.
     refusal: Option<(RefusalKind, u32)>,
 }
 
-impl From<&ServiceFailure> for NotDone {
+impl From<&ServiceFailure> for ServiceRefused {
     fn from(failure: &ServiceFailure) -> Self {
         Self { told: Failure::from_error(failure), refusal: failure.refusal() }
     }
@@ -76,8 +76,8 @@ impl From<&ServiceFailure> for NotDone {
 
 /// A line that is served.
 pub(crate) struct Session {
-    line: Box<dyn Line>,
-    devices: Vec<Known>,
+    client: Box<dyn ServiceClient>,
+    devices: Vec<KnownDevice>,
     place: String,
     kind: Kind,
     inventory: Option<Inventory>,
@@ -110,14 +110,14 @@ pub(crate) struct DeviceReport {
 
 /// Why there is no answer.
 #[derive(Debug)]
-pub(crate) enum Trouble {
+pub(crate) enum ServiceError {
     /// The SubDevice says no: exit status 1.
     Refused(Box<Refusal>),
     /// Nothing could be done: exit status 2.
     Failed(Failure),
 }
 
-impl Trouble {
+impl ServiceError {
     /// Why, in words.
     pub(crate) fn reason(&self) -> &str {
         match self {
@@ -127,7 +127,7 @@ impl Trouble {
     }
 }
 
-impl From<Failure> for Trouble {
+impl From<Failure> for ServiceError {
     fn from(failure: Failure) -> Self {
         Self::Failed(failure)
     }
@@ -137,17 +137,17 @@ impl Session {
     /// Scans the line and begins to serve it.
     pub(crate) fn open(place: &str) -> Result<Self, Failure> {
         if socket::is_one(place) {
-            let (line, devices) = socket::open(place)?;
-            let line = Box::new(line);
+            let (client, devices) = socket::open(place)?;
+            let client = Box::new(client);
             let (place, kind) = (place.to_owned(), Kind::Driven);
-            return Ok(Self { line, devices, place, kind, inventory: None });
+            return Ok(Self { client, devices, place, kind, inventory: None });
         }
         if place.starts_with("esi:") {
-            let (line, inventory, names) = segment::open_described(place)?;
+            let (client, inventory, names) = segment::open_described(place)?;
             let devices = known::all(&inventory, &names);
-            let (line, inventory) = (Box::new(line), Some(inventory));
+            let (client, inventory) = (Box::new(client), Some(inventory));
             return Ok(Self {
-                line,
+                client,
                 devices,
                 place: place.to_owned(),
                 kind: Kind::Passing,
@@ -155,20 +155,21 @@ impl Session {
             });
         }
         let selector: Selector = place.parse()?;
-        let (line, devices, kind, inventory): (Box<dyn Line>, _, _, _) = match &selector {
+        let (client, devices, kind, inventory): (Box<dyn ServiceClient>, _, _, _) = match &selector
+        {
             Selector::Cards(names) => {
-                let (line, inventory) = cards::open(names)?;
-                (Box::new(line), known::all(&inventory, &[]), Kind::Cards, inventory)
+                let (client, inventory) = cards::open(names)?;
+                (Box::new(client), known::all(&inventory, &[]), Kind::Cards, inventory)
             }
             Selector::Segment(path) => {
-                let (line, inventory, names) = segment::open(path)?;
-                (Box::new(line), known::all(&inventory, &names), Kind::Passing, inventory)
+                let (client, inventory, names) = segment::open(path)?;
+                (Box::new(client), known::all(&inventory, &names), Kind::Passing, inventory)
             }
             Selector::Listen(_) | Selector::File(_) => {
-                return Err(driven::not_drivable(place, &selector));
+                return Err(line_access::not_drivable(place, &selector));
             }
         };
-        Ok(Self { line, devices, place: place.to_owned(), kind, inventory: Some(inventory) })
+        Ok(Self { client, devices, place: place.to_owned(), kind, inventory: Some(inventory) })
     }
 
     /// Whether what is written is gone when the command ends.
@@ -184,7 +185,7 @@ impl Session {
     /// What is wrong with the line, by all frames since it was opened; `None` of a line that another process
     /// drives.
     pub(crate) fn diagnosis(&mut self) -> Option<Diagnosis> {
-        let diagnosis = self.line.diagnosis()?;
+        let diagnosis = self.client.diagnosis()?;
         Some(Diagnosis { tool: version::tool(), source: self.place.clone(), ..diagnosis })
     }
 
@@ -203,7 +204,7 @@ impl Session {
 
     /// Lets time pass. `false` when the user ended it.
     pub(crate) fn wait(&mut self, span: Span) -> Result<bool, Failure> {
-        self.line.wait(span)
+        self.client.wait(span)
     }
 
     /// Reads registers; `None` when nothing came back.
@@ -213,41 +214,45 @@ impl Session {
         address: RegisterAddress,
         len: u16,
     ) -> Result<Option<Vec<u8>>, Failure> {
-        match self.line.ask(id, Service::ReadRegister { address, len })? {
+        match self.client.ask(id, Service::ReadRegister { address, len })? {
             Ok(ServiceAnswer::Data(data)) => Ok(Some(data)),
             Ok(_) | Err(_) => Ok(None),
         }
     }
 
     /// All SubDevices.
-    pub(crate) fn devices(&self) -> &[Known] {
+    pub(crate) fn devices(&self) -> &[KnownDevice] {
         &self.devices
     }
 
     /// The SubDevice that a word means.
     pub(crate) fn device(&self, word: &str) -> Result<DeviceId, Failure> {
-        let called: Vec<Called<'_>> = self.devices.iter().map(Called::from).collect();
+        let called: Vec<DeviceNames<'_>> = self.devices.iter().map(DeviceNames::from).collect();
         find(&called, &self.place, word)
     }
 
     /// What is known of a SubDevice.
-    pub(crate) fn known(&self, id: DeviceId) -> Option<&Known> {
+    pub(crate) fn known(&self, id: DeviceId) -> Option<&KnownDevice> {
         self.devices.iter().find(|known| known.id == id)
     }
 
     /// `Term 4 (EL3104)`, or `SubDevice 4 (EL3104)` where it has no name.
     pub(crate) fn label(&self, id: DeviceId) -> String {
-        self.known(id).map_or_else(|| label(id, "", ""), Known::label)
+        self.known(id).map_or_else(|| label(id, "", ""), KnownDevice::label)
     }
 
     /// A SubDevice for a report.
     pub(crate) fn report(&self, id: DeviceId) -> DeviceReport {
         let nobody = || DeviceReport { no: id.no(), station: 0, name: None, r#type: String::new() };
-        self.known(id).map_or_else(nobody, Known::report)
+        self.known(id).map_or_else(nobody, KnownDevice::report)
     }
 
     /// Does one service.
-    pub(crate) fn ask(&mut self, id: DeviceId, service: Service) -> Result<ServiceAnswer, Trouble> {
+    pub(crate) fn ask(
+        &mut self,
+        id: DeviceId,
+        service: Service,
+    ) -> Result<ServiceAnswer, ServiceError> {
         self.attempt(id, service)?
     }
 
@@ -256,8 +261,8 @@ impl Session {
         &mut self,
         id: DeviceId,
         service: Service,
-    ) -> Result<Result<ServiceAnswer, Trouble>, Failure> {
-        let NotDone { mut told, refusal } = match self.line.ask(id, service)? {
+    ) -> Result<Result<ServiceAnswer, ServiceError>, Failure> {
+        let ServiceRefused { mut told, refusal } = match self.client.ask(id, service)? {
             Ok(answer) => return Ok(Ok(answer)),
             Err(not_done) => not_done,
         };
@@ -266,18 +271,22 @@ impl Session {
         Ok(Err(match refusal {
             Some(refusal) => {
                 let device = self.report(id);
-                Trouble::Refused(Box::new(Refusal::new(device, &label, refusal, told)))
+                ServiceError::Refused(Box::new(Refusal::new(device, &label, refusal, told)))
             }
             None => {
                 let reason = refusal::named(id, &label, &told.reason);
                 let reason = format!("{}: {reason}", self.place);
-                Trouble::Failed(Failure { reason, ..told })
+                ServiceError::Failed(Failure { reason, ..told })
             }
         }))
     }
 
     /// Does a service that gives bytes.
-    pub(crate) fn bytes(&mut self, id: DeviceId, service: Service) -> Result<Vec<u8>, Trouble> {
+    pub(crate) fn bytes(
+        &mut self,
+        id: DeviceId,
+        service: Service,
+    ) -> Result<Vec<u8>, ServiceError> {
         match self.ask(id, service)? {
             ServiceAnswer::Data(data) => Ok(data),
             ServiceAnswer::Done | ServiceAnswer::State { .. } | ServiceAnswer::Written { .. } => {
@@ -288,7 +297,7 @@ impl Session {
 
     /// Emergencies that came meanwhile, in words.
     pub(crate) fn emergencies(&mut self) -> Vec<String> {
-        let all = self.line.take_emergencies();
+        let all = self.client.take_emergencies();
         all.into_iter().map(|(id, text)| format!("{}: {text}", self.label(id))).collect()
     }
 }
@@ -315,14 +324,14 @@ fn plan(inventory: &Inventory) -> Plan {
 
 /// How a command ends: a refusal of the SubDevice is an answer, everything else is none.
 pub(crate) fn end(
-    outcome: Result<(), Trouble>,
+    outcome: Result<(), ServiceError>,
     json: bool,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     match outcome {
         Ok(()) => Ok(Status::Good),
-        Err(Trouble::Failed(failure)) => Err(failure),
-        Err(Trouble::Refused(refusal)) => {
+        Err(ServiceError::Failed(failure)) => Err(failure),
+        Err(ServiceError::Refused(refusal)) => {
             if json {
                 output.json(&refusal.report);
             }

@@ -1,4 +1,4 @@
-//! A SubDevice said no: told like a failure, and with `--json` as an object of its own.
+//! Refusal by a SubDevice: told like a failure, and with `--json` as an object of its own.
 
 use linesman_maindevice::service::RefusalKind;
 use linesman_proto::address::DeviceId;

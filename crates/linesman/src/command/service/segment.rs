@@ -1,4 +1,4 @@
-//! A virtual segment, served in virtual time.
+//! Service client of a virtual segment, in virtual time.
 
 use std::path::{Path, PathBuf};
 
@@ -12,8 +12,8 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
 use linesman_sim::segment_file::SegmentFile;
 
-use super::{Line, NotDone};
-use crate::command::driven;
+use super::{ServiceClient, ServiceRefused};
+use crate::command::line_access;
 use crate::failure::Failure;
 use crate::files;
 
@@ -25,7 +25,7 @@ const SERVICE_PATIENCE: Span = Span::s(3_600);
 const STEP: Span = Span::ms(1);
 
 /// A virtual segment.
-pub(super) struct Virtual {
+pub(super) struct SegmentClient {
     lab: Lab,
     path: PathBuf,
     /// Events up to here have been looked through.
@@ -34,13 +34,15 @@ pub(super) struct Virtual {
 }
 
 /// Builds and scans the segment.
-pub(super) fn open(path: &Path) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
+pub(super) fn open(path: &Path) -> Result<(SegmentClient, Inventory, Vec<String>), Failure> {
     serve(&files::segment_file(path)?, path)
 }
 
 /// Builds and scans a segment of one device that is as its maker describes it: its dictionary, without the
 /// device (SW-13). `device` is `esi:FILE#TYPE`, relative to the working directory.
-pub(super) fn open_described(device: &str) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
+pub(super) fn open_described(
+    device: &str,
+) -> Result<(SegmentClient, Inventory, Vec<String>), Failure> {
     let path = Path::new(device);
     let own = |on: &str| {
         format!("[[device]]\nname = \"offline\"\ntype = {}\non = \"{on}\"\n", toml_string(device))
@@ -64,18 +66,21 @@ fn toml_string(word: &str) -> String {
     format!("\"{}\"", word.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
-fn serve(file: &SegmentFile, path: &Path) -> Result<(Virtual, Inventory, Vec<String>), Failure> {
+fn serve(
+    file: &SegmentFile,
+    path: &Path,
+) -> Result<(SegmentClient, Inventory, Vec<String>), Failure> {
     let options =
         LabOptions { begin: Begin::Idle, project: false, probes: false, ..LabOptions::default() };
     let lab = Lab::new(file, options).map_err(|error| files::in_file(path, &error))?;
-    let mut segment = Virtual { lab, path: path.to_owned(), seen: 0, told: 0 };
+    let mut segment = SegmentClient { lab, path: path.to_owned(), seen: 0, told: 0 };
     let now = segment.lab.now();
     segment.lab.main_mut().scan(now);
     let scanned = segment.until(SCAN_PATIENCE, |event| {
         if let Event::Scanned(inventory) = event {
             Some(Ok((**inventory).clone()))
         } else if let Event::ScanFailed(error) = event {
-            Some(Err(driven::nobody(error)))
+            Some(Err(line_access::nobody(error)))
         } else {
             None
         }
@@ -96,7 +101,7 @@ fn names(lab: &Lab, inventory: &Inventory) -> Vec<String> {
     devices.iter().map(|device| device.name.clone()).collect()
 }
 
-impl Virtual {
+impl SegmentClient {
     /// Lets time pass until an event gives what is looked for.
     fn until<T>(
         &mut self,
@@ -126,19 +131,19 @@ impl Virtual {
     }
 }
 
-impl Line for Virtual {
+impl ServiceClient for SegmentClient {
     fn ask(
         &mut self,
         id: DeviceId,
         service: Service,
-    ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
+    ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure> {
         let now = self.lab.now();
         let wanted = self.lab.main_mut().serve(now, id, service);
         self.until(SERVICE_PATIENCE, |event| {
             if let Event::Served { ticket, result, .. } = event
                 && *ticket == wanted
             {
-                Some((**result).clone().map_err(|failure| NotDone::from(&failure)))
+                Some((**result).clone().map_err(|failure| ServiceRefused::from(&failure)))
             } else {
                 None
             }

@@ -1,4 +1,5 @@
-//! A line that a MainDevice drives: services go through its control socket, beside the cycle.
+//! Service client of a line that a MainDevice drives: services go through its control socket,
+//! beside the cycle.
 
 use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
@@ -10,12 +11,12 @@ use linesman_proto::sii::Identity;
 use linesman_proto::time::Span;
 use linesman_runtime::service;
 
-use super::known::Known;
-use super::{Line, NotDone};
+use super::known::KnownDevice;
+use super::{ServiceClient, ServiceRefused};
 use crate::failure::Failure;
 
 /// A running MainDevice.
-pub(super) struct Driven {
+pub(super) struct SocketClient {
     path: PathBuf,
 }
 
@@ -25,7 +26,7 @@ pub(crate) fn is_one(place: &str) -> bool {
 }
 
 /// Asks the MainDevice for its SubDevices.
-pub(super) fn open(place: &str) -> Result<(Driven, Vec<Known>), Failure> {
+pub(super) fn open(place: &str) -> Result<(SocketClient, Vec<KnownDevice>), Failure> {
     let path = PathBuf::from(place);
     let answer = service::status(&path).map_err(|error| silent(&path, &error))?;
     let Some(run) = answer.run else {
@@ -45,7 +46,7 @@ pub(super) fn open(place: &str) -> Result<(Driven, Vec<Known>), Failure> {
     let known = |device: &linesman_runtime::run::report::DeviceReport| {
         let seen = seen(device.no);
         let identity = seen.and_then(|seen| seen.found.or(seen.planned));
-        Known {
+        KnownDevice {
             id: DeviceId(device.no.saturating_sub(1)),
             station: device.station,
             alias: 0,
@@ -62,20 +63,20 @@ pub(super) fn open(place: &str) -> Result<(Driven, Vec<Known>), Failure> {
             boot: true,
         }
     };
-    Ok((Driven { path }, run.devices.iter().map(known).collect()))
+    Ok((SocketClient { path }, run.devices.iter().map(known).collect()))
 }
 
-impl Line for Driven {
+impl ServiceClient for SocketClient {
     fn ask(
         &mut self,
         id: DeviceId,
         service: Service,
-    ) -> Result<Result<ServiceAnswer, NotDone>, Failure> {
+    ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure> {
         let answer = service::ask(&self.path, id.no(), &service)
             .map_err(|error| silent(&self.path, &error))?;
         Ok(answer
             .given()
-            .map_err(|(why, refusal)| NotDone { told: Failure::from_text(&why), refusal }))
+            .map_err(|(why, refusal)| ServiceRefused { told: Failure::from_text(&why), refusal }))
     }
 
     fn wait(&mut self, span: Span) -> Result<bool, Failure> {

@@ -11,7 +11,7 @@ use linesman_proto::sii::word::{CHECKSUM, STATION_ALIAS};
 use linesman_proto::sii::{Image, WordAddress, checksum};
 
 use super::sdo::value::whole;
-use super::service::{Place, Session, Trouble, end};
+use super::service::{ServiceError, ServiceTarget, Session, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -26,7 +26,7 @@ const LARGEST: u64 = 512 << 10;
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    pub(crate) place: Place,
+    pub(crate) place: ServiceTarget,
     #[command(subcommand)]
     action: Action,
     /// JSON, schema linesman.sii/1
@@ -141,7 +141,7 @@ fn read(
     id: DeviceId,
     save: Option<&Path>,
     whole: bool,
-) -> Result<Report, Trouble> {
+) -> Result<Report, ServiceError> {
     let bytes = session.bytes(id, Service::ReadSii { whole })?;
     if let Some(path) = save {
         files::write_new_bytes(path, "the image", &bytes)?;
@@ -155,7 +155,7 @@ fn back_up(
     id: DeviceId,
     wanted: usize,
     path: Option<&Path>,
-) -> Result<(Vec<u8>, PathBuf), Trouble> {
+) -> Result<(Vec<u8>, PathBuf), ServiceError> {
     let station = session.report(id).station;
     let path = path.map_or_else(|| format!("sii-0x{station:04X}-backup.bin").into(), PathBuf::from);
     files::refuse_to_overwrite(&path)?;
@@ -175,7 +175,7 @@ fn write(
     backup: Option<&Path>,
     force: bool,
     output: &Output,
-) -> Result<Report, Trouble> {
+) -> Result<Report, ServiceError> {
     if !force {
         fits(session, id, file, image)?;
     }
@@ -196,7 +196,12 @@ fn write(
 }
 
 /// Writes words, which are read back one by one.
-fn put(session: &mut Session, id: DeviceId, at: WordAddress, data: &[u8]) -> Result<u32, Trouble> {
+fn put(
+    session: &mut Session,
+    id: DeviceId,
+    at: WordAddress,
+    data: &[u8],
+) -> Result<u32, ServiceError> {
     match session.ask(id, Service::WriteSii { at, data: data.to_vec() })? {
         ServiceAnswer::Written { words } => Ok(words),
         ServiceAnswer::Done | ServiceAnswer::Data(_) | ServiceAnswer::State { .. } => Ok(0),
@@ -247,7 +252,7 @@ fn verify(
     id: DeviceId,
     file: &Path,
     image: &[u8],
-) -> Result<Report, Trouble> {
+) -> Result<Report, ServiceError> {
     let mut there = session.bytes(id, Service::ReadSii { whole: false })?;
     if there.len() < image.len() {
         there = session.bytes(id, Service::ReadSii { whole: true })?;
@@ -255,7 +260,7 @@ fn verify(
     Ok(Report::verified(session.report(id), &there, image, file))
 }
 
-fn tell_alias(session: &mut Session, id: DeviceId) -> Result<Report, Trouble> {
+fn tell_alias(session: &mut Session, id: DeviceId) -> Result<Report, ServiceError> {
     let bytes = session.bytes(id, Service::ReadSii { whole: false })?;
     let at = Service::ReadRegister { address: register::STATION_ALIAS.address, len: 2 };
     let in_use = session.bytes(id, at)?.first_chunk().map(|word| u16::from_le_bytes(*word));
@@ -269,7 +274,7 @@ fn set_alias(
     alias: u16,
     backup: Option<&Path>,
     output: &Output,
-) -> Result<Report, Trouble> {
+) -> Result<Report, ServiceError> {
     let mut others = session.devices().iter().filter(|other| other.id != id && alias != 0);
     if let Some(other) = others.find(|other| other.alias == alias) {
         let reason = format!("alias {alias} is that of {} already", other.label());

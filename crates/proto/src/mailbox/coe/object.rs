@@ -1,4 +1,4 @@
-//! How an object is addressed, and the indices every EtherCAT device shares.
+//! Address of an object, and the indices every EtherCAT device shares.
 //!
 //! Reference: ETG.1000.6, object dictionary, ETG.1020.
 

@@ -1,4 +1,4 @@
-//! What a device can keep step with: objects 0x1C32 and 0x1C33, subindex 04.
+//! Synchronisation types that a device supports: objects 0x1C32 and 0x1C33, subindex 04.
 //!
 //! Reference: ETG.1020, synchronisation; S0 L597-609.
 

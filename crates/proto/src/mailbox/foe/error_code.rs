@@ -1,4 +1,4 @@
-//! Why a file was refused.
+//! Error codes of refused files.
 //!
 //! Reference: ETG.1000.6, FoE, error codes.
 

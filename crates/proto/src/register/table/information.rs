@@ -1,4 +1,4 @@
-//! What a controller is, how it is addressed, how it is protected: 0x0000 to 0x0041.
+//! Identification, addresses and write protection of a controller: 0x0000 to 0x0041.
 //!
 //! Reference: S2 2.1, 2.2, 2.3. Type numbers of other makers come from their own register lists.
 

@@ -1,5 +1,5 @@
-//! What differs from controller to controller, the pins it drives itself, and its user RAM: 0x0E00
-//! to 0x0FFF.
+//! Registers that differ from controller to controller, the pins it drives itself, and its user
+//! RAM: 0x0E00 to 0x0FFF.
 //!
 //! Reference: S2 2.16, 2.17, 2.18.
 

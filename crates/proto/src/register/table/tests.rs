@@ -1,4 +1,4 @@
-//! What must hold for every entry of the register table.
+//! Properties of every entry of the register table.
 
 use super::*;
 use crate::register::entry::{Access, Form};

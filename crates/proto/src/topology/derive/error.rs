@@ -1,4 +1,4 @@
-//! What keeps a tree from being derived.
+//! Errors that keep a tree from being derived.
 
 use crate::port::Port;
 

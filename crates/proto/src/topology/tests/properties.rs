@@ -1,4 +1,5 @@
-//! Whatever the line: route and walk agree, and the tree is found again from what was seen of it.
+//! Properties of any line: route and walk agree, and the tree is found again from what was seen of
+//! it.
 
 use proptest::prelude::*;
 

@@ -10,14 +10,14 @@ use linesman_proto::register as r;
 use linesman_proto::register::ControllerType;
 use linesman_proto::time::Instant;
 
-use crate::controller::core::{Core, Passing};
+use crate::controller::core::{Core, FrameProgress};
 use crate::hardware::PortKind;
 
 impl Core {
     /// The frame that just passed wrote to 0x0900: its receive times are kept, those of ports that
     /// it has not reached yet when it does.
     pub(in crate::controller) fn latch_receive_times(&mut self) {
-        let Passing { number, began, .. } = self.passing;
+        let FrameProgress { number, began, .. } = self.passing;
         let local = self.clock.taken(began);
         self.memory.set_u64(&r::RECEIVE_TIME_PROCESSING_UNIT, local);
         if self.latches_next_frame() {

@@ -1,4 +1,4 @@
-//! What a spoiled frame leaves behind: RAM it has already written, and nothing else.
+//! Effects of a damaged frame: RAM that it has already written, and nothing else.
 
 use linesman_proto::address::{LogicalAddress, RegisterAddress};
 use linesman_proto::command::Command;
@@ -6,7 +6,7 @@ use linesman_proto::register::{AlEvents, FmmuConfig, SmControl};
 use linesman_proto::time::Span;
 
 use super::rig::{Bench, Datagram, answers, at, frame, logical};
-use crate::controller::Verdict;
+use crate::controller::Forwarding;
 use crate::frame::Damage;
 
 const SPOILED: [Damage; 3] = [
@@ -18,7 +18,7 @@ const SPOILED: [Damage; 3] = [
 fn spoil(bench: &mut Bench, damage: Damage, datagrams: &[Datagram<'_>]) -> Vec<(Vec<u8>, u16)> {
     let mut frame = frame(datagrams);
     frame.damage = damage;
-    assert_eq!(bench.pass(&mut frame), Verdict::Forward);
+    assert_eq!(bench.pass(&mut frame), Forwarding::Forward);
     assert_eq!(frame.damage, damage);
     answers(&frame)
 }
@@ -133,7 +133,7 @@ fn a_cut_ends_execution_where_it_is() {
         let verdict = bench.pass(&mut cut);
         assert_eq!(cut.bytes.len(), len);
         // Without an EtherType it is not even EtherCAT.
-        let expected = if len < 14 { Verdict::Destroy } else { Verdict::Forward };
+        let expected = if len < 14 { Forwarding::Destroy } else { Forwarding::Forward };
         assert_eq!(verdict, expected, "cut at {len}");
         let written = |start: usize| len.saturating_sub(start).min(20);
         let ram = |bench: &mut Bench, ado| bench.read(ado, 20).unwrap();

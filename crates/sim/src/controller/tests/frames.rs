@@ -1,4 +1,4 @@
-//! What the processing unit does to frames as such: source mark, event field, wrappings, foreign
+//! Treatment of frames as such by the processing unit: source mark, event field, wrappings, foreign
 //! and circulating frames, frames that end too early.
 
 use linesman_proto::command::Command;
@@ -7,7 +7,7 @@ use linesman_proto::port::Port;
 use linesman_proto::register::{DlControl, ErrorCounter, LoopMode};
 
 use super::rig::{Bench, answers, at, frame};
-use crate::controller::Verdict;
+use crate::controller::Forwarding;
 use crate::frame::WireFrame;
 
 fn unit_errors(bench: &Bench) -> u8 {
@@ -36,11 +36,11 @@ fn foreign_frames_end_here_unless_told_otherwise() {
         bytes[12..14].copy_from_slice(&[0x08, 0x06]);
         WireFrame { bytes, ..WireFrame::default() }
     };
-    assert_eq!(bench.pass(&mut foreign()), Verdict::Destroy);
+    assert_eq!(bench.pass(&mut foreign()), Forwarding::Destroy);
     assert_eq!(unit_errors(&bench), 1);
     bench.write(0x0100, &[0]);
     let mut passed = foreign();
-    assert_eq!(bench.pass(&mut passed), Verdict::Forward);
+    assert_eq!(bench.pass(&mut passed), Forwarding::Forward);
     assert_eq!((passed.bytes, unit_errors(&bench)), (foreign().bytes, 1));
 }
 
@@ -51,7 +51,7 @@ fn other_ethercat_frames_pass_unprocessed() {
         let mut other = frame(&[(Command::Brd, at(0, 0x0000), &[0; 4])]);
         other.bytes[15] = other.bytes[15] & 0x0F | kind << 4;
         let datagram = other.bytes[16..].to_vec();
-        assert_eq!(bench.pass(&mut other), Verdict::Forward);
+        assert_eq!(bench.pass(&mut other), Forwarding::Forward);
         assert_eq!(other.bytes[16..], datagram);
     }
     assert_eq!(unit_errors(&bench), 0);
@@ -70,7 +70,7 @@ fn datagrams_are_found_behind_tags_and_in_udp() {
     let udp_header = [0x12, 0x34, 0x88, 0xA4, 0, 40, 0xAB, 0xCD];
     udp.bytes = [&ethernet[..12], &[0x08, 0x00], &ip, &udp_header, ethercat].concat();
     for probe in [&mut tagged, &mut udp] {
-        assert_eq!(bench.pass(probe), Verdict::Forward);
+        assert_eq!(bench.pass(probe), Forwarding::Forward);
         assert_eq!(answers(probe)[0], (vec![0x11], 1));
     }
     assert_eq!(udp.bytes[40..42], [0, 0], "the UDP checksum is dropped");
@@ -103,13 +103,13 @@ fn frames_come_round_once() {
     assert!(bench.controller.port_zero_closes_ring());
     let mut probe =
         frame(&[(Command::Brd, at(0, 0x0000), &[0]), (Command::Brd, at(0, 0x0000), &[0])]);
-    assert_eq!(bench.pass(&mut probe), Verdict::Forward);
+    assert_eq!(bench.pass(&mut probe), Forwarding::Forward);
     let view = FrameView::parse(&probe.bytes).unwrap();
     assert!(view.datagrams().all(|datagram| datagram.unwrap().circulated()));
     assert_eq!(answers(&probe)[0].1, 1);
 
     let before = probe.bytes.clone();
-    assert_eq!(bench.pass(&mut probe), Verdict::Destroy);
+    assert_eq!(bench.pass(&mut probe), Forwarding::Destroy);
     assert_eq!((unit_errors(&bench), &probe.bytes), (1, &before), "not processed again");
 }
 
@@ -127,7 +127,7 @@ fn a_port_closed_by_hand_or_in_use_lets_frames_circulate() {
 
     let mut probe = frame(&[(Command::Brd, at(0, 0x0000), &[0])]);
     probe.bytes[16 + 7] |= 0x40;
-    assert_eq!(bench.pass(&mut probe), Verdict::Forward);
+    assert_eq!(bench.pass(&mut probe), Forwarding::Forward);
     assert_eq!(answers(&probe)[0].1, 1);
     bench.link(Port::B, false);
     bench.link(Port::A, false);
@@ -142,7 +142,7 @@ fn a_frame_that_ends_before_its_datagrams_is_marked() {
         (Command::Bwr, at(0, 0x1000), &[7; 40]),
     ]);
     probe.bytes.truncate(16 + 14 + 10 + 20);
-    assert_eq!(bench.pass(&mut probe), Verdict::Forward);
+    assert_eq!(bench.pass(&mut probe), Forwarding::Forward);
     assert!(probe.damage.fcs_bad && probe.damage.marked);
     assert_eq!(unit_errors(&bench), 1);
     assert_eq!(bench.word(0x0200), 0, "registers are dropped");
@@ -151,7 +151,7 @@ fn a_frame_that_ends_before_its_datagrams_is_marked() {
     // More announced than there is: the last datagram lacks its successor.
     let mut probe = frame(&[(Command::Brd, at(0, 0x0000), &[0; 32])]);
     probe.bytes[16 + 7] |= 0x80;
-    assert_eq!(bench.pass(&mut probe), Verdict::Forward);
+    assert_eq!(bench.pass(&mut probe), Forwarding::Forward);
     assert!(probe.damage.marked);
     assert_eq!(unit_errors(&bench), 2);
 }
@@ -163,6 +163,6 @@ fn without_power_nothing_happens() {
     bench.controller.power_off(bench.now);
     assert_eq!(bench.open(), [false; 4]);
     let mut probe = frame(&[(Command::Brd, at(0, 0x0000), &[0])]);
-    assert_eq!(bench.pass(&mut probe), Verdict::Destroy);
+    assert_eq!(bench.pass(&mut probe), Forwarding::Destroy);
     assert!(!bench.controller.is_powered());
 }

@@ -84,7 +84,7 @@ fn the_first_edge_in_single_mode_until_it_is_read() {
 }
 
 #[test]
-fn what_the_processor_owns_a_frame_does_not_clear() {
+fn frame_does_not_clear_what_the_processor_owns() {
     let mut bench = bench();
     bench.write(0x09A8, &[0x01]);
     bench.write(0x0980, &[0x10]);

@@ -5,7 +5,7 @@ use linesman_proto::register::{PhyCommand, PhyControl};
 use linesman_proto::time::Span;
 
 use super::rig::{Bench, hardware, sii};
-use crate::controller::{PHY_ACCESS_TIME, PhyAct};
+use crate::controller::{PHY_ACCESS_TIME, PhyAction};
 use crate::device::NoFirmware;
 use crate::hardware::{Hardware, PortKind};
 use linesman_proto::address::RegisterAddress;
@@ -87,24 +87,24 @@ fn commands_take_their_time_and_tell_their_errors() {
 fn what_a_phy_is_told_it_does() {
     let mut bench = bench(hardware());
     bench.link(Port::C, true);
-    let acts = |bench: &mut Bench| {
-        let acts = bench.controller.take_phy_acts();
-        acts.into_iter().map(|(_, port, act)| (port, act)).collect::<Vec<_>>()
+    let actions = |bench: &mut Bench| {
+        let actions = bench.controller.take_phy_actions();
+        actions.into_iter().map(|(_, port, action)| (port, action)).collect::<Vec<_>>()
     };
     let rows = [
-        (0x3300, Some(PhyAct::Restart), "negotiate anew"),
-        (0x3900, Some(PhyAct::Sleep), "power down"),
+        (0x3300, Some(PhyAction::Restart), "negotiate anew"),
+        (0x3900, Some(PhyAction::Sleep), "power down"),
         (0x3B00, None, "asleep, it negotiates nothing"),
-        (0x3100, Some(PhyAct::Wake), "power up"),
+        (0x3100, Some(PhyAction::Wake), "power up"),
         (0x3100, None, "no change"),
-        (0x2100, Some(PhyAct::Restart), "without negotiation"),
-        (0x8000, Some(PhyAct::Restart), "reset"),
+        (0x2100, Some(PhyAction::Restart), "without negotiation"),
+        (0x8000, Some(PhyAction::Restart), "reset"),
     ];
     for (value, expected, why) in rows {
         assert_eq!(start(&mut bench, PhyCommand::Write, 2, 0, value), 1);
         bench.wait(Span::us(60));
-        let expected: Vec<_> = expected.map(|act| (Port::C, act)).into_iter().collect();
-        assert_eq!(acts(&mut bench), expected, "{why}");
+        let expected: Vec<_> = expected.map(|action| (Port::C, action)).into_iter().collect();
+        assert_eq!(actions(&mut bench), expected, "{why}");
     }
     assert_eq!(read(&mut bench, 2, 0), 0x3100, "as after a reset");
     start(&mut bench, PhyCommand::Write, 2, 4, 0x0101);

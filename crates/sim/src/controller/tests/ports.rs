@@ -158,7 +158,7 @@ fn temporary_loops_return_after_a_second() {
 }
 
 #[test]
-fn what_is_posted_ahead_can_be_foreseen() {
+fn port_event_posted_ahead_is_foreseen() {
     let mut bench = Bench::new();
     bench.link(Port::A, true);
     let (down, up) = (bench.now + Span::ms(1), bench.now + Span::ms(2));

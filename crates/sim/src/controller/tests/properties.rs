@@ -1,4 +1,5 @@
-//! Whatever comes in: no panic, no change of length, the same bytes again, and no allocation.
+//! Properties for any input: no panic, no change of length, the same bytes again, and no
+//! allocation.
 
 use linesman_proto::address::{LogicalAddress, RegisterAddress};
 use linesman_proto::command::Command;
@@ -9,7 +10,7 @@ use linesman_proto::time::Span;
 use proptest::prelude::*;
 
 use super::rig::{self, Bench, STATION, at, frame, logical};
-use crate::controller::{CountKind, PortEvent, Verdict};
+use crate::controller::{CountKind, Forwarding, PortEvent};
 use crate::device::{DigitalArea, Emulated, SignalId};
 use crate::frame::{Damage, WireFrame};
 
@@ -132,7 +133,7 @@ fn run(rounds: &[Round], polls: u64) -> (Vec<WireFrame>, Vec<u8>, String) {
         }
         let len = frame.bytes.len();
         let verdict = bench.pass(&mut frame);
-        assert!(verdict == Verdict::Forward || verdict == Verdict::Destroy);
+        assert!(verdict == Forwarding::Forward || verdict == Forwarding::Destroy);
         assert_eq!(frame.bytes.len(), len);
         for _ in 0..polls {
             bench.wait(Span::ns(round.gap / polls));

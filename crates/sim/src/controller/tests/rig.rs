@@ -9,7 +9,7 @@ use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{FmmuConfig, SmControl, SyncManagerConfig};
 use linesman_proto::time::{Instant, Span};
 
-use crate::controller::{Controller, LocalClock, Pdi, PortEvent, Verdict};
+use crate::controller::{Controller, Forwarding, LocalClock, Pdi, PortEvent};
 use crate::device::{Firmware, NoFirmware, Signals};
 use crate::frame::{Damage, WireFrame};
 use crate::hardware::{CountingProfile, Hardware, PortKind, Timing};
@@ -124,7 +124,7 @@ impl Bench {
     }
 
     /// A frame comes in by port A and passes the processing unit.
-    pub(crate) fn pass(&mut self, frame: &mut WireFrame) -> Verdict {
+    pub(crate) fn pass(&mut self, frame: &mut WireFrame) -> Forwarding {
         self.frames += 1;
         frame.number = self.frames;
         let at = self.now;
@@ -138,7 +138,7 @@ impl Bench {
     /// Sends datagrams in one frame and gives data and working counter of each.
     pub(crate) fn send(&mut self, datagrams: &[Datagram<'_>]) -> Vec<(Vec<u8>, u16)> {
         let mut frame = frame(datagrams);
-        assert_eq!(self.pass(&mut frame), Verdict::Forward);
+        assert_eq!(self.pass(&mut frame), Forwarding::Forward);
         answers(&frame)
     }
 

@@ -1,4 +1,4 @@
-//! What a device does with its process data: channels between objects and electrical signals.
+//! Application of a device: channels between its process data and electrical signals.
 
 pub mod analog;
 pub mod bridge;

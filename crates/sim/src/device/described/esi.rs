@@ -1,4 +1,4 @@
-//! From a device description of its maker to a type of device.
+//! Construction of a device type from the device description of its maker.
 
 use linesman_config::esi::dictionary::Shape;
 use linesman_config::esi::image::image;

@@ -1,4 +1,4 @@
-//! What is behind the controller of a described device.
+//! Firmware behind the controller of a described device.
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::sii::{

@@ -1,4 +1,4 @@
-//! Which controller a described device has.
+//! Controller of a described device.
 //!
 //! No data name it; they say what it has to have: ports, FMMUs, SyncManagers, memory. It is the
 //! smallest that has all that: an ET1200 for simple E-bus devices, an ET1100, else an IP core, whose

@@ -1,4 +1,4 @@
-//! Which electrical signals a described device has: what it drives, and what it takes.
+//! Electrical signals of a described device: those that it drives, and those that it takes.
 //!
 //! A device with a processor has one signal for each object that a PDO maps, in the order of the
 //! PDOs; a value of more than 32 bits has one for each 32 bits, lowest first. A controller that

@@ -8,7 +8,8 @@ use super::smart::{
     MAILBOX_IN, MAILBOX_OUT, NO_INPUTS, NO_OUTPUTS, SYNCHRONISED, TERMINAL, inputs, outputs,
 };
 use super::spec::{
-    Behind, COE, EntrySpec, Function, PdoSpec, ProcessorSpec, SettingSpec, SettingsSpec, Spec,
+    ApplicationSpec, COE, EntrySpec, Function, PdoSpec, ProcessorSpec, SettingSpec, SettingsSpec,
+    Spec,
 };
 use crate::device::application::analog::Range;
 use crate::device::processor::ResponseTimes;
@@ -218,7 +219,7 @@ const OUTPUTS: Spec = Spec {
 const TWO_OUT: Spec = Spec {
     sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(4), NO_INPUTS],
     pdos: TWO_OUTPUTS,
-    behind: Behind::Processor(&TWO_UNIPOLAR_OUT),
+    application: ApplicationSpec::Processor(&TWO_UNIPOLAR_OUT),
     ..OUTPUTS
 };
 
@@ -234,7 +235,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         product: 0x0BBC_3052,
         revision: 0x0015_0000,
         coe: COE,
-        behind: Behind::Processor(&FOUR_BIPOLAR_12),
+        application: ApplicationSpec::Processor(&FOUR_BIPOLAR_12),
         ..FOUR_IN
     }]),
     single(&[Spec {
@@ -243,7 +244,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         product: 0x0C1E_3052,
         chip: &ESC20,
         coe: COE,
-        behind: Behind::Processor(&TWO_BIPOLAR),
+        application: ApplicationSpec::Processor(&TWO_BIPOLAR),
         ..TWO_IN
     }]),
     single(&[Spec {
@@ -251,14 +252,14 @@ pub(super) const TYPES: &[LibraryType] = &[
         title: "EL3104 4Ch. Ana. Input +/-10V, DIFF",
         product: 0x0C20_3052,
         chip: &ET1100,
-        behind: Behind::Processor(&FOUR_BIPOLAR),
+        application: ApplicationSpec::Processor(&FOUR_BIPOLAR),
         ..FOUR_IN
     }]),
     single(&[Spec {
         name: "EL3154",
         title: "EL3154 4Ch. Ana. Input 4-20mA",
         product: 0x0C52_3052,
-        behind: Behind::Processor(&FOUR_UNIPOLAR),
+        application: ApplicationSpec::Processor(&FOUR_UNIPOLAR),
         ..FOUR_IN
     }]),
     single(&[Spec {
@@ -267,7 +268,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         product: 0x0C5A_3052,
         chip: &ESC20,
         coe: COE,
-        behind: Behind::Processor(&TWO_UNIPOLAR),
+        application: ApplicationSpec::Processor(&TWO_UNIPOLAR),
         ..TWO_IN
     }]),
     single(&[Spec {
@@ -276,7 +277,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         product: 0x0FA4_3052,
         sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(8), NO_INPUTS],
         pdos: FOUR_OUTPUTS,
-        behind: Behind::Processor(&FOUR_UNIPOLAR_OUT),
+        application: ApplicationSpec::Processor(&FOUR_UNIPOLAR_OUT),
         ..OUTPUTS
     }]),
     single(&[Spec {

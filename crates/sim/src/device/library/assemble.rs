@@ -1,11 +1,11 @@
-//! From the table of a type to a device: hardware, SII image and firmware.
+//! Assembly of a device from the table of its type: hardware, SII image and firmware.
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::LATCH0_STATUS;
 use linesman_proto::sii::Protocols;
 
 use super::object::{self, Individual};
-use super::spec::{Behind, Function, ProcessorSpec, Spec, Use};
+use super::spec::{ApplicationSpec, Function, ProcessorSpec, Spec, Use};
 use super::{Built, file, image};
 use crate::device::application::Channel;
 use crate::device::application::analog::{AnalogInput, AnalogOutput, Range};
@@ -28,8 +28,8 @@ pub(super) fn build_one(spec: &Spec, individual: Individual, signals: &mut Signa
     let mut add = |count: usize| (0..count).map(|_| signals.add()).collect::<Vec<_>>();
     let outputs = add(spec.output_channels());
     let inputs = add(spec.input_channels());
-    let firmware: Box<dyn Firmware> = match spec.behind {
-        Behind::Plain => {
+    let firmware: Box<dyn Firmware> = match spec.application {
+        ApplicationSpec::Plain => {
             let device = Emulated::new(
                 areas(spec, Use::Outputs, &outputs),
                 areas(spec, Use::Inputs, &inputs),
@@ -40,7 +40,7 @@ pub(super) fn build_one(spec: &Spec, individual: Individual, signals: &mut Signa
             let stamped: &[SignalId] = if stamps { &inputs } else { &[] };
             Box::new(device.with_time_stamps(TimeStamps::new(stamped)))
         }
-        Behind::CodingSwitch(at) => {
+        ApplicationSpec::CodingSwitch(at) => {
             let word =
                 inputs.iter().map(|signal| WordArea { sync_manager: 0, at, signal: *signal });
             let device = Emulated::default().with_words(word.collect());
@@ -49,13 +49,13 @@ pub(super) fn build_one(spec: &Spec, individual: Individual, signals: &mut Signa
                 None => Box::new(device),
             }
         }
-        Behind::Oversampling { .. } => {
+        ApplicationSpec::Oversampling { .. } => {
             let buffers = (0..).zip(&outputs);
             let buffers =
                 buffers.map(|(sync_manager, signal)| SampleBuffer::of_words(sync_manager, *signal));
             Box::new(Oversampling::new(buffers.collect(), Vec::new()))
         }
-        Behind::Processor(processor) => {
+        ApplicationSpec::Processor(processor) => {
             with_processor(spec, processor, individual, &outputs, &inputs)
         }
     };

@@ -5,7 +5,7 @@ use super::analog::{FOUR_OUTPUT_SETTINGS, FOUR_OUTPUTS_AT_11};
 use super::chip::{ET1100, IP_CORE};
 use super::digital;
 use super::smart::{MAILBOX_IN, MAILBOX_OUT, NO_INPUTS, SYNCHRONISED, TERMINAL, outputs};
-use super::spec::{Behind, Function, PdoSpec, ProcessorSpec, Spec};
+use super::spec::{ApplicationSpec, Function, PdoSpec, ProcessorSpec, Spec};
 use crate::device::application::analog::Range;
 use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Mii};
@@ -66,7 +66,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         ports: [Mii, Mii, Absent, Absent],
         sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(8), NO_INPUTS],
         pdos: FOUR_OUTPUTS_AT_11,
-        behind: Behind::Processor(&FOUR_ANALOG_OUTPUTS),
+        application: ApplicationSpec::Processor(&FOUR_ANALOG_OUTPUTS),
         op_modes: SYNCHRONISED,
         ..TERMINAL
     }]),

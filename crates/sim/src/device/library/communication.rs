@@ -10,8 +10,8 @@ use linesman_proto::sii::Protocols;
 use super::LibraryType;
 use super::smart::{NO_INPUTS, NO_OUTPUTS, TERMINAL, inputs, mailbox_in, mailbox_out};
 use super::spec::{
-    Behind, COE_WITH_PDO_CONFIGURATION, EntrySpec, Function, OpModeSpec, PdoSpec, ProcessorSpec,
-    SettingSpec, SettingsSpec, Spec, SyncManagerSpec,
+    ApplicationSpec, COE_WITH_PDO_CONFIGURATION, EntrySpec, Function, OpModeSpec, PdoSpec,
+    ProcessorSpec, SettingSpec, SettingsSpec, Spec, SyncManagerSpec,
 };
 use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Mii};
@@ -35,7 +35,7 @@ const SWITCH_PORT: Spec = Spec {
         SyncManagerSpec { start: 0x1C00, ..NO_INPUTS },
     ],
     protocols: Protocols::EOE | Protocols::COE | Protocols::FOE,
-    behind: Behind::Processor(&SWITCH_PORT_PROCESSOR),
+    application: ApplicationSpec::Processor(&SWITCH_PORT_PROCESSOR),
     ..TERMINAL
 };
 
@@ -163,7 +163,7 @@ const BRIDGE: Spec = Spec {
     pdos: BRIDGE_PDOS,
     coe: COE_WITH_PDO_CONFIGURATION,
     protocols: Protocols::AOE | Protocols::EOE | Protocols::COE | Protocols::FOE | Protocols::VOE,
-    behind: Behind::Processor(&BRIDGE_PROCESSOR),
+    application: ApplicationSpec::Processor(&BRIDGE_PROCESSOR),
     op_modes: &[OpModeSpec::free("FreeRun"), OpModeSpec::with_clock("DcSync", 0x0320)],
     ..TERMINAL
 };
@@ -177,7 +177,7 @@ const FAST_BRIDGE: Spec = Spec {
         SyncManagerSpec { start: 0x2400, ..inputs(2) },
     ],
     pdos: FAST_BRIDGE_PDOS,
-    behind: Behind::Processor(&FAST_BRIDGE_PROCESSOR),
+    application: ApplicationSpec::Processor(&FAST_BRIDGE_PROCESSOR),
     ..BRIDGE
 };
 
@@ -220,7 +220,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         ],
         pdos: CLOCK_PDOS,
         protocols: Protocols::EOE | Protocols::COE | Protocols::FOE,
-        behind: Behind::Processor(&CLOCK_PROCESSOR),
+        application: ApplicationSpec::Processor(&CLOCK_PROCESSOR),
         op_modes: &[OpModeSpec { name: "DcLatch", assign_activate: 0x0030, sync0_factor: 0 }],
         ..TERMINAL
     }]),

@@ -12,8 +12,8 @@ use super::chip::{ET1100, ET1100_FAST, ET1200};
 use super::digital::{INPUT_BYTE, OUTPUT_BYTE};
 use super::smart::{mailbox_in, mailbox_out};
 use super::spec::{
-    BECKHOFF, Behind, EntrySpec, Function, NO_COE, PdoSpec, ProcessorSpec, Spec, SyncManagerSpec,
-    Use,
+    ApplicationSpec, BECKHOFF, EntrySpec, Function, NO_COE, PdoSpec, ProcessorSpec, Spec,
+    SyncManagerSpec, Use,
 };
 use super::{LibraryType, digital, smart};
 use crate::device::processor::ResponseTimes;
@@ -43,7 +43,7 @@ pub(super) const COUPLER: Spec = Spec {
     pdos: &[],
     protocols: 0,
     coe: NO_COE,
-    behind: Behind::Plain,
+    application: ApplicationSpec::Plain,
     op_modes: &[],
 };
 
@@ -67,7 +67,7 @@ const WITH_CODING_SWITCH: Spec = Spec {
         Some(0),
         &[EntrySpec::number(0x6000, 1, "ID", DataType::UINT, 16)],
     )],
-    behind: Behind::CodingSwitch(CODING_SWITCH),
+    application: ApplicationSpec::CodingSwitch(CODING_SWITCH),
     ..COUPLER
 };
 
@@ -238,7 +238,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         ],
         protocols: Protocols::COE | Protocols::FOE,
         coe: CoeDetails(0x03),
-        behind: Behind::Processor(&ProcessorSpec {
+        application: ApplicationSpec::Processor(&ProcessorSpec {
             function: Function::None,
             hardware_version: "",
             software_version: "",

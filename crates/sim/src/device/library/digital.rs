@@ -6,7 +6,7 @@ use linesman_proto::register::SmControl;
 use super::LibraryType;
 use super::chip::{ESC20_64, ET1200};
 use super::spec::{
-    BECKHOFF, Behind, EntrySpec, NO_COE, OpModeSpec, PdoSpec, Spec, SyncManagerSpec, Use,
+    ApplicationSpec, BECKHOFF, EntrySpec, NO_COE, OpModeSpec, PdoSpec, Spec, SyncManagerSpec, Use,
 };
 use crate::hardware::PortKind::{Absent, Ebus};
 
@@ -61,7 +61,7 @@ pub(super) const TERMINAL: Spec = Spec {
     pdos: &[],
     protocols: 0,
     coe: NO_COE,
-    behind: Behind::Plain,
+    application: ApplicationSpec::Plain,
     op_modes: &[],
 };
 

@@ -7,8 +7,8 @@ use super::LibraryType;
 use super::object;
 use super::smart::{TERMINAL, inputs, mailbox_in, mailbox_out, outputs};
 use super::spec::{
-    Behind, COE_WITH_PDO_CONFIGURATION, EntrySpec, Function, NO_COE, NOBODY, OpModeSpec, PdoSpec,
-    ProcessorSpec, Rights, SettingSpec, SettingsSpec, Spec, SyncManagerSpec, VariableSpec,
+    ApplicationSpec, COE_WITH_PDO_CONFIGURATION, EntrySpec, Function, NO_COE, NOBODY, OpModeSpec,
+    PdoSpec, ProcessorSpec, Rights, SettingSpec, SettingsSpec, Spec, SyncManagerSpec, VariableSpec,
 };
 use crate::device::dictionary::Object;
 use crate::device::processor::ResponseTimes;
@@ -183,7 +183,7 @@ pub(super) const TYPES: &[LibraryType] = &[
             pdos: SERCOS_PDOS,
             protocols: Protocols::SOE | Protocols::FOE,
             coe: NO_COE,
-            behind: Behind::Processor(&SERCOS_PROCESSOR),
+            application: ApplicationSpec::Processor(&SERCOS_PROCESSOR),
             op_modes: &[OpModeSpec::with_clock("DC", 0x0730)],
             ..DRIVE
         }],
@@ -206,7 +206,7 @@ pub(super) const TYPES: &[LibraryType] = &[
             ],
             pdos: CIA402_PDOS,
             coe: COE_WITH_PDO_CONFIGURATION,
-            behind: Behind::Processor(&CIA402_PROCESSOR),
+            application: ApplicationSpec::Processor(&CIA402_PROCESSOR),
             op_modes: &[OpModeSpec::free("Synchron"), OpModeSpec::with_clock("DC", 0x0300)],
             ..DRIVE
         }],

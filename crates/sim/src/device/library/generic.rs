@@ -6,7 +6,7 @@ use super::chip::ET1100;
 use super::digital::{self, OUTPUT_BYTE};
 use super::smart::{self, MAILBOX_IN, MAILBOX_OUT, SYNCHRONISED, inputs, outputs};
 use super::spec::{
-    Behind, EntrySpec, Function, NOBODY, PdoSpec, ProcessorSpec, SettingsSpec, Spec,
+    ApplicationSpec, EntrySpec, Function, NOBODY, PdoSpec, ProcessorSpec, SettingsSpec, Spec,
     SyncManagerSpec, Use,
 };
 use crate::device::application::analog::Range;
@@ -86,7 +86,7 @@ pub(super) const TYPES: &[LibraryType] = &[
             ports: [Mii, Mii, Absent, Absent],
             sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(8), inputs(16)],
             pdos: ANALOG_PDOS,
-            behind: Behind::Processor(&ANALOG_PROCESSOR),
+            application: ApplicationSpec::Processor(&ANALOG_PROCESSOR),
             op_modes: SYNCHRONISED,
             ..smart::TERMINAL
         }],

@@ -10,7 +10,7 @@ use linesman_proto::register::SmControl;
 use super::LibraryType;
 use super::chip::ESC20_64;
 use super::digital::TERMINAL;
-use super::spec::{Behind, EntrySpec, OpModeSpec, PdoSpec, Spec, SyncManagerSpec, Use};
+use super::spec::{ApplicationSpec, EntrySpec, OpModeSpec, PdoSpec, Spec, SyncManagerSpec, Use};
 
 const fn samples(start: u16) -> SyncManagerSpec {
     SyncManagerSpec {
@@ -75,7 +75,7 @@ pub(super) const TYPES: &[LibraryType] = &[LibraryType {
         pdi_configuration_2: 0x0001,
         sync_managers: &[samples(0x1000), samples(0x1400), SyncManagerSpec::registers(0x0998)],
         pdos: PDOS,
-        behind: Behind::Oversampling { channels: 2 },
+        application: ApplicationSpec::Oversampling { channels: 2 },
         op_modes: &[
             mode("DcSync", 1),
             mode("DcSync2", 2),

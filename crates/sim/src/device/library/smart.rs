@@ -8,7 +8,7 @@ use linesman_proto::sii::Protocols;
 use super::LibraryType;
 use super::chip::ET1100;
 use super::spec::{
-    BECKHOFF, Behind, COE_WITH_COMPLETE_ACCESS, EntrySpec, Function, OpModeSpec, PdoSpec,
+    ApplicationSpec, BECKHOFF, COE_WITH_COMPLETE_ACCESS, EntrySpec, Function, OpModeSpec, PdoSpec,
     ProcessorSpec, SettingSpec, SettingsSpec, Spec, SyncManagerSpec, Use,
 };
 use crate::device::processor::ResponseTimes;
@@ -96,7 +96,7 @@ pub(super) const TERMINAL: Spec = Spec {
     pdos: &[],
     protocols: Protocols::COE | Protocols::FOE,
     coe: COE_WITH_COMPLETE_ACCESS,
-    behind: Behind::Plain,
+    application: ApplicationSpec::Plain,
     op_modes: &[],
 };
 
@@ -278,7 +278,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         ebus_current_ma: 60,
         sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(1), inputs(3)],
         pdos: DIAGNOSED_OUTPUTS,
-        behind: Behind::Processor(&DIAGNOSED_OUTPUTS_PROCESSOR),
+        application: ApplicationSpec::Processor(&DIAGNOSED_OUTPUTS_PROCESSOR),
         ..TERMINAL
     }]),
     single(&[Spec {
@@ -290,7 +290,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         ebus_current_ma: 140,
         sync_managers: &[MAILBOX_OUT, MAILBOX_IN, outputs(8), inputs(8)],
         pdos: AXIS,
-        behind: Behind::Processor(&AXIS_PROCESSOR),
+        application: ApplicationSpec::Processor(&AXIS_PROCESSOR),
         op_modes: &[OpModeSpec::free("Synchron"), OpModeSpec::with_clock("DC-Synchron", 0x0300)],
         ..TERMINAL
     }]),

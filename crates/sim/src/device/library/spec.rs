@@ -1,4 +1,4 @@
-//! How a type is described: data from which hardware, SII image and firmware are made.
+//! Specification of a type: data from which hardware, SII image and firmware are made.
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::coe::DataType;
@@ -49,7 +49,7 @@ pub(super) struct Spec {
     /// SII, category General: what its CoE can do; 0 for a device without.
     pub(super) coe: CoeDetails,
     /// What is behind the controller.
-    pub(super) behind: Behind,
+    pub(super) application: ApplicationSpec,
     /// Operation modes with distributed clocks, for those that have them.
     pub(super) op_modes: &'static [OpModeSpec],
 }
@@ -70,7 +70,7 @@ pub(super) const NOBODY: u32 = 0xFFFF_FFF0;
 
 /// What is behind a controller.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Behind {
+pub(super) enum ApplicationSpec {
     /// Nothing, or channels that the controller drives itself.
     Plain,
     /// A coding switch that can be read at this address.
@@ -403,19 +403,19 @@ impl Spec {
 
     /// How many signals it drives.
     pub(super) fn output_channels(&self) -> usize {
-        match self.behind {
-            Behind::Processor(processor) => processor.function.signals().0,
-            Behind::Oversampling { channels } => usize::from(channels),
-            Behind::Plain | Behind::CodingSwitch(_) => self.channels(true),
+        match self.application {
+            ApplicationSpec::Processor(processor) => processor.function.signals().0,
+            ApplicationSpec::Oversampling { channels } => usize::from(channels),
+            ApplicationSpec::Plain | ApplicationSpec::CodingSwitch(_) => self.channels(true),
         }
     }
 
     /// How many signals it takes.
     pub(super) fn input_channels(&self) -> usize {
-        match self.behind {
-            Behind::Processor(processor) => processor.function.signals().1,
-            Behind::Oversampling { .. } => 0,
-            Behind::Plain | Behind::CodingSwitch(_) => self.channels(false),
+        match self.application {
+            ApplicationSpec::Processor(processor) => processor.function.signals().1,
+            ApplicationSpec::Oversampling { .. } => 0,
+            ApplicationSpec::Plain | ApplicationSpec::CodingSwitch(_) => self.channels(false),
         }
     }
 
@@ -439,9 +439,11 @@ impl Spec {
 
     /// Where its coding switch can be read.
     pub(super) const fn coding_switch(&self) -> Option<RegisterAddress> {
-        match self.behind {
-            Behind::CodingSwitch(at) => Some(at),
-            Behind::Plain | Behind::Processor(_) | Behind::Oversampling { .. } => None,
+        match self.application {
+            ApplicationSpec::CodingSwitch(at) => Some(at),
+            ApplicationSpec::Plain
+            | ApplicationSpec::Processor(_)
+            | ApplicationSpec::Oversampling { .. } => None,
         }
     }
 

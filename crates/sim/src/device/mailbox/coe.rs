@@ -11,7 +11,7 @@ use linesman_proto::state::AlState;
 
 use super::{Answers, Served, information};
 use crate::device::dictionary::{Dictionary, LARGEST};
-use crate::device::trouble::RefusedWith;
+use crate::device::software_fault::RefusedWith;
 
 /// The server.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
@@ -34,11 +34,11 @@ impl CoeServer {
         served: &mut Served<'_>,
         room: usize,
     ) -> Result<Answers, ErrorReplyCode> {
-        let Served { dictionary, troubles, state, .. } = served;
+        let Served { dictionary, software_faults, state, .. } = served;
         match Message::parse(request) {
             Ok(Message::SdoRequest(request)) => {
                 match begun(&request)
-                    .and_then(|object| Some((object, troubles.refuses_sdo(object.index)?)))
+                    .and_then(|object| Some((object, software_faults.refuses_sdo(object.index)?)))
                 {
                     Some((object, RefusedWith::Abort(code))) => {
                         self.transfer = None;

@@ -20,7 +20,7 @@ const ERASING: &[u8] = b"erasing flash";
 
 /// How long messages can be, in bytes of their SyncManagers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Rooms {
+pub(super) struct MessageLimits {
     pub(super) requests: usize,
     pub(super) answers: usize,
 }
@@ -48,22 +48,22 @@ impl FoeServer {
         files: &mut Files,
         state: AlState,
         now: Instant,
-        rooms: Rooms,
+        limits: MessageLimits,
     ) -> Result<Answers, ErrorReplyCode> {
         let message = match Message::parse(request) {
             Ok(message) => message,
             Err(FoeError::CutOff { .. }) => return Err(ErrorReplyCode::SizeTooShort),
             Err(FoeError::UnknownOpcode { .. }) => {
                 self.transfer = None;
-                return Ok(refuse(FoeErrorCode::ILLEGAL, "unknown opcode", rooms));
+                return Ok(refuse(FoeErrorCode::ILLEGAL, "unknown opcode", limits));
             }
         };
         Ok(match message {
             Message::Read { password, name } => {
                 self.transfer = None;
                 match files.read(name, password, state) {
-                    Ok(data) => self.send(data.to_vec(), 1, 0, rooms),
-                    Err(code) => refuse(code, code.text(), rooms),
+                    Ok(data) => self.send(data.to_vec(), 1, 0, limits),
+                    Err(code) => refuse(code, code.text(), limits),
                 }
             }
             Message::Write { password, name } => {
@@ -72,16 +72,16 @@ impl FoeServer {
                     Ok(target) => {
                         let data = Vec::new();
                         self.transfer = Some(Transfer::Write { target, data, next: 1, began: now });
-                        vec![write(&Message::Ack { packet: 0 }, rooms)]
+                        vec![write(&Message::Ack { packet: 0 }, limits)]
                     }
-                    Err(code) => refuse(code, code.text(), rooms),
+                    Err(code) => refuse(code, code.text(), limits),
                 }
             }
-            Message::Data { packet, data } => self.take(packet, data, files, now, rooms),
-            Message::Ack { packet } => self.go_on(packet, rooms),
+            Message::Data { packet, data } => self.take(packet, data, files, now, limits),
+            Message::Ack { packet } => self.go_on(packet, limits),
             // The MainDevice has no time for the packet: it gets it again.
             Message::Busy { .. } => match self.transfer.take() {
-                Some(Transfer::Read { data, packet, at }) => self.send(data, packet, at, rooms),
+                Some(Transfer::Read { data, packet, at }) => self.send(data, packet, at, limits),
                 other => {
                     self.transfer = other;
                     Vec::new()
@@ -95,29 +95,29 @@ impl FoeServer {
     }
 
     /// Sends a packet of a file.
-    fn send(&mut self, data: Vec<u8>, packet: u32, at: usize, rooms: Rooms) -> Answers {
+    fn send(&mut self, data: Vec<u8>, packet: u32, at: usize, limits: MessageLimits) -> Answers {
         let rest = data.get(at..).unwrap_or_default();
-        let chunk = rest.get(..chunk_len(rooms.answers)).unwrap_or(rest);
-        let answer = write(&Message::Data { packet, data: chunk }, rooms);
+        let chunk = rest.get(..chunk_len(limits.answers)).unwrap_or(rest);
+        let answer = write(&Message::Data { packet, data: chunk }, limits);
         self.transfer = Some(Transfer::Read { data, packet, at });
         vec![answer]
     }
 
     /// A packet has been acknowledged: the next, if there is one.
-    fn go_on(&mut self, acknowledged: u32, rooms: Rooms) -> Answers {
+    fn go_on(&mut self, acknowledged: u32, limits: MessageLimits) -> Answers {
         let Some(Transfer::Read { data, packet, at }) = self.transfer.take() else {
             self.transfer = None;
-            return refuse(FoeErrorCode::ILLEGAL, "nothing is being read", rooms);
+            return refuse(FoeErrorCode::ILLEGAL, "nothing is being read", limits);
         };
         if acknowledged != packet {
-            return refuse(FoeErrorCode::WRONG_PACKET, "", rooms);
+            return refuse(FoeErrorCode::WRONG_PACKET, "", limits);
         }
-        let chunk = chunk_len(rooms.answers);
+        let chunk = chunk_len(limits.answers);
         let next = at + chunk;
         if chunk == 0 || next > data.len() {
             return Vec::new();
         }
-        self.send(data, packet.wrapping_add(1), next, rooms)
+        self.send(data, packet.wrapping_add(1), next, limits)
     }
 
     /// Takes a packet of a file.
@@ -127,45 +127,45 @@ impl FoeServer {
         new: &[u8],
         files: &mut Files,
         now: Instant,
-        rooms: Rooms,
+        limits: MessageLimits,
     ) -> Answers {
         let Some(Transfer::Write { target, mut data, next, began }) = self.transfer.take() else {
-            return refuse(FoeErrorCode::ILLEGAL, "nothing is being written", rooms);
+            return refuse(FoeErrorCode::ILLEGAL, "nothing is being written", limits);
         };
         if packet != next {
-            return refuse(FoeErrorCode::WRONG_PACKET, "", rooms);
+            return refuse(FoeErrorCode::WRONG_PACKET, "", limits);
         }
         let elapsed = now.since(began);
         if target.is_firmware() && elapsed < ERASE {
             let done = (elapsed.as_nanos() * 100 / ERASE.as_nanos()) as u16;
             self.transfer = Some(Transfer::Write { target, data, next, began });
-            return vec![write(&Message::Busy { done, total: 100, text: ERASING }, rooms)];
+            return vec![write(&Message::Busy { done, total: 100, text: ERASING }, limits)];
         }
         data.extend_from_slice(new);
         if data.len() > target.limit {
             let text = format!("no more than {} bytes", target.limit);
-            return refuse(FoeErrorCode::DISK_FULL, &text, rooms);
+            return refuse(FoeErrorCode::DISK_FULL, &text, limits);
         }
-        if new.len() < chunk_len(rooms.requests) {
+        if new.len() < chunk_len(limits.requests) {
             if let Err(code) = files.finish_write(target, data) {
-                return refuse(code, code.text(), rooms);
+                return refuse(code, code.text(), limits);
             }
         } else {
             let next = next.wrapping_add(1);
             self.transfer = Some(Transfer::Write { target, data, next, began });
         }
-        vec![write(&Message::Ack { packet }, rooms)]
+        vec![write(&Message::Ack { packet }, limits)]
     }
 }
 
 /// The end of a transfer.
-fn refuse(code: FoeErrorCode, text: &str, rooms: Rooms) -> Answers {
-    vec![write(&Message::Error { code, text: text.as_bytes() }, rooms)]
+fn refuse(code: FoeErrorCode, text: &str, limits: MessageLimits) -> Answers {
+    vec![write(&Message::Error { code, text: text.as_bytes() }, limits)]
 }
 
 /// A message as bytes; a text that is too long for the mailbox is cut.
-fn write(message: &Message<'_>, rooms: Rooms) -> Vec<u8> {
-    let room = chunk_len(rooms.answers);
+fn write(message: &Message<'_>, limits: MessageLimits) -> Vec<u8> {
+    let room = chunk_len(limits.answers);
     let cut = |text| <[u8]>::get(text, ..room).unwrap_or(text);
     let message = match *message {
         Message::Error { code, text } => Message::Error { code, text: cut(text) },
@@ -175,7 +175,7 @@ fn write(message: &Message<'_>, rooms: Rooms) -> Vec<u8> {
         | Message::Data { .. }
         | Message::Ack { .. }) => other,
     };
-    let mut bytes = vec![0; rooms.answers.saturating_sub(HEADER_LEN).max(FOE_HEADER_LEN)];
+    let mut bytes = vec![0; limits.answers.saturating_sub(HEADER_LEN).max(FOE_HEADER_LEN)];
     let len = message.write(&mut bytes).unwrap_or(0);
     bytes.truncate(len);
     bytes
@@ -187,7 +187,7 @@ mod tests {
     use crate::device::files::{File, FirmwareImage, FirmwareSlot};
 
     /// A mailbox of 20 bytes each way: 8 bytes of a file in a packet.
-    const ROOMS: Rooms = Rooms { requests: 20, answers: 20 };
+    const LIMITS: MessageLimits = MessageLimits { requests: 20, answers: 20 };
 
     struct Rig {
         server: FoeServer,
@@ -214,7 +214,7 @@ mod tests {
 
         fn ask(&mut self, request: &[u8]) -> Vec<u8> {
             let answers =
-                self.server.answer(request, &mut self.files, self.state, self.now, ROOMS).unwrap();
+                self.server.answer(request, &mut self.files, self.state, self.now, LIMITS).unwrap();
             assert!(answers.len() <= 1);
             answers.concat()
         }
@@ -288,7 +288,7 @@ mod tests {
             assert_eq!(rig.ask(b"\x04\0\x01\0\0\0")[2], 4, "nothing is under way");
         }
         let mut rig = Rig::new();
-        let short = rig.server.answer(&[1, 0, 0], &mut rig.files, rig.state, rig.now, ROOMS);
+        let short = rig.server.answer(&[1, 0, 0], &mut rig.files, rig.state, rig.now, LIMITS);
         assert_eq!(short, Err(ErrorReplyCode::SizeTooShort));
     }
 

@@ -27,7 +27,7 @@ use self::foe::FoeServer;
 use self::outbox::{Envelope, Outbox};
 use super::dictionary::Dictionary;
 use super::files::Files;
-use super::trouble::{Trouble, Troubles};
+use super::software_fault::{SoftwareFault, SoftwareFaults};
 use crate::controller::Pdi;
 
 /// The SyncManager that requests come by.
@@ -49,7 +49,7 @@ pub struct Served<'a> {
     /// The files that FoE is about; without any there is no FoE.
     pub files: &'a mut Files,
     /// What is wrong with the device.
-    pub troubles: &'a mut Troubles,
+    pub software_faults: &'a mut SoftwareFaults,
     /// The state the device is in.
     pub state: AlState,
 }
@@ -112,7 +112,7 @@ impl Mailbox {
         pdi: &mut Pdi<'_>,
         served: &mut Served<'_>,
     ) -> Option<Instant> {
-        let fills = !served.troubles.has(Trouble::MailboxNotFilled);
+        let fills = !served.software_faults.has(SoftwareFault::MailboxNotFilled);
         if fills && pdi.repeat_requested(ANSWERS) {
             self.outbox.repeat(pdi);
             pdi.acknowledge_repeat(ANSWERS);
@@ -140,14 +140,14 @@ impl Mailbox {
 
     /// Takes a request out of SyncManager 0.
     fn take(&mut self, now: Instant, pdi: &mut Pdi<'_>, served: &Served<'_>) {
-        let dead = served.troubles.has(Trouble::MailboxNotRead);
+        let dead = served.software_faults.has(SoftwareFault::MailboxNotRead);
         if dead || self.request.is_some() || self.outbox.len() >= WAITING {
             return;
         }
         let len = request_room(pdi);
         self.buffer.resize(len, 0);
         if pdi.read_sync_manager(REQUESTS, &mut self.buffer).is_some() {
-            let due = now + self.response_time + served.troubles.mailbox_delay();
+            let due = now + self.response_time + served.software_faults.mailbox_delay();
             self.request = Some((self.buffer.clone(), due));
         }
     }
@@ -187,8 +187,9 @@ impl Mailbox {
                 self.coe.answer(message.data, served, answer_room(pdi))
             }
             MailboxType::Foe if !served.files.is_empty() => {
-                let rooms = foe::Rooms { requests: request_room(pdi), answers: answer_room(pdi) };
-                self.foe.answer(message.data, served.files, served.state, now, rooms)
+                let limits =
+                    foe::MessageLimits { requests: request_room(pdi), answers: answer_room(pdi) };
+                self.foe.answer(message.data, served.files, served.state, now, limits)
             }
             MailboxType::Eoe if !boots && self.protocols.has(Protocols::EOE) => {
                 self.eoe.answer(message.data, now)

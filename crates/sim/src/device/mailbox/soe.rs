@@ -1,4 +1,4 @@
-//! What a drive of SoE answers that has no IDN to show: an error for each request.
+//! SoE server of a drive that has no IDN to show: it answers each request with an error.
 //!
 //! Reference: ETG.1000.6, SoE (header and error codes). Its process data need no IDN to be read: MDT
 //! and AT are what they are.

@@ -1,4 +1,4 @@
-//! What a device checks before it enters a state: SyncManagers and watchdog.
+//! Checks of a device before it enters a state: SyncManagers and watchdog.
 //!
 //! Read first: ETG.1000.6, state transitions; the codes are those that the public SubDevice stack
 //! code gives.

@@ -1,4 +1,4 @@
-//! What the controller asks of a device with a processor.
+//! Firmware interface of a device with a processor, as its controller calls it.
 
 use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::state::{AlState, AlStatusCode};
@@ -12,7 +12,7 @@ use crate::device::firmware::{Firmware, SampleAgain};
 use crate::device::history::History;
 use crate::device::mailbox::Served;
 use crate::device::signal::Signals;
-use crate::device::trouble::Trouble;
+use crate::device::software_fault::SoftwareFault;
 
 impl Firmware for Processor {
     fn start(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
@@ -46,7 +46,7 @@ impl Firmware for Processor {
             let mut served = Served {
                 dictionary: &mut self.dictionary,
                 files: &mut self.files,
-                troubles: &mut self.troubles,
+                software_faults: &mut self.software_faults,
                 state,
             };
             let again = self.mailbox.serve(now, pdi, &mut served);
@@ -78,14 +78,14 @@ impl Firmware for Processor {
         self.description.mailbox.is_present()
     }
 
-    fn trouble(&mut self, trouble: Trouble, begins: bool) {
-        if let Trouble::Mismatch(what) = trouble {
+    fn software_fault(&mut self, software_fault: SoftwareFault, begins: bool) {
+        if let SoftwareFault::Mismatch(what) = software_fault {
             self.mismatch(what, begins);
         }
         if begins {
-            self.troubles.begin(trouble);
+            self.software_faults.begin(software_fault);
         } else {
-            self.troubles.end(trouble);
+            self.software_faults.end(software_fault);
         }
     }
 

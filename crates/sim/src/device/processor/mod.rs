@@ -30,7 +30,7 @@ use super::files::Files;
 use super::history::History;
 use super::mailbox::Mailbox;
 use super::signal::Signals;
-use super::trouble::{Trouble, Troubles};
+use super::software_fault::{SoftwareFault, SoftwareFaults};
 use crate::controller::Pdi;
 
 /// Emergencies that wait for a mailbox; further ones are forgotten.
@@ -119,7 +119,7 @@ pub struct Processor {
     next_sample: Instant,
     files: Files,
     history: History,
-    troubles: Troubles,
+    software_faults: SoftwareFaults,
     /// Its application has run since it started: there are values.
     has_values: bool,
     /// It reads its SII itself on the way to PREOP.
@@ -164,7 +164,7 @@ impl Processor {
             next_sample: Instant::ZERO,
             files: Files::default(),
             history: History::default(),
-            troubles: Troubles::default(),
+            software_faults: SoftwareFaults::default(),
             has_values: false,
             reads_sii: false,
             has_locked: false,
@@ -201,7 +201,7 @@ impl Processor {
     // ---- states ----
 
     fn serve_requests(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        if self.troubles.has(Trouble::DeafToRequests) {
+        if self.software_faults.has(SoftwareFault::DeafToRequests) {
             return;
         }
         if let Some(step) = self.step.filter(|step| step.due <= now) {
@@ -329,7 +329,7 @@ impl Processor {
 
     /// Locks all buffers of its process data when that is wrong with it, and unlocks them when it is over.
     fn mind_locks(&mut self, pdi: &mut Pdi<'_>) {
-        let locks = self.troubles.has(Trouble::LockedBuffers);
+        let locks = self.software_faults.has(SoftwareFault::LockedBuffers);
         if std::mem::replace(&mut self.has_locked, locks) != locks {
             self.lock_all(pdi, locks);
         }
@@ -428,7 +428,7 @@ impl Processor {
     }
 
     fn drive_outputs(&mut self, now: Instant, signals: &mut Signals) {
-        if self.troubles.has(Trouble::FrozenApplication) {
+        if self.software_faults.has(SoftwareFault::FrozenApplication) {
             return;
         }
         for channel in &mut self.description.channels {
@@ -450,7 +450,7 @@ impl Processor {
     fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
         self.next_sample = now + self.description.times.sample;
         let time = pdi.system_time();
-        if !self.troubles.has(Trouble::FrozenApplication) {
+        if !self.software_faults.has(SoftwareFault::FrozenApplication) {
             self.has_values = true;
             for channel in &mut self.description.channels {
                 channel.tell_time(time);

@@ -1,4 +1,4 @@
-//! What a processor notes of itself in its diagnosis history, and tells the MainDevice unasked.
+//! Entries that a processor makes in its diagnosis history, and sends to the MainDevice unasked.
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::mailbox::coe::diagnosis::{DiagnosisMessage, Parameter, Severity};

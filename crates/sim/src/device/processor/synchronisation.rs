@@ -1,4 +1,4 @@
-//! How a device keeps step: by itself, with the frames, or with the SYNC signals of its clock.
+//! Synchronisation of a device: by itself, with the frames, or with the SYNC signals of its clock.
 //!
 //! Read first: ETG.1020, synchronisation; objects 0x1C32 (outputs) and 0x1C33 (inputs). Everything
 //! that a type can and wants stands in those two objects: modes (04), shortest cycle (05), time to

@@ -1,4 +1,4 @@
-//! What a device notes of itself and how a MainDevice reads it: 0x10F3, 0x10F8, emergencies.
+//! Diagnosis history of a device and how a MainDevice reads it: 0x10F3, 0x10F8, emergencies.
 
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::diagnosis::{DiagnosisMessage, Parameter, Severity};
@@ -9,8 +9,8 @@ use linesman_proto::mailbox::{ErrorReplyCode, Message};
 use linesman_proto::time::Span;
 
 use super::Device;
-use crate::device::Trouble;
-use crate::device::trouble::{RefusedWith, SdoRefusals};
+use crate::device::SoftwareFault;
+use crate::device::software_fault::{RefusedWith, SdoRefusals};
 use crate::seed::Seed;
 
 const HISTORY: u16 = 0x10F3;
@@ -131,7 +131,7 @@ fn refused_requests_are_refused_as_the_fault_says() {
     let mut device = Device::of("EL7041");
     device.enter_preop();
     let refusals = |answer| {
-        Trouble::RefusesSdo(SdoRefusals {
+        SoftwareFault::RefusesSdo(SdoRefusals {
             answer,
             first: ObjectIndex(0x8000),
             last: ObjectIndex(0x8FFF),
@@ -141,18 +141,18 @@ fn refused_requests_are_refused_as_the_fault_says() {
     };
     let aborts = refusals(RefusedWith::Abort(SdoAbortCode::HARDWARE_ERROR));
     let firmware = device.bench.controller.firmware_mut();
-    firmware.trouble(aborts, true);
+    firmware.software_fault(aborts, true);
     assert_eq!(device.upload(0x8010, 1), Err(0x0606_0000));
     assert_eq!(device.download(0x8010, 1, &[1, 0]), Err(0x0606_0000));
     assert!(device.upload(0x1018, 1).is_ok(), "only those objects");
     let replies = refusals(RefusedWith::ErrorReply(ErrorReplyCode::NoMemory));
     let firmware = device.bench.controller.firmware_mut();
-    firmware.trouble(aborts, false);
-    firmware.trouble(replies, true);
+    firmware.software_fault(aborts, false);
+    firmware.software_fault(replies, true);
     assert!(device.post(&[10, 0, 0, 0, 0, 0x03, 0, 0x20, 0x40, 0x10, 0x80, 1, 0, 0, 0, 0]));
     let answer = device.fetch_soon().unwrap();
     assert_eq!(answer[..10], [4, 0, 0, 0, 0, answer[5], 1, 0, 7, 0]);
-    device.bench.controller.firmware_mut().trouble(replies, false);
+    device.bench.controller.firmware_mut().software_fault(replies, false);
     assert!(device.upload(0x8010, 1).is_ok());
 }
 

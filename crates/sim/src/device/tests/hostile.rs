@@ -1,4 +1,4 @@
-//! Whatever is written to its registers, a device stays a device.
+//! Register writes of any kind: a device stays a device.
 
 use linesman_proto::time::Span;
 use proptest::prelude::*;

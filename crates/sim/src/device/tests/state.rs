@@ -6,7 +6,7 @@ use linesman_proto::time::Span;
 
 use super::Device;
 use crate::device::library::build;
-use crate::device::{Refusal, Signals, Trouble};
+use crate::device::{Refusal, Signals, SoftwareFault};
 
 #[test]
 fn it_takes_its_time() {
@@ -189,21 +189,21 @@ fn it_goes_down_step_by_step_or_at_once() {
 fn without_an_application_there_are_no_valid_values() {
     for (name, code) in [("EL3104", 0x0018), ("EL4102", 0x0019), ("EL7041", 0x002B)] {
         let mut device = Device::of(name);
-        let stands = Trouble::FrozenApplication;
+        let stands = SoftwareFault::FrozenApplication;
         let now = device.bench.now;
-        device.bench.controller.trouble(now, stands, true);
+        device.bench.controller.software_fault(now, stands, true);
         device.enter_preop();
         device.enter_safeop();
         device.exchange(&[]);
         assert_eq!(device.request(8), (0x14, code), "{name}");
         assert_eq!(device.request(0x14), (4, 0), "{name}");
         let now = device.bench.now;
-        device.bench.controller.trouble(now, stands, false);
+        device.bench.controller.software_fault(now, stands, false);
         device.exchange(&[]);
         assert_eq!(device.request(8), (8, 0), "{name}: it runs");
         // One that stops later has values: they stay as they are.
         let now = device.bench.now;
-        device.bench.controller.trouble(now, stands, true);
+        device.bench.controller.software_fault(now, stands, true);
         device.exchange(&[]);
         assert_eq!(device.status(), (8, 0), "{name}");
     }

@@ -1,4 +1,4 @@
-//! Where a kind of fault can be, and what has to be written for it.
+//! Places that a kind of fault allows, and what has to be written for each.
 
 /// Where a kind of fault can be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -6,11 +6,11 @@ pub enum PlaceRule {
     /// `at`: one link, both directions.
     Link,
     /// `at`: one link, one direction or both.
-    Lines,
+    Directions,
     /// `at`: one link or a list of links, one direction or both of each.
-    ManyLines,
+    ManyDirections,
     /// `at`: one direction of a link.
-    Line,
+    Direction,
     /// `device`: one device.
     Device,
     /// `device` or `devices`: what feeds one device or several, and with a coupler the terminals
@@ -40,9 +40,9 @@ impl PlaceRule {
     pub const fn keys(self) -> &'static [&'static str] {
         match self {
             Self::Link
-            | Self::Lines
-            | Self::ManyLines
-            | Self::Line
+            | Self::Directions
+            | Self::ManyDirections
+            | Self::Direction
             | Self::Card
             | Self::RingLink
             | Self::Entrance => &["at"],
@@ -64,11 +64,13 @@ impl PlaceRule {
     pub const fn allowed(self) -> &'static str {
         match self {
             Self::Link => "`at = \"K1.C-B3.A\"`, a link (or one end of it, `K1.C`)",
-            Self::Lines => "`at = \"K1.C>B3.A\"`, one direction of a link, or `K1.C-B3.A`, both",
-            Self::ManyLines => {
+            Self::Directions => {
+                "`at = \"K1.C>B3.A\"`, one direction of a link, or `K1.C-B3.A`, both"
+            }
+            Self::ManyDirections => {
                 "`at = \"K1.C-B3.A\"`, a link (`K1.C>B3.A` for one direction), or a list of them"
             }
-            Self::Line => "`at = \"K1.C>B3.A\"`, one direction of a link",
+            Self::Direction => "`at = \"K1.C>B3.A\"`, one direction of a link",
             Self::Device => "`device = \"B3\"`, a device",
             Self::Feed => "`device = \"K1\"`, a device that feeds the E-bus",
             Self::Pair => "`devices = [\"B3\", \"B4\"]`, two devices",

@@ -1,4 +1,4 @@
-//! What differs between types of controllers, and hits in particular places of a frame.
+//! Differences between types of controllers, and hits in particular places of a frame.
 
 use linesman_proto::address::Path;
 use linesman_proto::port::Port;
@@ -7,7 +7,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::rig::{Bench, Shape, tree, usual};
 use crate::hardware::Hardware;
-use crate::wire::{Change, Line};
+use crate::wire::{Change, DirectedLink};
 
 /// Four controllers in a row, A to B.
 fn row(of: impl Fn(usize) -> Hardware) -> Bench {
@@ -21,8 +21,8 @@ fn row(of: impl Fn(usize) -> Hardware) -> Bench {
 }
 
 /// The line towards a controller.
-fn to(node: usize) -> Line {
-    Line { link: node, downstream: true }
+fn to(node: usize) -> DirectedLink {
+    DirectedLink { link: node, downstream: true }
 }
 
 #[test]
@@ -32,7 +32,7 @@ fn a_controller_that_makes_symbol_errors_anew_hides_where_the_first_was() {
         hardware.counting.remakes_symbol_errors = node == 1;
         hardware
     });
-    bench.ambush(to(1));
+    bench.arm_frame_error(to(1));
     bench.broadcast(Path::A);
     let physical = |node| bench.counter(node, ErrorCounter::PhysicalLayer(Port::A));
     let invalid = |node| bench.counter(node, ErrorCounter::InvalidFrame(Port::A));
@@ -52,7 +52,7 @@ fn arrives_at_1(bench: &Bench) -> Instant {
 fn hit_at(offset: Span) -> (Bench, Option<(Path, bool, u16)>) {
     let mut bench = row(|_| usual());
     let at = arrives_at_1(&bench) + offset;
-    bench.script(vec![(at, Change::Hit { line: to(1), flip: 1 })]);
+    bench.script(vec![(at, Change::Hit { direction: to(1), flip: 1 })]);
     bench.now = Instant::from_nanos(2_000_000);
     let arrived = bench.broadcast(Path::A);
     (bench, arrived)
@@ -79,7 +79,7 @@ fn a_hit_is_in_the_frame_or_beside_it_to_the_nanosecond() {
     }
     let mut bench = row(|_| usual());
     let before = arrives_at_1(&bench) - Span::ns(1);
-    bench.script(vec![(before, Change::Hit { line: to(1), flip: 1 })]);
+    bench.script(vec![(before, Change::Hit { direction: to(1), flip: 1 })]);
     bench.now = Instant::from_nanos(2_000_000);
     assert_eq!(bench.broadcast(Path::A), Some((Path::A, true, 4)));
     assert_eq!(bench.counter(1, physical), 1);
@@ -95,7 +95,7 @@ fn without_its_start_delimiter_a_frame_ends() {
     profile.counting.counts_missing_start = false;
     let mut bench = row(|_| profile.clone());
     let at = arrives_at_1(&bench) + Span::ns(7 * 80 + 40);
-    bench.script(vec![(at, Change::Hit { line: to(1), flip: 1 })]);
+    bench.script(vec![(at, Change::Hit { direction: to(1), flip: 1 })]);
     bench.now = Instant::from_nanos(2_000_000);
     assert_eq!(bench.broadcast(Path::A), None);
     assert_eq!(bench.counter(1, ErrorCounter::InvalidFrame(Port::A)), 0);
@@ -105,8 +105,8 @@ fn without_its_start_delimiter_a_frame_ends() {
 #[test]
 fn a_frame_that_was_hit_twice_is_invalid_twice() {
     let mut bench = row(|_| usual());
-    bench.ambush(to(1));
-    bench.ambush(to(3));
+    bench.arm_frame_error(to(1));
+    bench.arm_frame_error(to(3));
     bench.broadcast(Path::A);
     let invalid = |node| bench.counter(node, ErrorCounter::InvalidFrame(Port::A));
     let forwarded = |node| bench.counter(node, ErrorCounter::Forwarded(Port::A));

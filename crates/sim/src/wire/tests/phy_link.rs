@@ -11,7 +11,7 @@ use crate::controller::{Controller, LocalClock};
 use crate::device::{NoFirmware, Signals};
 use crate::hardware::{Hardware, PortKind};
 use crate::wire::world::World;
-use crate::wire::{Change, Line};
+use crate::wire::{Change, DirectedLink};
 
 /// Two controllers over a cable; the SII of the second wants enhanced link detection, or not.
 fn bench(wants: bool) -> Bench {
@@ -30,10 +30,10 @@ fn bench(wants: bool) -> Bench {
 }
 
 fn burst(bench: &mut Bench, symbols: u64, apart: Span) {
-    let line = Line { link: 1, downstream: true };
+    let direction = DirectedLink { link: 1, downstream: true };
     let hits = (0..symbols).map(|n| {
         let at = bench.now + Span::us(10) + Span::ns(n * apart.as_nanos());
-        (at, Change::Hit { line, flip: 1 })
+        (at, Change::Hit { direction, flip: 1 })
     });
     let hits = hits.collect();
     bench.script(hits);

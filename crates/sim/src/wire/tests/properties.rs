@@ -1,4 +1,4 @@
-//! Whatever the line.
+//! Properties of any line.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use super::rig::{Bench, any_shape, tree, usual};
 use crate::controller::tests::rig::{answers, at, frame};
-use crate::wire::Line;
+use crate::wire::DirectedLink;
 use crate::wire::walk::Outcome;
 use linesman_proto::command::Command;
 use linesman_proto::topology::route::Direction;
@@ -94,7 +94,7 @@ proptest! {
         });
         let hop = hop % route.hops().len();
         let hit = route.hops()[hop];
-        bench.ambush(Line { link: hit.link, downstream: hit.direction == Direction::Downstream });
+        bench.arm_frame_error(DirectedLink { link: hit.link, downstream: hit.direction == Direction::Downstream });
         let arrived = bench.broadcast(Path::A);
         prop_assert_eq!(arrived.map(|(path, whole, _)| (path, whole)), route.arrives_at().map(|path| (path, false)));
 
@@ -129,7 +129,7 @@ proptest! {
         let mut bench = Bench::new(&tree, |_| usual());
         let hop = hop % route.hops().len();
         let hit = route.hops()[hop];
-        bench.ambush(Line { link: hit.link, downstream: hit.direction == Direction::Downstream });
+        bench.arm_frame_error(DirectedLink { link: hit.link, downstream: hit.direction == Direction::Downstream });
         // The hit is in the padding: what is written is what was sent.
         let write = frame(&[(Command::Bwr, at(0, 0x0010), &[0x34, 0x12])]);
         let (outcome, _) = bench.send_by(Path::A, write);

@@ -16,9 +16,9 @@ use crate::fault::{Running, Windows};
 use crate::frame::WireFrame;
 use crate::hardware::{Hardware, PortKind};
 use crate::truth::FaultId;
-use crate::wire::walk::{Outcome, Traveller};
+use crate::wire::walk::{FrameInTransit, Outcome};
 use crate::wire::world::World;
-use crate::wire::{Change, Line, Source};
+use crate::wire::{Change, DirectedLink, Source};
 
 /// How a line is put together: for each controller but the first whose free port it hangs on (of
 /// those there are), and the port by which it is entered.
@@ -104,8 +104,8 @@ impl Bench {
     }
 
     /// The next frame on a line is hit in the middle.
-    pub(super) fn ambush(&mut self, line: Line) {
-        self.script(vec![(self.now, Change::FrameHit { line, part: 1 << 15, flip: 0x10 })]);
+    pub(super) fn arm_frame_error(&mut self, direction: DirectedLink) {
+        self.script(vec![(self.now, Change::FrameHit { direction, part: 1 << 15, flip: 0x10 })]);
     }
 
     /// Sends a frame; gives where it arrived, what it was, and takes a millisecond.
@@ -114,11 +114,11 @@ impl Bench {
         let frame = WireFrame { number: self.world.frames, ..frame };
         self.world.look_ahead(self.now, frame.duration());
         self.world.advance(self.now);
-        let mut traveller = Traveller::new(frame);
-        let outcome = self.world.walk(card, self.now, &mut traveller);
+        let mut in_transit = FrameInTransit::new(frame);
+        let outcome = self.world.walk(card, self.now, &mut in_transit);
         self.now += Span::ms(1);
         self.world.advance(self.now);
-        (outcome, traveller.frame)
+        (outcome, in_transit.frame)
     }
 
     /// A broadcast read by a card: where it arrived, whether whole, and its working counter.

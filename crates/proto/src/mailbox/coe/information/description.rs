@@ -1,4 +1,4 @@
-//! What an object and its entries are.
+//! Descriptions of an object and its entries.
 //!
 //! Reference: ETG.1000.6, SDO information: object description, entry description. Names run to the
 //! end of the answer, without a terminating zero.

@@ -1,4 +1,4 @@
-//! What SDO messages carry: the first message of a transfer, and the segments that follow.
+//! Payload of SDO messages: the first message of a transfer, and the segments that follow.
 //!
 //! Reference: ETG.1000.6, SDO. The layouts are the same in both directions; only the specifiers in
 //! the upper three bits of the command differ.

@@ -1,4 +1,4 @@
-//! What the MainDevice asks.
+//! SDO requests of the MainDevice.
 //!
 //! Reference: ETG.1000.6, SDO. Client command specifiers: 0 download segment, 1 download, 2
 //! upload, 3 upload segment; 4 is an [`Abort`](super::Abort), 5 and 6 (block transfer) EtherCAT

@@ -1,4 +1,4 @@
-//! What a SubDevice answers.
+//! SDO responses of a SubDevice.
 //!
 //! Reference: ETG.1000.6, SDO. Server command specifiers: 0 upload segment, 1 download segment, 2
 //! upload, 3 download; 4 is an [`Abort`](super::Abort).

@@ -1,0 +1,205 @@
+//! Requests to a SubDevice through its mailbox, and the names that messages give them.
+
+use std::fmt;
+
+use linesman_proto::mailbox::MailboxType;
+use linesman_proto::mailbox::coe::information::{ListKind, ValueInfo};
+use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
+use linesman_proto::mailbox::soe::Idn;
+
+/// Something to be asked. What each of them gives is said there, as bytes.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum MailboxRequest {
+    /// Fetch an object: its data.
+    Upload {
+        /// Which entry; with complete access the one to begin with, 0 or 1.
+        object: ObjectAddress,
+        /// All entries in one transfer.
+        complete: bool,
+    },
+    /// Bring an object: nothing comes back.
+    Download {
+        /// Which entry; with complete access the one to begin with, 0 or 1.
+        object: ObjectAddress,
+        /// All entries in one transfer.
+        complete: bool,
+        /// The value, lowest byte first.
+        data: Vec<u8>,
+    },
+    /// Ask which objects there are: an
+    /// [`ObjectList`](linesman_proto::mailbox::coe::information::ObjectList).
+    ObjectList {
+        /// Which of the lists.
+        list: ListKind,
+    },
+    /// Ask what an object is: an
+    /// [`ObjectDescription`](linesman_proto::mailbox::coe::information::ObjectDescription).
+    DescribeObject {
+        /// Which.
+        index: ObjectIndex,
+    },
+    /// Ask what an entry is: an
+    /// [`EntryDescription`](linesman_proto::mailbox::coe::information::EntryDescription).
+    DescribeEntry {
+        /// Which.
+        object: ObjectAddress,
+        /// What the answer is to tell beyond the rest.
+        values: ValueInfo,
+    },
+    /// Set the addresses of an Ethernet port by EoE: nothing comes back.
+    SetAddresses {
+        /// Which port of the SubDevice.
+        port: u8,
+        /// The addresses as the message carries them.
+        parameters: Vec<u8>,
+    },
+    /// Write an identification number by SoE: nothing comes back.
+    WriteIdn {
+        /// Which drive of the SubDevice.
+        drive: u8,
+        /// Which number.
+        idn: Idn,
+        /// Which of its elements.
+        elements: u8,
+        /// What is written.
+        data: Vec<u8>,
+    },
+    /// Fetch a file: its bytes.
+    ReadFile {
+        /// As the SubDevice knows it.
+        name: String,
+        /// 0 for none.
+        password: u32,
+    },
+    /// Bring a file: nothing comes back.
+    WriteFile {
+        /// As the SubDevice is to know it.
+        name: String,
+        /// 0 for none.
+        password: u32,
+        /// The bytes.
+        data: Vec<u8>,
+    },
+}
+
+impl MailboxRequest {
+    /// What is to be done, without data and password.
+    #[must_use]
+    pub fn operation(&self) -> MailboxOperation {
+        match self {
+            Self::Upload { object, complete } => {
+                MailboxOperation::Read { object: *object, complete: *complete }
+            }
+            Self::Download { object, complete, .. } => {
+                MailboxOperation::Write { object: *object, complete: *complete }
+            }
+            Self::ObjectList { list } => MailboxOperation::List { list: *list },
+            Self::DescribeObject { index } => MailboxOperation::DescribeObject { index: *index },
+            Self::DescribeEntry { object, .. } => {
+                MailboxOperation::DescribeEntry { object: *object }
+            }
+            Self::SetAddresses { port, .. } => MailboxOperation::SetAddresses { port: *port },
+            Self::WriteIdn { drive, idn, .. } => {
+                MailboxOperation::WriteIdn { drive: *drive, idn: *idn }
+            }
+            Self::ReadFile { name, .. } => MailboxOperation::ReadFile { name: name.clone() },
+            Self::WriteFile { name, .. } => MailboxOperation::WriteFile { name: name.clone() },
+        }
+    }
+}
+
+/// What is to be done, as messages name it: "reading object 0x1018:01".
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum MailboxOperation {
+    /// Fetching an object.
+    Read {
+        /// Which.
+        object: ObjectAddress,
+        /// With all entries.
+        complete: bool,
+    },
+    /// Bringing an object.
+    Write {
+        /// Which.
+        object: ObjectAddress,
+        /// With all entries.
+        complete: bool,
+    },
+    /// Asking for a list of objects.
+    List {
+        /// Which list.
+        list: ListKind,
+    },
+    /// Asking what an object is.
+    DescribeObject {
+        /// Which.
+        index: ObjectIndex,
+    },
+    /// Asking what an entry is.
+    DescribeEntry {
+        /// Which.
+        object: ObjectAddress,
+    },
+    /// Setting the addresses of an Ethernet port.
+    SetAddresses {
+        /// Which port.
+        port: u8,
+    },
+    /// Writing an identification number of a drive.
+    WriteIdn {
+        /// Which drive.
+        drive: u8,
+        /// Which number.
+        idn: Idn,
+    },
+    /// Fetching a file.
+    ReadFile {
+        /// Which.
+        name: String,
+    },
+    /// Bringing a file.
+    WriteFile {
+        /// Which.
+        name: String,
+    },
+}
+
+impl MailboxOperation {
+    /// The protocol it takes.
+    #[must_use]
+    pub const fn protocol(&self) -> MailboxType {
+        match self {
+            Self::Read { .. }
+            | Self::Write { .. }
+            | Self::List { .. }
+            | Self::DescribeObject { .. }
+            | Self::DescribeEntry { .. } => MailboxType::Coe,
+            Self::SetAddresses { .. } => MailboxType::Eoe,
+            Self::WriteIdn { .. } => MailboxType::Soe,
+            Self::ReadFile { .. } | Self::WriteFile { .. } => MailboxType::Foe,
+        }
+    }
+}
+
+impl fmt::Display for MailboxOperation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let whole = |complete: &bool| if *complete { " with complete access" } else { "" };
+        match self {
+            Self::Read { object, complete } => {
+                write!(f, "reading object {object}{}", whole(complete))
+            }
+            Self::Write { object, complete } => {
+                write!(f, "writing object {object}{}", whole(complete))
+            }
+            Self::List { list } => write!(f, "asking for object list {}", list.code()),
+            Self::DescribeObject { index } => write!(f, "asking what object {index} is"),
+            Self::DescribeEntry { object } => write!(f, "asking what entry {object} is"),
+            Self::SetAddresses { port } => {
+                write!(f, "setting the addresses of Ethernet port {port}")
+            }
+            Self::WriteIdn { drive, idn } => write!(f, "writing {idn} of drive {drive}"),
+            Self::ReadFile { name } => write!(f, "reading file `{name}`"),
+            Self::WriteFile { name } => write!(f, "writing file `{name}`"),
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Status of a network: each SubDevice, and the network's state word.
+//!
+//! [`NetworkStatus`] is fed with the [`Event`]s of a MainDevice and words nothing. A MainDevice that runs a
+//! plan keeps one, so that an application sees the state words in its cycle
+//! ([`MainDevice::network_status`](crate::MainDevice::network_status)); [`Watch`](super::Watch) keeps one for people.
+
+use linesman_config::plan::Plan;
+use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::state::{AlState, NetworkState, StateValue};
+use linesman_proto::time::Instant;
+
+use super::device::concerned;
+use super::{CounterTotals, WatchedDevice};
+use crate::event::Event;
+
+/// How the network of a plan stands.
+#[derive(Clone, Debug)]
+pub struct NetworkStatus {
+    devices: Vec<WatchedDevice>,
+    /// Bits that do not follow from the SubDevices.
+    own: NetworkState,
+    responding: Option<WorkingCounter>,
+    /// Whose clock is the reference, and how far it is ahead of the host's, in ns.
+    network_time: Option<(DeviceId, i64)>,
+}
+
+impl NetworkStatus {
+    /// The SubDevices of a plan, of which nothing is known yet.
+    #[must_use]
+    pub fn new(plan: &Plan) -> Self {
+        let devices = plan.devices.iter().map(|device| WatchedDevice::new(plan, device)).collect();
+        Self { devices, own: NetworkState::default(), responding: None, network_time: None }
+    }
+
+    /// What is known of each SubDevice, by [`DeviceId`].
+    #[must_use]
+    pub fn devices(&self) -> &[WatchedDevice] {
+        &self.devices
+    }
+
+    /// What is known of one SubDevice.
+    #[must_use]
+    pub fn device(&self, id: DeviceId) -> Option<&WatchedDevice> {
+        self.devices.get(id.index())
+    }
+
+    /// The network's state word (PLC-07).
+    #[must_use]
+    pub fn network_state(&self) -> NetworkState {
+        let mut word = self.own;
+        for device in &self.devices {
+            let state = device.state();
+            let bit = match state.state() {
+                StateValue::Known(AlState::PreOp) => NetworkState::SOME_PREOP,
+                StateValue::Known(AlState::SafeOp) => NetworkState::SOME_SAFEOP,
+                StateValue::Known(AlState::Op) => 0,
+                StateValue::Known(AlState::Init | AlState::Boot) | StateValue::Unknown(_) => {
+                    NetworkState::SOME_INIT
+                }
+            };
+            word = word.with(bit, true);
+            if device.is_clock_apart() {
+                word = word.with(NetworkState::CLOCKS_APART, true);
+            }
+            if device.has_error() {
+                word = word.with(NetworkState::SOME_ERROR, true);
+            }
+        }
+        word
+    }
+
+    /// How many SubDevices answered the last broadcast read.
+    #[must_use]
+    pub fn responding(&self) -> Option<WorkingCounter> {
+        self.responding
+    }
+
+    /// Whose clock is the reference clock, and how far the network's time is ahead of the host's, in ns
+    /// (DC-09), as it was told last; negative: it is behind. `None`: no clock is in use.
+    #[must_use]
+    pub fn network_time(&self) -> Option<(DeviceId, i64)> {
+        self.network_time
+    }
+
+    /// How many SubDevices are there, of those that are planned (PLC-08).
+    #[must_use]
+    pub fn present(&self) -> usize {
+        self.devices.iter().filter(|device| device.is_present() == Some(true)).count()
+    }
+
+    /// For each SubDevice the sum of its frame and symbol errors at all ports, to be looked at often; then
+    /// at the ports of those whose sum has risen (PLC-14).
+    pub fn error_sums(&self) -> impl Iterator<Item = u64> {
+        self.devices.iter().map(|device| device.counters().sum())
+    }
+
+    /// Sets or clears bits of the network that do not follow from the SubDevices. Says whether that
+    /// changed them.
+    pub fn set(&mut self, bits: u16, set: bool) -> bool {
+        let before = self.own;
+        self.own = before.with(bits, set);
+        self.own != before
+    }
+
+    /// Something happened.
+    #[allow(clippy::wildcard_enum_match_arm, reason = "the others are of one SubDevice")]
+    pub fn handle_event(&mut self, now: Instant, event: &Event) {
+        match event {
+            Event::Responding { now: count, .. } => self.responding = Some(*count),
+            Event::Ring { intact } => {
+                self.set(NetworkState::REDUNDANCY_FRAME_MISSING, !intact);
+            }
+            Event::NetworkTime { id, ahead_ns } => self.network_time = Some((*id, *ahead_ns)),
+            Event::OutputsWithheld { .. } => {
+                self.set(NetworkState::WATCHDOG, true);
+            }
+            Event::OutputsResumed { .. } => {
+                self.set(NetworkState::WATCHDOG, false);
+            }
+            _ => {}
+        }
+        if let Some(id) = concerned(event)
+            && let Some(device) = self.devices.get_mut(id.index())
+        {
+            device.handle_event(now, event);
+        }
+    }
+
+    /// All error counters and change counters begin at 0 again. Nothing is written to the SubDevices:
+    /// other tools go on as they were, and no count is lost.
+    pub fn clear(&mut self) {
+        self.devices.iter_mut().for_each(WatchedDevice::clear);
+    }
+
+    /// The counters of a SubDevice.
+    #[must_use]
+    pub fn counters(&self, id: DeviceId) -> Option<&CounterTotals> {
+        self.device(id).map(WatchedDevice::counters)
+    }
+}

@@ -1,0 +1,340 @@
+//! Control socket of a running program in the file system: a line of JSON each way.
+//!
+//! A connection may carry one request after another. Threads of their own talk to those who ask; what
+//! is asked is done by the one thread that runs the line, between two frames. What may be asked, and
+//! what is answered, is the business of a [`Protocol`].
+
+use std::fs;
+use std::io::{self, BufRead as _, BufReader, Lines, Read as _, Write as _};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use linesman_link::socket::WakeHandle;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::part::guard;
+use crate::watched_file::WatchedFile;
+
+/// Longest request in bytes.
+const MOST: u64 = 64 * 1024;
+/// Bytes that are read and thrown away behind a request that is too long.
+const DISCARD_MAX: u64 = 16 * 1024 * 1024;
+/// How long the other side may take to read an answer.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Requests that may wait for the thread that does them.
+const WAITING: usize = 16;
+/// How long no connection is taken after one could not be: there may be too many open files.
+const REST: Duration = Duration::from_millis(100);
+/// Connections at a time.
+const CLIENTS: usize = 32;
+
+/// What is asked and answered.
+pub(crate) trait Protocol: Send + Sync + 'static {
+    /// What can be asked.
+    type Request: DeserializeOwned + Clone + Send;
+    /// What the thread that runs the line gives.
+    type Reply: Send;
+    /// What is answered.
+    type Answer: Serialize;
+    /// Who is asked, for messages: `segment`.
+    const WHO: &'static str;
+    /// A request, for messages.
+    const EXAMPLE: &'static str;
+    /// How long an answer may take.
+    const PATIENCE: Duration;
+
+    /// What is answered when this was given. Threads that talk to those who ask do that, so that the
+    /// one that runs the line need not put anything into words.
+    fn answer(&self, reply: Self::Reply) -> Self::Answer;
+
+    /// Why a request was not done.
+    fn refusal(&self, why: String) -> Self::Answer;
+
+    /// Keeps a connection to itself from here on, instead of answering. Says whether it has.
+    fn keep(
+        &self,
+        request: &Self::Request,
+        answer: &Self::Answer,
+        stream: &UnixStream,
+    ) -> io::Result<bool>;
+}
+
+/// The socket. It is removed at the end.
+pub(crate) struct ControlSocket<P: Protocol> {
+    path: PathBuf,
+    requests: Receiver<Asked<P>>,
+    watch: ControlSocketWatch,
+}
+
+/// Whether a socket can still be asked.
+#[derive(Clone, Debug)]
+pub struct ControlSocketWatch {
+    socket: WatchedFile,
+    /// Why nobody listens any more.
+    failed: Arc<Mutex<Option<String>>>,
+    /// Closed in order: nothing is wrong with that.
+    closed: Arc<AtomicBool>,
+}
+
+impl ControlSocketWatch {
+    /// Why nobody can ask any more, with the next step; `None` while all is well.
+    #[must_use]
+    pub fn trouble(&self) -> Option<String> {
+        if self.closed.load(Ordering::Acquire) {
+            return None;
+        }
+        let failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let path = self.socket.path().display();
+        failed.map(|why| format!("{path}: {why}")).or_else(|| {
+            let error = self.socket.check().err()?;
+            // It may have been closed between the two.
+            if self.closed.load(Ordering::Acquire) {
+                return None;
+            }
+            Some(format!(
+                "{path}: the control socket: {error}, so nobody can ask any more. Do: start the command anew, and \
+                 leave the socket where it is"
+            ))
+        })
+    }
+}
+
+/// A request, and who waits for its answer.
+pub(crate) struct Asked<P: Protocol> {
+    pub(crate) request: P::Request,
+    reply: Sender<P::Reply>,
+}
+
+impl<P: Protocol> Asked<P> {
+    pub(crate) fn give(self, reply: P::Reply) {
+        // Whoever asked may have lost patience.
+        let _ = self.reply.send(reply);
+    }
+}
+
+/// What a connection's thread needs.
+struct Connection<P: Protocol> {
+    requests: SyncSender<Asked<P>>,
+    wake_handle: WakeHandle,
+    protocol: P,
+    clients: AtomicUsize,
+}
+
+impl<P: Protocol> ControlSocket<P> {
+    /// Begins to listen at `path`. What an earlier run left there is replaced. `wake_handle` wakes the
+    /// thread that calls [`ControlSocket::poll`].
+    ///
+    /// # Errors
+    /// When somebody listens there already, something else is there, or the system refuses.
+    pub(crate) fn open(path: &Path, wake_handle: WakeHandle, protocol: P) -> io::Result<Self> {
+        if fs::symlink_metadata(path).is_ok() {
+            make_room(path, P::WHO)?;
+        }
+        let listener = UnixListener::bind(path)?;
+        hand_over(path);
+        let (requests, receiver) = mpsc::sync_channel(WAITING);
+        let connection =
+            Connection { requests, wake_handle, protocol, clients: AtomicUsize::default() };
+        let connection = Arc::new(connection);
+        let failed = Arc::default();
+        let (socket, closed) = (WatchedFile::at(path), Arc::default());
+        let watch = ControlSocketWatch { socket, failed: Arc::clone(&failed), closed };
+        // It ends with the process: nothing hangs on it.
+        thread::Builder::new().name("control".to_owned()).spawn(move || {
+            let listened = guard("the control socket", "nobody can ask any more", || {
+                listen(&listener, &connection);
+            });
+            if let Err(failure) = listened {
+                *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure.to_string());
+            }
+        })?;
+        Ok(Self { path: path.to_owned(), requests: receiver, watch })
+    }
+
+    /// For whoever tells that nobody can ask any more.
+    pub(crate) fn watch(&self) -> ControlSocketWatch {
+        self.watch.clone()
+    }
+
+    /// The next request.
+    pub(crate) fn poll(&self) -> Option<Asked<P>> {
+        self.requests.try_recv().ok()
+    }
+}
+
+impl<P: Protocol> Drop for ControlSocket<P> {
+    fn drop(&mut self) {
+        self.watch.closed.store(true, Ordering::Release);
+        // It may be gone already, and what is there now is somebody else's.
+        if self.watch.socket.check().is_ok() {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Takes one connection after another.
+fn listen<P: Protocol>(listener: &UnixListener, connection: &Arc<Connection<P>>) {
+    for stream in listener.incoming() {
+        let Ok(stream) = stream else {
+            thread::sleep(REST);
+            continue;
+        };
+        let connection = Arc::clone(connection);
+        // Whoever asked and went away needs no answer; a thread that cannot be had is as good as a full house.
+        let _ = thread::Builder::new().spawn(move || connection.welcome(&stream));
+    }
+}
+
+/// Started with sudo, the socket belongs to whoever called it: asking needs no privilege.
+fn hand_over(path: &Path) {
+    let number = |name| std::env::var(name).ok().and_then(|text| text.parse().ok());
+    if let (Some(user), Some(group)) = (number("SUDO_UID"), number("SUDO_GID")) {
+        // Where that is refused it stays root's, and asking needs sudo as well.
+        let _ = std::os::unix::fs::chown(path, Some(user), Some(group));
+    }
+}
+
+/// Removes the socket of a run that ended without doing so.
+fn make_room(path: &Path, who: &str) -> io::Result<()> {
+    use std::os::unix::fs::FileTypeExt as _;
+    if UnixStream::connect(path).is_ok() {
+        let what = format!("another {who} listens there");
+        return Err(io::Error::new(io::ErrorKind::AddrInUse, what));
+    }
+    if !fs::symlink_metadata(path)?.file_type().is_socket() {
+        let what = "there is a file that is no socket";
+        return Err(io::Error::new(io::ErrorKind::AlreadyExists, what));
+    }
+    fs::remove_file(path)
+}
+
+impl<P: Protocol> Connection<P> {
+    /// Serves one connection, if there are not too many.
+    fn welcome(&self, stream: &UnixStream) -> io::Result<()> {
+        let others = self.clients.fetch_add(1, Ordering::Relaxed);
+        let served = if others < CLIENTS {
+            // Whoever asked sees that the connection ends; the next one is served.
+            guard("a connection to the control socket", "it is closed", || self.serve(stream))
+                .unwrap_or(Ok(()))
+        } else {
+            self.refuse(stream, format!("{CLIENTS} connections are open: close one"))
+        };
+        self.clients.fetch_sub(1, Ordering::Relaxed);
+        served
+    }
+
+    fn refuse(&self, stream: &UnixStream, why: String) -> io::Result<()> {
+        reply(stream, &self.protocol.refusal(why))
+    }
+
+    /// One request after another, until there is no more.
+    fn serve(&self, stream: &UnixStream) -> io::Result<()> {
+        stream.set_write_timeout(Some(PATIENCE))?;
+        let mut lines = BufReader::new(stream);
+        loop {
+            let mut line = Vec::new();
+            let len = lines.by_ref().take(MOST + 1).read_until(b'\n', &mut line)?;
+            if len == 0 {
+                return Ok(());
+            }
+            if len as u64 > MOST {
+                self.refuse(stream, format!("the request is longer than {MOST} bytes"))?;
+                // Whoever still writes would be cut off, and not read why.
+                stream.set_read_timeout(Some(PATIENCE))?;
+                return io::copy(&mut lines.take(DISCARD_MAX), &mut io::sink()).map(drop);
+            }
+            if line.iter().all(u8::is_ascii_whitespace) {
+                continue;
+            }
+            match serde_json::from_slice::<P::Request>(&line) {
+                Ok(request) => {
+                    let answer = self.relay(request.clone());
+                    if self.protocol.keep(&request, &answer, stream)? {
+                        return Ok(());
+                    }
+                    reply(stream, &answer)?;
+                }
+                Err(error) => {
+                    let example = P::EXAMPLE;
+                    self.refuse(
+                        stream,
+                        format!(
+                            "the request cannot be read: {error}; expected one line of JSON such \
+                             as {example}"
+                        ),
+                    )?;
+                }
+            }
+        }
+    }
+
+    /// Asks the thread that runs the line.
+    fn relay(&self, request: P::Request) -> P::Answer {
+        let (reply, answer) = mpsc::channel();
+        let asked = self.requests.try_send(Asked { request, reply });
+        self.wake_handle.wake();
+        let (who, seconds) = (P::WHO, P::PATIENCE.as_secs());
+        match asked {
+            Ok(()) => match answer.recv_timeout(P::PATIENCE) {
+                Ok(reply) => self.protocol.answer(reply),
+                Err(_) => self
+                    .protocol
+                    .refusal(format!("the {who} gave no answer within {seconds} s: ask again")),
+            },
+            Err(_) => self
+                .protocol
+                .refusal(format!("too many requests at once, or the {who} has ended: ask again")),
+        }
+    }
+}
+
+fn reply<T: Serialize>(mut stream: &UnixStream, answer: &T) -> io::Result<()> {
+    let mut text = serde_json::to_string(answer)?;
+    text.push('\n');
+    stream.write_all(text.as_bytes())
+}
+
+/// Asks whoever listens at `path`; gives the line that is answered.
+///
+/// # Errors
+/// When nobody listens there, or nothing is answered in time.
+pub(crate) fn ask_line<Q: Serialize>(
+    path: &Path,
+    request: &Q,
+    patience: Duration,
+) -> io::Result<String> {
+    let mut lines = send(path, request, Some(patience + PATIENCE))?;
+    let mut line = String::new();
+    lines.read_line(&mut line)?;
+    Ok(line)
+}
+
+/// Asks, and gives line after line until the other side ends.
+///
+/// # Errors
+/// When nobody listens there.
+pub(crate) fn ask_lines<Q: Serialize>(
+    path: &Path,
+    request: &Q,
+) -> io::Result<Lines<BufReader<UnixStream>>> {
+    Ok(send(path, request, None)?.lines())
+}
+
+fn send<Q: Serialize>(
+    path: &Path,
+    request: &Q,
+    patience: Option<Duration>,
+) -> io::Result<BufReader<UnixStream>> {
+    let mut stream = UnixStream::connect(path)?;
+    stream.set_read_timeout(patience)?;
+    let mut text = serde_json::to_string(request)?;
+    text.push('\n');
+    stream.write_all(text.as_bytes())?;
+    Ok(BufReader::new(stream))
+}

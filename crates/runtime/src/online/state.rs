@@ -1,0 +1,144 @@
+//! State of a line so far, shared by the threads that report to it and those that ask.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use linesman_config::plan::Plan;
+use linesman_diagnosis::HostObservation;
+use linesman_diagnosis::observe::HostEvent;
+use linesman_maindevice::watch::LogEntry;
+use linesman_maindevice::{Event, Statistics, Watch};
+use linesman_proto::time::{Instant, Span};
+
+use super::build;
+use super::report::{Card, OnlineReport};
+use super::snapshot::Snapshot;
+
+/// So long after the last frame that a card did not take it counts as taking them again.
+const FORGIVEN_AFTER: Span = Span::s(1);
+
+/// What has happened on a line. Clones mean the same one.
+#[derive(Clone, Debug, Default)]
+pub struct OnlineState {
+    inner: Arc<Mutex<Inner>>,
+}
+
+#[derive(Debug, Default)]
+struct Inner {
+    on: String,
+    watch: Option<Watch>,
+    cards: Vec<Card>,
+    /// When a card took no frame the last time.
+    failed_at: Option<Instant>,
+    /// Where the counts of frames began when they were cleared last.
+    base: Statistics,
+}
+
+impl OnlineState {
+    /// Of the line that is called so.
+    #[must_use]
+    pub fn new(on: &str) -> Self {
+        let inner = Inner { on: on.to_owned(), ..Inner::default() };
+        Self { inner: Arc::new(Mutex::new(inner)) }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        // Whoever panicked with it was counting: the counts are whole.
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// This plan is run from now on.
+    pub fn begin(&self, plan: Arc<Plan>) {
+        self.lock().watch = Some(Watch::new(plan));
+    }
+
+    /// Something happened; gives the entries of the log that it leads to.
+    pub fn event(&self, at: Instant, event: &Event) -> Vec<LogEntry> {
+        let mut inner = self.lock();
+        let Some(watch) = &mut inner.watch else { return Vec::new() };
+        watch.handle_event(at, event);
+        entries(watch)
+    }
+
+    /// The host noticed something.
+    pub fn host(&self, observation: &HostObservation) -> Vec<LogEntry> {
+        let mut inner = self.lock();
+        let Inner { cards, watch, failed_at, .. } = &mut *inner;
+        let path = observation.path;
+        while cards.len() <= path.index() {
+            let path = if cards.is_empty() { "A" } else { "B" };
+            cards.push(Card { path: path.to_owned(), ..Card::default() });
+        }
+        let Some(card) = cards.get_mut(path.index()) else { return Vec::new() };
+        match observation.what {
+            HostEvent::Carrier(carrier) => {
+                let before = card.carrier.replace(carrier);
+                // That a card has a link when the run begins is no news.
+                if (before.is_some() || !carrier)
+                    && let Some(watch) = watch
+                {
+                    watch.handle_carrier(observation.time, path, carrier);
+                }
+            }
+            HostEvent::CardErrors { crc, other } => card.rx_errors += crc + other,
+            HostEvent::CardDrops(drops) | HostEvent::SocketDrops(drops) => card.rx_drops += drops,
+            HostEvent::SendFailures(failures) => {
+                card.tx_errors += failures;
+                *failed_at = Some(observation.time);
+                if let Some(watch) = watch {
+                    watch.handle_send_failure(true);
+                }
+            }
+            HostEvent::Late(_) | HostEvent::ClockStep(_) => {}
+        }
+        watch.as_mut().map(entries).unwrap_or_default()
+    }
+
+    /// Nothing has come for a while: what was waited with is told.
+    pub fn flush(&self) -> Vec<LogEntry> {
+        let mut inner = self.lock();
+        let Some(watch) = &mut inner.watch else { return Vec::new() };
+        watch.flush();
+        entries(watch)
+    }
+
+    /// Error and change counters begin at 0 again; no register is touched.
+    pub fn clear_errors(&self) {
+        let mut inner = self.lock();
+        inner.watch.iter_mut().for_each(Watch::clear);
+        for card in &mut inner.cards {
+            (card.rx_errors, card.rx_drops, card.tx_errors) = (0, 0, 0);
+        }
+    }
+
+    /// Counts of frames begin at 0 again.
+    pub fn clear_frames(&self, statistics: Statistics) {
+        self.lock().base = statistics;
+    }
+
+    /// The line as it is. `None` before a plan is run.
+    #[must_use]
+    pub fn report(&self, snapshot: &Snapshot) -> Option<OnlineReport> {
+        let mut inner = self.lock();
+        // A card that has taken all frames for a while takes them again.
+        if inner.failed_at.is_some_and(|at| snapshot.now >= at + FORGIVEN_AFTER) {
+            inner.failed_at = None;
+            inner.watch.iter_mut().for_each(|watch| watch.handle_send_failure(false));
+        }
+        let watch = inner.watch.as_ref()?;
+        let mut report = build::driven(watch.plan(), watch.network_status(), snapshot, &inner.base);
+        report.on.clone_from(&inner.on);
+        report.cards.clone_from(&inner.cards);
+        Some(report)
+    }
+
+    /// For each SubDevice its number and the sum of its errors; `None` before a plan is run.
+    #[must_use]
+    pub fn error_sums(&self) -> Option<Vec<u64>> {
+        let inner = self.lock();
+        Some(inner.watch.as_ref()?.network_status().error_sums().collect())
+    }
+}
+
+fn entries(watch: &mut Watch) -> Vec<LogEntry> {
+    std::iter::from_fn(|| watch.poll_entry()).collect()
+}
