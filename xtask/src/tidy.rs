@@ -1,6 +1,7 @@
 //! The house rules that no other tool checks.
 
 mod code;
+mod paths;
 mod registers;
 mod sources;
 mod type_names;
@@ -69,6 +70,7 @@ pub(crate) fn run(root: &Path) -> Result<bool> {
     annotations(root, &files, &mut broken)?;
     let tests = TestFiles::of(&files);
     sources::check(&files, &mut broken);
+    paths::check(&files, &mut broken);
     registers::check(&files, &tests, &mut broken);
     type_names::check(&files, &tests, &mut broken)?;
     for line in &broken {
