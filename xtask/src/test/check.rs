@@ -132,15 +132,18 @@ struct Crates(BTreeMap<String, BTreeSet<String>>);
 
 impl Crates {
     fn read(root: &Path) -> Result<Self> {
-        let mut crates = BTreeMap::new();
+        let mut folders = vec![root.join("fuzz"), root.join("xtask")];
         for entry in std::fs::read_dir(root.join("crates")).context("crates")? {
-            let entry = entry?;
-            let manifest = entry.path().join("Cargo.toml");
+            folders.push(entry?.path());
+        }
+        let mut crates = BTreeMap::new();
+        for folder in folders {
+            let manifest = folder.join("Cargo.toml");
             let Ok(text) = std::fs::read_to_string(&manifest) else { continue };
             let table = text.parse().with_context(|| manifest.display().to_string())?;
-            crates.insert(entry.file_name().to_string_lossy().into_owned(), needs(&table));
+            let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            crates.insert(name, needs(&table));
         }
-        crates.insert("xtask".to_owned(), BTreeSet::new());
         Ok(Self(crates))
     }
 
@@ -159,9 +162,10 @@ impl Crates {
     }
 
     fn of_file(&self, file: &str) -> Vec<String> {
-        let in_crate = file.strip_prefix("crates/").and_then(|rest| rest.split('/').next());
-        let name = in_crate.or(file.starts_with("xtask/").then_some("xtask"));
-        if let Some(name) = name {
+        let path = file.strip_prefix("crates/").unwrap_or(file);
+        let is_in_crate = path != file || ["fuzz/", "xtask/"].iter().any(|of| file.starts_with(of));
+        if is_in_crate {
+            let name = path.split('/').next().unwrap_or_default();
             // The folder of a crate that was removed is none.
             return self.0.get_key_value(name).map(|(name, _)| name.clone()).into_iter().collect();
         }
@@ -224,6 +228,7 @@ mod tests {
     #[test]
     fn file_of_a_crate_or_read_by_its_tests_changes_that_crate() {
         assert_eq!(of(&["crates/sim/src/a.rs", "xtask/src/b.rs"]), names(&["sim", "xtask"]));
+        assert_eq!(of(&["fuzz/src/a.rs"]), names(&[]), "no crate of this workspace");
         assert_eq!(of(&["scenarios/a.md", "docs/guide/b.md"]), names(&["lab", "linesman"]));
         assert_eq!(of(&["README.md", "crates/gone/src/a.rs"]), names(&[]));
     }
