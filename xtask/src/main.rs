@@ -33,7 +33,7 @@ enum Command {
     /// Changed is what differs from the last commit that HEAD shares with `main`: commits that are not on `main`, and what is
     /// not committed yet. Crates with a changed file are linted, with their tests, and tested. Crates that depend on them are
     /// compiled, without their tests. Format, house rules, FEATURES.md and unused dependencies are checked as a whole; they take
-    /// seconds.
+    /// seconds. Where the manifest of the workspace has changed, all crates are linted, and those with a changed file tested.
     ///
     /// Not checked are tests of crates that depend on the changed ones, documentation, stories, demo, swarm, habits, fuzzing and
     /// interop: `cargo xtask test`, of which `--only STEP` runs one step.

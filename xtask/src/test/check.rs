@@ -36,9 +36,12 @@ const ALL_CRATES: &[&str] = &["Cargo.toml", "clippy.toml", ".cargo/config.toml"]
 /// Checks what has changed; `false` when a step failed.
 pub(crate) fn run(root: &Path, check: &CheckOptions) -> Result<bool> {
     let crates = Crates::read(root)?;
-    let changed = match check.only.as_slice() {
-        [] => crates.of_files(&changed_files(root, check.since.as_deref())?),
-        names => crates.named(names)?,
+    let (changed, all_differ) = match check.only.as_slice() {
+        [] => {
+            let files = changed_files(root, check.since.as_deref())?;
+            (crates.of_files(&files), all_differ(&files))
+        }
+        names => (crates.named(names)?, false),
     };
     // Installing takes longer than all the rest.
     let options = Options { no_install: true, ..Options::default() };
@@ -48,20 +51,27 @@ pub(crate) fn run(root: &Path, check: &CheckOptions) -> Result<bool> {
     take("tidy", &mut rows, || cargo::tidy(&context));
     take("features", &mut rows, || cargo::features(&context));
     take("dependencies", &mut rows, || dependencies::run(&context));
-    // Each crate on its own: cargo then takes what it built the last time, whatever else has changed.
-    for name in &changed {
-        let package = package(name);
-        take(&format!("lints {name}"), &mut rows, || cargo::lints_of(&context, &package));
-    }
     let dependents = crates.dependents(&changed);
-    if !dependents.is_empty() {
-        take("dependents", &mut rows, || cargo::compile(&context, &dependents));
+    if all_differ {
+        take("lints", &mut rows, || cargo::lints(&context));
+    } else {
+        // Each crate on its own: cargo then takes what it built the last time, whatever else has changed.
+        for name in &changed {
+            let package = package(name);
+            take(&format!("lints {name}"), &mut rows, || cargo::lints_of(&context, &package));
+        }
+        if !dependents.is_empty() {
+            take("dependents", &mut rows, || cargo::compile(&context, &dependents));
+        }
     }
     for name in &changed {
         let package = package(name);
         take(&format!("tests {name}"), &mut rows, || cargo::tests_of(&context, &package));
     }
     let passed = summary(&rows);
+    if all_differ {
+        println!("\nall crates are built otherwise, and only those with changed files were tested");
+    }
     report(&changed, &dependents, &rows);
     Ok(passed)
 }
@@ -127,6 +137,14 @@ fn git(root: &Path, arguments: &[&str]) -> Result<String> {
     Ok(String::from_utf8(output.stdout)?)
 }
 
+/// A file with which all crates are built is among these.
+fn all_differ(files: &[String]) -> bool {
+    // A crate that takes another library changes the lock file with its manifest.
+    let manifest = files.iter().any(|file| file.ends_with("/Cargo.toml"));
+    let counts = |file: &str| ALL_CRATES.contains(&file) || (file == "Cargo.lock" && !manifest);
+    files.iter().any(|file| counts(file))
+}
+
 /// The crates of the workspace by their folders, and on which others each depends.
 struct Crates(BTreeMap<String, BTreeSet<String>>);
 
@@ -149,15 +167,6 @@ impl Crates {
 
     /// Those that changed with these files.
     fn of_files(&self, files: &[String]) -> BTreeSet<String> {
-        let all = || self.0.keys().cloned().collect();
-        if files.iter().any(|file| ALL_CRATES.contains(&file.as_str())) {
-            return all();
-        }
-        // A crate that takes another library changes the lock file with its manifest.
-        let manifest = files.iter().any(|file| file.ends_with("/Cargo.toml"));
-        if !manifest && files.iter().any(|file| file == "Cargo.lock") {
-            return all();
-        }
         files.iter().flat_map(|file| self.of_file(file)).collect()
     }
 
@@ -234,10 +243,13 @@ mod tests {
     }
 
     #[test]
-    fn manifest_of_the_workspace_or_lock_file_alone_changes_all_crates() {
-        assert_eq!(of(&["Cargo.toml"]).len(), 5);
-        assert_eq!(of(&["Cargo.lock"]).len(), 5);
-        assert_eq!(of(&["Cargo.lock", "crates/sim/Cargo.toml"]), names(&["sim"]));
+    fn manifest_of_the_workspace_or_lock_file_alone_concerns_all_crates() {
+        let all = |files: &[&str]| {
+            all_differ(&files.iter().map(|&file| file.to_owned()).collect::<Vec<_>>())
+        };
+        assert!(all(&["Cargo.toml"]));
+        assert!(all(&["Cargo.lock"]));
+        assert!(!all(&["Cargo.lock", "crates/sim/Cargo.toml"]));
     }
 
     #[test]
