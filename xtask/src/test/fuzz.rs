@@ -8,7 +8,7 @@ use super::cargo::cargo;
 use super::{Context, Outcome};
 
 /// A target per step run, unless said otherwise: enough to try each corpus and its neighbourhood.
-const SMOKE_SECONDS: u64 = 5;
+const SMOKE_SECONDS: u64 = 7;
 
 pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
     let seconds = context.options.fuzz_seconds.unwrap_or(SMOKE_SECONDS);
