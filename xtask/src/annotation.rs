@@ -205,12 +205,8 @@ fn is_id(word: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn file(path: &str, text: &str) -> TextFile {
-        TextFile { path: path.to_owned(), text: text.to_owned() }
-    }
-
     fn of(path: &str, text: &str) -> (Vec<(String, Extent, String)>, usize) {
-        let (claims, errors) = claims(&[file(path, text)]);
+        let (claims, errors) = claims(&[TextFile::new(path, text)]);
         let claims = claims.into_iter().map(|claim| (claim.id, claim.extent, claim.test)).collect();
         (claims, errors.len())
     }

@@ -1,6 +1,6 @@
 //! Developer commands, run as `cargo xtask COMMAND`.
 //!
-//! `test` is everything that is checked, in one command; `tidy` holds the house rules; `features`
+//! `test` is everything that is checked, in one command; `check` what a small change needs; `tidy` holds the house rules; `features`
 //! writes `FEATURES.md` from the annotations on tests; `fuzz` and `interop` run those two alone;
 //! `bench-peers` measures Linesman beside other MainDevices.
 
@@ -28,6 +28,16 @@ struct Arguments {
 enum Command {
     /// Check everything, with a summary at the end
     Test(test::Options),
+    /// Check what has changed: format, house rules, lints, tests
+    ///
+    /// Changed is what differs from the last commit that HEAD shares with `main`: commits that are not on `main`, and what is
+    /// not committed yet. Crates with a changed file are linted, with their tests, and tested. Crates that depend on them are
+    /// compiled, without their tests. Format, house rules, FEATURES.md and unused dependencies are checked as a whole; they take
+    /// seconds. Where the manifest of the workspace has changed, all crates are linted, and those with a changed file tested.
+    ///
+    /// Not checked are tests of crates that depend on the changed ones, documentation, stories, demo, swarm, habits, fuzzing and
+    /// interop: `cargo xtask test`, of which `--only STEP` runs one step.
+    Check(test::CheckOptions),
     /// Check the house rules
     Tidy,
     /// Write FEATURES.md from the annotations on tests
@@ -67,6 +77,7 @@ fn run(command: Command) -> Result<bool> {
     let root = root()?;
     match command {
         Command::Test(options) => test::run(&root, &options),
+        Command::Check(check) => test::check(&root, &check),
         Command::Tidy => tidy::run(&root),
         Command::Features { check } => features::run(&root, check),
         Command::Fuzz { seconds } => test::run(&root, &test::Options::only("fuzz", Some(seconds))),

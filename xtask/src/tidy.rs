@@ -1,9 +1,16 @@
 //! The house rules that no other tool checks.
 
+mod code;
+mod paths;
+mod registers;
+mod sources;
+mod type_names;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use code::TestFiles;
 use toml::Table;
 
 use crate::annotation;
@@ -61,6 +68,11 @@ pub(crate) fn run(root: &Path) -> Result<bool> {
     }
     crates(&files, &mut broken)?;
     annotations(root, &files, &mut broken)?;
+    let tests = TestFiles::of(&files);
+    sources::check(&files, &mut broken);
+    paths::check(&files, &mut broken);
+    registers::check(&files, &tests, &mut broken);
+    type_names::check(&files, &tests, &mut broken)?;
     for line in &broken {
         println!("{line}");
     }
@@ -186,13 +198,9 @@ fn annotations(root: &Path, files: &[TextFile], broken: &mut Vec<String>) -> Res
 mod tests {
     use super::*;
 
-    fn file(path: &str, text: &str) -> TextFile {
-        TextFile { path: path.to_owned(), text: text.to_owned() }
-    }
-
     fn found(check: fn(&TextFile, &mut Vec<String>), path: &str, text: &str) -> usize {
         let mut broken = Vec::new();
-        check(&file(path, text), &mut broken);
+        check(&TextFile::new(path, text), &mut broken);
         broken.len()
     }
 
@@ -231,7 +239,7 @@ mod tests {
                         [dependencies]\nlinesman-proto.workspace = true\n\
                         linesman-sim.workspace = true\n";
         let mut broken = Vec::new();
-        crates(&[file("crates/diagnosis/Cargo.toml", manifest)], &mut broken).unwrap();
+        crates(&[TextFile::new("crates/diagnosis/Cargo.toml", manifest)], &mut broken).unwrap();
         assert_eq!(broken, ["crates/diagnosis/Cargo.toml: diagnosis may not depend on sim"]);
     }
 }

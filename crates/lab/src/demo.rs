@@ -19,7 +19,7 @@ use crate::drawing::{Label, Row, draw};
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 use crate::swarm::run::cabled;
-use crate::verdict::judge::{FaultContext, best_finding};
+use crate::verdict::judge::{JudgedFault, best_finding};
 use crate::verdict::{Claim, Match, Scene, Site};
 
 /// SubDevices of a demo plant, at least.
@@ -269,7 +269,7 @@ fn verdict_on(lab: &Lab, id: FaultId) -> Option<(FindingReport, Match)> {
     let log = lab.truth();
     let truth = lab.truth_of(id)?;
     let scene = Scene { tree: lab.tree(), host_counters: true, answered_again: false };
-    let context = FaultContext::of(log, log.fault(id)?);
+    let context = JudgedFault::of(log, log.fault(id)?);
     let diagnosis = lab.diagnosis();
     let (finding, fits) = best_finding(&diagnosis, &truth, &scene, context)?;
     Some((finding.clone(), fits))

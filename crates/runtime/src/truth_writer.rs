@@ -87,7 +87,7 @@ pub enum EventKind {
 }
 
 /// What the segment's thread hands over.
-enum WriterOrder {
+enum TruthWriterOrder {
     Fault(FaultName, Vec<Place>),
     Happened(Vec<Entry>),
     Reader(UnixStream, bool),
@@ -97,7 +97,7 @@ enum WriterOrder {
 
 /// Writes down what happens, until it is finished or dropped.
 pub struct TruthWriter {
-    sender: Sender<WriterOrder>,
+    sender: Sender<TruthWriterOrder>,
     thread: Option<JoinHandle<io::Result<()>>>,
     watch: TruthWriterWatch,
     /// Faults that were told of so far.
@@ -122,7 +122,7 @@ impl TruthWriterWatch {
 
 /// Handle by which others read from a truth writer.
 #[derive(Clone)]
-pub struct TruthReader(Sender<WriterOrder>);
+pub struct TruthReader(Sender<TruthWriterOrder>);
 
 impl TruthWriter {
     /// Begins one: to a file that must not be there yet, if there is to be one.
@@ -158,11 +158,11 @@ impl TruthWriter {
     /// Takes what happened in a segment since the last call.
     pub fn take(&mut self, segment: &mut Segment) {
         for fault in &segment.truth().faults()[self.told..] {
-            let _ = self.sender.send(WriterOrder::Fault(fault.name, fault.places.clone()));
+            let _ = self.sender.send(TruthWriterOrder::Fault(fault.name, fault.places.clone()));
             self.told += 1;
         }
         if !segment.truth().entries().is_empty() {
-            let _ = self.sender.send(WriterOrder::Happened(segment.take_truth()));
+            let _ = self.sender.send(TruthWriterOrder::Happened(segment.take_truth()));
         }
     }
 
@@ -182,7 +182,7 @@ impl TruthWriter {
 
     fn end(&mut self) -> io::Result<()> {
         let Some(thread) = self.thread.take() else { return Ok(()) };
-        let _ = self.sender.send(WriterOrder::End);
+        let _ = self.sender.send(TruthWriterOrder::End);
         thread.join().unwrap_or_else(|_| Err(io::Error::other("the writer failed")))
     }
 }
@@ -199,7 +199,7 @@ impl TruthReader {
     /// then closes it.
     pub fn send_to(&self, stream: UnixStream, follow: bool) {
         // A writer that has ended closes the stream, which says so.
-        let _ = self.0.send(WriterOrder::Reader(stream, follow));
+        let _ = self.0.send(TruthWriterOrder::Reader(stream, follow));
     }
 }
 
@@ -219,12 +219,12 @@ struct TruthThread {
 }
 
 impl TruthThread {
-    fn run(&mut self, notes: &Receiver<WriterOrder>) -> io::Result<()> {
+    fn run(&mut self, notes: &Receiver<TruthWriterOrder>) -> io::Result<()> {
         while let Ok(first) = notes.recv() {
             let mut note = Some(first);
             let mut ended = false;
             while let Some(one) = note {
-                ended |= matches!(one, WriterOrder::End);
+                ended |= matches!(one, TruthWriterOrder::End);
                 self.note(one);
                 note = notes.try_recv().ok();
             }
@@ -236,16 +236,16 @@ impl TruthThread {
         self.failed.take().map_or(Ok(()), Err)
     }
 
-    fn note(&mut self, note: WriterOrder) {
+    fn note(&mut self, note: TruthWriterOrder) {
         match note {
-            WriterOrder::End => {}
-            WriterOrder::Fault(name, places) => self.faults.push((name, places)),
-            WriterOrder::Happened(entries) => {
+            TruthWriterOrder::End => {}
+            TruthWriterOrder::Fault(name, places) => self.faults.push((name, places)),
+            TruthWriterOrder::Happened(entries) => {
                 for entry in entries {
                     self.write(&entry);
                 }
             }
-            WriterOrder::Reader(stream, follow) => self.welcome(stream, follow),
+            TruthWriterOrder::Reader(stream, follow) => self.welcome(stream, follow),
         }
     }
 

@@ -285,8 +285,11 @@ fn captures(frames: &Made) -> Result<Made, Box<dyn Error>> {
     let ethernet = LinkType::from_number(1);
     let write = |interface, number: usize, bytes| {
         let time = UnixTime::from_nanos(1_700_000_000_000_000_000 + number as i128 * 2_000_000);
-        let direction =
-            if number % 2 == 0 { FrameDirection::Outgoing } else { FrameDirection::Incoming };
+        let direction = if number.is_multiple_of(2) {
+            FrameDirection::Outgoing
+        } else {
+            FrameDirection::Incoming
+        };
         FrameToWrite::new(interface, time, direction, bytes)
     };
     let mut pcap = PcapWriter::new(Vec::new(), ethernet, false)?;

@@ -1,5 +1,6 @@
 //! The steps that are cargo's own, and the house rules.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -42,9 +43,14 @@ pub(super) fn tidy(context: &Context<'_>) -> Result<Outcome> {
 }
 
 pub(super) fn lints(context: &Context<'_>) -> Result<Outcome> {
+    lints_of(context, "--workspace")
+}
+
+/// Clippy with the packages that an option of cargo names, tests included.
+pub(super) fn lints_of(context: &Context<'_>, packages: &str) -> Result<Outcome> {
     let arguments = [
         "clippy",
-        "--workspace",
+        packages,
         "--all-targets",
         "--keep-going",
         "--color=never",
@@ -52,19 +58,41 @@ pub(super) fn lints(context: &Context<'_>) -> Result<Outcome> {
         "-D",
         "warnings",
     ];
-    let ran = context.command("lints", cargo(), &arguments).run()?;
+    let ran = context.command(&log("lints", packages), cargo(), &arguments).run()?;
     if !ran.success() {
         return Ok(Outcome::Failed { count: 0, why: ran.explain() });
     }
     Ok(Outcome::Passed { count: 0, note: "clippy has no warning".into() })
 }
 
+/// Crates compile, without their tests. All are asked for, so that cargo takes what it has of the others.
+pub(super) fn compile(context: &Context<'_>, crates: &BTreeSet<String>) -> Result<Outcome> {
+    let arguments = ["check", "--workspace", "--keep-going", "--color=never"];
+    let ran = context.command("dependents", cargo(), &arguments).run()?;
+    if !ran.success() {
+        return Ok(Outcome::Failed { count: 0, why: ran.explain() });
+    }
+    Ok(Outcome::Passed { count: crates.len() as u64, note: "crates compile".into() })
+}
+
+/// The name of a step's log: that of the step, and of the package if it is one.
+fn log(step: &str, packages: &str) -> String {
+    match packages.strip_prefix("--package=") {
+        Some(package) => format!("{step}-{package}"),
+        None => step.to_owned(),
+    }
+}
+
 /// All tests of the workspace, those in documentation too.
 pub(super) fn tests(context: &Context<'_>) -> Result<Outcome> {
+    tests_of(context, "--workspace")
+}
+
+/// The tests of the packages that an option of cargo names.
+pub(super) fn tests_of(context: &Context<'_>, packages: &str) -> Result<Outcome> {
     // Tests that skip something say so; without this flag nobody would see it.
-    let arguments =
-        ["test", "--workspace", "--no-fail-fast", "--color=never", "--", "--show-output"];
-    let ran = context.command("tests", cargo(), &arguments).run()?;
+    let arguments = ["test", packages, "--no-fail-fast", "--color=never", "--", "--show-output"];
+    let ran = context.command(&log("tests", packages), cargo(), &arguments).run()?;
     let counts = Counts::parse(&ran.output);
     for line in &counts.skipped {
         println!("    {line}");

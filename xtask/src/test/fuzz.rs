@@ -8,7 +8,7 @@ use super::cargo::cargo;
 use super::{Context, Outcome};
 
 /// A target per step run, unless said otherwise: enough to try each corpus and its neighbourhood.
-const SMOKE_SECONDS: u64 = 5;
+const SMOKE_SECONDS: u64 = 7;
 
 pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
     let seconds = context.options.fuzz_seconds.unwrap_or(SMOKE_SECONDS);
@@ -23,17 +23,9 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
     let mut failed = Vec::new();
     let mut why = String::new();
     if !coverage {
-        let arguments = [
-            "build",
-            "--release",
-            "--manifest-path=fuzz/Cargo.toml",
-            "--no-default-features",
-            "--example=replay",
-        ];
-        let ran = context
-            .command("fuzz-build", cargo(), &arguments)
-            .env("CARGO_TARGET_DIR", context.target.join("fuzz"))
-            .run()?;
+        // As the tests build it, with all its checks: after that step there is nothing left to build.
+        let arguments = ["build", "--profile=test", "--workspace", "--example=replay"];
+        let ran = context.command("fuzz-build", cargo(), &arguments).run()?;
         if !ran.success() {
             return Ok(Outcome::Failed { count: 0, why: ran.explain() });
         }
@@ -47,8 +39,10 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
             let found = found.to_string_lossy().into_owned();
             let corpus = format!("fuzz/corpus/{target}");
             // New inputs go to the first folder, so that the committed corpus stays as it is.
+            let target = ["--features=libfuzzer", target];
+            let options = ["--", &time, "-max_len=4096"];
             let arguments =
-                ["+nightly", "fuzz", "run", target, &found, &corpus, "--", &time, "-max_len=4096"];
+                [&["+nightly", "fuzz", "run"], &target[..], &[&found, &corpus], &options].concat();
             // The compiler that runs us would override `+nightly`.
             context
                 .command(&log, "cargo", &arguments)
@@ -57,7 +51,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
                 .limit(seconds + 900)
                 .run()?
         } else {
-            let program = context.target.join("fuzz/release/examples/replay");
+            let program = context.target.join("debug/examples/replay");
             let arguments = [target.as_str(), "--seconds", &seconds.to_string()];
             context.command(&log, program, &arguments).limit(seconds + 120).run()?
         };

@@ -71,7 +71,9 @@ pub(super) fn ethercrab(context: &Context<'_>) -> Result<PathBuf> {
 /// Prints how the segment's answer compares with that of a bare reflector. What the benchmark makes of it depends on what
 /// else this host does, so nothing fails by it.
 fn latency(context: &Context<'_>) -> Result<()> {
-    let arguments = ["bench", "-p", "linesman-runtime", "--bench", "answer_over_veth"];
+    // With the binary's package, so that cargo takes the libraries that it built for the binary.
+    let arguments =
+        ["bench", "-p", "linesman", "-p", "linesman-runtime", "--bench", "answer_over_veth"];
     let ran = context.command("interop-latency", cargo(), &arguments).limit(900).run()?;
     for line in ran.output.lines().filter(|line| line.contains("of the reflector")) {
         println!("    {line}");

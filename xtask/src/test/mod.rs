@@ -1,7 +1,9 @@
 //! `cargo xtask test`: everything that is checked, step by step, with counts and times.
 
 mod cargo;
+mod check;
 mod count;
+mod dependencies;
 mod exec;
 mod fuzz;
 mod habits;
@@ -17,6 +19,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use clap::Args;
 
+pub(crate) use check::{CheckOptions, run as check};
 use exec::Run;
 
 /// What to check.
@@ -98,6 +101,7 @@ struct Step {
 const STEPS: &[Step] = &[
     Step { name: "format", quick: true, alone: false, run: cargo::format },
     Step { name: "tidy", quick: true, alone: false, run: cargo::tidy },
+    Step { name: "dependencies", quick: true, alone: false, run: dependencies::run },
     Step { name: "lints", quick: true, alone: false, run: cargo::lints },
     Step { name: "tests", quick: true, alone: false, run: cargo::tests },
     Step { name: "docs", quick: true, alone: false, run: cargo::docs },
@@ -127,10 +131,7 @@ pub(crate) fn run(root: &Path, options: &Options) -> Result<bool> {
             options.only.iter().any(|name| name == step.name)
         }
     };
-    let target = cargo::target_folder(root);
-    let logs = target.join("xtask");
-    std::fs::create_dir_all(&logs)?;
-    let mut context = Context { root, options, target, logs, missing: BTreeMap::new() };
+    let mut context = Context::new(root, options)?;
     let wanted = STEPS
         .iter()
         .filter(chosen)
@@ -140,25 +141,43 @@ pub(crate) fn run(root: &Path, options: &Options) -> Result<bool> {
     }
     let mut rows = Vec::new();
     for step in STEPS.iter().filter(chosen) {
-        println!("== {}", step.name);
-        let start = Instant::now();
-        let outcome = (step.run)(&context)
-            .unwrap_or_else(|error| Outcome::Failed { count: 0, why: format!("{error:#}") });
-        let took = start.elapsed();
-        if let Outcome::Failed { why, .. } = &outcome {
-            println!("FAILED: {why}");
-        }
-        rows.push((step.name, outcome, took));
+        take(step.name, &mut rows, || (step.run)(&context));
     }
     Ok(summary(&rows))
 }
 
+/// A step that was taken.
+struct StepResult {
+    name: String,
+    outcome: Outcome,
+    took: Duration,
+}
+
+impl StepResult {
+    fn failed(&self) -> bool {
+        matches!(self.outcome, Outcome::Failed { .. })
+    }
+}
+
+/// Takes a step and adds its row; an error of its own is a failure.
+fn take(name: &str, rows: &mut Vec<StepResult>, step: impl FnOnce() -> Result<Outcome>) {
+    println!("== {name}");
+    let start = Instant::now();
+    let outcome =
+        step().unwrap_or_else(|error| Outcome::Failed { count: 0, why: format!("{error:#}") });
+    let took = start.elapsed();
+    if let Outcome::Failed { why, .. } = &outcome {
+        println!("FAILED: {why}");
+    }
+    rows.push(StepResult { name: name.to_owned(), outcome, took });
+}
+
 /// The table at the end; `false` when a step failed.
-fn summary(rows: &[(&str, Outcome, Duration)]) -> bool {
-    println!("\n{:<10} {:<8} {:>7} {:>8}  ", "step", "result", "count", "time");
+fn summary(rows: &[StepResult]) -> bool {
+    println!("\n{:<16} {:<8} {:>7} {:>8}  ", "step", "result", "count", "time");
     let (mut total, mut failed, mut skipped) = (0, 0, 0);
     let mut time = Duration::ZERO;
-    for (name, outcome, took) in rows {
+    for StepResult { name, outcome, took } in rows {
         let (result, count, note) = match outcome {
             Outcome::Passed { count, note } => ("passed", *count, note.as_str()),
             Outcome::Skipped(why) => {
@@ -172,10 +191,10 @@ fn summary(rows: &[(&str, Outcome, Duration)]) -> bool {
         };
         total += count;
         time += *took;
-        println!("{name:<10} {result:<8} {count:>7} {:>7.1}s  {note}", took.as_secs_f64());
+        println!("{name:<16} {result:<8} {count:>7} {:>7.1}s  {note}", took.as_secs_f64());
     }
     println!(
-        "{:<10} {:<8} {total:>7} {:>7.1}s  {} steps, {failed} failed, {skipped} skipped",
+        "{:<16} {:<8} {total:>7} {:>7.1}s  {} steps, {failed} failed, {skipped} skipped",
         "total",
         if failed == 0 { "passed" } else { "FAILED" },
         time.as_secs_f64(),
@@ -184,7 +203,14 @@ fn summary(rows: &[(&str, Outcome, Duration)]) -> bool {
     failed == 0
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    fn new(root: &'a Path, options: &'a Options) -> Result<Self> {
+        let target = cargo::target_folder(root);
+        let logs = target.join("xtask");
+        std::fs::create_dir_all(&logs)?;
+        Ok(Self { root, options, target, logs, missing: BTreeMap::new() })
+    }
+
     /// A command in the project's root that logs to `NAME.log`.
     fn command(&self, log: &str, program: impl AsRef<Path>, arguments: &[&str]) -> Run {
         Run::new(self.root, self.logs.join(format!("{log}.log")), program.as_ref(), arguments)

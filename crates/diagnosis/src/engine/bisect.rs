@@ -55,22 +55,22 @@ enum SearchStep {
     /// Nothing is closed; since when.
     Open(Instant),
     /// Nothing is closed, and it is watched whether frames vanish again.
-    NetworkWatch(FrameCounts),
+    NetworkWatch(FrameMark),
     /// The port before this link is closed; since when.
     Closed(usize, Instant),
     /// The port before this link is closed, and something came back.
-    Helps(usize, FrameCounts),
+    Helps(usize, FrameMark),
 }
 
 /// What had been sent and had come back at a time.
 #[derive(Clone, Copy, Debug)]
-struct FrameCounts {
+struct FrameMark {
     at: Instant,
     sent: u64,
     processed: u64,
 }
 
-impl FrameCounts {
+impl FrameMark {
     const fn of(model: &NetworkModel, at: Instant) -> Self {
         Self { at, sent: model.traffic.sent, processed: model.traffic.processed }
     }
@@ -106,7 +106,7 @@ impl Bisect {
         let left: Vec<usize> = (0..tree.links().len()).collect();
         model.hole = Some(HoleSearch { since, found: None, has_helped: false, ended: None });
         // That nothing comes back is known already.
-        let nothing = FrameCounts { at: now.before(ROUND), sent: 0, ..FrameCounts::of(model, now) };
+        let nothing = FrameMark { at: now.before(ROUND), sent: 0, ..FrameMark::of(model, now) };
         Some(Self { before: left.clone(), left, step: SearchStep::NetworkWatch(nothing) })
     }
 
@@ -115,7 +115,7 @@ impl Bisect {
         let came_back = model.traffic.latest_processed;
         match self.step {
             SearchStep::Closed(link, at) if came_back.is_some_and(|back| back > at) => {
-                self.step = SearchStep::Helps(link, FrameCounts::of(model, now));
+                self.step = SearchStep::Helps(link, FrameMark::of(model, now));
                 None
             }
             // The request may be sent again for a while: what is written before that is over would be undone.
@@ -144,7 +144,7 @@ impl Bisect {
             }
             SearchStep::Open(at) if now < at + SETTLE => None,
             SearchStep::Open(_) => {
-                self.step = SearchStep::NetworkWatch(FrameCounts::of(model, now));
+                self.step = SearchStep::NetworkWatch(FrameMark::of(model, now));
                 None
             }
             SearchStep::NetworkWatch(mark) if came_back.is_some_and(|back| back > mark.at) => {

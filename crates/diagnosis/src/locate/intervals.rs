@@ -3,24 +3,24 @@
 use linesman_proto::time::Instant;
 
 /// From when to when something happened.
-pub type Interval = (Instant, Instant);
+pub type TimeInterval = (Instant, Instant);
 
 /// Stretches of time in order, none of which touches the next.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
-pub struct Intervals(Vec<Interval>);
+pub struct Intervals(Vec<TimeInterval>);
 
 impl Intervals {
     /// Whether one of them overlaps a stretch.
     #[must_use]
-    pub fn meet(&self, spell: Interval) -> bool {
+    pub fn meet(&self, spell: TimeInterval) -> bool {
         let next = self.0.partition_point(|other| other.1 <= spell.0);
         self.0.get(next).is_some_and(|other| meet(*other, spell))
     }
 }
 
-impl FromIterator<Interval> for Intervals {
-    fn from_iter<T: IntoIterator<Item = Interval>>(spells: T) -> Self {
-        let mut all: Vec<Interval> = spells.into_iter().collect();
+impl FromIterator<TimeInterval> for Intervals {
+    fn from_iter<T: IntoIterator<Item = TimeInterval>>(spells: T) -> Self {
+        let mut all: Vec<TimeInterval> = spells.into_iter().collect();
         all.sort_unstable();
         all.dedup_by(|later, earlier| {
             let touches = later.0 <= earlier.1;
@@ -34,7 +34,7 @@ impl FromIterator<Interval> for Intervals {
 }
 
 /// Whether two stretches overlap.
-pub(super) fn meet(one: Interval, other: Interval) -> bool {
+pub(super) fn meet(one: TimeInterval, other: TimeInterval) -> bool {
     one.0 < other.1 && other.0 < one.1
 }
 

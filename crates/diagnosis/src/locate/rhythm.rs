@@ -6,7 +6,7 @@ use linesman_proto::topology::End;
 
 use super::damage::Damage;
 use super::input::LocateInput;
-use super::intervals::{Interval, Intervals, meet};
+use super::intervals::{Intervals, TimeInterval, meet};
 use crate::model::Rise;
 
 /// Readings further apart than this say nothing of what came at the same moment.
@@ -28,7 +28,7 @@ const ENOUGH_MEETINGS: usize = 2;
 /// circles: each keeps its own rhythm, and how often places are hit and read does not matter.
 pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]) -> bool {
     let (a, b) = (hits(input, a), hits(input, b));
-    let ends = |hits: &[Interval]| Some((*hits.first()?, *hits.last()?));
+    let ends = |hits: &[TimeInterval]| Some((*hits.first()?, *hits.last()?));
     let (Some((a_first, a_last)), Some((b_first, b_last))) = (ends(&a), ends(&b)) else {
         return false;
     };
@@ -36,7 +36,7 @@ pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]
         return true;
     }
     let both = (a_first.0.max(b_first.0), a_last.1.min(b_last.1));
-    let within = |hits: &[Interval]| -> Vec<Interval> {
+    let within = |hits: &[TimeInterval]| -> Vec<TimeInterval> {
         hits.iter().copied().filter(|hit| meet(*hit, both)).collect()
     };
     let (a, b) = (within(&a), Intervals::from_iter(within(&b)));
@@ -45,7 +45,7 @@ pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]
     if met < ENOUGH_MEETINGS || around == 0 {
         return false;
     }
-    let moved = |(begin, end): Interval, by: u64| {
+    let moved = |(begin, end): TimeInterval, by: u64| {
         let moved = both.0 + Span::ns((begin.since(both.0).as_nanos() + by) % around);
         (moved, moved + end.since(begin))
     };
@@ -58,10 +58,10 @@ pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]
 
 /// When a place was hit, in order, as far as it was read closely: a hit lies between the reading before a rise
 /// and the reading that shows it.
-fn hits(input: &LocateInput<'_>, damages: &[Damage]) -> Vec<Interval> {
+fn hits(input: &LocateInput<'_>, damages: &[Damage]) -> Vec<TimeInterval> {
     let rises = damages.iter().flat_map(|damage| rises(input, damage));
     let between = rises.map(|rise| (rise.after_time, rise.at));
-    let mut hits: Vec<Interval> =
+    let mut hits: Vec<TimeInterval> =
         between.filter(|(begin, end)| end.since(*begin) <= CLOSE_READING).collect();
     hits.sort_unstable();
     hits.dedup();

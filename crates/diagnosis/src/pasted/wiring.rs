@@ -79,7 +79,7 @@ fn by_open_ports(hints: &[Hints]) -> Option<Vec<AttachPoint>> {
 
 /// What a port is wired to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum PortKind {
+enum PortAttachment {
     /// Contacts between terminals.
     Terminal,
     /// A cable.
@@ -88,7 +88,7 @@ enum PortKind {
     Any,
 }
 
-impl PortKind {
+impl PortAttachment {
     fn fits(self, other: Self) -> bool {
         self == other || self == Self::Any || other == Self::Any
     }
@@ -96,9 +96,9 @@ impl PortKind {
 
 /// By which kind of port a type is entered, and its further ports in the order of the frames. Reference: device
 /// descriptions of the maker.
-fn ports_of(type_name: Option<&str>) -> (PortKind, &'static [(Port, PortKind)]) {
+fn ports_of(type_name: Option<&str>) -> (PortAttachment, &'static [(Port, PortAttachment)]) {
     use Port::{B, C, D};
-    use PortKind::{Any, Cable, Terminal};
+    use PortAttachment::{Any, Cable, Terminal};
     let Some(name) = type_name else { return (Any, &[(B, Any)]) };
     let is = |families: &[&str]| families.iter().any(|family| name.starts_with(family));
     if is(&["EK1110"]) {
@@ -125,7 +125,7 @@ fn ports_of(type_name: Option<&str>) -> (PortKind, &'static [(Port, PortKind)]) 
 /// A SubDevice to which more can still be attached: those that come later hang on it or on one before it.
 struct OpenChain {
     node: usize,
-    ports: Vec<(Port, PortKind)>,
+    ports: Vec<(Port, PortAttachment)>,
 }
 
 fn assumed(hints: &[Hints]) -> Vec<AttachPoint> {
@@ -164,9 +164,9 @@ fn attach(
     hints: &[Hints],
     spine: &[OpenChain],
     hint: &Hints,
-    entry: PortKind,
+    entry: PortAttachment,
 ) -> Option<(usize, Port)> {
-    let fits = |depth: &usize, port: Port, kind: PortKind| {
+    let fits = |depth: &usize, port: Port, kind: PortAttachment| {
         let above = &hints[spine[*depth].node];
         let is_reached =
             hint.answers != Some(true) || (above.answers != Some(false) && !above.missing[port]);

@@ -37,7 +37,7 @@ pub const PAGE: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// Vendor, product and revision: what a description is of.
-type DeviceKind = (u32, u32, u32);
+type DescriptionKey = (u32, u32, u32);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let model = view.model;
@@ -51,7 +51,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         // Whoever is wired otherwise than planned is fed otherwise, too: first things first.
         return;
     }
-    let known: BTreeMap<DeviceKind, Seen<Power>> =
+    let known: BTreeMap<DescriptionKey, Seen<Power>> =
         model.devices.iter().filter_map(|device| Some((kind(device)?, device.power?))).collect();
     let power = |device: &Device| {
         device.power.or_else(|| known.get(&kind(device)?).copied()).map(|seen| seen.value)
@@ -79,7 +79,7 @@ fn is_as_planned(device: &Device) -> bool {
     }
 }
 
-fn kind(device: &Device) -> Option<DeviceKind> {
+fn kind(device: &Device) -> Option<DescriptionKey> {
     let identity = &device.identity;
     let value = |seen: Option<Seen<u32>>| seen.map(|seen| seen.value);
     Some((value(identity.vendor_id)?, value(identity.product_code)?, value(identity.revision)?))

@@ -3,7 +3,7 @@
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, Severity};
 use linesman_proto::time::{Instant, Span};
 
-use crate::verdict::judge::{FaultContext, may_be_common};
+use crate::verdict::judge::{JudgedFault, may_be_common};
 use crate::verdict::{Claim, Grade, Match, Naming, Scene, Truth, matches};
 
 /// What was said of a fault.
@@ -39,7 +39,7 @@ pub fn judge(
     truth: &Truth,
     all: &[Truth],
     scene: &Scene<'_>,
-    (context, among): (FaultContext, usize),
+    (context, among): (JudgedFault, usize),
     naming: Naming<'_>,
 ) -> Judged {
     let began = context.began.unwrap_or(Instant::ZERO);

@@ -28,7 +28,7 @@ use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
 use crate::swarm::run::cabled;
-use crate::verdict::judge::FaultContext;
+use crate::verdict::judge::JudgedFault;
 use crate::verdict::{Grade, Scene, Truth, TruthPlace, matches};
 
 /// How long the bring-up may take.
@@ -512,7 +512,7 @@ impl<'a> Play<'a> {
         let answered_again = self.lab.reached().len() >= tree.len();
         let host_counters = self.case.host_counters;
         let scene = Scene { tree, host_counters, answered_again };
-        let context = FaultContext::of(self.lab.truth(), record);
+        let context = JudgedFault::of(self.lab.truth(), record);
         let when = (context, self.case.faults.len().max(1) + self.beside);
         let cycle = self.case.cycle.as_nanos().max(1);
         let cycles = first.place.map(|after| after.as_nanos().div_ceil(cycle));

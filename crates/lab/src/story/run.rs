@@ -17,7 +17,7 @@ use super::segment_probe::SegmentProbe;
 use super::step::{Expectation, Heal, Step, StepAt, What, Written};
 use crate::lab::Lab;
 use crate::options::LabOptions;
-use crate::verdict::judge::{FaultContext, best_finding};
+use crate::verdict::judge::{JudgedFault, best_finding};
 use crate::verdict::{Claim, Scene, Site};
 
 /// How long a line may take to be brought up.
@@ -399,7 +399,7 @@ fn verdict(on: Option<FaultName>, lab: &Lab, diagnosis: &Diagnosis) -> Result<()
             let over = !fault.is_active();
             let scene = Scene { tree: lab.tree(), host_counters, answered_again };
             (over || !answered_again)
-                && best_finding(diagnosis, &truth, &scene, FaultContext::of(log, fault))
+                && best_finding(diagnosis, &truth, &scene, JudgedFault::of(log, fault))
                     .is_some_and(|(_, fits)| fits.is_right())
         });
         if !fits {

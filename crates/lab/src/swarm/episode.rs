@@ -18,7 +18,7 @@ use super::run::{SwarmOptions, cabled};
 use crate::choice::{AT_RUN_TIME, Choice, LineOutline, are_apart};
 use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
-use crate::verdict::judge::{FaultContext, best_finding, explains, is_left_open};
+use crate::verdict::judge::{JudgedFault, best_finding, explains, is_left_open};
 use crate::verdict::{Claim, Match, Naming, Scene, Site, Truth};
 
 /// Slices of time between two checks.
@@ -233,7 +233,7 @@ impl<'a> Episode<'a> {
         let diagnosis = self.lab.diagnosis();
         let Some(truth) = self.lab.truth_of(id) else { return outcome };
         if let Some((finding, graded)) =
-            best_finding(&diagnosis, &truth, &scene, FaultContext::of(log, fault))
+            best_finding(&diagnosis, &truth, &scene, JudgedFault::of(log, fault))
         {
             let site = Site::from(&finding.place);
             let text = format!("{} {} at {site}", finding.code, finding.cause);

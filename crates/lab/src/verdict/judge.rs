@@ -44,14 +44,14 @@ pub fn truth_of(log: &TruthLog, fault: &FaultRecord) -> Truth {
 
 /// When and in what company a fault acted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct FaultContext {
+pub struct JudgedFault {
     /// When it began.
     pub began: Option<Instant>,
     /// Whether another began with it.
     pub is_shared: bool,
 }
 
-impl FaultContext {
+impl JudgedFault {
     /// Of a fault of the log.
     #[must_use]
     pub fn of(log: &TruthLog, fault: &FaultRecord) -> Self {
@@ -77,7 +77,7 @@ pub fn best_finding<'a>(
     diagnosis: &'a Diagnosis,
     truth: &Truth,
     scene: &Scene<'_>,
-    context: FaultContext,
+    context: JudgedFault,
 ) -> Option<(&'a FindingReport, Match)> {
     let began = context.began.unwrap_or(Instant::ZERO).as_nanos();
     let of_its_time =

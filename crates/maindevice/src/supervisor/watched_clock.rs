@@ -26,7 +26,7 @@ pub(super) struct WatchedClock {
 }
 
 /// What is being read of a clock.
-pub(super) struct ClockReading {
+pub(super) struct WatchedClockReading {
     is_reference: bool,
     asked_at: Instant,
 }
@@ -37,8 +37,9 @@ impl WatchedClock {
         &self,
         context: &Context,
         device: &DevicePlan,
-    ) -> Option<impl Future<Output = (ClockReading, Result<Reply, ExchangeError>)> + Send + 'static>
-    {
+    ) -> Option<
+        impl Future<Output = (WatchedClockReading, Result<Reply, ExchangeError>)> + Send + 'static,
+    > {
         let device_table = lock(&context.device_table);
         let is_reference = device_table.reference_clock()? == device.station;
         let is_set = device_table.has_clock_set(device.id);
@@ -51,7 +52,7 @@ impl WatchedClock {
             true => register::SYSTEM_TIME,
             false => register::SYSTEM_TIME_DIFFERENCE,
         };
-        let look = ClockReading { is_reference, asked_at: context.wire.now() };
+        let look = WatchedClockReading { is_reference, asked_at: context.wire.now() };
         let read =
             context.wire.read(Target::Station(device.station), register.address, register.len);
         Some(async move { (look, read.await) })
@@ -62,7 +63,7 @@ impl WatchedClock {
         &mut self,
         context: &Context,
         device: &DevicePlan,
-        (look, reply): (ClockReading, Result<Reply, ExchangeError>),
+        (look, reply): (WatchedClockReading, Result<Reply, ExchangeError>),
     ) {
         let Some(reply) = reply.ok().filter(Reply::answered) else { return };
         let (wire, id) = (&context.wire, device.id);

@@ -15,7 +15,7 @@ use super::join::Joins;
 use super::judge::judge_listener;
 use super::play::Listener;
 use super::{HealthyListened, HealthySaid, Heard, Listeners, Pair};
-use crate::verdict::judge::FaultContext;
+use crate::verdict::judge::JudgedFault;
 use crate::verdict::{Naming, Scene, Truth};
 
 /// Who joins a healthy run listens for the last part of it: two of three.
@@ -98,7 +98,7 @@ impl Play<'_> {
             truth,
             all,
             scene,
-            context: FaultContext::of(self.lab.truth(), record),
+            context: JudgedFault::of(self.lab.truth(), record),
         };
         Some(Listeners {
             start: judging.pair(None),
@@ -115,7 +115,7 @@ struct Judging<'a, 'p> {
     truth: &'a Truth,
     all: &'a [Truth],
     scene: &'a Scene<'a>,
-    context: FaultContext,
+    context: JudgedFault,
 }
 
 impl Judging<'_, '_> {

@@ -7,7 +7,7 @@ use linesman_proto::time::Span;
 use super::super::judge::{Judged, alarms, judge};
 use super::super::trace::Trace;
 use super::{Listened, Outcome};
-use crate::verdict::judge::{FaultContext, is_left_open, may_be};
+use crate::verdict::judge::{JudgedFault, is_left_open, may_be};
 use crate::verdict::{Match, Naming, Scene, Truth};
 
 /// What lost frames may be, where nothing but the frames is known.
@@ -29,7 +29,7 @@ pub(in crate::score) fn judge_listener(
     truth: &Truth,
     all: &[Truth],
     scene: &Scene<'_>,
-    context: FaultContext,
+    context: JudgedFault,
     naming: Naming<'_>,
     traces: &[Trace],
 ) -> Listened {
