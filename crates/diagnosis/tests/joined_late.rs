@@ -1,4 +1,4 @@
-//! What was before anybody listened, as far as frames still tell: whoever joins a line that somebody else drives.
+//! Listeners that join a line late: findings about what happened before the first frame that they hear.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -226,4 +226,29 @@ fn recording_that_begins_with_a_return_has_one_maindevice() {
     cycles(&mut script, 600, 6, 0x03E9, &[Some(OP); 3]);
     let report = report(&mut script);
     assert_eq!(codes(&report), Vec::<&str>::new(), "{}", text(&report));
+}
+
+#[test]
+fn late_frames_before_subdevices_lose_their_step_explain_it() {
+    let mut script = listening(SOEM, None);
+    for _ in 0..100 {
+        script.exchange(&[lrw(0x0100_0000, 8, 6)]);
+        script.now += 1_900_000;
+    }
+    cycles(&mut script, 20, 6, 0x1001, &[Some(OP); 3]);
+    for _ in 0..100 {
+        // Comes back a millisecond later than the others.
+        script.send(&[lrw(0x0100_0000, 8, 6)]);
+        script.now += 1_000_000;
+        script.give_back(&[lrw(0x0100_0000, 8, 6)]);
+        script.index = script.index.wrapping_add(1);
+        script.now += 900_000;
+    }
+    cycles(&mut script, 100, 4, 0x1001, &[Some(OP), Some(OP), Some(OUT_OF_STEP)]);
+    cycles(&mut script, 600, 6, 0x1001, &[Some(OP); 3]);
+    let report = report(&mut script);
+    let late = report.findings.iter().find(|finding| finding.code == "T411").unwrap();
+    assert_eq!(late.severity, Severity::Error, "{}", text(&report));
+    assert!(late.consequences.iter().any(|one| one.code == "T400"), "{}", text(&report));
+    assert!(!codes(&report).contains(&"T400"), "{}", text(&report));
 }
