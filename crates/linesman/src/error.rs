@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use linesman_link::error::LinkError;
-use linesman_runtime::image::VariableError;
 use linesman_runtime::run::RunError;
 use linesman_runtime::selector::SelectorError;
+use linesman_session::image::VariableError;
 
 /// Each says who, where, what was expected and what to do.
 #[derive(Debug, thiserror::Error)]

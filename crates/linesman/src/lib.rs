@@ -49,9 +49,9 @@ pub use error::Error;
 pub use linesman_proto::address::DeviceId;
 pub use linesman_proto::state::{AlState, DeviceState, NetworkState};
 pub use linesman_proto::time::{Instant, Span};
-pub use linesman_runtime::image::{Input, Output, Value, VariableError};
 pub use linesman_runtime::run::report::RunReport;
 pub use linesman_runtime::run::{Application, Io, Next, RunError};
+pub use linesman_session::image::{Input, Output, Value, VariableError};
 pub use plan::{Plan, Scan};
 pub use segment::{RunOptions, Segment, open};
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use linesman_config::eni::Eni;
 use linesman_config::inventory::Inventory;
 use linesman_proto::time::Span;
-use linesman_runtime::image::{Input, Output, Value};
 use linesman_runtime::run::PlanChoices;
+use linesman_session::image::{Input, Output, Value};
 
 use crate::Error;
 

@@ -8,6 +8,7 @@ use linesman_config::inventory::Inventory;
 use linesman_config::plan::IoAt;
 use linesman_config::project::Project;
 use linesman_link::clock::HostClock;
+use linesman_link::error::LinkError;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::listen::is_driven;
@@ -69,7 +70,7 @@ enum Where {
 }
 
 impl Where {
-    fn line(&mut self) -> &mut dyn Transport {
+    fn line(&mut self) -> &mut dyn Transport<Error = LinkError> {
         match self {
             Self::Cards(cards) => cards,
             Self::Virtual(line) => &mut **line,

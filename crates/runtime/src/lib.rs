@@ -14,7 +14,6 @@ mod control_socket;
 pub mod drive;
 pub mod event_log;
 pub mod host_watch;
-pub mod image;
 pub mod listen;
 pub mod named_files;
 pub mod names;

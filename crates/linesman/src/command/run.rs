@@ -12,6 +12,7 @@ use linesman_config::project::Project;
 use linesman_diagnosis::report::Verdict;
 use linesman_diagnosis::{InputKind, Setup};
 use linesman_link::clock::HostClock;
+use linesman_link::error::LinkError;
 use linesman_link::socket::WakeHandle;
 use linesman_maindevice::watch::EntryKind;
 use linesman_proto::state::AlState;
@@ -308,7 +309,7 @@ fn with_source(
 
 /// Runs the line in a thread of its own, and tells what happens meanwhile.
 #[allow(clippy::too_many_arguments, reason = "called twice, from above")]
-fn drive<L: Transport + Send>(
+fn drive<L: Transport<Error = LinkError> + Send>(
     line: L,
     wanted: PlanSource,
     options: &SessionOptions,
