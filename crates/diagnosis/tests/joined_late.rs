@@ -1,4 +1,4 @@
-//! What was before anybody listened, as far as frames still tell: whoever joins a line that somebody else drives.
+//! Listeners that join a line late: findings about what happened before the first frame that they hear.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -226,4 +226,46 @@ fn recording_that_begins_with_a_return_has_one_maindevice() {
     cycles(&mut script, 600, 6, 0x03E9, &[Some(OP); 3]);
     let report = report(&mut script);
     assert_eq!(codes(&report), Vec::<&str>::new(), "{}", text(&report));
+}
+
+/// A hundred cycles, then a hundred whose frames come back a millisecond later than those.
+fn late_frames(script: &mut Script, states: &[Option<[u8; 6]>]) {
+    for _ in 0..100 {
+        script.exchange(&[lrw(0x0100_0000, 8, 6)]);
+        script.now += 1_900_000;
+    }
+    cycles(script, 20, 6, 0x1001, states);
+    for _ in 0..100 {
+        script.send(&[lrw(0x0100_0000, 8, 6)]);
+        script.now += 1_000_000;
+        script.give_back(&[lrw(0x0100_0000, 8, 6)]);
+        script.index = script.index.wrapping_add(1);
+        script.now += 900_000;
+    }
+}
+
+fn frames_late(report: &Diagnosis) -> &FindingReport {
+    report.findings.iter().find(|finding| finding.code == "T411").unwrap()
+}
+
+#[test]
+fn late_frames_before_subdevices_lose_their_step_explain_it() {
+    let mut script = listening(SOEM, None);
+    late_frames(&mut script, &[Some(OP); 3]);
+    cycles(&mut script, 100, 4, 0x1001, &[Some(OP), Some(OP), Some(OUT_OF_STEP)]);
+    cycles(&mut script, 600, 6, 0x1001, &[Some(OP); 3]);
+    let report = report(&mut script);
+    let late = frames_late(&report);
+    assert_eq!(late.severity, Severity::Error, "{}", text(&report));
+    assert!(late.consequences.iter().any(|one| one.code == "T400"), "{}", text(&report));
+    assert!(!codes(&report).contains(&"T400"), "{}", text(&report));
+}
+
+#[test]
+fn late_frames_beside_error_bits_that_are_echoes_stay_a_note() {
+    let mut script = listening(KICKCAT, None);
+    late_frames(&mut script, &[]);
+    cycles(&mut script, 100, 6, 0x1001, &[Some([0x18, 0, 0, 0, 0, 0]); 3]);
+    let report = report(&mut script);
+    assert_eq!(frames_late(&report).severity, Severity::Info, "{}", text(&report));
 }

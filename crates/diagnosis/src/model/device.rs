@@ -387,7 +387,7 @@ impl Device {
                 error.code.is_none_or(|code| code.value.explain().class == CodeClass::Timing);
             let at = error.status.at;
             let was_away = self.absences.iter().any(|one| one.disturbs(at));
-            is_timing && !was_away && at >= from && at <= to + READ_WITHIN
+            is_timing && !error.may_be_echo() && !was_away && at >= from && at <= to + READ_WITHIN
         })
     }
 

@@ -50,8 +50,8 @@ const QUIET: Span = Span::s(2);
 /// Of so many frames one is too much for a line that is to work.
 const OFTEN: u64 = 1_000;
 
-/// So many lost frames may cost a SubDevice its step: the usual limit of its counter of missed events (0x10F1:02) is 4,
-/// and each miss counts 3.
+/// Losses before an error of step that are taken for its cause. A single one is not: SubDevices bear missed events up to
+/// a limit (0x10F1:02).
 const FOR_A_STEP: usize = 2;
 /// So many intervals make a rhythm.
 const RHYTHM: usize = 6;

@@ -147,8 +147,9 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
         .shown_by(Evidence::frame(last.sent + last.by, last.frame, late.text.clone()))
         .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
         .advise("Take switches and media converters out of the way between card and first SubDevice.");
-    // Whoever joins late has not seen who was set up to keep step.
-    let may_keep_step = |device: &&Device| device.sync_on.map_or(is_recorded, |on| on.value);
+    // The set-up of SYNC signals may have been before the first frame that was seen.
+    let may_be_unseen = !model.sees_all_orders;
+    let may_keep_step = |device: &&Device| device.sync_on.map_or(may_be_unseen, |on| on.value);
     let in_step = model.devices.iter().filter(may_keep_step);
     let hurt: Vec<&Device> =
         in_step.filter(|device| device.lost_step_within(first.sent, last.sent + last.by)).collect();

@@ -37,7 +37,8 @@ pub(super) fn restarted(model: &NetworkModel) -> Option<Condition> {
     );
     let silent = model.device(first).and_then(|device| device.absences.back());
     let heard_since = silent.map_or(seen.at, |absence| absence.since.at.min(seen.at));
-    let since = uncounted(model, together.len(), seen.at).unwrap_or(heard_since).min(heard_since);
+    let since =
+        missing_since(model, together.len(), seen.at).unwrap_or(heard_since).min(heard_since);
     // Who joined late has seen the last of it: it may have lasted longer.
     let was_long = seen.at.since(since) >= LONG_HEARD;
     let (cause, others) = match (was_long, together.len() > 1) {
@@ -74,7 +75,7 @@ pub(super) fn restarted(model: &NetworkModel) -> Option<Condition> {
 }
 
 /// The time since which `count` SubDevices that came back at `back` were missing when SubDevices were counted.
-fn uncounted(model: &NetworkModel, count: usize, back: Instant) -> Option<Instant> {
+fn missing_since(model: &NetworkModel, count: usize, back: Instant) -> Option<Instant> {
     let rise = model.traffic.broadcast_rose?;
     let is_same = usize::from(rise.more.value - rise.fewer.value) == count
         && rise.more.at.before(TOGETHER) <= back

@@ -32,7 +32,7 @@ pub(super) fn errors(model: &NetworkModel) -> Vec<(&Device, &AlError)> {
     unseen
 }
 
-/// What keeps process data away for longer than a watchdog holds.
+/// Adds the causes that keep process data away for longer than a watchdog holds.
 fn outage(condition: Condition) -> Condition {
     condition
         .or(FaultName::LinkOpen, 0.2)
@@ -43,7 +43,7 @@ fn outage(condition: Condition) -> Condition {
         .or_at(FaultName::HostJitter, Place::Host, 0.05)
 }
 
-/// What costs SubDevices their step: a few frames that are late or lost are enough.
+/// Adds the causes that cost SubDevices their step: a few frames that are late or lost are enough.
 fn missed_frames(condition: Condition) -> Condition {
     condition
         .or(FaultName::LinkOpen, 0.15)
