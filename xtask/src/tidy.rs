@@ -50,8 +50,22 @@ const MAY_DEPEND_ON: &[(&str, &[&str])] = &[
     ("diagnosis", &["proto", "config"]),
     ("lab", &["proto", "config", "maindevice", "sim", "diagnosis"]),
     ("link", &["proto"]),
-    ("runtime", &["proto", "config", "maindevice", "sim", "diagnosis", "lab", "link"]),
-    ("linesman", &["proto", "config", "maindevice", "sim", "diagnosis", "lab", "link", "runtime"]),
+    ("runtime", &["proto", "config", "maindevice", "sim", "diagnosis", "link"]),
+    ("linesman", &["proto", "config", "maindevice", "sim", "diagnosis", "link", "runtime"]),
+    (
+        "cli",
+        &[
+            "proto",
+            "config",
+            "maindevice",
+            "sim",
+            "diagnosis",
+            "lab",
+            "link",
+            "runtime",
+            "linesman",
+        ],
+    ),
 ];
 
 /// Checks all rules and prints what breaks them.

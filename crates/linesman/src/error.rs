@@ -29,6 +29,17 @@ pub enum Error {
         /// The card.
         card: String,
     },
+    /// A card cannot be broken by a program.
+    #[error(
+        "`{given}` is no virtual segment: faults are injected there alone. Do: open `sim:line.toml`"
+    )]
+    NotSimulated {
+        /// What is open.
+        given: String,
+    },
+    /// A virtual segment cannot be built, or has no place for a fault.
+    #[error("virtual segment: {0}")]
+    Segment(String),
     /// A file.
     #[error("{}: {why}", .path.display())]
     File {

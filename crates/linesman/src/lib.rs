@@ -33,6 +33,13 @@
 #![doc = include_str!("../examples/axis.rs")]
 //! ```
 //!
+//! The diagnosis runs beside the cycle, and a virtual segment breaks on order, so that an application can be tested
+//! against faults:
+//!
+//! ```
+#![doc = include_str!("../examples/find_the_fault.rs")]
+//! ```
+//!
 //! The closure is called once a cycle, with inputs that have just come back; outputs leave with the
 //! next frames ([`RunOptions::exchange_at_end`] turns that round). When it is late more often than [`RunOptions::allow_misses`] says, outputs are withheld, so
 //! that the watchdogs of SubDevices do their work. At the end outputs go to zero and every SubDevice
@@ -46,12 +53,17 @@ mod plan;
 mod segment;
 
 pub use error::Error;
+pub use linesman_config::fault::FaultName;
+pub use linesman_diagnosis::report::{FindingReport, PlaceReport, Verdict};
+pub use linesman_diagnosis::{Diagnosis, Event as FindingEvent, EventKind as FindingChange};
 pub use linesman_proto::address::DeviceId;
 pub use linesman_proto::state::{AlState, DeviceState, NetworkState};
 pub use linesman_proto::time::{Instant, Span};
 pub use linesman_runtime::run::report::RunReport;
 pub use linesman_runtime::run::{Application, Io, Next, RunError};
 pub use linesman_session::image::{Input, Output, Value, VariableError};
+pub use linesman_sim::segment_file::{FaultEntry, SegmentFile};
+pub use linesman_sim::truth::FaultId;
 pub use plan::{Plan, Scan};
 pub use segment::{RunOptions, Segment, open};
 

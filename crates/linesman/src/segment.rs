@@ -1,12 +1,14 @@
 //! A line that is opened: scanned, planned, run.
 
 use std::path::Path;
-use std::sync::mpsc;
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::thread;
 
 use linesman_config::eni::Eni;
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::IoAt;
 use linesman_config::project::Project;
+use linesman_diagnosis::{Event, InputKind, Setup};
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
 use linesman_proto::state::AlState;
@@ -17,15 +19,16 @@ use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::run::scan::PATIENCE;
 use linesman_runtime::run::{
-    self as running, Application, MakePlan, PlanChoices, PlanSource, RealTime, RunControls,
-    SessionOptions,
+    self as running, Application, MakePlan, NOTES, Note, PlanChoices, PlanSource, RealTime,
+    RunControls, SessionOptions,
 };
 use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
 use linesman_runtime::transport::{Cards, Pace, SegmentTransport, Transport};
 use linesman_runtime::wiring::Wiring;
 use linesman_sim::segment::Segment as VirtualSegment;
-use linesman_sim::segment_file::SegmentFile;
+use linesman_sim::segment_file::{FaultEntry, SegmentFile};
+use linesman_sim::truth::FaultId;
 
 use crate::{Error, Io, Next, Plan, Scan};
 
@@ -55,8 +58,12 @@ fn virtual_line(path: &Path) -> Result<Where, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
     let file = SegmentFile::parse_with(&text, &NamedFiles::of(path))
         .map_err(|error| refuse(error.to_string()))?;
+    built(&file, &refuse)
+}
+
+fn built(file: &SegmentFile, refuse: &dyn Fn(String) -> Error) -> Result<Where, Error> {
     let project = file.project().map_err(|error| refuse(error.to_string()))?;
-    let segment = VirtualSegment::build(&file).map_err(|error| refuse(error.to_string()))?;
+    let segment = VirtualSegment::build(file).map_err(|error| refuse(error.to_string()))?;
     let ring = file.ring.is_some();
     let wiring = Wiring::of(&segment, &project);
     let line = SegmentTransport::new(segment, wiring, ring, Pace::Free)
@@ -172,6 +179,43 @@ impl RunOptions {
 }
 
 impl Segment {
+    /// Opens a virtual segment that a program has made, in virtual time that goes as fast as the work is done.
+    ///
+    /// # Errors
+    /// When it cannot be built: an unknown type, a port that is used twice.
+    pub fn simulated(file: &SegmentFile) -> Result<Self, Error> {
+        let line = built(file, &Error::Segment)?;
+        Ok(Self { line, place: format!("sim:{}", file.name), stop: Stop::default() })
+    }
+
+    /// Breaks a virtual segment. The times of the fault count from now on.
+    ///
+    /// # Errors
+    /// On a card, or where the segment has no such place.
+    pub fn inject(&mut self, fault: &FaultEntry) -> Result<FaultId, Error> {
+        let (line, refuse) = (self.simulation()?, |why: String| Error::Segment(why));
+        let now = line.now();
+        line.segment_mut().inject(now, fault).map_err(|error| refuse(error.to_string()))
+    }
+
+    /// Ends a fault of a virtual segment.
+    ///
+    /// # Errors
+    /// On a card.
+    pub fn heal(&mut self, fault: FaultId) -> Result<(), Error> {
+        let line = self.simulation()?;
+        let now = line.now();
+        line.segment_mut().heal(now, fault);
+        Ok(())
+    }
+
+    fn simulation(&mut self) -> Result<&mut SegmentTransport, Error> {
+        match &mut self.line {
+            Where::Virtual(line) => Ok(line),
+            Where::Cards(_) => Err(Error::NotSimulated { given: self.place.clone() }),
+        }
+    }
+
     /// Finds out what is there. SubDevices get station addresses, and keep their states.
     ///
     /// # Errors
@@ -232,6 +276,51 @@ impl Segment {
         cycle: RunOptions,
         application: impl Application,
     ) -> Result<RunReport, Error> {
+        // Nobody listens to notes here; they go nowhere.
+        let (notes, _) = mpsc::sync_channel(1);
+        self.run_session(plan, cycle, application, None, notes)
+    }
+
+    /// The same with the diagnosis beside it, on a thread of its own: `tell` is called for each finding that opens, is
+    /// confirmed, or closes, and [`RunReport::diagnosis`] has the whole answer at the end. The cycle never waits for
+    /// either.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn run_diagnosed(
+        &mut self,
+        plan: Plan,
+        cycle: RunOptions,
+        application: impl FnMut(&mut Io<'_>) -> Next,
+        mut tell: impl FnMut(&Event) + Send,
+    ) -> Result<RunReport, Error> {
+        let setup = Setup {
+            input: InputKind::Driven,
+            exchange: plan.plan.exchange(),
+            source: self.place.clone(),
+            ..Setup::default()
+        };
+        let (notes, heard): (SyncSender<Note>, Receiver<Note>) = mpsc::sync_channel(NOTES);
+        thread::scope(|scope| {
+            scope.spawn(move || {
+                for note in heard {
+                    if let Note::Finding(event) = note {
+                        tell(&event);
+                    }
+                }
+            });
+            self.run_session(plan, cycle, application, Some(setup), notes)
+        })
+    }
+
+    fn run_session(
+        &mut self,
+        plan: Plan,
+        cycle: RunOptions,
+        application: impl Application,
+        diagnose: Option<Setup>,
+        notes: SyncSender<Note>,
+    ) -> Result<RunReport, Error> {
         let mut plan = if cycle.clocks { plan.clocked(cycle.time)? } else { plan.plan };
         // The first task is the application's; an imported one keeps the times of its others.
         if let Some(task) = plan.tasks.first_mut() {
@@ -245,10 +334,8 @@ impl Segment {
             real_time: matches!(self.line, Where::Cards(_)).then_some(cycle.real_time),
             allowed_misses: Some(cycle.misses),
             hold: cycle.hold,
-            diagnose: None,
+            diagnose,
         };
-        // Nobody listens to notes here; they go nowhere.
-        let (notes, _) = mpsc::sync_channel(1);
         let wanted = PlanSource::Plan(Box::new(plan));
         let line = self.line.line();
         let beside = RunControls { stop: &self.stop, notes, socket: None };

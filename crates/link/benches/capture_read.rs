@@ -1,7 +1,8 @@
 //! Frames a second that the capture reader delivers: small frames, the hardest case.
 //!
-//! `cargo bench -p linesman-link`. The goal is well over 5 million frames a second, so that reading
-//! is a small part of judging a capture 20 times as fast as tshark dissects it (42,000 frames/s).
+//! `cargo bench -p linesman-link --features packed-input`. The goal is well over 5 million frames a
+//! second, so that reading is a small part of judging a capture 20 times as fast as tshark dissects
+//! it (42,000 frames/s).
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that fails may panic")]
 

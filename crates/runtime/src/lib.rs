@@ -12,6 +12,7 @@ pub mod capture;
 pub mod control;
 mod control_socket;
 pub mod drive;
+#[cfg(feature = "event-log")]
 pub mod event_log;
 pub mod host_watch;
 pub mod listen;
@@ -27,6 +28,7 @@ pub mod selector;
 pub mod serve;
 pub mod service;
 pub mod stop;
+#[cfg(feature = "journald")]
 pub mod system_log;
 pub mod transport;
 pub mod truth_writer;

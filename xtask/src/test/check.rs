@@ -23,11 +23,11 @@ pub(crate) struct CheckOptions {
 
 /// Files outside the crates that tests of a crate read, or that are compiled into it; the first that fits counts.
 const READ_BY: &[(&str, &[&str])] = &[
-    ("scenarios/observations/", &["diagnosis", "linesman"]),
+    ("scenarios/observations/", &["diagnosis", "cli"]),
     ("scenarios/", &["lab"]),
-    ("docs/guide/", &["linesman"]),
-    ("docs/findings/", &["linesman"]),
-    ("docs/GLOSSARY.md", &["linesman"]),
+    ("docs/guide/", &["cli"]),
+    ("docs/findings/", &["cli"]),
+    ("docs/GLOSSARY.md", &["cli"]),
 ];
 
 /// Files that every crate is built with.
@@ -224,7 +224,7 @@ mod tests {
             ("proto", &[][..]),
             ("sim", &["proto"]),
             ("lab", &["proto", "sim"]),
-            ("linesman", &["lab"]),
+            ("cli", &["lab"]),
             ("xtask", &[]),
         ];
         Crates(needs.iter().map(|(name, needs)| ((*name).to_owned(), self::names(needs))).collect())
@@ -238,7 +238,7 @@ mod tests {
     fn file_of_a_crate_or_read_by_its_tests_changes_that_crate() {
         assert_eq!(of(&["crates/sim/src/a.rs", "xtask/src/b.rs"]), names(&["sim", "xtask"]));
         assert_eq!(of(&["fuzz/src/a.rs"]), names(&[]), "no crate of this workspace");
-        assert_eq!(of(&["scenarios/a.md", "docs/guide/b.md"]), names(&["lab", "linesman"]));
+        assert_eq!(of(&["scenarios/a.md", "docs/guide/b.md"]), names(&["lab", "cli"]));
         assert_eq!(of(&["README.md", "crates/gone/src/a.rs"]), names(&[]));
     }
 
@@ -255,8 +255,8 @@ mod tests {
     #[test]
     fn dependents_are_followed_to_the_end_without_the_changed_ones() {
         let dependents = |changed| crates().dependents(&names(changed));
-        assert_eq!(dependents(&["sim"]), names(&["lab", "linesman"]));
-        assert_eq!(dependents(&["proto", "lab"]), names(&["linesman", "sim"]));
+        assert_eq!(dependents(&["sim"]), names(&["lab", "cli"]));
+        assert_eq!(dependents(&["proto", "lab"]), names(&["cli", "sim"]));
         assert_eq!(dependents(&["xtask"]), names(&[]));
     }
 

@@ -73,7 +73,7 @@ pub(super) fn ethercrab(context: &Context<'_>) -> Result<PathBuf> {
 fn latency(context: &Context<'_>) -> Result<()> {
     // With the binary's package, so that cargo takes the libraries that it built for the binary.
     let arguments =
-        ["bench", "-p", "linesman", "-p", "linesman-runtime", "--bench", "answer_over_veth"];
+        ["bench", "-p", "linesman-cli", "-p", "linesman-runtime", "--bench", "answer_over_veth"];
     let ran = context.command("interop-latency", cargo(), &arguments).limit(900).run()?;
     for line in ran.output.lines().filter(|line| line.contains("of the reflector")) {
         println!("    {line}");

@@ -30,7 +30,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
         println!("    {line}");
     }
     // What a cycle costs on a card, as a share of bare sending and receiving on the same CPU.
-    let floor = ["bench", "-p", "linesman", "-p", "linesman-runtime", "--bench", "round_trips"];
+    let floor = ["bench", "-p", "linesman-cli", "-p", "linesman-runtime", "--bench", "round_trips"];
     let trips = context.command("round-trips", cargo(), &floor).limit(900).run()?;
     for line in trips.output.lines().filter(|line| line.contains("µs")) {
         println!("    {line}");

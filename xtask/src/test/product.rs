@@ -14,8 +14,9 @@ pub(super) fn binary(context: &Context<'_>) -> PathBuf {
 
 /// Builds it; what follows needs it.
 pub(super) fn release(context: &Context<'_>) -> Result<Outcome> {
-    let ran =
-        context.command("release", cargo(), &["build", "--release", "--package=linesman"]).run()?;
+    let ran = context
+        .command("release", cargo(), &["build", "--release", "--package=linesman-cli"])
+        .run()?;
     if !ran.success() {
         return Ok(Outcome::Failed { count: 0, why: ran.explain() });
     }

@@ -7,7 +7,7 @@ use crate::project::Project;
 
 macro_rules! plan {
     ($file:literal) => {
-        plan(include_str!(concat!("../../../linesman/tests/data/plan/", $file)))
+        plan(include_str!(concat!("../../../cli/tests/data/plan/", $file)))
     };
 }
 

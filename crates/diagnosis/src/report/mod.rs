@@ -9,6 +9,7 @@ pub mod coverage;
 pub mod device;
 pub mod main_device;
 pub mod number;
+mod place_text;
 pub(crate) mod reading;
 
 use linesman_config::fault::{Class, FaultName};

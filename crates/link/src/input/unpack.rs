@@ -1,23 +1,20 @@
 //! Packed inputs: gzip, xz, zstd, told by their first bytes.
 
-use std::io::{self, BufReader, Read};
+use std::io::{self, Read};
 
-use flate2::bufread::MultiGzDecoder;
-use liblzma::bufread::XzDecoder;
-use liblzma::stream::{CONCATENATED, Stream};
+#[cfg(feature = "packed-input")]
+#[path = "unpack/decoder.rs"]
+mod decoder;
+#[cfg(not(feature = "packed-input"))]
+#[path = "unpack/no_decoder.rs"]
+mod decoder;
 
 const GZIP: &[u8] = b"\x1F\x8B";
 const XZ: &[u8] = b"\xFD7zXZ\0";
 const ZSTD: &[u8] = b"\x28\xB5\x2F\xFD";
 
-/// Most memory for unpacking xz, in bytes; `xz -9` needs 65 MiB.
-const XZ_MEMORY: u64 = 128 * 1024 * 1024;
-/// Largest window for unpacking zstd, as a power of 2; `zstd --long` takes 27.
-const ZSTD_WINDOW_LOG: u32 = 27;
 /// So many first bytes tell what an input is, however slowly the others come.
 const ENOUGH: usize = 8;
-/// Packed bytes that are fetched in one go.
-const FETCHED: usize = 64 * 1024;
 
 /// The first bytes of a source once it is unpacked, at least `len` where it has so many, and all of it
 /// from the first byte on.
@@ -36,18 +33,12 @@ enum Packing {
 }
 
 fn unpacked(head: &[u8], stream: Box<dyn Read + Send>) -> Packing {
-    let packed = |stream| BufReader::with_capacity(FETCHED, stream);
-    let opened: io::Result<Box<dyn Read + Send>> = if head.starts_with(GZIP) {
-        Ok(Box::new(MultiGzDecoder::new(packed(stream))))
+    let opened = if head.starts_with(GZIP) {
+        decoder::gzip(stream)
     } else if head.starts_with(XZ) {
-        Stream::new_stream_decoder(XZ_MEMORY, CONCATENATED)
-            .map(|decoder| Box::new(XzDecoder::new_stream(packed(stream), decoder)) as _)
-            .map_err(io::Error::from)
+        decoder::xz(stream)
     } else if head.starts_with(ZSTD) {
-        zstd::Decoder::with_buffer(packed(stream)).and_then(|mut decoder| {
-            decoder.window_log_max(ZSTD_WINDOW_LOG)?;
-            Ok(Box::new(decoder) as _)
-        })
+        decoder::zstd(stream)
     } else {
         return Packing::None(stream);
     };

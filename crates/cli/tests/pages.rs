@@ -168,7 +168,7 @@ fn the_pages_are_up_to_date() {
     }
     assert!(
         stale.is_empty(),
-        "{stale:?}: run `LINESMAN_WRITE_PAGES=1 cargo test -p linesman --test pages`"
+        "{stale:?}: run `LINESMAN_WRITE_PAGES=1 cargo test -p linesman-cli --test pages`"
     );
 }
 

@@ -1,6 +1,6 @@
 //! Speed of `linesman diagnose` on a capture, with tshark on the same file beside it.
 //!
-//! `cargo bench -p linesman`. The capture is made here: a plant of 30 SubDevices in the lab, brought
+//! `cargo bench -p linesman-cli`. The capture is made here: a plant of 30 SubDevices in the lab, brought
 //! to OP and run until there are enough frames. Both programs then read it in turns; what counts is
 //! the ratio of their best times, since a machine has slow moments and no fast ones.
 

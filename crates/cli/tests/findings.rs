@@ -69,7 +69,7 @@ fn every_page_has_a_case_that_fires_and_a_look_alike_that_does_not() {
     for story in files(&house().join("scenarios"), "md") {
         shown.story(&story);
     }
-    for folder in ["crates/diagnosis/tests", "crates/linesman/tests"] {
+    for folder in ["crates/diagnosis/tests", "crates/cli/tests"] {
         for test in files(&house().join(folder), "rs") {
             shown.test(&test);
         }

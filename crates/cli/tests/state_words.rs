@@ -7,7 +7,7 @@ use linesman::{DeviceId, DeviceState};
 use tempfile::TempDir;
 
 #[allow(dead_code, unreachable_pub, reason = "it is a program of its own, too")]
-#[path = "../examples/watched.rs"]
+#[path = "../../linesman/examples/watched.rs"]
 mod watched;
 
 /// Three terminals share one datagram; the last one loses its supply after a second.

@@ -100,7 +100,7 @@ fn no_text_says_subdevice_before_a_label() {
     }
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut found = Vec::new();
-    for name in ["config", "diagnosis", "linesman", "maindevice", "runtime"] {
+    for name in ["cli", "config", "diagnosis", "linesman", "maindevice", "runtime"] {
         look(&crates.join(name).join("src"), &mut found);
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
