@@ -298,6 +298,8 @@ impl Segment {
             input: InputKind::Driven,
             exchange: plan.plan.exchange(),
             source: self.place.clone(),
+            host_counters: true,
+            probes: true,
             ..Setup::default()
         };
         let (notes, heard): (SyncSender<Note>, Receiver<Note>) = mpsc::sync_channel(NOTES);
