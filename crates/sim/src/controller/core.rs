@@ -19,11 +19,12 @@ use super::kind::ControllerKind;
 use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
 use super::phy::Phys;
-use super::port_event::Queue;
+use super::port_event::QueuedEvent;
 use super::shadow::Shadow;
 use super::sii::Sii;
 use super::sync_manager::{self, SyncManagers};
 use super::watchdog::{Watchdog, WatchdogExpiry};
+use crate::event_queue::EventQueue;
 use crate::hardware::PortKind;
 
 /// All that a MainDevice sees.
@@ -34,7 +35,8 @@ pub(super) struct Core {
     pub(super) memory: Memory,
     pub(super) rights: Arc<Rights>,
     pub(super) loops: Loops,
-    pub(super) queue: Queue,
+    /// What happens at its ports.
+    pub(super) queue: EventQueue<QueuedEvent>,
     pub(super) fmmus: Fmmus,
     pub(super) sync_managers: SyncManagers,
     pub(super) sii: Sii,
@@ -120,7 +122,7 @@ impl Core {
             memory: Memory::new(&hardware),
             rights: hardware.rights(ClockUnits::default()),
             loops: Loops::new(&hardware),
-            queue: Queue::default(),
+            queue: EventQueue::default(),
             fmmus: Fmmus::new(),
             sync_managers: SyncManagers::new(Features(hardware.features).sequential_mode()),
             sii: Sii::new(sii, &hardware),

@@ -119,11 +119,11 @@ impl Core {
         .flatten()
         .filter(|(at, _)| *at <= when)
         .peekable();
-        for (at, event) in self.queue.until(when) {
+        for (at, event) in self.queue.iter().take_while(|(at, _)| *at <= when) {
             while let Some((_, control)) = rewrites.next_if(|(rewrite, _)| *rewrite < at) {
                 loops.rewrite(control);
             }
-            loops.apply(event);
+            loops.apply(*event);
         }
         for (_, control) in rewrites {
             loops.rewrite(control);
