@@ -46,7 +46,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     if !model.devices.iter().any(feeds) {
         return;
     }
-    let is_whole = usize::from(model.traffic.positions_seen) >= tree.len();
+    let is_whole = usize::from(model.traffic.broadcasts.positions()) >= tree.len();
     if !is_whole || !model.devices.iter().all(is_as_planned) || super::wiring::judges(model) {
         // Whoever is wired otherwise than planned is fed otherwise, too: first things first.
         return;

@@ -78,7 +78,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let traffic = &model.traffic;
     conditions.extend(told(view));
     // Of frames that were cut off nobody knows whether they were answered.
-    if traffic.is_one_sided() || traffic.datagrams_cut * 2 > traffic.frames {
+    if traffic.is_one_sided() || traffic.recording.cut() * 2 > traffic.recording.frames() {
         return;
     }
     // One condition: the latest silence, or the one that lasts.
@@ -86,7 +86,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         Some(ended) => {
             silence.frames >= CERTAIN
                 && ended.since(silence.since.at) >= LINK_UP
-                && !traffic.was_badly_recorded(silence.since.at, ended)
+                && !traffic.recording.was_bad(silence.since.at, ended)
         }
         // A few at the end, where a few were lost all along, are more of the same.
         None => {
@@ -95,8 +95,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             silence.frames >= CERTAIN || is_few
         }
     };
-    let swallowed = traffic.swallowed.iter().rev().find(|silence| silence.frames >= CERTAIN);
-    let silence = traffic.silences.iter().rev().find(is_long);
+    let swallowed =
+        traffic.losses.swallowed().iter().rev().find(|silence| silence.frames >= CERTAIN);
+    let silence = traffic.losses.silences().iter().rev().find(is_long);
     if let Some(silence) = silence.into_iter().chain(swallowed).max_by_key(|one| one.since.at) {
         let is_swallowed = swallowed.is_some_and(|one| one.since == silence.since);
         let silence = &searched(model, silence);
@@ -107,7 +108,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             return;
         }
         conditions.push(vanished(view, silence, is_hole));
-    } else if traffic.answered == 0 && traffic.returned >= FEW && traffic.unanswered >= CERTAIN {
+    } else if traffic.datagrams.answered() == 0
+        && traffic.returns.count() >= FEW
+        && traffic.datagrams.unanswered() >= CERTAIN
+    {
         conditions.push(ignored(view));
     }
 }
@@ -118,7 +122,7 @@ fn told(view: &View<'_>) -> Option<Condition> {
     let silent = model.devices.iter().map(|device| device.silent);
     let silent: Vec<Seen<()>> = silent.collect::<Option<_>>()?;
     // Frames tell it themselves; how many answer a broadcast is another rule's.
-    if model.traffic.frames > 0 || model.reported.answering.is_some() {
+    if model.traffic.recording.frames() > 0 || model.reported.answering.is_some() {
         return None;
     }
     let at = silent.iter().map(|seen| seen.at).min()?;
@@ -183,7 +187,7 @@ fn nothing_was_cut(view: &View<'_>, silence: &Silence) -> bool {
 
 /// Whether other frames were lost than those of a silence, with others coming back between them.
 fn is_among_others(model: &NetworkModel, silence: &Silence) -> bool {
-    let lost = model.traffic.lost;
+    let lost = model.traffic.losses.frames();
     let share = lost.of_spell().saturating_sub(silence.frames);
     share >= FEW && share * 50 >= silence.frames
 }
@@ -191,10 +195,10 @@ fn is_among_others(model: &NetworkModel, silence: &Silence) -> bool {
 /// Nothing comes back.
 fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
     let model = view.model;
-    let was_answered = model.traffic.answered > 0;
+    let was_answered = model.traffic.datagrams.answered() > 0;
     let carrier = carrier_during(model, silence);
     let since = silence.since;
-    let is_swallowed = model.traffic.swallowed.iter().any(|one| one.since == since);
+    let is_swallowed = model.traffic.losses.swallowed().iter().any(|one| one.since == since);
     let text = if is_swallowed {
         format!(
             "from here on {} requests in a row came round as card B had sent them, and not as card A had",
@@ -233,7 +237,7 @@ fn vanished(view: &View<'_>, silence: &Silence, is_hole: bool) -> Condition {
         );
         condition = condition.shown_by(Evidence::host(spoiled.last, text));
     }
-    if was_answered && let Some(returned) = model.traffic.latest_returned {
+    if was_answered && let Some(returned) = model.traffic.returns.latest() {
         let frame = returned.frame.unwrap_or(0);
         let text = "the last frame that came back".to_owned();
         if returned.at <= since.at {
@@ -330,7 +334,9 @@ fn cut(model: &NetworkModel, at: Instant, carrier: Option<bool>, was_searched: b
     };
     let condition = condition.or_at(FaultName::NicDamaged, Place::Host, CARD);
     // Who was never seen may not be there at all.
-    match first_device(model).filter(|_| model.tree_is_planned && model.traffic.answered == 0) {
+    match first_device(model)
+        .filter(|_| model.tree_is_planned && model.traffic.datagrams.answered() == 0)
+    {
         Some(id) => condition
             .or_at(FaultName::DeviceMissing, Place::device(model.network, id), NEVER_SEEN)
             .or_at(FaultName::SupplyOff, Place::device(model.network, id), NEVER_SEEN),
@@ -412,18 +418,19 @@ fn carrier_during(model: &NetworkModel, silence: &Silence) -> Option<bool> {
 /// Whether frames were seen to leave the card itself for so long that it had a link: the system hands none to a card
 /// without one, once it knows.
 fn went_on_leaving(model: &NetworkModel, silence: &Silence) -> bool {
-    let is_host = model.traffic.senders.iter().any(|sender| sender.is_host);
+    let is_host = model.traffic.requests.senders().iter().any(|sender| sender.is_host);
     is_host && silence.last.at.since(silence.since.at) >= CARRIER_KNOWN
 }
 
 /// Frames come back as they went out.
 fn ignored(view: &View<'_>) -> Condition {
     let traffic = &view.model.traffic;
-    let first = traffic.first_unanswered;
+    let first = traffic.datagrams.first_unanswered();
     let at = first.map_or(view.now, |first| first.at);
     let text = format!(
         "{} frames came back, but no SubDevice processed any of their {} datagrams",
-        traffic.returned, traffic.unanswered
+        traffic.returns.count(),
+        traffic.datagrams.unanswered()
     );
     let frame = first.and_then(|first| first.frame).unwrap_or(0);
     Condition::new(&PAGE, first_link(view.model), FaultName::ForeignFrames, at)

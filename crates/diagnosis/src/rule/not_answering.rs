@@ -118,7 +118,7 @@ fn alone(model: &NetworkModel, device: &Device, absence: &Absence, is_cut_off: b
         condition = condition.ended(ended);
     }
     // Another tool's list says at once who is gone: those behind went with it.
-    if model.traffic.frames == 0 && !is_cut_off {
+    if model.traffic.recording.frames() == 0 && !is_cut_off {
         condition = condition.explaining(behind(model, device.id));
     }
     condition

@@ -53,19 +53,20 @@ fn ring(model: &NetworkModel) -> Option<&Tree> {
 /// How many have processed either copy of a broadcast, if both were processed although the ring is closed.
 fn split(model: &NetworkModel, tree: &Tree) -> Option<Seen<(u16, u16)>> {
     // Not one that fewer, or more, have answered to since.
-    let changed = model.traffic.broadcast_now.map(|now| now.at);
-    let split = model.traffic.broadcast_split.filter(|split| changed <= Some(split.at))?;
+    let changed = model.traffic.broadcasts.now().map(|now| now.at);
+    let split = model.traffic.broadcasts.split().filter(|split| changed <= Some(split.at))?;
     let (one, other) = split.value;
     let is_whole = usize::from(one) + usize::from(other) == tree.len();
     // Nobody is turned round while a line runs.
-    (is_whole && !model.traffic.was_processed_by_one && !is_open(model, tree)).then_some(split)
+    (is_whole && !model.traffic.broadcasts.was_processed_by_one() && !is_open(model, tree))
+        .then_some(split)
 }
 
 /// The broadcast of which all have processed the copy of card B, and nobody that of card A, though that one
 /// went round, too.
 fn exchanged(model: &NetworkModel, tree: &Tree) -> Option<Seen<Path>> {
-    let is_whole = usize::from(model.traffic.broadcast_answers) == tree.len();
-    model.traffic.processed_alone.filter(|seen| seen.value == Path::B && is_whole)
+    let is_whole = usize::from(model.traffic.broadcasts.most()) == tree.len();
+    model.traffic.broadcasts.processed_alone().filter(|seen| seen.value == Path::B && is_whole)
 }
 
 /// Whether the ring is open somewhere: both its ends have a link less than planned. Whose answers are taken

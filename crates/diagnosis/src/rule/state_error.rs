@@ -130,7 +130,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
     let is_new = view.now.since(error.status.at) < ACKNOWLEDGED_WITHIN && !view.has_ended;
     is_new
-        && view.model.traffic.frames > 0
+        && view.model.traffic.recording.frames() > 0
         && was_left_over(view.model, error)
         && error.ended.is_none()
 }

@@ -21,7 +21,7 @@ pub use address::Addresses;
 use answer::{Answer, answers};
 use count::CountDoubt;
 
-use super::{CountRise, Cyclic, Device, NetworkModel, Seen, SharedBy};
+use super::{Cyclic, Device, NetworkModel, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
 
 /// Process RAM begins here: mailboxes and process data.
@@ -108,7 +108,9 @@ impl Learner {
         let mut events = None;
         for answer in answers(exchange, request, reply) {
             let Some(answer) = answer else {
-                model.traffic.datagrams += u64::from(exchange.is_last);
+                if exchange.is_last {
+                    model.traffic.datagrams.record_judged();
+                }
                 continue;
             };
             if let Some(added) = answer.added_events() {
@@ -140,14 +142,13 @@ impl Learner {
             model.traffic.record_processed(answer.at);
         }
         if answer.is_last {
-            model.traffic.datagrams += 1;
+            let datagrams = &mut model.traffic.datagrams;
+            datagrams.record_judged();
             if is_expected && answer.sum == 0 {
-                model.traffic.unanswered += 1;
-                model.traffic.unanswered_alone += u64::from(!model.cyclic.is_empty());
                 let seen = Seen::new((), answer.at, Some(answer.frame));
-                model.traffic.first_unanswered.get_or_insert(seen);
+                datagrams.record_unanswered(seen, !model.cyclic.is_empty());
             } else if answer.sum > 0 {
-                model.traffic.answered += 1;
+                datagrams.record_answered();
             }
         }
     }
@@ -163,40 +164,25 @@ impl Learner {
         if !answer.is_last {
             return;
         }
-        let most = model.traffic.broadcast_answers;
+        let most = model.traffic.broadcasts.most();
         let is_confirmed = is_counted_twice || passed.is_none();
         if counts && self.broadcast_doubt.is_believed(answer.sum, most, is_confirmed) {
-            if answer.is_single && answer.sum > most && !model.cyclic.is_empty() {
-                let more = Seen::new(answer.sum, answer.at, Some(answer.frame));
-                let fewer = model.traffic.broadcast_now.filter(|now| now.value == most && most > 0);
-                let rise = fewer.map(|fewer| CountRise { fewer, more });
-                model.traffic.broadcast_rose = rise.or(model.traffic.broadcast_rose);
-            }
-            model.traffic.broadcast_answers = most.max(answer.sum);
-            model.traffic.broadcast_read = model.traffic.broadcast_read.max(Some(answer.at));
+            let broadcasts = &mut model.traffic.broadcasts;
             let split = (answer.sum - answer.own, answer.own);
             let is_split = split.0 > 0 && split.1 > 0;
             if is_split {
                 let seen = Seen::new(split, answer.at, Some(answer.frame));
-                model.traffic.broadcast_split = Some(seen);
+                broadcasts.record_split(seen);
             }
             if !answer.is_single && !is_split && answer.sum > 0 {
-                model.traffic.was_processed_by_one = true;
                 // A guess which card is which proves nothing here.
                 let sent_by = answer.sent_by.filter(|_| answer.knows_cards);
                 let card = if answer.own > 0 { sent_by } else { sent_by.map(Path::other) };
-                model.traffic.processed_alone =
-                    card.map(|card| Seen::new(card, answer.at, Some(answer.frame)));
+                let seen = card.map(|card| Seen::new(card, answer.at, Some(answer.frame)));
+                broadcasts.record_processed_by_one(seen);
             }
-            let is_news = model.traffic.broadcast_now.is_none_or(|known| known.value != answer.sum);
-            if is_news {
-                let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
-                if model.traffic.broadcast_first_low.is_none()
-                    && answer.sum < model.traffic.broadcast_answers
-                {
-                    model.traffic.broadcast_first_low = Some(seen);
-                }
-                model.traffic.broadcast_now = Some(seen);
+            let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
+            if broadcasts.record(seen, answer.is_single && !model.cyclic.is_empty()) {
                 model.touch();
             }
             if passed.is_none() {
@@ -351,22 +337,20 @@ fn lost(model: &mut NetworkModel, exchange: &Exchange<'_>, request: &FrameCopy<'
         model.touch();
     }
     if let Some(card) = exchange.copy_lost.filter(|_| !model.is_lost_by_order(request.time)) {
-        model.traffic.copies_lost[card.index()].add(1, request.time);
+        model.traffic.losses.record_copy(card, request.time);
         model.touch();
     }
     if exchange.is_copy_gone && !model.is_lost_by_order(request.time) {
-        model.traffic.copies_gone.add(1, request.time);
+        model.traffic.losses.record_copy_gone(request.time);
         model.touch();
     }
     for (index, datagram) in view.datagrams().enumerate() {
         let Ok(datagram) = datagram else { break };
-        let traffic = &mut model.traffic;
-        traffic.datagrams += 1;
+        let counts = &mut model.traffic.datagrams;
+        counts.record_judged();
         let sent = datagram.wkc().0;
         if exchange.added(index, sent, sent) == 0 && datagram.command() != Some(Command::Nop) {
-            traffic.unanswered += 1;
-            let seen = Seen::new((), request.time, Some(request.number));
-            traffic.first_unanswered.get_or_insert(seen);
+            counts.record_unanswered(Seen::new((), request.time, Some(request.number)), false);
         }
         let addressing = datagram.command().map(Command::addressing);
         if addressing == Some(Addressing::Logical) {
@@ -401,10 +385,8 @@ fn lost(model: &mut NetworkModel, exchange: &Exchange<'_>, request: &FrameCopy<'
             let ids = concerned(model, addressing, datagram.adp());
             registers::may_be_cleared(model, &ids, (datagram.ado(), datagram.data()), request.time);
         }
-        let traffic = &mut model.traffic;
         if matches!(addressing, Some(Addressing::Station | Addressing::Logical)) {
-            traffic.lost_addressed += 1;
-            traffic.lost_logical += u64::from(addressing == Some(Addressing::Logical));
+            model.traffic.datagrams.record_lost(addressing == Some(Addressing::Logical));
         }
     }
 }

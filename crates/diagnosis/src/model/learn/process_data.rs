@@ -63,7 +63,7 @@ pub(super) fn returned(model: &mut NetworkModel, latest: &mut usize, answer: &An
         if owners.iter().any(is_lower) || (!are_all && devices.iter().any(lower)) {
             return Ordered::Yes;
         }
-        let since = traffic.first.unwrap_or(answer.at);
+        let since = traffic.recording.first().unwrap_or(answer.at);
         let is_early = !are_all && answer.at.since(since) < JUST_BEGUN;
         let was_before = cyclic_before.unwrap_or(answer.at);
         if !sees_all && (is_early || traffic.may_lack(was_before, answer.at)) {

@@ -22,13 +22,14 @@ impl<'a> FoundWiring<'a> {
         ids.extend(
             model.devices.iter().map(|device| device.id).filter(|id| id.index() >= planned.len()),
         );
-        let count = usize::from(model.traffic.positions_seen);
+        let count = usize::from(model.traffic.broadcasts.positions());
         if count == 0 || count > ids.len() {
             return None;
         }
         ids.truncate(count);
         // Where positions have moved, their station addresses tell whose answers they are taken for.
-        let placed = (0..model.traffic.positions_seen).map(|at| model.by_position(Position(at)));
+        let placed =
+            (0..model.traffic.broadcasts.positions()).map(|at| model.by_position(Position(at)));
         if let Some(placed) = placed.collect::<Option<Vec<DeviceId>>>() {
             ids = placed;
         }
@@ -117,8 +118,8 @@ impl<'a> FoundWiring<'a> {
 /// Whether the ring was seen closed, with everybody in it plugged in the right way round: frames of card A are
 /// processed by all of them, and those of card B by nobody.
 fn is_closed(model: &NetworkModel) -> bool {
-    let by = model.traffic.processed_alone.map(|seen| seen.value);
-    model.traffic.was_processed_by_one && by != Some(Path::B)
+    let by = model.traffic.broadcasts.processed_alone().map(|seen| seen.value);
+    model.traffic.broadcasts.was_processed_by_one() && by != Some(Path::B)
 }
 
 /// The closed ring that these controllers form. All on its way are entered at port A, since they process the
