@@ -146,7 +146,8 @@ impl NetworkWatch {
 
     /// What makes it worth asking: frames lost, and working counters that fell.
     pub(super) fn alarms(&self) -> (u64, u64) {
-        let deficits = self.model.cyclic.iter().map(|cyclic| cyclic.deficits.len() as u64).sum();
+        let deficits =
+            self.model.cyclic.iter().map(|cyclic| cyclic.wkc.deficits().len() as u64).sum();
         (self.model.traffic.losses.frames().times, deficits)
     }
 }

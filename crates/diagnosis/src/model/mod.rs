@@ -21,6 +21,7 @@ pub mod round_trip;
 pub mod search;
 pub mod sii_image;
 pub mod traffic;
+pub mod working_counter;
 
 use std::collections::VecDeque;
 
@@ -39,7 +40,7 @@ pub use al_history::{AlChange, AlError, AlHistory, StateRequest};
 pub use clock::{ClockHistory, Reference};
 pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cycle_timing::{CycleDeviation, CycleTiming, Pause};
-pub use cyclic::{Cyclic, Deficit, Ordered, Owner};
+pub use cyclic::{Cyclic, Owner};
 pub use device::{Absence, Chip, Device, Planned, SeenIdentity, SharedAddress, SharedBy, Trouble};
 pub use dl_history::{DlChange, DlHistory};
 pub use event_field::{EventField, EventTrack};
@@ -51,6 +52,7 @@ pub use round_trip::RoundTripTimes;
 pub use search::LoopWrite;
 pub use sii_image::{Power, SiiImage};
 pub use traffic::{Silence, Traffic};
+pub use working_counter::{Deficit, Ordered, WorkingCounterHistory};
 
 /// How many changes of one kind are kept of a controller; older ones are forgotten.
 pub const CHANGES_KEPT: usize = 64;
@@ -308,7 +310,7 @@ impl NetworkModel {
     /// frames tells: before that links come as the line is brought up.
     #[must_use]
     pub fn changed_link(&self) -> Option<Seen<()>> {
-        let is_running = |at: Instant| self.cyclic.iter().any(|cyclic| cyclic.first.at < at);
+        let is_running = |at: Instant| self.cyclic.iter().any(|cyclic| cyclic.wkc.first().at < at);
         self.events.dl_status.came.filter(|came| is_running(came.at))
     }
 

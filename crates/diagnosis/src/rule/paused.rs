@@ -264,7 +264,7 @@ fn stood_still(model: &NetworkModel) -> Option<Condition> {
     }
     let went_on = |pause: &Pause| {
         model.cyclic.iter().any(|cyclic| {
-            let has_begun = cyclic.first.at <= pause.from;
+            let has_begun = cyclic.wkc.first().at <= pause.from;
             has_begun && cyclic.sent.last().is_some_and(|last| last > pause.to)
         })
     };

@@ -68,7 +68,7 @@ struct Suspects {
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     // Datagrams of one device fail together: one finding for each set of suspects.
     let mut groups: BTreeMap<Suspects, Vec<(&Cyclic, &Deficit)>> = BTreeMap::new();
-    if view.model.cyclic.iter().all(|cyclic| cyclic.deficits.is_empty()) {
+    if view.model.cyclic.iter().all(|cyclic| cyclic.wkc.deficits().is_empty()) {
         return;
     }
     let lost = LinkLosses::all(view.model);
@@ -78,7 +78,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         let judged = |deficit: &&Deficit| {
             !is_history(deficit) && !may_be_start_up(view.model, cyclic, deficit)
         };
-        for deficit in cyclic.deficits.iter().filter(judged) {
+        for deficit in cyclic.wkc.deficits().iter().filter(judged) {
             let explained = explained(conditions, deficit);
             let suspects = suspects(view, &lost, cyclic, deficit, &explained);
             groups.entry(suspects).or_default().push((cyclic, deficit));
@@ -97,7 +97,7 @@ fn may_be_start_up(model: &NetworkModel, cyclic: &Cyclic, deficit: &Deficit) -> 
             change.from.state().state() < change.to.state().state() && !change.from.error()
         })
     };
-    cyclic.low_before() == Some(deficit)
+    cyclic.wkc.low_before() == Some(deficit)
         && (model.devices.iter().any(went_up)
             || model.devices.iter().all(|device| device.al.status.is_none()))
 }

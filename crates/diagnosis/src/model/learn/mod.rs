@@ -293,7 +293,7 @@ impl Learner {
             return;
         }
         let is_news = device.answered.is_none() || device.silent.is_some();
-        if model.cyclic.iter().any(Cyclic::has_deficit) {
+        if model.cyclic.iter().any(|cyclic| cyclic.wkc.has_deficit()) {
             device.heard_short = Some(answer.at);
         }
         device.answers(answer.at, Some(answer.frame));

@@ -101,12 +101,12 @@ fn owners(model: &NetworkModel, behind: &[usize]) -> usize {
 fn lacks(model: &NetworkModel, cyclic: &Cyclic, behind: &[usize], since: Instant) -> bool {
     let own = model.owners(cyclic).filter(|owner| behind.contains(&owner.device.index()));
     let share: u16 = own.filter_map(|owner| shares(cyclic, &owner).first().copied()).sum();
-    let then = cyclic.deficits.iter().rev().find(|deficit| {
+    let then = cyclic.wkc.deficits().iter().rev().find(|deficit| {
         let at = deficit.first.at;
         at <= since + AT_ONCE && since <= at + AT_ONCE
     });
     let lacking = |deficit: &Deficit| {
-        let now = if deficit.ended.is_some() { deficit.lowest } else { cyclic.wkc.value };
+        let now = if deficit.ended.is_some() { deficit.lowest } else { cyclic.wkc.now().value };
         deficit.expected.saturating_sub(now)
     };
     share == then.map_or(0, lacking)
