@@ -22,6 +22,7 @@ use linesman_proto::register::table;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
+use crate::found_wiring;
 use crate::model::{Device, NetworkModel, Power, Seen};
 
 /// The page.
@@ -47,7 +48,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         return;
     }
     let is_whole = usize::from(model.traffic.broadcasts.positions()) >= tree.len();
-    if !is_whole || !model.devices.iter().all(is_as_planned) || super::wiring::judges(model) {
+    if !is_whole
+        || !model.devices.iter().all(is_as_planned)
+        || found_wiring::is_wired_otherwise(model)
+    {
         // Whoever is wired otherwise than planned is fed otherwise, too: first things first.
         return;
     }

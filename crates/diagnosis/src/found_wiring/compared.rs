@@ -1,17 +1,31 @@
-//! Wiring that was found, and whether a comparison with the plan says anything.
+//! Wiring that was found, laid upon the plan, and whether that says anything.
 
 use linesman_config::compare::{Comparison, Difference, Side, There, Wanted, compare, unlike};
 use linesman_proto::address::{DeviceId, Path, Position};
 use linesman_proto::port::Port;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::derive::EntryBasis;
-use linesman_proto::topology::{Reconstruction, SeenController};
+use linesman_proto::topology::{Reconstruction, SeenController, Tree};
 
-use super::FoundWiring;
 use crate::model::{Device, NetworkModel};
 
+/// What was found, as far as it is enough to be laid upon the plan.
+pub(crate) struct FoundWiring<'a> {
+    pub(crate) model: &'a NetworkModel,
+    pub(crate) planned: &'a Tree,
+    pub(crate) wanted: Vec<Wanted>,
+    pub(crate) tree: Tree,
+    pub(crate) basis: Vec<EntryBasis>,
+    /// Whose answers those of a found node are taken for: positions move with what is missing.
+    pub(crate) ids: Vec<DeviceId>,
+    pub(crate) there: Vec<There>,
+    /// When the last of it was learnt.
+    pub(crate) at: Instant,
+    pub(crate) frame: Option<u64>,
+}
+
 impl<'a> FoundWiring<'a> {
-    pub(super) fn of(model: &'a NetworkModel) -> Option<Self> {
+    pub(crate) fn of(model: &'a NetworkModel) -> Option<Self> {
         let planned = model.tree.as_ref().filter(|_| model.tree_is_planned)?;
         let is_ring = planned.closes_at().is_some();
         if !model.devices.iter().any(is_known_to_plan) || (is_ring && !is_closed(model)) {
@@ -67,7 +81,7 @@ impl<'a> FoundWiring<'a> {
         })
     }
 
-    pub(super) fn compare(&self) -> Comparison {
+    pub(crate) fn compare(&self) -> Comparison {
         if self.is_as_planned() {
             return Comparison::default();
         }
@@ -91,7 +105,7 @@ impl<'a> FoundWiring<'a> {
     }
 
     /// Whether a comparison says anything that can be relied on.
-    pub(super) fn tells(&self, comparison: &Comparison) -> bool {
+    pub(crate) fn tells(&self, comparison: &Comparison) -> bool {
         let ring = self.planned.ring_nodes();
         let is_gone = |difference: &Difference| {
             // A ring that is closed goes on behind who is missing: it is not without power, or cut off.
@@ -143,7 +157,7 @@ fn is_known_to_plan(device: &Device) -> bool {
     device.planned.is_some_and(|planned| planned.identity.is_some())
 }
 
-pub(super) fn wanted(device: Option<&Device>) -> Wanted {
+pub(crate) fn wanted(device: Option<&Device>) -> Wanted {
     let planned = device.and_then(|device| device.planned);
     planned.map_or_else(Wanted::default, |planned| Wanted {
         identity: planned.identity,
