@@ -45,7 +45,7 @@ pub(super) struct RxReasons(Option<PortMap<Instant>>);
 impl RxReasons {
     /// `are_kept` if the controller has the registers.
     pub(super) fn new(are_kept: bool) -> Self {
-        Self(are_kept.then(|| PortMap([Instant::ZERO; 4])))
+        Self(are_kept.then_some(PortMap([Instant::ZERO; 4])))
     }
 
     /// When the last frame of a port ends, to be set as one comes in; `None` where nobody keeps it.
