@@ -208,81 +208,93 @@ impl Learner {
             self.addresses.passed(model, answer.sent_by, passed, false);
         }
         let is_position = answer.effect.addressing == Addressing::Position;
-        let device = if is_position {
-            let adp = match (answer.request, self.addresses.present()) {
-                (Some(request), _) => Some(request.adp()),
-                (None, Some(present)) => Some(answer.reply.adp().wrapping_sub(present)),
-                (None, None) => None,
-            };
-            let position = adp.map(Position::from_auto_increment);
-            position.and_then(|position| self.addresses.at_position(model, position, answer))
-        } else {
-            let station = StationAddress(answer.reply.adp());
-            self.addresses.at_station(model, station, answer.sum > 0)
-        };
-        let Some(id) = device else {
+        let station = StationAddress(answer.reply.adp());
+        let Some(id) = self.addressed(model, answer, is_position) else {
             if !is_position && answer.is_last && answer.sum == 0 && answer.is_everywhere() {
-                let seen = Seen::new((), answer.at, Some(answer.frame));
-                let station = StationAddress(answer.reply.adp());
-                self.addresses.asked_in_vain(model, station, seen);
-                model.touch();
+                self.asked_in_vain(model, answer);
             }
             return;
         };
         if answer.sum > 0 && !is_position {
-            self.addresses.answers_at_last(model, StationAddress(answer.reply.adp()));
+            self.addresses.answers_at_last(model, station);
         }
         let Some(device) = model.devices.get_mut(id.index()) else { return };
         if answer.effect.multiple_write {
             clock::handed_round(model, id, answer);
-            return;
-        }
-        if !is_position && answer.sum > answer.command.increment(true, true) {
+        } else if !is_position && answer.sum > answer.command.increment(true, true) {
             // Two controllers have answered: what they say is mixed, and nothing can be learnt of it.
             device.answers(answer.at, Some(answer.frame));
             if answer.is_last {
                 let shared = SharedBy::WorkingCounter(answer.sum);
-                let station = StationAddress(answer.reply.adp());
                 device.shares_address(station, Seen::new(shared, answer.at, Some(answer.frame)));
                 model.touch();
             }
+        } else if answer.sum == 0 {
+            self.unanswered_by(model, id, answer);
+        } else if answer.own > 0 {
+            // Otherwise the other copy was answered, and taught what there was to learn.
+            self.answered_by(model, id, answer);
+        }
+    }
+
+    /// The controller that a datagram is for.
+    fn addressed(
+        &mut self,
+        model: &mut NetworkModel,
+        answer: &Answer<'_>,
+        is_position: bool,
+    ) -> Option<DeviceId> {
+        if !is_position {
+            let station = StationAddress(answer.reply.adp());
+            return self.addresses.at_station(model, station, answer.sum > 0);
+        }
+        let adp = match (answer.request, self.addresses.present()) {
+            (Some(request), _) => request.adp(),
+            (None, Some(present)) => answer.reply.adp().wrapping_sub(present),
+            (None, None) => return None,
+        };
+        self.addresses.at_position(model, Position::from_auto_increment(adp), answer)
+    }
+
+    /// Nobody answers to the station address of a datagram.
+    fn asked_in_vain(&mut self, model: &mut NetworkModel, answer: &Answer<'_>) {
+        let seen = Seen::new((), answer.at, Some(answer.frame));
+        self.addresses.asked_in_vain(model, StationAddress(answer.reply.adp()), seen);
+        model.touch();
+    }
+
+    /// A datagram to a controller came back as it went out.
+    fn unanswered_by(&mut self, model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) {
+        let Some(device) = model.devices.get_mut(id.index()) else { return };
+        if answer.is_last && answer.ado >= FIRST_RAM && answer.effect.writes {
+            coe::written(model, id, answer, false);
             return;
         }
-        if answer.sum == 0 {
-            if answer.is_last && answer.ado >= FIRST_RAM && answer.effect.writes {
-                coe::written(model, id, answer, false);
-                return;
-            }
-            if answer.ado >= FIRST_RAM && answer.effect.reads {
-                device.mailbox.polled = Some(answer.at);
-                return;
-            }
-            if answer.is_last && registers::untaken(device, answer) {
-                // Whether it is there, others tell: who does not fetch requests takes no new one.
-                return;
-            }
-            let is_asked = answer.is_last && answer.is_everywhere();
-            if is_asked && device.answered.is_none() && !is_position {
-                let seen = Seen::new((), answer.at, Some(answer.frame));
-                let station = StationAddress(answer.reply.adp());
-                self.addresses.asked_in_vain(model, station, seen);
+        if answer.ado >= FIRST_RAM && answer.effect.reads {
+            device.mailbox.polled = Some(answer.at);
+            return;
+        }
+        if answer.is_last && registers::untaken(device, answer) {
+            // Whether it is there, others tell: who does not fetch requests takes no new one.
+            return;
+        }
+        if !answer.is_last || !answer.is_everywhere() {
+            return;
+        }
+        if device.answered.is_some() {
+            let is_news = device.silent.is_none();
+            device.is_silent(answer.at, Some(answer.frame));
+            if is_news {
                 model.touch();
-                return;
             }
-            if is_asked && device.answered.is_some() {
-                let is_news = device.silent.is_none();
-                device.is_silent(answer.at, Some(answer.frame));
-                if is_news {
-                    model.touch();
-                }
-            }
-            return;
+        } else if answer.effect.addressing != Addressing::Position {
+            self.asked_in_vain(model, answer);
         }
-        if answer.own == 0 {
-            // The other copy was answered, and taught what there was to learn.
-            return;
-        }
-        if is_position && !self.addresses.is_settled() {
+    }
+
+    /// A controller has processed a datagram.
+    fn answered_by(&mut self, model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) {
+        if answer.effect.addressing == Addressing::Position && !self.addresses.is_settled() {
             // Who is where is a guess so far: only that counts which puts it right.
             if answer.effect.reads {
                 self.addresses.read(model, id, answer);
@@ -292,6 +304,7 @@ impl Learner {
             }
             return;
         }
+        let Some(device) = model.devices.get_mut(id.index()) else { return };
         let is_news = device.answered.is_none() || device.silent.is_some();
         if model.cyclic.iter().any(|cyclic| cyclic.wkc.has_deficit()) {
             device.heard_short = Some(answer.at);
