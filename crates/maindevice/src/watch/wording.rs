@@ -21,7 +21,7 @@ pub(super) fn of(
     plan: &Plan,
     network_status: &NetworkStatus,
 ) -> Vec<LogEntry> {
-    let words = Words { at, plan, network_status };
+    let words = EntryWords { at, plan, network_status };
     match event {
         Event::AbnormalState { id, .. } => {
             words.states(event, Some(*id), Severity::Error, EntryKind::AbnormalState)
@@ -107,13 +107,13 @@ pub(super) fn of(
 }
 
 /// What the words of an entry need beside the event.
-struct Words<'a> {
+struct EntryWords<'a> {
     at: Instant,
     plan: &'a Plan,
     network_status: &'a NetworkStatus,
 }
 
-impl Words<'_> {
+impl EntryWords<'_> {
     /// An entry about a SubDevice.
     fn about(&self, id: DeviceId, severity: Severity, kind: EntryKind, text: String) -> LogEntry {
         let text = format!("{}{text}", name(self.plan, id));

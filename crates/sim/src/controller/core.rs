@@ -18,7 +18,7 @@ use super::implemented::ClockUnits;
 use super::kind::ControllerKind;
 use super::memory::{Memory, Rights, at};
 use super::phy::Phys;
-use super::port::Ports;
+use super::port::ControllerPorts;
 use super::rx_code::RxReasons;
 use super::shadow::Shadow;
 use super::sii::Sii;
@@ -33,7 +33,7 @@ pub(super) struct Core {
     pub(super) hardware: ControllerKind,
     pub(super) memory: Memory,
     pub(super) rights: Arc<Rights>,
-    pub(super) ports: Ports,
+    pub(super) ports: ControllerPorts,
     pub(super) fmmus: Fmmus,
     pub(super) sync_managers: SyncManagers,
     pub(super) sii: Sii,
@@ -115,7 +115,7 @@ impl Core {
             id,
             memory: Memory::new(&hardware),
             rights: hardware.rights(ClockUnits::default()),
-            ports: Ports::new(&hardware),
+            ports: ControllerPorts::new(&hardware),
             fmmus: Fmmus::new(),
             sync_managers: SyncManagers::new(Features(hardware.features).sequential_mode()),
             sii: Sii::new(sii, &hardware),

@@ -20,7 +20,7 @@ const TEMPORARY_LOOPS: Span = Span::s(1);
 
 /// Ports: how their loops stand, and what is to happen to them.
 #[derive(Clone, Debug)]
-pub(super) struct Ports {
+pub(super) struct ControllerPorts {
     pub(super) loops: Loops,
     /// What happens at the ports, told by the wire or by frames that end.
     pub(super) queue: EventQueue<QueuedEvent>,
@@ -32,7 +32,7 @@ pub(super) struct Ports {
     link_lost_at: PortMap<Option<Instant>>,
 }
 
-impl Ports {
+impl ControllerPorts {
     /// No links, modes as after a reset.
     pub(super) fn new(hardware: &Hardware) -> Self {
         Self {

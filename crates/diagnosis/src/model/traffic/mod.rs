@@ -16,7 +16,7 @@ pub use broadcasts::{BroadcastReads, CountRise};
 pub use datagrams::DatagramCounts;
 pub use foreign::ForeignFrames;
 pub use losses::LostFrames;
-pub use recording::Recording;
+pub use recording::RecordedFrames;
 pub use returns::{Requests, Returns};
 pub use silence::Silence;
 
@@ -29,7 +29,7 @@ use crate::observe::Questions;
 #[derive(Clone, Default, Debug)]
 pub struct Traffic {
     /// What was recorded, and what the recording lacks.
-    pub recording: Recording,
+    pub recording: RecordedFrames,
     /// Frames on their way out, each once.
     pub requests: Requests,
     /// Frames that came back.

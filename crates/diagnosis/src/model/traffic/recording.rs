@@ -17,7 +17,7 @@ const OPEN_LINK: Span = Span::ms(100);
 
 /// Frames that were recorded, and those that were not. The intake of frames fills it in.
 #[derive(Clone, Default, Debug)]
-pub struct Recording {
+pub struct RecordedFrames {
     frames: u64,
     is_direction_known: bool,
     cut: u64,
@@ -35,7 +35,7 @@ pub struct Recording {
     quiet: VecDeque<Pause>,
 }
 
-impl Recording {
+impl RecordedFrames {
     // ---- what the intake tells ----
 
     /// A frame was seen, on its way out or back.
