@@ -34,6 +34,11 @@ pub trait DriverHooks {
     fn event(&mut self, now: Instant, event: Event, main: &mut MainDevice);
     /// Everything up to `now` is done: time for commands. Says whether to go on.
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool;
+    /// Whether the last [`turn`](Self::turn) waits for somebody outside of the driver. Nothing is sent until it is
+    /// taken again.
+    fn is_paused(&self) -> bool {
+        false
+    }
     /// When [`turn`](Self::turn) has something to do.
     fn poll_timeout(&self) -> Option<Instant>;
     /// The thread came so late for the begin of a cycle.
@@ -91,7 +96,7 @@ impl<L: Transport> Driver<L> {
         self.line.now()
     }
 
-    /// Drives the line until `until`, `stop`, or the hooks have enough.
+    /// Drives the line until `until`, `stop`, or the hooks have enough or pause; after a pause it goes on where it was.
     ///
     /// # Errors
     /// When an interface vanished, was switched off, or the kernel refuses something else.
@@ -106,6 +111,7 @@ impl<L: Transport> Driver<L> {
             self.receive(now, hooks)?;
             if let Some(due) = self.main.poll_cycle_timeout()
                 && due <= now
+                && !hooks.is_paused()
             {
                 let late = now.since(due);
                 self.line.note_late(late);
@@ -116,6 +122,9 @@ impl<L: Transport> Driver<L> {
                 hooks.event(now, event, &mut self.main);
             }
             let goes_on = hooks.turn(now, &mut self.main);
+            if hooks.is_paused() {
+                return Ok(());
+            }
             self.send(now, hooks)?;
             if !goes_on || stop.is_set() || now >= until {
                 return Ok(());

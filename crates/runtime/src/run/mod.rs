@@ -23,7 +23,7 @@ pub use plan_choices::PlanChoices;
 pub use real_time::RealTime;
 pub use scan::scan;
 pub use session::{
-    MakePlan, NOTES, PlanSource, RunControls, RunOutcome, RunSession, SessionOptions, run,
-    run_observed,
+    MakePlan, NOTES, PlanSource, RunControls, RunOutcome, RunSession, SessionOptions, StartedRun,
+    run, run_observed, start, start_observed,
 };
 pub use shared::Shared;

@@ -1,32 +1,34 @@
 //! Session of a run: finds the line, makes the plan, starts, calls the application, stops.
 
 mod ending;
+mod started;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError};
 
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{DevicePlan, IoAt, Plan};
-use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, Probe, Setup};
-use linesman_maindevice::{Event, MainDevice, Options, ProbeRequest, Target};
+use linesman_diagnosis::{Asked, FrameSeen, HostObservation, Probe, Setup};
+use linesman_maindevice::{Event, MainDevice, ProbeRequest, Target};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
-use super::bring_up::BringUpReport;
-use super::diagnosis_thread::{DiagnosisObserver, DiagnosisOutput, judge};
+use super::diagnosis_thread::DiagnosisObserver;
 use super::io::{Application, Io, Next};
 use super::note::{Note, RunError};
 use super::real_time::{GrantedRealTime, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
 use super::scan;
-use super::tap::{FrameSummary, Tap, tap};
-use crate::drive::{Driver, DriverHooks};
+use super::tap::{FrameSummary, Tap};
+use crate::drive::DriverHooks;
 use crate::part::PartFailure;
 use crate::serve::lateness::Lateness;
 use crate::service::ServiceSocket;
 use crate::stop::Stop;
 use crate::transport::Transport;
+
+pub use started::{StartedRun, start, start_observed};
 
 /// That the diagnosis does not keep up is told no more often than this.
 const MISSED_EVERY: Span = Span::s(10);
@@ -62,13 +64,10 @@ pub struct SessionOptions {
     pub diagnose: Option<Setup>,
 }
 
-/// Room for what the diagnosis would like to have read.
-const PROBES: usize = 64;
-
 /// Room for notes that are on their way to whoever listens.
 pub const NOTES: usize = 65_536;
 
-/// A session of a MainDevice. It is the [`DriverHooks`] of a [`Driver`].
+/// A session of a MainDevice. It is the [`DriverHooks`] of a [`Driver`](crate::drive::Driver).
 pub struct RunSession<A> {
     wanted: Option<PlanSource>,
     application: A,
@@ -97,6 +96,11 @@ pub struct RunSession<A> {
     begun_at: Instant,
     granted: GrantedRealTime,
     on: String,
+    /// The caller takes the turn of the application behind it; and it is the caller's turn.
+    pauses: bool,
+    paused: bool,
+    /// The caller gave no outputs in its turn.
+    old: bool,
 }
 
 impl<A: Application> RunSession<A> {
@@ -200,6 +204,10 @@ impl<A: Application> RunSession<A> {
 
     /// Calls the application when it is its turn.
     fn call(&mut self, now: Instant, main: &mut MainDevice) {
+        if std::mem::take(&mut self.paused) {
+            let old = std::mem::take(&mut self.old);
+            return self.give_outputs(now, main, old);
+        }
         // The first task is that of the application; others exchange beside it.
         let exchanged = main.take_exchanged(0);
         let missed = main.statistics().cycles_missed;
@@ -217,11 +225,20 @@ impl<A: Application> RunSession<A> {
         if !due {
             return;
         }
-        let mut io = Io { main, now, missed, withheld: self.withheld, old: false };
+        let mut io = Io { main: &mut *main, now, missed, withheld: self.withheld, old: false };
         if self.application.cycle(&mut io) == Next::Stop {
             self.ended = true;
         }
-        if !io.old && !self.application.is_idle() {
+        let old = io.old;
+        self.paused = self.pauses && !self.ended;
+        if !self.paused {
+            self.give_outputs(now, main, old);
+        }
+    }
+
+    /// Outputs count as given anew unless they are old.
+    fn give_outputs(&mut self, now: Instant, main: &mut MainDevice, old: bool) {
+        if !old && !self.application.is_idle() {
             main.outputs_mut();
             if std::mem::take(&mut self.held) {
                 main.release(now);
@@ -272,6 +289,7 @@ impl<A: Application> DriverHooks for RunSession<A> {
                 if let Some(socket) = &mut self.socket {
                     socket.served(*ticket, result);
                 }
+                self.application.served(*ticket, result);
                 return;
             }
             _ => {}
@@ -311,6 +329,10 @@ impl<A: Application> DriverHooks for RunSession<A> {
             self.call(now, main);
         }
         self.failure.is_none() && !self.ended
+    }
+
+    fn is_paused(&self) -> bool {
+        self.paused
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
@@ -356,8 +378,9 @@ pub fn run<L: Transport, A: Application>(
     options: &SessionOptions,
     beside: RunControls<'_>,
 ) -> Result<RunOutcome, RunError> {
-    let observer = |setup| Box::new(Engine::new(setup)) as Box<dyn DiagnosisObserver>;
-    run_observed(line, wanted, application, options, beside, observer)
+    let mut started = start(line, wanted, application, options, beside)?;
+    started.drive();
+    started.end()
 }
 
 /// The same with a diagnosis of one's own, made of [`SessionOptions::diagnose`].
@@ -372,84 +395,7 @@ pub fn run_observed<L: Transport, A: Application>(
     beside: RunControls<'_>,
     observer: impl FnOnce(Setup) -> Box<dyn DiagnosisObserver>,
 ) -> Result<RunOutcome, RunError> {
-    let RunControls { stop, notes, socket } = beside;
-    let is_virtual = options.real_time.is_none();
-    let (ask, probes) = sync_channel(PROBES);
-    let untold = Arc::<AtomicU64>::default();
-    let (tap, judging) = match &options.diagnose {
-        None => (None, None),
-        Some(setup) => {
-            let (tap, listener) = tap(is_virtual);
-            // In virtual time the judge has no time of its own: when it asked would be chance.
-            let setup = Setup { probes: !is_virtual, ..setup.clone() };
-            let (notes, untold) = (notes.clone(), Arc::clone(&untold));
-            let told = DiagnosisOutput { notes, untold, probes: ask };
-            let thread = judge(observer(setup), listener, told).map_err(RunError::Thread)?;
-            (Some(tap), Some(thread))
-        }
-    };
-    // Threads started from here on would be real-time ones.
-    let granted = options.real_time.map(RealTime::ask).unwrap_or_default();
-    let allowed_misses = options.allowed_misses.filter(|_| !application.is_idle());
-    let hold_at = options.hold.then_some(AlState::PreOp);
-    let settings = Options { allowed_misses, hold_at, ..line.options() };
-    let mut driver = Driver::new(line, settings);
-    let begun = driver.now();
-    let mut operator = RunSession {
-        wanted: Some(wanted),
-        application,
-        io_at: IoAt::default(),
-        notes,
-        probes: tap.is_some().then_some(probes),
-        tap,
-        plan: None,
-        begun: false,
-        reached_at: None,
-        failure: None,
-        lateness: Lateness::default(),
-        ended: false,
-        leaving: false,
-        withheld: false,
-        held: options.hold,
-        scan_until: Instant::MAX,
-        socket,
-        untold,
-        missed_told: (0, Instant::ZERO),
-        begun_at: begun,
-        granted,
-        on: options.on.clone(),
-    };
-    let until = options.lasts.map_or(Instant::MAX, |lasts| begun + lasts);
-    let ran = operator.drive(&mut driver, until, stop);
-    let now = driver.now();
-    let mut report = operator.report(now, driver.main_mut());
-    let times = operator.plan.as_deref().zip(driver.main_mut().bring_up_times());
-    report.bring_up = times.map(|(plan, times)| BringUpReport::of(plan, &times));
-    let error = match (operator.failure.take(), ran) {
-        (Some(failure), _) => Some(failure),
-        // Where the interface has failed, nothing can be left in order.
-        (None, Err(error @ RunError::Link(_))) => Some(error),
-        (None, Err(error)) => operator.leave(&mut driver, options.leave).err().or(Some(error)),
-        (None, Ok(())) => operator.leave(&mut driver, options.leave).err(),
-    };
-    if let Some(error) = &error {
-        report.error = Some(error.to_string());
-    }
-    let planned = operator.plan.is_some();
-    // Ends the tap, and with it the thread that judges.
-    drop(operator);
-    let judged = judging.map(|thread| match thread.join() {
-        Ok(judged) => judged,
-        Err(panic) => Err(PartFailure::of_panic("the diagnosis", "nothing was judged", &*panic)),
-    });
-    let (diagnosis, failed) = match judged.transpose() {
-        Ok(diagnosis) => (diagnosis, None),
-        Err(failure) => (None, Some(failure)),
-    };
-    report.diagnosis = diagnosis;
-    report.failed.extend(failed.iter().map(PartFailure::to_string));
-    match error {
-        Some(error) if !planned => Err(error),
-        error => Ok(RunOutcome { report, error, failed }),
-    }
+    let mut started = start_observed(line, wanted, application, options, beside, observer)?;
+    started.drive();
+    started.end()
 }
