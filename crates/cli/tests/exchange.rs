@@ -90,6 +90,8 @@ impl Watched {
 }
 
 impl Transport for Watched {
+    type Error = LinkError;
+
     fn options(&self) -> Options {
         Options::default().on_line(self.segment.tree().len(), self.segment.longest_way())
     }

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
-use linesman::{Device, Next, RunOptions};
+use linesman::{DeviceHandle, Next, RunOptions};
 use serde_json::{Value, json};
 use support::linesman;
 use tempfile::TempDir;
@@ -118,7 +118,7 @@ fn a_drive_that_fails_costs_the_data_of_its_sync_unit_only() {
             cycles += 1;
             if cycles > 200 {
                 let bad = io.devices().filter(|device| !io.quality(*device).valid);
-                discarded.extend(bad.map(Device::no));
+                discarded.extend(bad.map(DeviceHandle::no));
             }
             if cycles < 400 { Next::Continue } else { Next::Stop }
         })

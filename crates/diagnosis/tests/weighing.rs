@@ -309,6 +309,23 @@ fn a_typed_working_counter_that_lacks_all_behind_a_link_names_the_link() {
 
 // silent: C331
 #[test]
+fn counters_read_behind_their_clearing_write_in_one_frame_count_as_before_it() {
+    let counters = [0, 255, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    let mut script = Script::scanned(2);
+    script.exchange(&[
+        fprd(0x1001, 0x0300, &counters),
+        fpwr(0x1001, 0x0300, &[0; 20]),
+        fprd(0x1001, 0x0300, &counters),
+    ]);
+    script.now += 100_000_000;
+    script.exchange(&[fprd(0x1001, 0x0300, &[0; 20])]);
+    script.finish();
+    let report = script.engine.diagnosis();
+    assert!(!codes(&report).contains(&"C331"), "{}", text(&report));
+}
+
+// silent: C331
+#[test]
 fn a_clear_whose_return_was_lost_is_nobody_elses() {
     let play = |is_ours: bool| {
         let mut script = running();

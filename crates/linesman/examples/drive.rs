@@ -4,7 +4,7 @@
 //! `cargo run --example drive -- eth0` with a drive of your own, or without a place for a virtual segment.
 
 use linesman::prelude::*;
-use linesman::{Application, Device, Inputs, Outputs};
+use linesman::{Application, DeviceHandle, InputsOf, OutputsOf};
 
 /// Statusword under its mask, and the controlword that leads on from there (CiA 402, 8.1).
 const WAY: [(u16, u16, u16); 4] = [
@@ -35,9 +35,9 @@ linesman::outputs! {
 }
 
 struct Axis {
-    device: Device,
-    feedback: Inputs<Feedback>,
-    command: Outputs<Command>,
+    device: DeviceHandle,
+    feedback: InputsOf<Feedback>,
+    command: OutputsOf<Command>,
     cycle: u32,
     positions: Vec<i32>, // with room from the start: the cycle does not allocate
 }

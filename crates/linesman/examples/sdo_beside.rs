@@ -6,7 +6,7 @@
 use std::thread;
 use std::time::Duration;
 
-use linesman::ServiceError;
+use linesman::RequestError;
 use linesman::prelude::*;
 
 /// Identity object, its product code; the name that the maker gave the SubDevice.
@@ -22,7 +22,7 @@ pub fn ask(segment: &mut Segment) -> Result<(u32, String), linesman::Error> {
     let (services, beside) = (segment.services(), segment.services());
 
     // Another thread may wait.
-    let reader = thread::spawn(move || -> Result<String, ServiceError> {
+    let reader = thread::spawn(move || -> Result<String, RequestError> {
         beside.sdo_read(sensor, DEVICE_NAME, 0).wait(Duration::from_secs(10))
     });
 
@@ -37,8 +37,8 @@ pub fn ask(segment: &mut Segment) -> Result<(u32, String), linesman::Error> {
         }
         if product.is_some() && reader.is_finished() { Next::Stop } else { Next::Continue }
     })?;
-    let name = reader.join().unwrap_or(Err(ServiceError::Ended))?;
-    Ok((product.unwrap_or(Err(ServiceError::Ended))?, name))
+    let name = reader.join().unwrap_or(Err(RequestError::Ended))?;
+    Ok((product.unwrap_or(Err(RequestError::Ended))?, name))
 }
 // endregion
 

@@ -15,7 +15,7 @@ pub fn main() -> Result<(), linesman::Error> {
 /// Runs a line for five seconds and tells what changes.
 pub fn watch(segment: &mut Segment, mut tell: impl FnMut(String)) -> Result<(), linesman::Error> {
     let plan = segment.scan()?.plan()?;
-    let devices: Vec<(Device, String)> =
+    let devices: Vec<(DeviceHandle, String)> =
         plan.devices().map(|(device, name)| (device, name.to_owned())).collect();
     let mut told = vec![(false, DeviceState::OP); devices.len()];
     let mut cycle = 0;

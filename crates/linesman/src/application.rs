@@ -11,14 +11,14 @@ use linesman_runtime::run::{Next, RunOutcome};
 use crate::Error;
 use crate::handle::PlanId;
 use crate::io::{Application, Io};
-use crate::services::Orders;
+use crate::services::ServiceOrders;
 
 /// Notes of a cycle for the run behind it.
 #[derive(Default)]
 pub(crate) struct Handoff {
     /// The plan of the first handle that belongs to another one; it ends the run.
     pub(crate) foreign: Cell<Option<PlanId>>,
-    /// Outputs were not given in this cycle.
+    /// OutputsOf were not given in this cycle.
     pub(crate) old: Cell<bool>,
 }
 
@@ -51,7 +51,7 @@ impl<A: Application> Application for Borrowed<'_, A> {
 /// An application with the services that are asked for beside it.
 pub(crate) struct ServedApplication<'a, A> {
     pub(crate) application: A,
-    pub(crate) orders: Orders<'a>,
+    pub(crate) orders: ServiceOrders<'a>,
     pub(crate) plan: PlanId,
     pub(crate) handoff: Rc<Handoff>,
 }

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use linesman_link::error::LinkError;
-use linesman_runtime::image::VariableError;
 use linesman_runtime::run::RunError;
 use linesman_runtime::selector::SelectorError;
+use linesman_session::image::VariableError;
 use linesman_sim::segment_file::SegmentFileError;
 
-use crate::{PlanId, ServiceError};
+use crate::{PlanId, RequestError};
 
 /// Each says who, where, what was expected and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -73,7 +73,7 @@ pub enum Error {
     },
     /// A service for a SubDevice.
     #[error(transparent)]
-    Service(#[from] ServiceError),
+    Service(#[from] RequestError),
     /// The run was stopped before.
     #[error("the run was stopped before. Do: start another one")]
     Stopped,

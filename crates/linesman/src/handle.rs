@@ -8,7 +8,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use linesman_config::plan::{DevicePlan, Plan};
 use linesman_proto::address::DeviceId;
-use linesman_runtime::image::{self, Value};
+use linesman_session::image::{self, Value};
 
 /// Identity of a plan: which SubDevices it has, and where their process data lie. Plans that agree in both are
 /// the same, wherever they come from: a handle found in one serves in the other.
@@ -97,12 +97,12 @@ impl<T: Value> Output<T> {
 
 /// A SubDevice of a plan.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Device {
+pub struct DeviceHandle {
     pub(crate) id: DeviceId,
     pub(crate) plan: PlanId,
 }
 
-impl Device {
+impl DeviceHandle {
     /// Its number in the plan, in the order in which frames pass, from 1: as findings name it.
     #[must_use]
     pub fn no(self) -> u32 {

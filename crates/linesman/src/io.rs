@@ -3,13 +3,13 @@
 use linesman_maindevice::{FrameStatus, Quality, Statistics};
 use linesman_proto::state::{DeviceState, NetworkState};
 use linesman_proto::time::Instant;
-use linesman_runtime::image::Value;
 use linesman_runtime::run as running;
 pub use linesman_runtime::run::Next;
+use linesman_session::image::Value;
 
 use crate::application::Handoff;
-use crate::handle::{Device, Input, Output, PlanId};
-use crate::record::{InputRecord, Inputs, OutputRecord, Outputs};
+use crate::handle::{DeviceHandle, Input, Output, PlanId};
+use crate::record::{InputRecord, InputsOf, OutputRecord, OutputsOf};
 
 /// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
 /// sent.
@@ -22,7 +22,7 @@ pub trait Application {
 
     /// A second program of a task that exchanges at its end: called when the outputs of
     /// [`cycle`](Self::cycle) have gone out and the inputs are back, for what must not delay them (SYN-14).
-    /// Outputs that it sets leave with the next cycle, unless that sets them anew. Of a task that exchanges
+    /// OutputsOf that it sets leave with the next cycle, unless that sets them anew. Of a task that exchanges
     /// at its begin it is never called: there `cycle` itself runs after the outputs went out.
     fn after_outputs(&mut self, _io: &mut Io<'_>) {}
 }
@@ -80,12 +80,12 @@ impl<'a> Io<'a> {
 
     /// The inputs of a SubDevice that a record names.
     #[must_use]
-    pub fn read<R: InputRecord>(&self, inputs: Inputs<R>) -> R {
+    pub fn read<R: InputRecord>(&self, inputs: InputsOf<R>) -> R {
         R::read(self, inputs.handles)
     }
 
     /// Sets the outputs of a SubDevice that a record names.
-    pub fn write<R: OutputRecord>(&mut self, outputs: Outputs<R>, record: R) {
+    pub fn write<R: OutputRecord>(&mut self, outputs: OutputsOf<R>, record: R) {
         record.write(self, outputs.handles);
     }
 
@@ -114,7 +114,7 @@ impl<'a> Io<'a> {
 
     /// Validity and age of the process data of a SubDevice.
     #[must_use]
-    pub fn quality(&self, device: Device) -> Quality {
+    pub fn quality(&self, device: DeviceHandle) -> Quality {
         match self.admits(device.plan) {
             true => self.inner.quality(device.id),
             false => Quality::default(),
@@ -124,14 +124,14 @@ impl<'a> Io<'a> {
     /// True when a working counter that a SubDevice has a share in was wrong the last time: for all that
     /// share the datagram, whoever is to blame (PLC-03). [`Io::state`] tells who that is.
     #[must_use]
-    pub fn wc_state(&self, device: Device) -> bool {
+    pub fn wc_state(&self, device: DeviceHandle) -> bool {
         !self.quality(device).valid
     }
 
     /// The state word of a SubDevice: its software in the low byte, its wiring in the high byte
     /// (PLC-04 to PLC-06). [`DeviceState::OP`] is OP and nothing wrong.
     #[must_use]
-    pub fn state(&self, device: Device) -> DeviceState {
+    pub fn state(&self, device: DeviceHandle) -> DeviceState {
         match self.admits(device.plan) {
             true => self.inner.state(device.id),
             false => DeviceState::default(),
@@ -181,9 +181,9 @@ impl<'a> Io<'a> {
     }
 
     /// The SubDevices of the plan that runs, in the order in which frames pass.
-    pub fn devices(&self) -> impl Iterator<Item = Device> {
+    pub fn devices(&self) -> impl Iterator<Item = DeviceHandle> {
         let planned = self.inner.plan().into_iter().flat_map(|plan| &plan.devices);
-        planned.map(|device| Device { id: device.id, plan: self.plan })
+        planned.map(|device| DeviceHandle { id: device.id, plan: self.plan })
     }
 
     /// The plan that runs, as the crates below this one see it.

@@ -30,10 +30,10 @@
 //! | plan it | [`Segment::scan`] and [`Scan::plan`] for what is there; [`Segment::load`] for a project or an ENI file |
 //! | name things | [`Plan::input`], [`Plan::output`], [`Plan::device`]; [`inputs!`] and [`outputs!`] for a struct of them |
 //! | run it | [`Segment::run`] with a closure, [`Segment::run_application`] with a struct |
-//! | run it in a loop of one's own | [`Segment::start`] and [`Run::cycle`] |
+//! | run it in a loop of one's own | [`Segment::start`] and [`SteppedRun::cycle`] |
 //! | see whether data are good | [`Io::quality`], [`Io::state`], [`Io::network_state`] |
 //! | ask beside the cycle | [`Segment::services`]: objects (SDO), files (FoE), EEPROM (SII), registers, states |
-//! | hear what is wrong | [`Segment::run_diagnosed`], or [`RunOptions::diagnosed`] and [`Run::findings`] |
+//! | hear what is wrong | [`Segment::run_diagnosed`], or [`RunOptions::diagnosed`] and [`SteppedRun::findings`] |
 //! | test against faults | [`Segment::simulation`]: [`Simulation::inject`], [`Simulation::heal`] |
 //! | drive a segment with another MainDevice | [`VirtualWire`] |
 //!
@@ -84,14 +84,14 @@ mod io;
 mod options;
 mod plan;
 mod record;
-mod run;
 mod segment;
 mod services;
 mod simulation;
+mod stepped_run;
 mod virtual_wire;
 
 pub use error::Error;
-pub use handle::{Device, Input, Output, PlanId};
+pub use handle::{DeviceHandle, Input, Output, PlanId};
 pub use io::{Application, Io, Next};
 pub use linesman_config::fault::{Class, FaultName};
 pub use linesman_config::inventory::Inventory;
@@ -107,25 +107,25 @@ pub use linesman_proto::address::{DeviceId, RegisterAddress};
 pub use linesman_proto::register::{self, AlStatus};
 pub use linesman_proto::state::{AlState, AlStatusCode, DeviceState, NetworkState, StateValue};
 pub use linesman_proto::time::{Instant, Span};
-pub use linesman_runtime::image::{Value, VariableError};
 pub use linesman_runtime::run::RunError;
 pub use linesman_runtime::run::report::RunReport;
 pub use linesman_runtime::stop::Stop;
+pub use linesman_session::image::{Value, VariableError};
 pub use linesman_sim::segment_file::{FaultEntry, SegmentFile, SegmentFileError};
 pub use linesman_sim::truth::FaultId;
 pub use options::RunOptions;
 pub use plan::{Plan, Scan};
-pub use record::{InputRecord, Inputs, OutputRecord, Outputs};
-pub use run::Run;
+pub use record::{InputRecord, InputsOf, OutputRecord, OutputsOf};
 pub use segment::{Segment, open};
-pub use services::{ObjectValue, Pending, ReadState, RegisterValue, ServiceError, Services};
+pub use services::{ObjectValue, PendingAnswer, ReadState, RegisterValue, RequestError, Services};
 pub use simulation::Simulation;
+pub use stepped_run::SteppedRun;
 pub use virtual_wire::VirtualWire;
 
 /// Names that nearly every program needs.
 pub mod prelude {
     pub use crate::{
-        Application, Device, Input, Io, Next, Output, Plan, RunOptions, RunReport, Segment,
+        Application, DeviceHandle, Input, Io, Next, Output, Plan, RunOptions, RunReport, Segment,
         SegmentFile,
     };
 }

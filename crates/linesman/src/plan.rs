@@ -6,11 +6,11 @@ use std::path::Path;
 use linesman_config::eni::Eni;
 use linesman_config::inventory::Inventory;
 use linesman_proto::time::Span;
-use linesman_runtime::image::{Value, find_device};
 use linesman_runtime::run::PlanChoices;
+use linesman_session::image::{Value, find_device};
 
-use crate::handle::{Device, Input, Output, PlanId};
-use crate::record::{InputRecord, Inputs, OutputRecord, Outputs};
+use crate::handle::{DeviceHandle, Input, Output, PlanId};
+use crate::record::{InputRecord, InputsOf, OutputRecord, OutputsOf};
 use crate::{Error, RunOptions};
 
 /// Result of a scan.
@@ -65,14 +65,14 @@ impl Plan {
     ///
     /// # Errors
     /// When there is none, or several; the error lists those that there are.
-    pub fn device(&self, name: &str) -> Result<Device, Error> {
+    pub fn device(&self, name: &str) -> Result<DeviceHandle, Error> {
         let id = find_device(&self.plan, name)?.id;
-        Ok(Device { id, plan: self.id })
+        Ok(DeviceHandle { id, plan: self.id })
     }
 
     /// All SubDevices with their names, in the order in which frames pass.
-    pub fn devices(&self) -> impl Iterator<Item = (Device, &str)> {
-        let handle = |id| Device { id, plan: self.id };
+    pub fn devices(&self) -> impl Iterator<Item = (DeviceHandle, &str)> {
+        let handle = |id| DeviceHandle { id, plan: self.id };
         self.plan.devices.iter().map(move |device| (handle(device.id), device.name.as_str()))
     }
 
@@ -103,7 +103,7 @@ impl Plan {
     ///
     /// # Errors
     /// As [`Plan::input`], or when the SubDevice is one of another plan.
-    pub fn input_of<T: Value>(&self, device: Device, name: &str) -> Result<Input<T>, Error> {
+    pub fn input_of<T: Value>(&self, device: DeviceHandle, name: &str) -> Result<Input<T>, Error> {
         self.input(&self.whole_name(device, name)?)
     }
 
@@ -111,7 +111,11 @@ impl Plan {
     ///
     /// # Errors
     /// As [`Plan::input_of`].
-    pub fn output_of<T: Value>(&self, device: Device, name: &str) -> Result<Output<T>, Error> {
+    pub fn output_of<T: Value>(
+        &self,
+        device: DeviceHandle,
+        name: &str,
+    ) -> Result<Output<T>, Error> {
         self.output(&self.whole_name(device, name)?)
     }
 
@@ -119,19 +123,19 @@ impl Plan {
     ///
     /// # Errors
     /// When there is no such SubDevice, or a variable is missing or of another type.
-    pub fn inputs<R: InputRecord>(&self, device: &str) -> Result<Inputs<R>, Error> {
-        Ok(Inputs { handles: R::find(self, self.device(device)?)? })
+    pub fn inputs<R: InputRecord>(&self, device: &str) -> Result<InputsOf<R>, Error> {
+        Ok(InputsOf { handles: R::find(self, self.device(device)?)? })
     }
 
     /// The outputs that a struct of [`outputs!`](crate::outputs) names, of a SubDevice by its name.
     ///
     /// # Errors
     /// As [`Plan::inputs`].
-    pub fn outputs<R: OutputRecord>(&self, device: &str) -> Result<Outputs<R>, Error> {
-        Ok(Outputs { handles: R::find(self, self.device(device)?)? })
+    pub fn outputs<R: OutputRecord>(&self, device: &str) -> Result<OutputsOf<R>, Error> {
+        Ok(OutputsOf { handles: R::find(self, self.device(device)?)? })
     }
 
-    fn whole_name(&self, device: Device, name: &str) -> Result<String, Error> {
+    fn whole_name(&self, device: DeviceHandle, name: &str) -> Result<String, Error> {
         let found = self.plan.device(device.id).filter(|_| device.plan == self.id);
         let other = Error::OtherPlan { found: device.plan, running: self.id };
         Ok(format!("{}/{name}", found.ok_or(other)?.name))

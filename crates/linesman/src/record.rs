@@ -3,11 +3,11 @@
 //! [`inputs!`](crate::inputs) and [`outputs!`](crate::outputs) define one. A macro by rules does: the fields and
 //! their names are all there is to know, and a program that uses it compiles no macro crate.
 
-use crate::handle::Device;
+use crate::handle::DeviceHandle;
 use crate::io::Io;
 use crate::{Error, Plan};
 
-/// Inputs of a SubDevice, a struct of [`inputs!`](crate::inputs).
+/// InputsOf of a SubDevice, a struct of [`inputs!`](crate::inputs).
 pub trait InputRecord: Sized {
     /// A handle for each field.
     type Handles: Copy;
@@ -16,13 +16,13 @@ pub trait InputRecord: Sized {
     ///
     /// # Errors
     /// When the SubDevice has no such variable, or it is of another type.
-    fn find(plan: &Plan, device: Device) -> Result<Self::Handles, Error>;
+    fn find(plan: &Plan, device: DeviceHandle) -> Result<Self::Handles, Error>;
 
     /// The values as they are.
     fn read(io: &Io<'_>, handles: Self::Handles) -> Self;
 }
 
-/// Outputs of a SubDevice, a struct of [`outputs!`](crate::outputs).
+/// OutputsOf of a SubDevice, a struct of [`outputs!`](crate::outputs).
 pub trait OutputRecord: Sized {
     /// A handle for each field.
     type Handles: Copy;
@@ -31,7 +31,7 @@ pub trait OutputRecord: Sized {
     ///
     /// # Errors
     /// As [`InputRecord::find`].
-    fn find(plan: &Plan, device: Device) -> Result<Self::Handles, Error>;
+    fn find(plan: &Plan, device: DeviceHandle) -> Result<Self::Handles, Error>;
 
     /// Sets the values.
     fn write(self, io: &mut Io<'_>, handles: Self::Handles);
@@ -39,31 +39,31 @@ pub trait OutputRecord: Sized {
 
 /// Handle of the inputs that an [`InputRecord`] names: [`Plan::inputs`].
 #[derive(Debug)]
-pub struct Inputs<R: InputRecord> {
+pub struct InputsOf<R: InputRecord> {
     pub(crate) handles: R::Handles,
 }
 
 /// Handle of the outputs that an [`OutputRecord`] names: [`Plan::outputs`].
 #[derive(Debug)]
-pub struct Outputs<R: OutputRecord> {
+pub struct OutputsOf<R: OutputRecord> {
     pub(crate) handles: R::Handles,
 }
 
-impl<R: InputRecord> Clone for Inputs<R> {
+impl<R: InputRecord> Clone for InputsOf<R> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<R: InputRecord> Copy for Inputs<R> {}
+impl<R: InputRecord> Copy for InputsOf<R> {}
 
-impl<R: OutputRecord> Clone for Outputs<R> {
+impl<R: OutputRecord> Clone for OutputsOf<R> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<R: OutputRecord> Copy for Outputs<R> {}
+impl<R: OutputRecord> Copy for OutputsOf<R> {}
 
 /// Defines a struct of inputs: each field with its type and the name of its variable in the SubDevice.
 ///
@@ -94,7 +94,7 @@ macro_rules! inputs {
 
             fn find(
                 plan: &$crate::Plan,
-                device: $crate::Device,
+                device: $crate::DeviceHandle,
             ) -> ::std::result::Result<Self::Handles, $crate::Error> {
                 ::std::result::Result::Ok(($(plan.input_of::<$type>(device, $name)?,)+))
             }
@@ -135,7 +135,7 @@ macro_rules! outputs {
 
             fn find(
                 plan: &$crate::Plan,
-                device: $crate::Device,
+                device: $crate::DeviceHandle,
             ) -> ::std::result::Result<Self::Handles, $crate::Error> {
                 ::std::result::Result::Ok(($(plan.output_of::<$type>(device, $name)?,)+))
             }

@@ -9,6 +9,7 @@ use linesman_config::eni::Eni;
 use linesman_config::project::Project;
 use linesman_diagnosis::{Event, InputKind, Setup};
 use linesman_link::clock::HostClock;
+use linesman_link::error::LinkError;
 use linesman_runtime::listen::is_driven;
 use linesman_runtime::named_files::NamedFiles;
 use linesman_runtime::plan_file::PlanFile;
@@ -28,9 +29,11 @@ use linesman_sim::truth::FaultId;
 
 use crate::application::{Borrowed, Handoff, ServedApplication};
 use crate::handle::PlanId;
-use crate::run::Caller;
-use crate::services::{Order, Orders};
-use crate::{Application, Error, Io, Next, Plan, Run, RunOptions, Scan, Services, Simulation};
+use crate::services::{ServiceOrder, ServiceOrders};
+use crate::stepped_run::Caller;
+use crate::{
+    Application, Error, Io, Next, Plan, RunOptions, Scan, Services, Simulation, SteppedRun,
+};
 
 /// Opens a line: `eth0`, `eth0+eth1` (a ring) or `sim:line.toml` (a virtual segment, in virtual time
 /// that goes as fast as the work is done). Nothing is sent yet.
@@ -43,9 +46,9 @@ pub fn open(place: &str) -> Result<Segment, Error> {
             if is_driven(&names)?.is_some() {
                 return Err(Error::Driven { card: names.join("+") });
             }
-            Line::Cards(Cards::open(&names, HostClock::start())?)
+            OpenLine::Cards(Cards::open(&names, HostClock::start())?)
         }
-        Selector::Segment(path) => Line::Virtual(read(&path)?),
+        Selector::Segment(path) => OpenLine::Virtual(read(&path)?),
         Selector::Listen(_) | Selector::File(_) => {
             return Err(Error::NotDrivable { given: place.to_owned() });
         }
@@ -74,13 +77,14 @@ pub(crate) fn build(
     Ok(Simulation::new(line))
 }
 
-enum Line {
+/// Cards, or a virtual segment.
+enum OpenLine {
     Cards(Cards),
     Virtual(Simulation),
 }
 
-impl Line {
-    fn transport(&mut self) -> &mut dyn Transport {
+impl OpenLine {
+    fn transport(&mut self) -> &mut dyn Transport<Error = LinkError> {
         match self {
             Self::Cards(cards) => cards,
             Self::Virtual(segment) => segment,
@@ -89,19 +93,20 @@ impl Line {
 }
 
 /// A run of an application on any line.
-type Started<'a, A> = StartedRun<'a, &'a mut dyn Transport, ServedApplication<'a, A>>;
+type Started<'a, A> =
+    StartedRun<'a, &'a mut dyn Transport<Error = LinkError>, ServedApplication<'a, A>>;
 
 /// A line.
 pub struct Segment {
-    line: Line,
+    line: OpenLine,
     place: String,
     stop: Stop,
     services: Services,
-    orders: Receiver<Order>,
+    orders: Receiver<ServiceOrder>,
 }
 
 impl Segment {
-    fn new(line: Line, place: String) -> Self {
+    fn new(line: OpenLine, place: String) -> Self {
         let (services, orders) = Services::new();
         Self { line, place, stop: Stop::default(), services, orders }
     }
@@ -111,7 +116,7 @@ impl Segment {
     /// # Errors
     /// When it cannot be built: an unknown type, a port that is used twice.
     pub fn simulated(file: &SegmentFile) -> Result<Self, Error> {
-        let line = Line::Virtual(build(file, &Error::Segment)?);
+        let line = OpenLine::Virtual(build(file, &Error::Segment)?);
         Ok(Self::new(line, format!("sim:{}", file.name)))
     }
 
@@ -121,8 +126,8 @@ impl Segment {
     /// On a card.
     pub fn simulation(&self) -> Result<Simulation, Error> {
         match &self.line {
-            Line::Virtual(segment) => Ok(segment.clone()),
-            Line::Cards(_) => Err(Error::NotSimulated { given: self.place.clone() }),
+            OpenLine::Virtual(segment) => Ok(segment.clone()),
+            OpenLine::Cards(_) => Err(Error::NotSimulated { given: self.place.clone() }),
         }
     }
 
@@ -251,13 +256,13 @@ impl Segment {
     ///
     /// # Errors
     /// When clocks are asked for and the plan has none, or the system has no more threads. What goes wrong later
-    /// is said by [`Run::stop`].
-    pub fn start(&mut self, plan: Plan, options: RunOptions) -> Result<Run<'_>, Error> {
+    /// is said by [`SteppedRun::stop`].
+    pub fn start(&mut self, plan: Plan, options: RunOptions) -> Result<SteppedRun<'_>, Error> {
         let (notes, heard) = mpsc::sync_channel(if options.diagnosed { NOTES } else { 1 });
         // Notes that nobody wants go nowhere.
         let heard = options.diagnosed.then_some(heard);
         let (started, id, handoff) = self.start_session(plan, options, Caller, notes)?;
-        Ok(Run::new(started, heard, id, handoff))
+        Ok(SteppedRun::new(started, heard, id, handoff))
     }
 
     fn start_session<A: Application>(
@@ -273,20 +278,22 @@ impl Segment {
             input: InputKind::Driven,
             exchange: plan.exchange(),
             source: self.place.clone(),
+            host_counters: true,
+            probes: true,
             ..Setup::default()
         };
         let session = SessionOptions {
             on: self.place.clone(),
             leave: options.leave,
             lasts: None,
-            real_time: matches!(self.line, Line::Cards(_)).then_some(options.real_time),
+            real_time: matches!(self.line, OpenLine::Cards(_)).then_some(options.real_time),
             allowed_misses: Some(options.misses),
             hold: options.hold,
             diagnose: options.diagnosed.then(setup),
         };
         let served = ServedApplication {
             application,
-            orders: Orders::new(&self.orders, id),
+            orders: ServiceOrders::new(&self.orders, id),
             plan: id,
             handoff: Rc::clone(&handoff),
         };

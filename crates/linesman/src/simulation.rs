@@ -55,6 +55,8 @@ impl Simulation {
 }
 
 impl Transport for Simulation {
+    type Error = LinkError;
+
     fn options(&self) -> Options {
         self.lock().options()
     }

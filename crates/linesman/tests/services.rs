@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use linesman::prelude::*;
-use linesman::{AlState, Error, Pending, RefusalKind, ServiceError, register};
+use linesman::{AlState, Error, PendingAnswer, RefusalKind, RequestError, register};
 
 const DEVICES: [(&str, &str); 3] = [("K1", "EK1100"), ("Sensor", "EL3104"), ("Lamps", "EL2008")];
 /// Identity object, settings of the first channel, and an object that is not there.
@@ -22,7 +22,10 @@ fn machine() -> (Segment, Plan) {
 }
 
 /// Takes cycles until the answer is there.
-fn answer<T>(run: &mut linesman::Run<'_>, mut pending: Pending<T>) -> Result<T, ServiceError> {
+fn answer<T>(
+    run: &mut linesman::SteppedRun<'_>,
+    mut pending: PendingAnswer<T>,
+) -> Result<T, RequestError> {
     for _ in 0..20_000 {
         assert!(run.cycle().is_some());
         if let Some(answer) = pending.poll() {
@@ -55,9 +58,9 @@ fn value_of_another_size_and_a_missing_object_are_refused() {
     let (sensor, services) = (plan.device("EL3104").unwrap(), segment.services());
     let mut run = segment.start(plan, RunOptions::us(1_000)).unwrap();
     let size = answer(&mut run, services.sdo_read::<u16>(sensor, IDENTITY, 1));
-    assert!(matches!(size, Err(ServiceError::Size { expected: 2, received: 4, .. })), "{size:?}");
+    assert!(matches!(size, Err(RequestError::Size { expected: 2, received: 4, .. })), "{size:?}");
     let missing = answer(&mut run, services.sdo_read::<u16>(sensor, MISSING, 0));
-    let Err(ServiceError::Failed(failure)) = missing else { panic!("{missing:?}") };
+    let Err(RequestError::Failed(failure)) = missing else { panic!("{missing:?}") };
     assert_eq!(failure.refusal().map(|(kind, _)| kind), Some(RefusalKind::SdoAbort));
     run.stop().unwrap();
 }
@@ -93,7 +96,7 @@ fn answer_that_is_not_there_when_the_run_ends_says_so() {
     let pending = services.sdo_read::<u32>(sensor, IDENTITY, 1);
     run.cycle();
     run.stop().unwrap();
-    assert!(matches!(pending.wait(Duration::from_secs(5)), Err(ServiceError::Ended)));
+    assert!(matches!(pending.wait(Duration::from_secs(5)), Err(RequestError::Ended)));
 }
 
 #[test]
@@ -103,7 +106,7 @@ fn answer_without_a_run_is_waited_for_so_long_as_was_said() {
     let pending = segment.services().sdo_read::<u32>(sensor, IDENTITY, 1);
     let after = Duration::from_millis(20);
     let late = pending.wait(after);
-    assert!(matches!(late, Err(ServiceError::Late { after: waited }) if waited == after));
+    assert!(matches!(late, Err(RequestError::Late { after: waited }) if waited == after));
 }
 
 #[test]
@@ -114,7 +117,7 @@ fn device_of_another_plan_is_refused() {
     let services = segment.services();
     let mut run = segment.start(plan, RunOptions::us(1_000)).unwrap();
     let refused = answer(&mut run, services.sdo_read::<u32>(sensor, IDENTITY, 1));
-    assert!(matches!(refused, Err(ServiceError::OtherPlan { .. })), "{refused:?}");
+    assert!(matches!(refused, Err(RequestError::OtherPlan { .. })), "{refused:?}");
     let text = Error::from(refused.unwrap_err()).to_string();
     assert!(text.contains("2 SubDevices") && text.contains("3 SubDevices"), "{text}");
     run.stop().unwrap();

@@ -14,7 +14,7 @@ fn machine() -> (Segment, Plan) {
     (segment, plan)
 }
 
-/// Inputs and time of each of the first cycles, with outputs that count.
+/// InputsOf and time of each of the first cycles, with outputs that count.
 fn stepped(options: RunOptions) -> Vec<(u64, Vec<u8>)> {
     let (mut segment, plan) = machine();
     let mut run = segment.start(plan, options).unwrap();

@@ -21,7 +21,8 @@ use linesman_diagnosis::Direction;
 use linesman_maindevice::MainDevice;
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::run::tap::{FrameSummary, Tap, tap};
+use linesman_runtime::run::tap::{Tap, tap};
+use linesman_session::frame::FrameSummary;
 
 use steady::{Answer, Running, answers, received, running, scripted};
 

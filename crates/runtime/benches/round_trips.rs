@@ -27,10 +27,12 @@ use linesman_link::socket::{RawSocket, SocketOptions};
 use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Driver, DriverHooks};
-use linesman_runtime::run::tap::{FrameSummary, Tap, tap};
+use linesman_runtime::drive::Driver;
+use linesman_runtime::run::tap::{Tap, tap};
 use linesman_runtime::stop::Stop;
 use linesman_runtime::transport::Cards;
+use linesman_session::SessionHooks;
+use linesman_session::frame::FrameSummary;
 
 use own_namespace::{FAR, NEAR};
 use steady::{Running, answers, running, scripted};
@@ -266,20 +268,20 @@ fn engine_trips(running: Running) -> Best {
 fn driver_cycles(keeps: bool) -> Best {
     let running = running(LINE, false, CYCLE);
     let clock = HostClock::start();
-    let mut driver =
-        Driver::new(Cards::open(&[NEAR.to_owned()], clock).unwrap(), Options::default());
+    let hooks = Keeping { tap: keeps.then(kept) };
+    let line = Cards::open(&[NEAR.to_owned()], clock).unwrap();
+    let mut driver = Driver::new(line, Options::default(), hooks);
     clock.sleep_until(running.now + CYCLE);
-    *driver.main_mut() = running.main;
-    let mut hooks = Keeping { tap: keeps.then(kept) };
+    *driver.session_mut().main_mut() = running.main;
     let stop = Stop::default();
     let now = driver.now();
-    driver.run(now + CYCLE * 100, &stop, &mut hooks).unwrap();
-    let before = driver.main_mut().statistics();
+    driver.run(now + CYCLE * 100, &stop).unwrap();
+    let before = driver.session().main().statistics();
     let now = driver.now();
     let best = timed(CYCLES, || {
-        driver.run(now + CYCLE * CYCLES, &stop, &mut hooks).unwrap();
+        driver.run(now + CYCLE * CYCLES, &stop).unwrap();
     });
-    let after = driver.main_mut().statistics();
+    let after = driver.session().main().statistics();
     if after.working_counter_errors != before.working_counter_errors {
         // The host slept so long that SubDevices were taken for lost: this round tells nothing.
         return Best::default();
@@ -294,7 +296,7 @@ struct Keeping {
     tap: Option<Tap>,
 }
 
-impl DriverHooks for Keeping {
+impl SessionHooks for Keeping {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         if let Some(tap) = &mut self.tap {
             tap.frame(frame);
@@ -321,9 +323,5 @@ impl DriverHooks for Keeping {
             tap.turn(now);
         }
         true
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        None
     }
 }

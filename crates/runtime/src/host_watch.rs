@@ -1,12 +1,13 @@
 //! Watch over one card by the host, in the words of the diagnosis.
 
-use linesman_diagnosis::observe::{HostEvent, HostObservation};
+use linesman_diagnosis::HostObservation;
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
 use linesman_link::host::{HostSample, HostSampler};
 use linesman_link::socket::SocketCounters;
 use linesman_proto::address::{Network, Path};
 use linesman_proto::time::{Instant, Span};
+use linesman_session::card::{CardSample, CardWatch};
 
 /// How often the card is asked.
 const EVERY: Span = Span::ms(100);
@@ -18,7 +19,7 @@ const NEWS: Span = Span::ms(1);
 pub struct HostWatch {
     sampler: HostSampler,
     path: Path,
-    carrier: Option<bool>,
+    news: CardWatch,
     next: Instant,
     next_news: Instant,
 }
@@ -31,7 +32,7 @@ impl HostWatch {
     pub fn open(interface: &str, path: Path, clock: &HostClock) -> Result<Self, LinkError> {
         let sampler = HostSampler::open(interface, clock)?;
         let now = clock.now();
-        Ok(Self { sampler, path, carrier: None, next: now, next_news: now })
+        Ok(Self { sampler, path, news: CardWatch::default(), next: now, next_news: now })
     }
 
     /// Whether the card is to be asked now: its time has come, or the kernel has told of it.
@@ -64,48 +65,34 @@ impl HostWatch {
         socket: SocketCounters,
     ) -> Result<Vec<HostObservation>, LinkError> {
         self.next = now + EVERY;
-        let sample = self.sampler.sample(socket)?;
-        let events = events(&sample, self.carrier);
-        self.carrier = Some(sample.carrier);
+        let taken = self.sampler.sample(socket)?;
         let observe = |what| HostObservation {
             network: Network::default(),
             path: self.path,
-            time: sample.at,
+            time: taken.at,
             what,
         };
-        Ok(events.into_iter().map(observe).collect())
+        Ok(self.news.events(&sample(&taken)).map(observe).collect())
     }
 }
 
-/// What of a sample is news.
-fn events(sample: &HostSample, carrier_before: Option<bool>) -> Vec<HostEvent> {
-    let mut events = Vec::new();
-    let went_and_came = sample.carrier_changes > 1 && carrier_before == Some(sample.carrier);
-    if went_and_came {
-        events.push(HostEvent::Carrier(!sample.carrier));
-    }
-    if went_and_came || carrier_before != Some(sample.carrier) {
-        events.push(HostEvent::Carrier(sample.carrier));
-    }
+/// A sample of the host, as of any card.
+fn sample(sample: &HostSample) -> CardSample {
     let card = &sample.card;
     let crc = card.rx_crc_errors;
     // Drivers sum up all errors in one counter, and fill the others as they like.
     let summed = card.rx_errors.saturating_sub(crc + card.rx_fifo_errors + card.rx_missed);
-    let other = summed.max(card.rx_alignment_errors + card.rx_length_errors);
-    if crc + other > 0 {
-        events.push(HostEvent::CardErrors { crc, other });
+    CardSample {
+        carrier: sample.carrier,
+        carrier_changes: sample.carrier_changes,
+        crc,
+        damaged: summed.max(card.rx_alignment_errors + card.rx_length_errors),
+        card_drops: card.rx_missed + card.rx_fifo_errors,
+        socket_drops: sample.socket.drops,
+        send_failures: sample.socket.send_failures + card.tx_errors + card.tx_dropped,
+        latest_wake: (sample.wakes.count > 0).then_some(sample.wakes.latest),
+        clock_step_ns: sample.clock_step_ns,
     }
-    let counts = [
-        (card.rx_missed + card.rx_fifo_errors, HostEvent::CardDrops as fn(u64) -> HostEvent),
-        (sample.socket.drops, HostEvent::SocketDrops),
-        (sample.socket.send_failures + card.tx_errors + card.tx_dropped, HostEvent::SendFailures),
-    ];
-    events.extend(counts.into_iter().filter(|(count, _)| *count > 0).map(|(n, event)| event(n)));
-    if sample.wakes.count > 0 {
-        events.push(HostEvent::Late(sample.wakes.latest));
-    }
-    events.extend(sample.clock_step_ns.map(HostEvent::ClockStep));
-    events
 }
 
 #[cfg(test)]
@@ -132,26 +119,17 @@ mod tests {
     }
 
     #[test]
-    fn a_quiet_host_says_its_carrier_once() {
-        assert_eq!(events(&quiet(), None), [HostEvent::Carrier(true)]);
-        assert_eq!(events(&quiet(), Some(true)), []);
-        let blinked = HostSample { carrier_changes: 2, ..quiet() };
-        let both = [HostEvent::Carrier(false), HostEvent::Carrier(true)];
-        assert_eq!(events(&blinked, Some(true)), both);
-    }
-
-    #[test]
     fn errors_are_counted_once_however_a_driver_counts_them() {
+        let of = |card| sample(&HostSample { card, ..quiet() });
+        let expected = CardSample { carrier: true, ..CardSample::default() };
         let card = CardCounters { rx_errors: 7, rx_crc_errors: 5, ..CardCounters::default() };
-        let sample = HostSample { card, ..quiet() };
-        assert_eq!(events(&sample, Some(true)), [HostEvent::CardErrors { crc: 5, other: 2 }]);
+        assert_eq!(of(card), CardSample { crc: 5, damaged: 2, ..expected });
         let card = CardCounters { rx_missed: 3, rx_errors: 3, ..CardCounters::default() };
-        let sample = HostSample { card, ..quiet() };
-        assert_eq!(events(&sample, Some(true)), [HostEvent::CardDrops(3)]);
+        assert_eq!(of(card), CardSample { card_drops: 3, ..expected });
         let socket = SocketCounters { drops: 2, send_failures: 1, ..SocketCounters::default() };
-        let sample = HostSample { socket, clock_step_ns: Some(-5), ..quiet() };
+        let busy = sample(&HostSample { socket, clock_step_ns: Some(-5), ..quiet() });
         let expected =
-            [HostEvent::SocketDrops(2), HostEvent::SendFailures(1), HostEvent::ClockStep(-5)];
-        assert_eq!(events(&sample, Some(true)), expected);
+            CardSample { socket_drops: 2, send_failures: 1, clock_step_ns: Some(-5), ..expected };
+        assert_eq!(busy, expected);
     }
 }

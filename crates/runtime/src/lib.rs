@@ -15,7 +15,6 @@ pub mod drive;
 #[cfg(feature = "event-log")]
 pub mod event_log;
 pub mod host_watch;
-pub mod image;
 pub mod listen;
 pub mod named_files;
 pub mod names;

@@ -6,7 +6,7 @@
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use linesman_config::plan::Plan;
-use linesman_diagnosis::{Diagnosis, Engine, Event, HostObservation, Probe, Setup};
+use linesman_diagnosis::{Diagnosis, Engine, Event, FrameSeen, HostObservation, Probe, Setup};
 use linesman_link::error::LinkError;
 use linesman_maindevice::Options;
 use linesman_proto::address::Path;
@@ -14,7 +14,6 @@ use linesman_proto::register;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::run::diagnosis_thread::DiagnosisObserver;
-use linesman_runtime::run::tap::TapLog;
 use linesman_runtime::run::{
     Application, Idle, Io, NOTES, Next, Note, PlanChoices, RunControls, RunError, RunOutcome,
     SessionOptions, run_observed,
@@ -22,6 +21,7 @@ use linesman_runtime::run::{
 use linesman_runtime::stop::Stop;
 use linesman_runtime::transport::{FrameSink, Pace, SegmentTransport, Transport};
 use linesman_runtime::wiring::Wiring;
+use linesman_session::DiagnosisInput;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::SegmentFile;
 
@@ -42,7 +42,7 @@ fn states(line: &SegmentTransport) -> Vec<u8> {
 
 const INIT: [u8; 3] = [1; 3];
 
-fn driven<L: Transport>(
+fn driven<L: Transport<Error = LinkError>>(
     line: L,
     application: impl Application,
     observer: impl FnOnce(Setup) -> Box<dyn DiagnosisObserver>,
@@ -69,16 +69,18 @@ fn engine(setup: Setup) -> Box<dyn DiagnosisObserver> {
 /// A diagnosis that panics over the frames of a line that is up.
 struct Panics;
 
-impl DiagnosisObserver for Panics {
-    fn take(&mut self, log: &TapLog) -> Instant {
-        let last = log.frames().last().map_or(Instant::ZERO, |frame| frame.time);
-        assert!(last < Instant::ZERO + Span::s(1), "the judge stumbles");
-        last
+impl DiagnosisInput for Panics {
+    fn frame(&mut self, frame: &FrameSeen<'_>) {
+        assert!(frame.time < Instant::ZERO + Span::s(1), "the judge stumbles");
     }
+
+    fn host(&mut self, _: &HostObservation) {}
 
     fn turn(&mut self, _: Instant) {}
 
-    fn finish(&mut self, _: Instant) {}
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
 
     fn poll_event(&mut self) -> Option<Event> {
         None
@@ -87,6 +89,12 @@ impl DiagnosisObserver for Panics {
     fn poll_probe(&mut self) -> Option<Probe> {
         None
     }
+}
+
+impl DiagnosisObserver for Panics {
+    fn missed(&mut self, _: u64, _: Instant) {}
+
+    fn finish(&mut self, _: Instant) {}
 
     fn diagnosis(&self) -> Diagnosis {
         unreachable!("it has failed")
@@ -142,6 +150,8 @@ fn an_application_that_panics_leaves_the_subdevices_as_after_any_other_end() {
 struct Broken(SegmentTransport, u64);
 
 impl Transport for Broken {
+    type Error = LinkError;
+
     fn options(&self) -> Options {
         self.0.options()
     }

@@ -12,6 +12,7 @@ use linesman_config::project::Project;
 use linesman_diagnosis::report::Verdict;
 use linesman_diagnosis::{InputKind, Setup};
 use linesman_link::clock::HostClock;
+use linesman_link::error::LinkError;
 use linesman_link::socket::WakeHandle;
 use linesman_maindevice::watch::EntryKind;
 use linesman_proto::state::AlState;
@@ -167,6 +168,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             Source::AsFound | Source::Project(_) => PlannedExchange::default(),
         },
         source: arguments.on.clone(),
+        probes: true,
+        host_counters: true,
         ..Setup::default()
     });
     let options = SessionOptions {
@@ -239,6 +242,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let line = line_access::virtual_line(path, pace)?;
             stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
+            let mut options = options;
+            if let Some(setup) = &mut options.diagnose {
+                setup.clock = "virtual".to_owned();
+            }
             drive(line, wanted, &options, application, socket, &stop, &said, reporter, output)
         }
         Selector::Listen(_) | Selector::File(_) => {
@@ -300,7 +307,6 @@ fn with_source(
     options.real_time = real_time;
     if let Some(setup) = &mut options.diagnose {
         setup.clock = "host, monotonic".to_owned();
-        setup.host_counters = true;
         setup.start = start;
     }
     options
@@ -308,7 +314,7 @@ fn with_source(
 
 /// Runs the line in a thread of its own, and tells what happens meanwhile.
 #[allow(clippy::too_many_arguments, reason = "called twice, from above")]
-fn drive<L: Transport + Send>(
+fn drive<L: Transport<Error = LinkError> + Send>(
     line: L,
     wanted: PlanSource,
     options: &SessionOptions,

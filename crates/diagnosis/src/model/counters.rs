@@ -26,6 +26,8 @@ pub struct CounterHistory {
     last_rise: Option<Instant>,
     /// When the counters of bad frames were last cleared by a write that was seen.
     cleared_by_order: Option<Instant>,
+    /// The frame whose write last cleared a group.
+    cleared_in: [Option<u64>; ClearGroup::ALL.len()],
     /// When a write that would clear a group was last sent, of which nobody saw whether it arrived.
     may_be_cleared: [Option<Instant>; ClearGroup::ALL.len()],
     /// When the counter that fell had been read before.
@@ -91,12 +93,23 @@ impl CounterHistory {
         frame: Option<u64>,
     ) -> bool {
         let mut fell = [false; ClearGroup::ALL.len()];
+        // A write takes effect when the frame has passed and its check sequence was right: readings behind it in the same
+        // frame show what was before.
+        let is_old = |history: &Self, counter: ErrorCounter| {
+            frame.is_some() && history.cleared_in[counter.clear_group() as usize] == frame
+        };
         for (counter, value) in reading.iter() {
+            if is_old(self, counter) {
+                continue;
+            }
             self.note_fall(counter, value.into(), &mut fell, Seen::new((), at, frame));
         }
         self.clears += fell.iter().filter(|fell| **fell).count() as u32;
         let mut news = false;
         for (counter, value) in reading.iter() {
+            if is_old(self, counter) {
+                continue;
+            }
             let group = counter.clear_group() as usize;
             let track = self.track_of(counter, value.into(), at, frame, &mut news);
             let difference = match fell[group] {
@@ -150,7 +163,7 @@ impl CounterHistory {
             let group = counter.clear_group() as usize;
             if self.may_be_cleared[group].is_some_and(|sent| sent >= read) {
                 // By a write of our own, whose return was lost.
-                self.note_clear(counter.clear_group(), read);
+                self.note_clear(counter.clear_group(), read, None);
                 return;
             }
             fell[group] = true;
@@ -189,8 +202,9 @@ impl CounterHistory {
         }
     }
 
-    /// Notes that a write cleared a group on purpose: the next readings count from 0.
-    pub fn note_clear(&mut self, group: ClearGroup, at: Instant) {
+    /// Notes that a write in a frame cleared a group on purpose: readings of the frames behind it count from 0.
+    pub fn note_clear(&mut self, group: ClearGroup, at: Instant, frame: Option<u64>) {
+        self.cleared_in[group as usize] = frame;
         if group == ClearGroup::Rx {
             self.cleared_by_order = Some(at);
         }

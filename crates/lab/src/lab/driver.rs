@@ -8,6 +8,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_sim::segment_file::SegmentFile;
 
+use super::other_session::OtherSession;
 use super::{Lab, LabError};
 use crate::habit::Habit;
 use crate::options::{Begin, LabOptions};
@@ -27,11 +28,11 @@ impl Lab {
                 });
                 let settings = Settings {
                     cycle: self.options.cycle,
-                    ring: self.paths == 2,
+                    ring: self.line.line.paths().count() == 2,
                     hooks: hooks.collect(),
                 };
                 self.plan = Some(plan);
-                self.other = Some(Soem::new(self.now, settings));
+                self.other = Some(OtherSession::new(Soem::new(self.now(), settings)));
             }
             Err(error) => self.failure = Some(error),
         }
@@ -56,26 +57,29 @@ impl Lab {
 
     /// Asks for registers.
     pub(super) fn probe(&mut self, request: ProbeRequest) {
+        let now = self.now();
         match &self.other {
-            Some(other) => other.order(Order::Probe(request)),
-            None => self.main.probe(self.now, request),
+            Some(other) => other.soem.order(Order::Probe(request)),
+            None => self.session.main_mut().probe(now, request),
         }
     }
 
     /// Asks for an object of a SubDevice of the plan.
     pub(super) fn upload(&mut self, of: DeviceId, object: ObjectAddress) {
+        let now = self.now();
         match &self.other {
-            Some(other) => other.order(Order::Upload(of, object)),
-            None => self.main.sdo_upload(self.now, of, object, false),
+            Some(other) => other.soem.order(Order::Upload(of, object)),
+            None => self.session.main_mut().sdo_upload(now, of, object, false),
         }
     }
 
     /// Brings a SubDevice of the plan, or all, to a state and leaves it there.
     pub fn request_state(&mut self, of: Option<DeviceId>, state: AlState) {
+        let now = self.now();
         match &self.other {
-            Some(other) => other.order(Order::State(of, state)),
+            Some(other) => other.soem.order(Order::State(of, state)),
             None => {
-                self.main.request_state(self.now, of, state);
+                self.session.main_mut().request_state(now, of, state);
             }
         }
     }
@@ -83,24 +87,26 @@ impl Lab {
     /// Changes each byte of the outputs.
     pub fn change_outputs(&mut self, change: impl FnMut(&mut u8)) {
         match &self.other {
-            Some(other) => other.change_outputs(change),
-            None => self.main.outputs_mut().iter_mut().for_each(change),
+            Some(other) => other.soem.change_outputs(change),
+            None => self.session.main_mut().outputs_mut().iter_mut().for_each(change),
         }
     }
 
     /// Brings all to a state and ends the MainDevice.
     pub fn stop_main(&mut self, down: AlState) {
+        let now = self.now();
         match &self.other {
-            Some(other) => other.order(Order::Stop(down)),
-            None => self.main.stop(self.now, down),
+            Some(other) => other.soem.order(Order::Stop(down)),
+            None => self.session.main_mut().stop(now, down),
         }
     }
 
     /// Starts the MainDevice again by this plan; one of others finds out by itself what it needs.
     pub fn start_main(&mut self, plan: Plan) {
+        let now = self.now();
         match &mut self.other {
-            Some(other) => other.start(self.now),
-            None => self.main.start(self.now, plan),
+            Some(other) => other.soem.start(now),
+            None => self.session.main_mut().start(now, plan),
         }
     }
 }

@@ -1,15 +1,19 @@
 //! The lab: a segment, a MainDevice and a diagnosis in one process, in virtual time.
 //!
-//! Time jumps from one thing that is due to the next. Every frame, on its way out and back, passes
-//! the diagnosis, and a tap if there is one; what the card counts becomes host observations, as it
-//! does with a real card.
+//! Time jumps from one thing that is due to the next. MainDevice and diagnosis are the
+//! [session](linesman_session) that runs on real cards, too; the line is the segment, with a tap if there
+//! is one.
 
 mod capture_loss;
+mod diagnosis;
 mod driver;
-mod engines;
 mod error;
+mod events;
+mod line;
 mod object;
+mod other_session;
 mod pause;
+mod plan;
 mod register;
 mod truth;
 
@@ -19,7 +23,7 @@ use linesman_config::inventory::Inventory;
 use linesman_config::plan::Plan;
 use linesman_config::plan::layout::DEFAULT_TASK;
 use linesman_config::project::{Project, ProjectDevice, ProjectTask};
-use linesman_diagnosis::observe::{Direction, FrameSeen, HostObservation};
+use linesman_diagnosis::observe::{FrameSeen, HostObservation};
 use linesman_diagnosis::report::{Diagnosis, FindingState, Severity};
 use linesman_diagnosis::{Engine, Event as FindingEvent, InputKind, Setup};
 use linesman_maindevice::watch::{LogEntry, Watch};
@@ -28,21 +32,22 @@ use linesman_proto::address::{DeviceId, Network};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
+use linesman_session::{Idle, PlanRun, Session};
 use linesman_sim::seed::Stream;
-use linesman_sim::segment::{HostPort, Segment};
+use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::SegmentFile;
 use linesman_sim::truth::TruthLog;
 
 pub use error::LabError;
 
 use self::capture_loss::CaptureLoss;
+use self::diagnosis::LabDiagnosis;
+use self::line::LabLine;
+use self::other_session::OtherSession;
 use self::pause::Socket;
 use crate::habit::Habit;
 use crate::options::{Begin, LabOptions};
-use crate::soem::Soem;
 
-/// How often the card's counters are looked at.
-const HOST_INTERVAL: Span = Span::ms(100);
 /// How many things may happen at one instant. Beyond that an engine does not move on.
 const AT_ONE_INSTANT: u32 = 100_000;
 /// The largest frame, without check sequence.
@@ -60,23 +65,14 @@ pub type HostTap = Box<dyn FnMut(&HostObservation) + Send>;
 
 /// A segment, a MainDevice and a diagnosis.
 pub struct Lab {
-    now: Instant,
-    network: Network,
     options: LabOptions,
     project: Project,
     tree: Tree,
-    segment: Segment,
-    main: MainDevice,
+    line: LabLine,
+    session: Session<PlanRun<Idle, LabDiagnosis>>,
     /// The MainDevice of others that drives the line in place of ours.
-    other: Option<Soem>,
-    engine: Engine,
-    tap: Option<Tap>,
-    recorder: Option<Tap>,
-    recorded: u64,
-    host_tap: Option<HostTap>,
-    capture_loss: Option<CaptureLoss>,
-    recorder_veil: Option<CaptureLoss>,
-    frames: u64,
+    other: Option<OtherSession>,
+    socket: Socket,
     events: Vec<(Instant, Event)>,
     finding_events: VecDeque<FindingEvent>,
     failure: Option<String>,
@@ -84,13 +80,6 @@ pub struct Lab {
     plan: Option<Plan>,
     watch: Option<Watch>,
     log: Vec<LogEntry>,
-    host_next: Instant,
-    host_last: [Option<HostPort>; 2],
-    paths: usize,
-    socket: Socket,
-    arrival: Vec<u8>,
-    outgoing: Vec<u8>,
-    transmit: Vec<u8>,
 }
 
 impl Lab {
@@ -121,8 +110,6 @@ impl Lab {
             project.devices.iter_mut().for_each(|device| device.serial = None);
         }
         let tree = project.tree()?;
-        let network = Network(0);
-        let paths = if file.ring.is_some() { 2 } else { 1 };
         let is_own = options.habit == Habit::Own;
         let setup = Setup {
             exchange: linesman_config::plan::PlannedExchange::default(),
@@ -138,28 +125,28 @@ impl Lab {
             start: None,
             clock: "virtual".to_owned(),
         };
-        let mut settings = Options { ring: paths == 2, ..Options::default() };
+        let mut settings = Options::default();
         if options.clocks || project.devices.iter().any(|device| device.clock.is_some()) {
             settings.drift_frames = DRIFT_FRAMES;
         }
-        let settings = settings.on_line(segment.tree().len(), segment.longest_way());
-        let main = MainDevice::new(network, options.habit.main_device(settings));
+        let mut line = LabLine::new(segment, file.ring.is_some(), options.host_counters);
+        let main_options = options.habit.main_device(line.line.options(settings));
+        let main = MainDevice::new(Network::default(), main_options);
+        let mut diagnosis = LabDiagnosis::default();
+        let engine = Engine::new(setup);
+        if is_own {
+            diagnosis.engine = Some(engine);
+        } else {
+            line.capture.listener = Some(engine);
+        }
+        line.segment_mut().listen(!is_own);
         let mut lab = Self {
-            now: Instant::ZERO,
-            network,
             project,
             tree,
-            segment,
-            main,
+            line,
+            session: Session::new(main, PlanRun::new(None, Idle, diagnosis, false)),
             other: None,
-            engine: Engine::new(setup),
-            tap: None,
-            recorder: None,
-            recorded: 0,
-            host_tap: None,
-            capture_loss: None,
-            recorder_veil: None,
-            frames: 0,
+            socket: Socket::default(),
             events: Vec::new(),
             finding_events: VecDeque::new(),
             failure: None,
@@ -167,54 +154,47 @@ impl Lab {
             plan: None,
             watch: None,
             log: Vec::new(),
-            host_next: Instant::ZERO,
-            host_last: [None; 2],
-            paths,
-            socket: Socket::default(),
-            arrival: Vec::with_capacity(FRAME),
-            outgoing: Vec::with_capacity(FRAME),
-            transmit: vec![0; FRAME],
             options,
         };
-        lab.segment.listen(!is_own);
         if lab.options.habit == Habit::Soem && lab.options.begin == Begin::Run {
             lab.start_other(file);
         } else if lab.options.begin != Begin::Idle {
-            lab.main.scan(lab.now);
+            let now = lab.now();
+            lab.main_mut().scan(now);
         }
         Ok(lab)
     }
 
     /// Lets `tap` see every frame from now on.
     pub fn set_tap(&mut self, tap: Tap) {
-        self.tap = Some(tap);
+        self.diagnosis_input().tap = Some(tap);
     }
 
     /// Lets `recorder` see every frame from now on as a capture tool beside the MainDevice does: what was handed to a
     /// card, when it was, and what came back. What no card took is not in it
     /// ([`Segment::poll_outgoing`](linesman_sim::segment::Segment::poll_outgoing)).
     pub fn set_recorder(&mut self, recorder: Tap) {
-        self.segment.listen(true);
-        self.recorder = Some(recorder);
+        self.line.segment_mut().listen(true);
+        self.line.capture.recorder = Some(recorder);
     }
 
     /// Lets `tap` see every observation of the host from now on.
     pub fn set_host_tap(&mut self, tap: HostTap) {
-        self.host_tap = Some(tap);
+        self.diagnosis_input().host_tap = Some(tap);
     }
 
     /// Hides a share of the exchanges in which error counters are read from the diagnosis and the tap, and
     /// from the recorder.
     pub fn hide_counters(&mut self, share: f64, stream: Stream) {
         let capture_loss = (share > 0.0).then(|| CaptureLoss::new(stream, share));
-        self.recorder_veil.clone_from(&capture_loss);
-        self.capture_loss = capture_loss;
+        self.line.capture.loss.clone_from(&capture_loss);
+        self.diagnosis_input().loss = capture_loss;
     }
 
     /// The present.
     #[must_use]
     pub fn now(&self) -> Instant {
-        self.now
+        self.line.line.now()
     }
 
     /// How it was set up.
@@ -226,24 +206,24 @@ impl Lab {
     /// The segment.
     #[must_use]
     pub fn segment(&self) -> &Segment {
-        &self.segment
+        self.line.segment()
     }
 
     /// The MainDevice.
     #[must_use]
     pub fn main(&self) -> &MainDevice {
-        &self.main
+        self.session.main()
     }
 
     /// The MainDevice, to give it outputs or commands.
     pub fn main_mut(&mut self) -> &mut MainDevice {
-        &mut self.main
+        self.session.main_mut()
     }
 
     /// What was injected and what it did.
     #[must_use]
     pub fn truth(&self) -> &TruthLog {
-        self.segment.truth()
+        self.segment().truth()
     }
 
     /// What was planned: the segment file without its faults.
@@ -273,7 +253,7 @@ impl Lab {
     /// Findings that are open: errors and warnings, consequences not counted.
     #[must_use]
     pub fn open_findings(&self) -> usize {
-        let diagnosis = self.engine.diagnosis();
+        let diagnosis = self.engine().diagnosis();
         let open = diagnosis.findings.iter();
         let open = open.filter(|f| f.state != FindingState::Closed && f.severity != Severity::Info);
         open.count()
@@ -300,7 +280,7 @@ impl Lab {
     /// Frames seen by the diagnosis, both directions.
     #[must_use]
     pub fn frames(&self) -> u64 {
-        self.frames
+        self.session.hooks().diagnosis().frames
     }
 
     /// Why the line was not brought up, if it was not.
@@ -311,21 +291,36 @@ impl Lab {
 
     /// The engine that judges, with all that it knows of the line.
     #[must_use]
-    pub const fn engine(&self) -> &Engine {
-        &self.engine
+    pub fn engine(&self) -> &Engine {
+        let inline = &self.session.hooks().diagnosis().engine;
+        let engine = self.line.capture.listener.as_ref().or(inline.as_ref());
+        engine.unwrap_or_else(|| unreachable!("a lab judges inline or listens"))
+    }
+
+    fn engine_mut(&mut self) -> &mut Engine {
+        let inline = &mut self.session.hooks_mut().diagnosis_mut().engine;
+        let engine = self.line.capture.listener.as_mut().or(inline.as_mut());
+        engine.unwrap_or_else(|| unreachable!("a lab judges inline or listens"))
+    }
+
+    const fn diagnosis_input(&mut self) -> &mut LabDiagnosis {
+        self.session.hooks_mut().diagnosis_mut()
     }
 
     /// The diagnosis as it stands.
     #[must_use]
     pub fn diagnosis(&self) -> Diagnosis {
-        self.engine.diagnosis()
+        self.engine().diagnosis()
     }
 
     /// Ends the input of the diagnosis, and gives its last word.
     pub fn finish(&mut self) -> Diagnosis {
-        self.engine.finish(self.now, true);
-        self.finding_events.extend(std::iter::from_fn(|| self.engine.poll_event()));
-        self.engine.diagnosis()
+        let now = self.now();
+        let engine = self.engine_mut();
+        engine.finish(now, true);
+        let last: Vec<FindingEvent> = std::iter::from_fn(|| engine.poll_event()).collect();
+        self.finding_events.extend(last);
+        self.engine().diagnosis()
     }
 
     /// Whether every SubDevice is in the target state without error, and the MainDevice drives it.
@@ -338,10 +333,10 @@ impl Lab {
     /// can reach.
     pub fn not_up(&self) -> impl Iterator<Item = DeviceId> {
         let reached = self.reached();
-        self.segment.devices().filter(move |id| {
+        self.segment().devices().filter(move |id| {
             let is_reached = reached.contains(id);
             !is_reached
-                || self.segment.controller(*id).is_none_or(|controller| {
+                || self.segment().controller(*id).is_none_or(|controller| {
                     let status = controller.al_status();
                     status.error() || status.state().state() != Some(self.target_of(*id))
                 })
@@ -361,22 +356,23 @@ impl Lab {
     pub fn run_until(&mut self, until: Instant) -> Result<(), LabError> {
         let mut here = 0_u32;
         loop {
-            self.drain()?;
+            self.send();
+            self.hear();
             let (at, what) = self.next_due();
             if at > until {
-                self.now = self.now.max(until);
+                self.line.line.set_now(until);
                 return Ok(());
             }
-            if at > self.now {
-                self.now = at;
+            if at > self.now() {
+                self.line.line.set_now(at);
                 here = 0;
             } else {
                 here += 1;
                 if here > AT_ONE_INSTANT {
-                    return Err(LabError::Stuck { at: self.now, what });
+                    return Err(LabError::Stuck { at: self.now(), what });
                 }
             }
-            self.serve();
+            self.take_in();
         }
     }
 
@@ -392,15 +388,15 @@ impl Lab {
         step: Span,
         mut done: impl FnMut(&Self) -> bool,
     ) -> Result<bool, LabError> {
-        let until = self.now + within;
+        let until = self.now() + within;
         loop {
             if done(self) {
                 return Ok(true);
             }
-            if self.now >= until {
+            if self.now() >= until {
                 return Ok(false);
             }
-            self.run_until((self.now + step).min(until))?;
+            self.run_until((self.now() + step).min(until))?;
         }
     }
 
@@ -427,48 +423,53 @@ impl Lab {
 
     /// A SubDevice and the state it is in, in words.
     pub(crate) fn state_of(&self, id: DeviceId) -> String {
-        let state = self.segment.controller(id).map_or_else(
+        let state = self.segment().controller(id).map_or_else(
             || "missing".to_owned(),
             |controller| format!("{}, code {}", controller.al_status(), controller.al_code()),
         );
-        format!("{} {} ({state})", id.no(), self.segment.name(id))
+        format!("{} {} ({state})", id.no(), self.segment().name(id))
     }
 
     fn next_due(&mut self) -> (Instant, &'static str) {
+        let listener = self.line.capture.listener.as_ref();
         let due = [
-            (self.segment.poll_timeout(), "the segment"),
-            (self.main_due(), "the MainDevice"),
-            (self.engine.poll_timeout(), "the diagnosis"),
-            (Some(self.host_next), "the card"),
+            (Some(self.line.line.poll_timeout()), "the segment"),
+            (listener.and_then(Engine::poll_timeout), "the diagnosis"),
+            (self.main_due(), "the session"),
         ];
         let earliest = due.into_iter().filter_map(|(at, what)| at.map(|at| (at, what))).min();
         earliest.unwrap_or((Instant::MAX, "nobody"))
     }
 
-    /// Lets everyone do what is due now.
-    fn serve(&mut self) {
-        self.segment.advance(self.now);
-        self.record_outgoing();
-        self.receive();
-        self.serve_main();
-        self.engine.handle_timeout(self.now);
-        let has_news = self.segment.takes_card_news();
-        if has_news || self.now >= self.host_next {
-            self.host_next = self.now + HOST_INTERVAL;
-            self.look_at_cards();
+    /// Lets frames come back, and everyone do what is due now.
+    fn take_in(&mut self) {
+        let now = self.now();
+        if self.is_paused() {
+            return self.take_in_paused(now);
+        }
+        self.fetch_waiting(now);
+        let Self { line, session, other, .. } = self;
+        match other {
+            Some(other) => other.take_in(now, line, session.hooks_mut().diagnosis_mut()),
+            None => {
+                // A lab goes on whatever came of the run.
+                let Ok(_) = session.take_in(now, line);
+            }
         }
     }
 
-    fn receive(&mut self) {
-        let mut arrival = std::mem::take(&mut self.arrival);
-        while let Some(came) = self.segment.poll_arrival(&mut arrival) {
-            // What is not intact the card drops and counts; nobody behind it sees it.
-            if came.intact {
-                self.show(Direction::Received, came.path, came.at, &arrival);
-                self.record(Direction::Received, came.path, came.at, &arrival);
-                self.give_main(came.at.max(self.now), came.path, &arrival);
+    /// Lets whoever drives the line send.
+    fn send(&mut self) {
+        if self.is_paused() {
+            return;
+        }
+        let now = self.now();
+        let Self { line, session, other, .. } = self;
+        match other {
+            Some(other) => other.send(now, line, session.hooks_mut().diagnosis_mut()),
+            None => {
+                let Ok(()) = session.send(now, line);
             }
         }
-        self.arrival = arrival;
     }
 }

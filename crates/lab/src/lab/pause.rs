@@ -8,14 +8,29 @@ use std::collections::VecDeque;
 
 use linesman_proto::address::Path;
 use linesman_proto::time::Instant;
+use linesman_session::DiagnosisInput;
+use linesman_session::transport::{FrameSink, RxFrame, Transport};
 
-use super::Lab;
+use super::{FRAME, Lab};
 use crate::habit::Habit;
 
 /// Frames that have arrived while nobody fetched them.
 #[derive(Default)]
 pub(super) struct Socket {
     waiting: VecDeque<(Path, Vec<u8>)>,
+    arrival: Vec<u8>,
+}
+
+impl FrameSink for Socket {
+    fn room(&mut self) -> &mut [u8] {
+        self.arrival.resize(FRAME, 0);
+        &mut self.arrival
+    }
+
+    fn frame_received(&mut self, received: RxFrame) {
+        let frame = self.arrival.get(..received.len).unwrap_or_default();
+        self.waiting.push_back((received.path, frame.to_vec()));
+    }
 }
 
 impl Lab {
@@ -24,7 +39,8 @@ impl Lab {
         if self.options.habit == Habit::Own {
             return None;
         }
-        self.segment.silent_until(self.now, Path::A)
+        let now = self.now();
+        self.line.segment_mut().silent_until(now, Path::A)
     }
 
     pub(super) fn is_paused(&mut self) -> bool {
@@ -34,38 +50,26 @@ impl Lab {
     /// When the MainDevice has something to do.
     pub(super) fn main_due(&mut self) -> Option<Instant> {
         self.paused_until().or_else(|| match &self.other {
-            Some(other) => other.poll_timeout(),
-            None => self.main.poll_timeout(),
+            Some(other) => other.soem.poll_timeout(),
+            None => self.session.poll_timeout(),
         })
     }
 
-    /// Hands a frame to the MainDevice, or keeps it until the pause is over.
-    pub(super) fn give_main(&mut self, at: Instant, path: Path, frame: &[u8]) {
-        if self.is_paused() {
-            self.socket.waiting.push_back((path, frame.to_vec()));
-        } else {
-            self.hand_over(at, path, frame);
-        }
+    /// Lets frames come, and nobody fetch them.
+    pub(super) fn take_in_paused(&mut self, now: Instant) {
+        let Self { line, socket, session, .. } = self;
+        let shown = session.hooks_mut().diagnosis_mut();
+        let Ok(_) = line.receive(now, socket);
+        let Ok(()) = line.look_at_host(now, &mut |observation| shown.host(observation));
     }
 
-    fn hand_over(&mut self, at: Instant, path: Path, frame: &[u8]) {
-        match &mut self.other {
-            Some(other) => other.handle_frame(at, path, frame),
-            None => self.main.handle_frame(at, path, frame),
-        }
-    }
-
-    /// Lets the MainDevice do what is due, unless it is in a pause.
-    pub(super) fn serve_main(&mut self) {
-        if self.is_paused() {
-            return;
-        }
+    /// Hands over what has arrived during a pause.
+    pub(super) fn fetch_waiting(&mut self, now: Instant) {
         while let Some((path, frame)) = self.socket.waiting.pop_front() {
-            self.hand_over(self.now, path, &frame);
-        }
-        match &mut self.other {
-            Some(other) => other.handle_timeout(self.now),
-            None => self.main.handle_timeout(self.now),
+            match &mut self.other {
+                Some(other) => other.soem.handle_frame(now, path, &frame),
+                None => self.session.main_mut().handle_frame(now, path, &frame),
+            }
         }
     }
 }

@@ -20,7 +20,8 @@ impl Lab {
     /// # Errors
     /// The segment's, when the entry names no place or parameter.
     pub fn inject(&mut self, entry: &FaultEntry) -> Result<FaultId, LabError> {
-        Ok(self.segment.inject(self.now, entry)?)
+        let now = self.now();
+        Ok(self.line.segment_mut().inject(now, entry)?)
     }
 
     /// A fault of the run as a verdict is held against it; `None` if there is no such fault.
@@ -35,7 +36,7 @@ impl Lab {
             && let Some(TruthPlace::Device(missing)) = truth.places.first()
         {
             truth.equals = self.equals_in_a_row(*missing);
-            truth.leaves_nobody = self.segment.tree().is_empty();
+            truth.leaves_nobody = self.segment().tree().is_empty();
         }
         Some(truth)
     }
@@ -73,7 +74,8 @@ impl Lab {
     /// # Errors
     /// The segment's, when there is no such SubDevice or group, or it is out already.
     pub fn unplug(&mut self, name: &str) -> Result<Vec<FaultId>, PlugError> {
-        self.segment.unplug(self.now, name)
+        let now = self.now();
+        self.line.segment_mut().unplug(now, name)
     }
 
     /// Plugs a SubDevice in again, where it was or elsewhere.
@@ -81,27 +83,29 @@ impl Lab {
     /// # Errors
     /// The segment's, when it is in, or does not fit there.
     pub fn plug(&mut self, name: &str, on: Option<&Attachment>) -> Result<(), PlugError> {
-        self.segment.plug(self.now, name, on)
+        let now = self.now();
+        self.line.segment_mut().plug(now, name, on)
     }
 
     /// Ends a fault.
     pub fn heal(&mut self, fault: FaultId) {
-        self.segment.heal(self.now, fault);
+        let now = self.now();
+        self.line.segment_mut().heal(now, fault);
     }
 
     /// Counters that moved without a logged cause since the last audit.
     pub fn audit(&mut self) -> Vec<Unexplained> {
-        self.segment.audit()
+        self.line.segment_mut().audit()
     }
 
     /// Controllers that a frame of either card can get to: powered, with open ports all the way.
     pub(crate) fn reached(&self) -> BTreeSet<DeviceId> {
-        let tree = self.segment.tree();
-        let ids: Vec<DeviceId> = self.segment.devices().collect();
+        let tree = self.segment().tree();
+        let ids: Vec<DeviceId> = self.segment().devices().collect();
         let is_open = |end: End| match end {
-            End::MainDevice(path) => self.segment.host(path).carrier,
+            End::MainDevice(path) => self.segment().host(path).carrier,
             End::Controller(node, port) => {
-                let controller = ids.get(node).and_then(|id| self.segment.controller(*id));
+                let controller = ids.get(node).and_then(|id| self.segment().controller(*id));
                 controller.is_some_and(|known| known.is_powered() && known.is_open(port))
             }
         };

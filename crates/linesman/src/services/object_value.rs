@@ -1,14 +1,14 @@
 //! Values of the object dictionary as types of Rust (ETG.1000.6, 5.6.2: data lowest byte first).
 
-use super::ServiceError;
+use super::RequestError;
 
 mod sealed {
-    pub trait Sealed {}
+    pub trait SealedValue {}
 }
 
 /// A type in which an object is read and written: integers of 8 to 64 bits, `f32`, `f64`, `bool`, `String`
 /// (VISIBLE_STRING) and `Vec<u8>` (the bytes as they are). The size must be that of the object.
-pub trait ObjectValue: Sized + Send + sealed::Sealed + 'static {
+pub trait ObjectValue: Sized + Send + sealed::SealedValue + 'static {
     /// Its name in messages.
     const NAME: &'static str;
 
@@ -16,7 +16,7 @@ pub trait ObjectValue: Sized + Send + sealed::Sealed + 'static {
     ///
     /// # Errors
     /// When they are not so many as the type has, or no text.
-    fn from_bytes(bytes: &[u8]) -> Result<Self, ServiceError>;
+    fn from_bytes(bytes: &[u8]) -> Result<Self, RequestError>;
 
     /// The bytes of this value.
     #[must_use]
@@ -31,15 +31,15 @@ pub trait RegisterValue: ObjectValue {
 
 macro_rules! numbers {
     ($($type:ty),+ $(,)?) => {$(
-        impl sealed::Sealed for $type {}
+        impl sealed::SealedValue for $type {}
 
         impl ObjectValue for $type {
             const NAME: &'static str = stringify!($type);
 
-            fn from_bytes(bytes: &[u8]) -> Result<Self, ServiceError> {
+            fn from_bytes(bytes: &[u8]) -> Result<Self, RequestError> {
                 let expected = size_of::<Self>();
                 let received = bytes.len();
-                let size = ServiceError::Size { wanted: Self::NAME, expected, received };
+                let size = RequestError::Size { wanted: Self::NAME, expected, received };
                 bytes.try_into().map(Self::from_le_bytes).map_err(|_| size)
             }
 
@@ -56,17 +56,17 @@ macro_rules! numbers {
 
 numbers!(u8, u16, u32, u64, i8, i16, i32, i64, f32, f64);
 
-impl sealed::Sealed for bool {}
+impl sealed::SealedValue for bool {}
 
 impl ObjectValue for bool {
     const NAME: &'static str = "bool";
 
-    fn from_bytes(bytes: &[u8]) -> Result<Self, ServiceError> {
+    fn from_bytes(bytes: &[u8]) -> Result<Self, RequestError> {
         match bytes {
             [byte] => Ok(byte & 1 == 1),
             _ => {
                 let received = bytes.len();
-                Err(ServiceError::Size { wanted: Self::NAME, expected: 1, received })
+                Err(RequestError::Size { wanted: Self::NAME, expected: 1, received })
             }
         }
     }
@@ -76,15 +76,15 @@ impl ObjectValue for bool {
     }
 }
 
-impl sealed::Sealed for String {}
+impl sealed::SealedValue for String {}
 
 impl ObjectValue for String {
     const NAME: &'static str = "String";
 
     /// The text up to its first zero byte.
-    fn from_bytes(bytes: &[u8]) -> Result<Self, ServiceError> {
+    fn from_bytes(bytes: &[u8]) -> Result<Self, RequestError> {
         let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
-        Self::from_utf8(text.to_vec()).map_err(|_| ServiceError::NoText)
+        Self::from_utf8(text.to_vec()).map_err(|_| RequestError::NoText)
     }
 
     fn to_bytes(&self) -> Vec<u8> {
@@ -92,12 +92,12 @@ impl ObjectValue for String {
     }
 }
 
-impl sealed::Sealed for Vec<u8> {}
+impl sealed::SealedValue for Vec<u8> {}
 
 impl ObjectValue for Vec<u8> {
     const NAME: &'static str = "bytes";
 
-    fn from_bytes(bytes: &[u8]) -> Result<Self, ServiceError> {
+    fn from_bytes(bytes: &[u8]) -> Result<Self, RequestError> {
         Ok(bytes.to_vec())
     }
 
@@ -143,6 +143,6 @@ mod tests {
     #[test]
     fn a_text_ends_at_its_first_zero_byte() {
         assert_eq!(String::from_bytes(b"EL1008\0\0").unwrap(), "EL1008");
-        assert!(matches!(String::from_bytes(&[0xFF, 0xFE]), Err(ServiceError::NoText)));
+        assert!(matches!(String::from_bytes(&[0xFF, 0xFE]), Err(RequestError::NoText)));
     }
 }

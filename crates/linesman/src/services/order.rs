@@ -1,4 +1,4 @@
-//! Orders for services: taken between two cycles, answered when the MainDevice has done them.
+//! ServiceOrders for services: taken between two cycles, answered when the MainDevice has done them.
 
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -7,35 +7,35 @@ use linesman_proto::state::{AlState, DeviceState, StateValue};
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::run::Io;
 
-use super::ServiceError;
-use crate::handle::{Device, PlanId};
+use super::RequestError;
+use crate::handle::{DeviceHandle, PlanId};
 
-/// Orders that are taken in one cycle at most.
+/// ServiceOrders that are taken in one cycle at most.
 const A_CYCLE: usize = 16;
 /// An order for a SubDevice that is not up yet waits so long for it; then the refusal tells.
 const COMES_UP: Span = Span::s(5);
 
 /// The end of a service that somebody waits for.
-type AnswerTo = Sender<Result<ServiceAnswer, ServiceError>>;
+type AnswerTo = Sender<Result<ServiceAnswer, RequestError>>;
 
 /// A service that somebody waits for.
 #[derive(Debug)]
-pub(crate) struct Order {
-    pub(super) device: Device,
+pub(crate) struct ServiceOrder {
+    pub(super) device: DeviceHandle,
     pub(super) service: Service,
     pub(super) answer: AnswerTo,
 }
 
-/// Orders of a run: those that are not taken, those that wait for their SubDevice, those that are being done.
-pub(crate) struct Orders<'a> {
-    new: &'a Receiver<Order>,
-    early: Vec<(Instant, Order)>,
+/// ServiceOrders of a run: those that are not taken, those that wait for their SubDevice, those that are being done.
+pub(crate) struct ServiceOrders<'a> {
+    new: &'a Receiver<ServiceOrder>,
+    early: Vec<(Instant, ServiceOrder)>,
     pending: Vec<(ServiceTicket, AnswerTo)>,
     plan: PlanId,
 }
 
-impl<'a> Orders<'a> {
-    pub(crate) const fn new(new: &'a Receiver<Order>, plan: PlanId) -> Self {
+impl<'a> ServiceOrders<'a> {
+    pub(crate) const fn new(new: &'a Receiver<ServiceOrder>, plan: PlanId) -> Self {
         Self { new, early: Vec::new(), pending: Vec::new(), plan }
     }
 
@@ -48,14 +48,14 @@ impl<'a> Orders<'a> {
             } else {
                 let (found, running) = (order.device.plan, self.plan);
                 // Nobody may wait for it any more, here and below.
-                let _ = order.answer.send(Err(ServiceError::OtherPlan { found, running }));
+                let _ = order.answer.send(Err(RequestError::OtherPlan { found, running }));
             }
         }
-        let due = |(until, order): &mut (Instant, Order)| {
+        let due = |(until, order): &mut (Instant, ServiceOrder)| {
             *until <= io.now() || is_up(io.state(order.device.id), &order.service)
         };
         let due: Vec<_> = self.early.extract_if(.., due).collect();
-        for (_, Order { device, service, answer }) in due {
+        for (_, ServiceOrder { device, service, answer }) in due {
             self.pending.push((io.serve(device.id, service), answer));
         }
     }
@@ -68,7 +68,7 @@ impl<'a> Orders<'a> {
     ) {
         if let Some(at) = self.pending.iter().position(|(pending, _)| *pending == ticket) {
             let (_, answer) = self.pending.swap_remove(at);
-            let _ = answer.send(result.map_err(ServiceError::Failed));
+            let _ = answer.send(result.map_err(RequestError::Failed));
         }
     }
 }

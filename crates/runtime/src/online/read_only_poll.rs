@@ -11,15 +11,15 @@ use linesman_proto::register::AlStatus;
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{Reconstruction, SeenController};
+use linesman_session::SessionHooks;
 
 use super::build;
 use super::report::OnlineReport;
-use crate::drive::DriverHooks;
 
 /// Between two looks. Each is a few frames long, so that damage has something to hit.
 const LOOK_EVERY: Span = Span::ms(20);
 
-/// Somebody who looks. The [`DriverHooks`] of a [`Driver`](crate::drive::Driver).
+/// Somebody who looks. The [`SessionHooks`] of a [`Driver`](crate::drive::Driver).
 pub struct ReadOnlyPoller {
     on: String,
     names: Vec<String>,
@@ -201,7 +201,7 @@ fn seen(look: &ReadOnlyScan, names: &[String]) -> Plan {
     plan
 }
 
-impl DriverHooks for ReadOnlyPoller {
+impl SessionHooks for ReadOnlyPoller {
     fn frame(&mut self, _: &FrameSeen<'_>) {}
 
     fn host(&mut self, _: &HostObservation) {}

@@ -5,73 +5,61 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::thread::{self, JoinHandle};
 
-use linesman_diagnosis::{Diagnosis, Engine, Event, Probe};
+use linesman_diagnosis::{Diagnosis, Engine, Probe};
 use linesman_proto::address::Network;
 use linesman_proto::time::Instant;
+use linesman_session::DiagnosisInput;
 
 use super::note::Note;
 use super::tap::{Listener, TapLog};
 use crate::part::{PartFailure, guard};
 
 /// The diagnosis in messages.
-const PART: &str = "the diagnosis";
+pub(super) const PART: &str = "the diagnosis";
 /// The consequence of its failure.
-const EFFECT: &str = "the line is driven on, and not judged any more";
+pub(super) const EFFECT: &str = "the line is driven on, and not judged any more";
 
-/// A diagnosis that is fed with the frames of a run: an [`Engine`], but in tests.
-pub trait DiagnosisObserver: Send {
-    /// Takes frames and what the host noticed, in order of time; gives the time of the last frame.
-    fn take(&mut self, log: &TapLog) -> Instant;
-    /// Time has passed.
-    fn turn(&mut self, now: Instant);
+/// A diagnosis of a run: an [`Engine`], but in tests.
+pub trait DiagnosisObserver: DiagnosisInput + Send {
+    /// So many frames passed up to this time that were not shown.
+    fn missed(&mut self, count: u64, at: Instant);
     /// The run has ended.
     fn finish(&mut self, at: Instant);
-    /// What happened to findings.
-    fn poll_event(&mut self) -> Option<Event>;
-    /// What it would like to have read.
-    fn poll_probe(&mut self) -> Option<Probe>;
     /// The whole answer.
     fn diagnosis(&self) -> Diagnosis;
 }
 
 impl DiagnosisObserver for Engine {
-    fn take(&mut self, log: &TapLog) -> Instant {
-        let mut last = Instant::ZERO;
-        let mut host = log.host().iter().peekable();
-        for frame in log.frames() {
-            while let Some(observation) = host.next_if(|one| one.time <= frame.time) {
-                self.handle_host(observation);
-            }
-            if Engine::poll_timeout(self).is_some_and(|due| due <= frame.time) {
-                self.handle_timeout(frame.time);
-            }
-            self.handle_frame(&frame);
-            last = last.max(frame.time);
-        }
-        host.for_each(|observation| self.handle_host(observation));
-        self.handle_missed(Network::default(), log.missed(), last);
-        last
-    }
-
-    fn turn(&mut self, now: Instant) {
-        self.handle_timeout(now);
+    fn missed(&mut self, count: u64, at: Instant) {
+        self.handle_missed(Network::default(), count, at);
     }
 
     fn finish(&mut self, at: Instant) {
         Engine::finish(self, at, true);
     }
 
-    fn poll_event(&mut self) -> Option<Event> {
-        Engine::poll_event(self)
-    }
-
-    fn poll_probe(&mut self) -> Option<Probe> {
-        Engine::poll_probe(self)
-    }
-
     fn diagnosis(&self) -> Diagnosis {
         Engine::diagnosis(self)
     }
+}
+
+/// Shows frames and what the host noticed, in order of time; gives the time of the last frame.
+fn take(observer: &mut dyn DiagnosisObserver, log: &TapLog) -> Instant {
+    let mut last = Instant::ZERO;
+    let mut host = log.host().iter().peekable();
+    for frame in log.frames() {
+        while let Some(observation) = host.next_if(|one| one.time <= frame.time) {
+            observer.host(observation);
+        }
+        if observer.poll_timeout().is_some_and(|due| due <= frame.time) {
+            observer.turn(frame.time);
+        }
+        observer.frame(&frame);
+        last = last.max(frame.time);
+    }
+    host.for_each(|observation| observer.host(observation));
+    observer.missed(log.missed(), last);
+    last
 }
 
 /// Where a diagnosis tells what it finds.
@@ -125,7 +113,7 @@ fn work(
 ) -> Diagnosis {
     let (mut done, mut last) = (None, Instant::ZERO);
     while let Some(log) = listener.next(done.take()) {
-        last = last.max(observer.take(&log));
+        last = last.max(take(&mut *observer, &log));
         observer.turn(last);
         while let Some(probe) = observer.poll_probe() {
             // What is not read now is asked for again.

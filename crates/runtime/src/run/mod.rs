@@ -1,13 +1,13 @@
 //! A MainDevice that runs a machine: brought up, exchanging process data, watched, stopped.
 //!
-//! [`session`] does it, on whatever [transport](crate::transport); [`io`] is what the application
-//! sees in a cycle; [`tap`] shows the frames to the diagnosis, which judges in a thread of its own
-//! ([`diagnosis_thread`]); [`shared`] lets another program be the application; [`report`] is what is told at the end and in between;
-//! [`scan`](mod@scan) is for those who only look.
+//! [`session`] runs a [session](linesman_session) on whatever [transport](crate::transport); on cards [`tap`] shows
+//! the frames to the diagnosis, which judges in a thread of its own ([`diagnosis_thread`]), in virtual time they are
+//! judged at once; [`shared`] lets another program be the application; [`report`] is what is told at the end and in
+//! between; [`scan`](mod@scan) is for those who only look.
 
 pub mod bring_up;
+pub mod diagnosis_input;
 pub mod diagnosis_thread;
-pub mod io;
 pub mod note;
 pub mod plan_choices;
 pub mod real_time;
@@ -17,13 +17,13 @@ pub mod session;
 pub mod shared;
 pub mod tap;
 
-pub use io::{Application, Idle, Io, Next};
+pub use linesman_session::{Application, Idle, Io, MakePlan, Next, PlanSource};
 pub use note::{Note, RunError};
 pub use plan_choices::PlanChoices;
 pub use real_time::RealTime;
 pub use scan::scan;
 pub use session::{
-    MakePlan, NOTES, PlanSource, RunControls, RunOutcome, RunSession, SessionOptions, StartedRun,
-    run, run_observed, start, start_observed,
+    NOTES, RunControls, RunOutcome, RunSession, SessionOptions, StartedRun, run, run_observed,
+    start, start_observed,
 };
 pub use shared::Shared;

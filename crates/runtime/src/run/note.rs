@@ -8,6 +8,7 @@ use linesman_diagnosis::HostObservation;
 use linesman_link::error::LinkError;
 use linesman_maindevice::Event;
 use linesman_proto::time::Instant;
+use linesman_session::{RunEvent, RunFailure};
 
 use crate::part::PartFailure;
 
@@ -32,6 +33,19 @@ pub enum Note {
     Leaving(Instant),
 }
 
+impl From<RunEvent> for Note {
+    fn from(event: RunEvent) -> Self {
+        match event {
+            RunEvent::Scanned(inventory) => Self::Scanned(inventory),
+            RunEvent::Planned(plan) => Self::Planned(plan),
+            RunEvent::MainDevice(at, event) => Self::Event(at, event),
+            RunEvent::Host(observation) => Self::Host(observation),
+            RunEvent::Finding(event) => Self::Finding(event),
+            RunEvent::Leaving(at) => Self::Leaving(at),
+        }
+    }
+}
+
 /// Why a line cannot be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -51,4 +65,13 @@ pub enum RunError {
     /// A part of this program, or the application.
     #[error(transparent)]
     Failed(PartFailure),
+}
+
+impl From<RunFailure> for RunError {
+    fn from(failure: RunFailure) -> Self {
+        match failure {
+            RunFailure::Scan(why) => Self::Scan(why),
+            RunFailure::Plan(why) => Self::Plan(why),
+        }
+    }
 }

@@ -8,7 +8,7 @@ use linesman_config::project::{ClockChoice, Project};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
-use super::session::{MakePlan, PlanSource};
+use linesman_session::{MakePlan, PlanSource};
 
 /// Choices beside the project.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

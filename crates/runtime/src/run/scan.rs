@@ -2,28 +2,31 @@
 
 use linesman_config::inventory::Inventory;
 use linesman_diagnosis::{FrameSeen, HostObservation};
+use linesman_link::error::LinkError;
 use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::time::{Instant, Span};
+use linesman_session::SessionHooks;
+pub use linesman_session::run::SCAN_PATIENCE as PATIENCE;
 
 use super::note::RunError;
-use crate::drive::{Driver, DriverHooks};
+use crate::drive::Driver;
 use crate::stop::Stop;
 use crate::transport::Transport;
-
-/// How long a scan of a line of usual length may take: one of a thousand SubDevices takes some
-/// seconds.
-pub const PATIENCE: Span = Span::s(60);
 
 /// Finds out what is on a line: it gets station addresses, and keeps its states.
 ///
 /// # Errors
 /// When it does not answer, the scan is not done after `patience`, or the interface fails.
-pub fn scan<L: Transport>(line: L, patience: Span, stop: &Stop) -> Result<Inventory, RunError> {
+pub fn scan<L: Transport<Error = LinkError>>(
+    line: L,
+    patience: Span,
+    stop: &Stop,
+) -> Result<Inventory, RunError> {
     let settings = line.options();
-    let mut driver = Driver::new(line, settings);
-    let mut scanning = Scanning { begun: false, result: None };
+    let scanning = Scanning { begun: false, result: None };
+    let mut driver = Driver::new(line, settings, scanning);
     let until = driver.now() + patience;
-    driver.run(until, stop, &mut scanning)?;
+    driver.run(until, stop)?;
     let unfinished = || {
         let why = if stop.is_set() {
             "the scan was ended before it was done".to_owned()
@@ -32,7 +35,7 @@ pub fn scan<L: Transport>(line: L, patience: Span, stop: &Stop) -> Result<Invent
         };
         Err(RunError::Scan(format!("{why}. Do: scan again")))
     };
-    scanning.result.unwrap_or_else(unfinished)
+    driver.into_hooks().result.unwrap_or_else(unfinished)
 }
 
 /// Waits for the one result.
@@ -41,7 +44,7 @@ struct Scanning {
     result: Option<Result<Inventory, RunError>>,
 }
 
-impl DriverHooks for Scanning {
+impl SessionHooks for Scanning {
     fn frame(&mut self, _: &FrameSeen<'_>) {}
 
     fn host(&mut self, _: &HostObservation) {}
@@ -60,9 +63,5 @@ impl DriverHooks for Scanning {
             main.scan(now);
         }
         self.result.is_none()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        None
     }
 }

@@ -1,27 +1,25 @@
-//! Session of a run: finds the line, makes the plan, starts, calls the application, stops.
+//! Run of a line: a session, what the host gives it, and who is told.
 
 mod ending;
 mod started;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError};
+use std::sync::mpsc::{SyncSender, TrySendError};
 
-use linesman_config::inventory::Inventory;
-use linesman_config::plan::{DevicePlan, IoAt, Plan};
-use linesman_diagnosis::{Asked, FrameSeen, HostObservation, Probe, Setup};
-use linesman_maindevice::{Event, MainDevice, ProbeRequest, Target};
+use linesman_diagnosis::{FrameSeen, HostObservation, Setup};
+use linesman_link::error::LinkError;
+use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
+use linesman_session::frame::FrameSummary;
+use linesman_session::{Application, PlanRun, PlanSource, SessionHooks};
 
+use super::diagnosis_input::RunDiagnosis;
 use super::diagnosis_thread::DiagnosisObserver;
-use super::io::{Application, Io, Next};
 use super::note::{Note, RunError};
 use super::real_time::{GrantedRealTime, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
-use super::scan;
-use super::tap::{FrameSummary, Tap};
-use crate::drive::DriverHooks;
 use crate::part::PartFailure;
 use crate::serve::lateness::Lateness;
 use crate::service::ServiceSocket;
@@ -32,17 +30,6 @@ pub use started::{StartedRun, start, start_observed};
 
 /// That the diagnosis does not keep up is told no more often than this.
 const MISSED_EVERY: Span = Span::s(10);
-
-/// What is to be run.
-pub enum PlanSource {
-    /// A plan that is made already.
-    Plan(Box<Plan>),
-    /// One that is made of what a scan finds; or why it cannot be made.
-    Found(MakePlan),
-}
-
-/// Makes a plan of what was found.
-pub type MakePlan = Box<dyn FnOnce(&Inventory) -> Result<Plan, String> + Send>;
 
 /// How it is to be run.
 #[derive(Clone, Debug)]
@@ -67,59 +54,39 @@ pub struct SessionOptions {
 /// Room for notes that are on their way to whoever listens.
 pub const NOTES: usize = 65_536;
 
-/// A session of a MainDevice. It is the [`DriverHooks`] of a [`Driver`](crate::drive::Driver).
+/// The [`SessionHooks`] of a run on a machine: a [`PlanRun`], and what is beside it: notes for whoever listens, services
+/// asked for through a socket, the times of the host.
 pub struct RunSession<A> {
-    wanted: Option<PlanSource>,
-    application: A,
-    io_at: IoAt,
+    run: PlanRun<A, RunDiagnosis>,
     notes: SyncSender<Note>,
-    tap: Option<Tap>,
-    /// What the diagnosis would like to have read.
-    probes: Option<Receiver<Probe>>,
-    plan: Option<Arc<Plan>>,
-    begun: bool,
-    reached_at: Option<Instant>,
-    failure: Option<RunError>,
-    lateness: Lateness,
-    /// The application has enough, or the line is being stopped.
-    ended: bool,
-    leaving: bool,
-    withheld: bool,
-    /// SubDevices wait in PREOP for the first outputs.
-    held: bool,
-    scan_until: Instant,
-    socket: Option<ServiceSocket>,
     /// Notes for which there was no room.
     untold: Arc<AtomicU64>,
+    lateness: Lateness,
+    socket: Option<ServiceSocket>,
     /// Left-out frames that were told, and nothing of more before that time.
     missed_told: (u64, Instant),
     begun_at: Instant,
     granted: GrantedRealTime,
     on: String,
-    /// The caller takes the turn of the application behind it; and it is the caller's turn.
-    pauses: bool,
-    paused: bool,
-    /// The caller gave no outputs in its turn.
-    old: bool,
 }
 
 impl<A: Application> RunSession<A> {
-    fn start(&mut self, now: Instant, plan: Plan, main: &mut MainDevice) {
-        if let Err(why) = self.application.begin(&plan) {
-            self.failure = Some(RunError::Plan(why));
-            return;
-        }
-        self.io_at = plan.tasks.first().map(|task| task.io_at).unwrap_or_default();
-        let plan = Arc::new(plan);
-        self.note(Note::Planned(Arc::clone(&plan)));
-        main.start(now, (*plan).clone());
-        self.plan = Some(plan);
-    }
-
     fn note(&self, note: Note) {
         // Whoever listened may have gone, or be busy: the machine runs on.
         if let Err(TrySendError::Full(_)) = self.notes.try_send(note) {
             self.untold.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Passes on what happened in the run.
+    fn tell(&mut self) {
+        while let Some(event) = self.run.poll_event() {
+            self.note(event.into());
+        }
+        if let RunDiagnosis::Inline(inline) = self.run.diagnosis_mut()
+            && let Some(failure) = inline.poll_failure()
+        {
+            self.note(Note::Failed(failure));
         }
     }
 
@@ -133,31 +100,22 @@ impl<A: Application> RunSession<A> {
         }
     }
 
-    fn scanned(&mut self, now: Instant, inventory: &Inventory, main: &mut MainDevice) {
-        self.note(Note::Scanned(Box::new(inventory.clone())));
-        let Some(PlanSource::Found(make)) = self.wanted.take() else { return };
-        match make(inventory) {
-            Ok(plan) => self.start(now, plan, main),
-            Err(why) => self.failure = Some(RunError::Plan(why)),
-        }
-    }
-
     /// How the run goes.
     fn report(&self, now: Instant, main: &MainDevice) -> RunReport {
-        let (devices, frames) = match &self.plan {
+        let (devices, frames) = match self.run.plan() {
             Some(plan) => of_plan(plan, main, now),
             None => (Vec::new(), Vec::new()),
         };
-        let left_out = self.tap.as_ref().map_or(0, Tap::left_out);
+        let left_out = self.run.diagnosis().left_out();
         RunReport {
             schema: SCHEMA.to_owned(),
             error: None,
             on: self.on.clone(),
             time_ns: now.since(self.begun_at).as_nanos(),
-            reached_ns: self.reached_at.map(|at| at.since(self.begun_at).as_nanos()),
+            reached_ns: self.run.reached_at().map(|at| at.since(self.begun_at).as_nanos()),
             bring_up: None,
             settled: main.is_settled(),
-            outputs_withheld: self.withheld,
+            outputs_withheld: self.run.is_withheld(),
             devices,
             frames,
             responding: main.responding().map(|count| count.0),
@@ -178,165 +136,56 @@ impl<A: Application> RunSession<A> {
         socket.turn(now, main, |main| self.report(now, main));
         self.socket = Some(socket);
     }
-
-    /// Has read what the diagnosis would like to know; it sees the frames.
-    fn look_up(&mut self, now: Instant, main: &mut MainDevice) {
-        let (Some(plan), Some(probes)) = (&self.plan, &self.probes) else { return };
-        while let Ok(probe) = probes.try_recv() {
-            match probe.what {
-                Asked::Register { address, len } => {
-                    let target = Target::Station(probe.station);
-                    main.probe(now, ProbeRequest { target, register: address, len, write: None });
-                }
-                Asked::Written { address, data } => {
-                    let (target, write) = (Target::Station(probe.station), Some(data.to_vec()));
-                    main.probe(now, ProbeRequest { target, register: address, len: 2, write });
-                }
-                Asked::Object(object) => {
-                    let at = |device: &&DevicePlan| device.station == probe.station;
-                    if let Some(device) = plan.devices.iter().find(at) {
-                        main.sdo_upload(now, device.id, object, false);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Calls the application when it is its turn.
-    fn call(&mut self, now: Instant, main: &mut MainDevice) {
-        if std::mem::take(&mut self.paused) {
-            let old = std::mem::take(&mut self.old);
-            return self.give_outputs(now, main, old);
-        }
-        // The first task is that of the application; others exchange beside it.
-        let exchanged = main.take_exchanged(0);
-        let missed = main.statistics().cycles_missed;
-        let due = match self.io_at {
-            IoAt::TaskBegin => exchanged,
-            IoAt::TaskEnd => {
-                if exchanged {
-                    let withheld = self.withheld;
-                    let mut io = Io { main: &mut *main, now, missed, withheld, old: false };
-                    self.application.after_outputs(&mut io);
-                }
-                main.next_cycle(0).is_some_and(|due| due <= now)
-            }
-        };
-        if !due {
-            return;
-        }
-        let mut io = Io { main: &mut *main, now, missed, withheld: self.withheld, old: false };
-        if self.application.cycle(&mut io) == Next::Stop {
-            self.ended = true;
-        }
-        let old = io.old;
-        self.paused = self.pauses && !self.ended;
-        if !self.paused {
-            self.give_outputs(now, main, old);
-        }
-    }
-
-    /// Outputs count as given anew unless they are old.
-    fn give_outputs(&mut self, now: Instant, main: &mut MainDevice, old: bool) {
-        if !old && !self.application.is_idle() {
-            main.outputs_mut();
-            if std::mem::take(&mut self.held) {
-                main.release(now);
-            }
-        }
-    }
 }
 
-impl<A: Application> DriverHooks for RunSession<A> {
+impl<A: Application> SessionHooks for RunSession<A> {
     #[inline]
     fn frame(&mut self, frame: &FrameSeen<'_>) {
-        if let Some(tap) = &mut self.tap {
-            tap.frame(frame);
-        }
+        self.run.frame(frame);
     }
 
     #[inline]
     fn room(&mut self, now: Instant) -> Option<&mut [u8]> {
-        self.tap.as_mut().map(|tap| &mut tap.room(now)[..])
+        self.run.room(now)
     }
 
     #[inline]
-    fn keep(&mut self, sent: &FrameSummary, len: usize) {
-        if let Some(tap) = &mut self.tap {
-            tap.keep(sent, len);
-        }
+    fn keep(&mut self, passed: &FrameSummary, len: usize) {
+        self.run.keep(passed, len);
     }
 
     fn host(&mut self, observation: &HostObservation) {
-        self.note(Note::Host(*observation));
-        if let Some(tap) = &mut self.tap {
-            tap.host(observation);
-        }
+        self.run.host(observation);
     }
 
-    #[allow(clippy::wildcard_enum_match_arm, reason = "all but a few are only passed on")]
     fn event(&mut self, now: Instant, event: Event, main: &mut MainDevice) {
-        match &event {
-            Event::Scanned(inventory) => return self.scanned(now, inventory, main),
-            Event::ScanFailed(error) => self.failure = Some(RunError::Scan(error.to_string())),
-            Event::AllReached => {
-                self.reached_at.get_or_insert(now);
+        if let Event::Served { ticket, result, .. } = &event {
+            if let Some(socket) = &mut self.socket {
+                socket.served(*ticket, result);
             }
-            Event::OutputsWithheld { .. } => self.withheld = true,
-            Event::OutputsResumed { .. } => self.withheld = false,
-            Event::Stopped => self.ended = true,
-            Event::Served { ticket, result, .. } => {
-                if let Some(socket) = &mut self.socket {
-                    socket.served(*ticket, result);
-                }
-                self.application.served(*ticket, result);
-                return;
-            }
-            _ => {}
+            self.run.application_mut().served(*ticket, result);
+            return;
         }
-        self.note(Note::Event(now, Box::new(event)));
+        self.run.event(now, event, main);
     }
 
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
-        if let Some(tap) = &mut self.tap {
-            tap.turn(now);
-            let left_out = tap.left_out();
-            if left_out > self.missed_told.0 {
-                self.tell_missed(now, left_out);
-            }
-        }
-        if !self.begun {
-            self.begun = true;
-            self.scan_until = now + scan::PATIENCE;
-            match self.wanted.take() {
-                Some(PlanSource::Plan(plan)) => self.start(now, *plan, main),
-                other => {
-                    self.wanted = other;
-                    main.scan(now);
-                }
-            }
-        }
-        if self.plan.is_none() && now > self.scan_until && self.failure.is_none() {
-            let words =
-                "the scan was not done after 60 s. Do: look at the line with `linesman scan`";
-            self.failure = Some(RunError::Scan(words.to_owned()));
-        }
         self.attend(now, main);
-        if !self.leaving {
-            self.look_up(now, main);
+        let goes_on = self.run.turn(now, main);
+        self.tell();
+        let left_out = self.run.diagnosis().left_out();
+        if left_out > self.missed_told.0 {
+            self.tell_missed(now, left_out);
         }
-        if self.plan.is_some() && !self.leaving {
-            self.call(now, main);
-        }
-        self.failure.is_none() && !self.ended
+        goes_on
     }
 
     fn is_paused(&self) -> bool {
-        self.paused
+        self.run.is_paused()
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        None
+        self.run.poll_timeout()
     }
 
     #[inline]
@@ -371,7 +220,7 @@ pub struct RunControls<'a> {
 ///
 /// # Errors
 /// When nothing could be run: the line does not answer, or is not what was wanted.
-pub fn run<L: Transport, A: Application>(
+pub fn run<L: Transport<Error = LinkError>, A: Application>(
     line: L,
     wanted: PlanSource,
     application: A,
@@ -387,7 +236,7 @@ pub fn run<L: Transport, A: Application>(
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_observed<L: Transport, A: Application>(
+pub fn run_observed<L: Transport<Error = LinkError>, A: Application>(
     line: L,
     wanted: PlanSource,
     application: A,

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use linesman_config::plan::Plan;
 use linesman_link::shared_image::{ImageState, SharedImage};
 
-use super::io::{Application, Io, Next};
 use linesman_proto::address::DeviceId;
+use linesman_session::{Application, Io, Next};
 
 /// States of so many SubDevices are brought up to date in a cycle, in turn.
 const STATES_A_CYCLE: usize = 64;
@@ -60,7 +60,7 @@ impl Application for Shared {
         let states = indices.map(|at| (at, io.state(DeviceId(at as u32)).0));
         image.publish(io.inputs(), &self.state, states);
         // Its first outputs count; what stays as it was is old.
-        if !image.take_outputs(io.outputs_unchanged(), &mut self.last) {
+        if !image.take_outputs(io.outputs_mut(), &mut self.last) {
             io.outputs_are_old();
         }
         Next::Continue

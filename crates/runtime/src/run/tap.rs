@@ -11,14 +11,12 @@ use std::sync::{Arc, OnceLock};
 use std::thread::{self, Thread};
 
 use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
-use linesman_proto::address::{Network, Path};
+use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
+use linesman_session::frame::{FRAME_ROOM, FrameSummary};
 
 /// Bytes of a log.
 const ROOM: usize = 256 * 1024;
-/// Room for one frame, in bytes: the longest has 1,514, and what is longer than any may be has its
-/// end cut off.
-pub const FRAME_ROOM: usize = 1_536;
 /// What is noted of a frame lies before it: its time, its number, and a word of all else.
 const HEAD: usize = 24;
 /// What a frame takes at most.
@@ -79,7 +77,7 @@ impl TapLog {
         let Some(head) = self.bytes.get_mut(self.len..).and_then(<[u8]>::first_chunk_mut) else {
             return;
         };
-        passed.write(len, head);
+        write_head(passed, len, head);
         self.len += HEAD + len;
     }
 
@@ -88,18 +86,9 @@ impl TapLog {
         let mut rest = &self.bytes[..self.len];
         std::iter::from_fn(move || {
             let (head, behind) = rest.split_first_chunk()?;
-            let (passed, len) = FrameSummary::read(head);
+            let (passed, len) = read_head(head);
             rest = behind.get(len..)?;
-            Some(FrameSeen {
-                network: Network::default(),
-                path: passed.path,
-                direction: passed.direction,
-                time: passed.time,
-                number: passed.number,
-                fcs: None,
-                truncated: passed.truncated,
-                bytes: behind.get(..len)?,
-            })
+            Some(passed.seen(behind.get(..len)?))
         })
     }
 
@@ -116,21 +105,6 @@ impl TapLog {
     }
 }
 
-/// What is known of a frame that passed, without its bytes.
-#[derive(Clone, Copy, Debug)]
-pub struct FrameSummary {
-    /// When, as [`FrameSeen::time`].
-    pub time: Instant,
-    /// Its number, as [`FrameSeen::number`].
-    pub number: u64,
-    /// The card.
-    pub path: Option<Path>,
-    /// Which way it went.
-    pub direction: Direction,
-    /// Its end is missing.
-    pub truncated: bool,
-}
-
 /// The word of an entry: the frame's length in its lower half, above it these.
 const SENT: u64 = 1 << 32;
 const RECEIVED: u64 = 1 << 33;
@@ -138,48 +112,46 @@ const BY_A: u64 = 1 << 34;
 const BY_B: u64 = 1 << 35;
 const TRUNCATED: u64 = 1 << 36;
 
-impl FrameSummary {
-    /// Notes it before the frame, which has so many bytes.
-    #[inline]
-    fn write(&self, len: usize, head: &mut [u8; HEAD]) {
-        let direction = match self.direction {
-            Direction::Sent => SENT,
-            Direction::Received => RECEIVED,
-            Direction::Unknown => 0,
-        };
-        let path = match self.path {
-            Some(Path::A) => BY_A,
-            Some(Path::B) => BY_B,
-            None => 0,
-        };
-        let truncated = if self.truncated { TRUNCATED } else { 0 };
-        let words = [self.time.as_nanos(), self.number, len as u64 | direction | path | truncated];
-        for (to, word) in head.as_chunks_mut().0.iter_mut().zip(words) {
-            *to = word.to_le_bytes();
-        }
+/// Notes a frame before its bytes, which are so many.
+#[inline]
+fn write_head(passed: &FrameSummary, len: usize, head: &mut [u8; HEAD]) {
+    let direction = match passed.direction {
+        Direction::Sent => SENT,
+        Direction::Received => RECEIVED,
+        Direction::Unknown => 0,
+    };
+    let path = match passed.path {
+        Some(Path::A) => BY_A,
+        Some(Path::B) => BY_B,
+        None => 0,
+    };
+    let truncated = if passed.truncated { TRUNCATED } else { 0 };
+    let words = [passed.time.as_nanos(), passed.number, len as u64 | direction | path | truncated];
+    for (to, word) in head.as_chunks_mut().0.iter_mut().zip(words) {
+        *to = word.to_le_bytes();
     }
+}
 
-    /// What [`FrameSummary::write`] has noted, and the length of the frame.
-    fn read(head: &[u8; HEAD]) -> (Self, usize) {
-        let mut words = head.as_chunks().0.iter().map(|word| u64::from_le_bytes(*word));
-        let mut word = || words.next().unwrap_or(0);
-        let (time, number, rest) = (word(), word(), word());
-        let is = |bit: u64| rest & bit != 0;
-        let path = [(BY_A, Path::A), (BY_B, Path::B)].into_iter().find(|(bit, _)| is(*bit));
-        let direction = match (is(SENT), is(RECEIVED)) {
-            (true, _) => Direction::Sent,
-            (false, true) => Direction::Received,
-            (false, false) => Direction::Unknown,
-        };
-        let passed = Self {
-            time: Instant::from_nanos(time),
-            number,
-            path: path.map(|(_, path)| path),
-            direction,
-            truncated: is(TRUNCATED),
-        };
-        (passed, (rest & 0xFFFF_FFFF) as usize)
-    }
+/// What [`write_head`] has noted, and the length of the frame.
+fn read_head(head: &[u8; HEAD]) -> (FrameSummary, usize) {
+    let mut words = head.as_chunks().0.iter().map(|word| u64::from_le_bytes(*word));
+    let mut word = || words.next().unwrap_or(0);
+    let (time, number, rest) = (word(), word(), word());
+    let is = |bit: u64| rest & bit != 0;
+    let path = [(BY_A, Path::A), (BY_B, Path::B)].into_iter().find(|(bit, _)| is(*bit));
+    let direction = match (is(SENT), is(RECEIVED)) {
+        (true, _) => Direction::Sent,
+        (false, true) => Direction::Received,
+        (false, false) => Direction::Unknown,
+    };
+    let passed = FrameSummary {
+        time: Instant::from_nanos(time),
+        number,
+        path: path.map(|(_, path)| path),
+        direction,
+        truncated: is(TRUNCATED),
+    };
+    (passed, (rest & 0xFFFF_FFFF) as usize)
 }
 
 /// The end in the cycle.
@@ -387,6 +359,8 @@ impl Listener {
 
 #[cfg(test)]
 mod tests {
+    use linesman_proto::address::Network;
+
     use super::*;
 
     fn frame(number: u64, bytes: &[u8]) -> FrameSeen<'_> {

@@ -100,6 +100,8 @@ impl Cards {
 }
 
 impl Transport for Cards {
+    type Error = LinkError;
+
     fn options(&self) -> Options {
         // The network's time begins as the host's, so that times of both can be compared.
         let unix = self.clock.started_at().as_nanos();

@@ -1,11 +1,12 @@
 //! Diagnosis of a line that nobody drives: reads again and again, and sees what changes.
 
-use linesman_diagnosis::{Asked, Engine, FrameSeen, HostObservation, InputKind, Setup};
+use linesman_diagnosis::{Engine, FrameSeen, HostObservation, InputKind, Setup};
 use linesman_link::clock::HostClock;
-use linesman_maindevice::{Event, MainDevice, ProbeRequest, Target};
+use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Driver, DriverHooks};
+use linesman_runtime::drive::Driver;
 use linesman_runtime::record::Recorder;
+use linesman_session::{SessionHooks, probe};
 
 use super::Session;
 use crate::command::line_access;
@@ -31,7 +32,6 @@ pub(super) fn run(
     let stop = line_access::stop()?;
     let clock = HostClock::start();
     let until = session.until(LASTS);
-    let mut driver = Driver::open(names, clock)?;
     let setup = Setup {
         input: InputKind::Driven,
         host_counters: true,
@@ -42,7 +42,7 @@ pub(super) fn run(
         ..session.setup.clone()
     };
     let recorder = session.recorder(clock.started_at(), names)?;
-    let mut looking = CardPoll {
+    let looking = CardPoll {
         engine: Engine::new(setup),
         session,
         recorder,
@@ -51,8 +51,10 @@ pub(super) fn run(
         next: if active { Next::Scan } else { Next::LookAt(Instant::ZERO) },
         frames: 0,
     };
-    let result = driver.run(until, &stop, &mut looking);
-    let CardPoll { engine, mut session, recorder, frames, mut progress, output, .. } = looking;
+    let mut driver = Driver::open(names, clock, looking)?;
+    let result = driver.run(until, &stop);
+    let CardPoll { engine, mut session, recorder, frames, mut progress, output, .. } =
+        driver.into_hooks();
     progress.clear();
     session.end_recording(recorder, output);
     let complete = match result {
@@ -89,7 +91,7 @@ enum Next {
     Wait,
 }
 
-impl DriverHooks for CardPoll<'_> {
+impl SessionHooks for CardPoll<'_> {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.frames += 1;
         if let Some(recorder) = &mut self.recorder {
@@ -119,21 +121,9 @@ impl DriverHooks for CardPoll<'_> {
         self.engine.handle_timeout(now);
         self.session.follow(&mut self.engine, self.output);
         self.session.look_at_recording(self.recorder.as_ref(), self.output);
-        while let Some(probe) = self.engine.poll_probe() {
-            let line = self.engine.model(probe.network);
-            let station = line.and_then(|line| line.device(probe.device)?.station);
-            // Who has no address yet cannot be asked.
-            let Some(station) = station else { continue };
-            let (register, len, write) = match probe.what {
-                Asked::Register { address, len } => (address, len, None),
-                Asked::Written { address, data } => (address, 2, Some(Vec::from(data))),
-                // Mailboxes of SubDevices that nobody drives are not asked.
-                Asked::Object(_) => continue,
-            };
-            main.probe(
-                now,
-                ProbeRequest { target: Target::Station(station), register, len, write },
-            );
+        while let Some(wish) = self.engine.poll_probe() {
+            // Mailboxes of SubDevices that nobody drives are not asked: they are of no plan.
+            probe::ask(&wish, now, main);
         }
         match self.next {
             Next::Scan => {

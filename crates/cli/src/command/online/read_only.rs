@@ -4,14 +4,16 @@ use std::path::Path;
 
 use linesman_diagnosis::{FrameSeen, HostObservation};
 use linesman_link::clock::HostClock;
+use linesman_link::error::LinkError;
 use linesman_maindevice::procedure::counters::read_and_clear;
 use linesman_maindevice::{Event, MainDevice, Target};
 use linesman_proto::address::Position;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Driver, DriverHooks};
+use linesman_runtime::drive::Driver;
 use linesman_runtime::online::ReadOnlyPoller;
 use linesman_runtime::online::report::OnlineReport;
 use linesman_runtime::transport::{Cards, Pace as VirtualPace, Transport};
+use linesman_session::SessionHooks;
 
 use super::live::{Live, Pace};
 use super::{Arguments, interval, lasts};
@@ -48,7 +50,7 @@ pub(super) fn segment(
     look(line, ReadOnlyPoller::new(place, names), place, arguments, output)
 }
 
-fn look<L: Transport>(
+fn look<L: Transport<Error = LinkError>>(
     line: L,
     poller: ReadOnlyPoller,
     place: &str,
@@ -57,14 +59,13 @@ fn look<L: Transport>(
 ) -> Result<OnlineReport, Failure> {
     let stop = line_access::stop()?;
     let options = line.options();
-    let mut driver = Driver::new(line, options);
     let lasts = lasts(arguments);
     let span = lasts.map(|lasts| Span::ns(lasts.as_nanos() as u64));
     let poller = if arguments.live || lasts.is_some() { poller } else { poller.once() };
     let until = match (span, arguments.live) {
-        (Some(span), _) => driver.now() + span,
+        (Some(span), _) => line.now() + span,
         (None, true) => Instant::MAX,
-        (None, false) => driver.now() + PATIENCE,
+        (None, false) => line.now() + PATIENCE,
     };
     let live = match arguments.live {
         true => Some(Live::start(
@@ -75,17 +76,19 @@ fn look<L: Transport>(
         false => None,
     };
     let clears = arguments.clear.is_some_and(super::What::errors);
-    let mut looking =
+    let looking =
         ReadOnlyView { poller, live, output, clears, show_at: Instant::ZERO, failure: None };
-    let result = driver.run(until, &stop, &mut looking);
-    let ReadOnlyView { poller, live, failure, .. } = looking;
+    let mut driver = Driver::new(line, options, looking);
+    let result = driver.run(until, &stop);
+    let now = driver.now();
+    let ReadOnlyView { poller, live, failure, .. } = driver.into_hooks();
     // The terminal is given back before anything else is told.
     drop(live);
     result?;
     if let Some(failure) = failure {
         return Err(failure);
     }
-    poller.report(driver.now()).ok_or_else(|| {
+    poller.report(now).ok_or_else(|| {
         let why = poller.failure().unwrap_or("nobody has answered yet");
         line_access::nobody_since(why).at(place)
     })
@@ -115,7 +118,7 @@ impl ReadOnlyView<'_> {
     }
 }
 
-impl DriverHooks for ReadOnlyView<'_> {
+impl SessionHooks for ReadOnlyView<'_> {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.poller.frame(frame);
     }

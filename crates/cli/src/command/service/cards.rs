@@ -9,8 +9,10 @@ use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, Servi
 use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::{Driver, DriverHooks};
+use linesman_runtime::drive::Driver;
 use linesman_runtime::stop::Stop;
+use linesman_runtime::transport::Cards;
+use linesman_session::SessionHooks;
 
 use super::{ServiceClient, ServiceRefused};
 use crate::command::line_access;
@@ -23,9 +25,8 @@ const SERVICE_PATIENCE: Span = Span::s(24 * 3_600);
 
 /// A line on cards.
 pub(super) struct CardClient {
-    driver: Driver,
+    driver: Driver<Cards, PendingCommand>,
     stop: Stop,
-    pending: PendingCommand,
     name: String,
 }
 
@@ -34,7 +35,6 @@ pub(super) fn open(names: &[String]) -> Result<(CardClient, Inventory), Failure>
     line_access::refuse(names)?;
     let stop = line_access::stop()?;
     let clock = HostClock::start();
-    let driver = Driver::open(names, clock)?;
     let setup = Setup {
         input: InputKind::ReadOut,
         host_counters: true,
@@ -42,11 +42,11 @@ pub(super) fn open(names: &[String]) -> Result<(CardClient, Inventory), Failure>
         clock: "host, monotonic".to_owned(),
         ..Setup::default()
     };
-    let pending = PendingCommand::new(Engine::new(setup));
-    let mut cards = CardClient { driver, stop, pending, name: names.join("+") };
-    cards.pending.order = Some(ClientOrder::Scan);
+    let driver = Driver::open(names, clock, PendingCommand::new(Engine::new(setup)))?;
+    let mut cards = CardClient { driver, stop, name: names.join("+") };
+    cards.pending().order = Some(ClientOrder::Scan);
     cards.run(SCAN_PATIENCE)?;
-    let inventory = match cards.pending.scanned.take() {
+    let inventory = match cards.pending().scanned.take() {
         Some(Ok(inventory)) => inventory,
         Some(Err(failure)) => {
             let reason = format!("{}: {}", cards.name, failure.reason);
@@ -54,15 +54,19 @@ pub(super) fn open(names: &[String]) -> Result<(CardClient, Inventory), Failure>
         }
         None => return Err(cards.interrupted()),
     };
-    cards.pending.order = Some(ClientOrder::Attend(Box::new(super::plan(&inventory))));
+    cards.pending().order = Some(ClientOrder::Attend(Box::new(super::plan(&inventory))));
     Ok((cards, inventory))
 }
 
 impl CardClient {
+    fn pending(&mut self) -> &mut PendingCommand {
+        self.driver.session_mut().hooks_mut()
+    }
+
     fn run(&mut self, patience: Span) -> Result<(), Failure> {
         let until = self.driver.clock().now() + patience;
-        self.pending.done = false;
-        self.driver.run(until, &self.stop, &mut self.pending)?;
+        self.pending().done = false;
+        self.driver.run(until, &self.stop)?;
         Ok(())
     }
 
@@ -78,9 +82,9 @@ impl ServiceClient for CardClient {
         id: DeviceId,
         service: Service,
     ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure> {
-        self.pending.service = Some((id, service));
+        self.pending().service = Some((id, service));
         self.run(SERVICE_PATIENCE)?;
-        let served = self.pending.served.take().ok_or_else(|| self.interrupted())?;
+        let served = self.pending().served.take().ok_or_else(|| self.interrupted())?;
         Ok(served.map_err(|failure| ServiceRefused::from(&failure)))
     }
 
@@ -90,13 +94,14 @@ impl ServiceClient for CardClient {
     }
 
     fn diagnosis(&mut self) -> Option<Diagnosis> {
-        let engine = &mut self.pending.engine;
-        engine.finish(self.driver.clock().now(), true);
+        let now = self.driver.clock().now();
+        let engine = &mut self.pending().engine;
+        engine.finish(now, true);
         Some(engine.diagnosis())
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
-        self.pending.emergencies.drain(..).collect()
+        self.pending().emergencies.drain(..).collect()
     }
 }
 
@@ -133,7 +138,7 @@ impl PendingCommand {
     }
 }
 
-impl DriverHooks for PendingCommand {
+impl SessionHooks for PendingCommand {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
         self.engine.handle_frame(frame);
     }

@@ -244,7 +244,7 @@ fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
     let is_set = watchdog(device, data, start, Seen::new((), answer.at, Some(answer.frame)));
     if touches(start, data, COUNTERS) {
         for group in cleared_by(start, data) {
-            device.counters.note_clear(group, answer.at);
+            device.counters.note_clear(group, answer.at, Some(answer.frame));
         }
     }
     is_set

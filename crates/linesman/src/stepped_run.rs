@@ -4,6 +4,7 @@ use std::rc::Rc;
 use std::sync::mpsc::Receiver;
 
 use linesman_diagnosis::Event;
+use linesman_link::error::LinkError;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::run::{Next, Note, StartedRun};
 use linesman_runtime::transport::Transport;
@@ -13,7 +14,7 @@ use crate::handle::PlanId;
 use crate::{Application, Error, Io};
 
 /// A run whose cycles the caller takes one by one, in a loop and a thread of its own: [`Segment::start`](
-/// crate::Segment::start). When it is dropped, the line is stopped as by [`Run::stop`].
+/// crate::Segment::start). When it is dropped, the line is stopped as by [`SteppedRun::stop`].
 ///
 /// ```
 /// use linesman::prelude::*;
@@ -37,8 +38,10 @@ use crate::{Application, Error, Io};
 /// # }
 /// # first_lines().unwrap();
 /// ```
-pub struct Run<'a> {
-    started: Option<StartedRun<'a, &'a mut dyn Transport, ServedApplication<'a, Caller>>>,
+pub struct SteppedRun<'a> {
+    started: Option<
+        StartedRun<'a, &'a mut dyn Transport<Error = LinkError>, ServedApplication<'a, Caller>>,
+    >,
     /// Where findings come from, if the run is diagnosed.
     notes: Option<Receiver<Note>>,
     plan: PlanId,
@@ -54,9 +57,13 @@ impl Application for Caller {
     }
 }
 
-impl<'a> Run<'a> {
+impl<'a> SteppedRun<'a> {
     pub(crate) const fn new(
-        started: StartedRun<'a, &'a mut dyn Transport, ServedApplication<'a, Caller>>,
+        started: StartedRun<
+            'a,
+            &'a mut dyn Transport<Error = LinkError>,
+            ServedApplication<'a, Caller>,
+        >,
         notes: Option<Receiver<Note>>,
         plan: PlanId,
         handoff: Rc<Handoff>,
@@ -64,8 +71,8 @@ impl<'a> Run<'a> {
         Self { started: Some(started), notes, plan, handoff }
     }
 
-    /// Waits for the next cycle and gives its process data; `None` when the run is over, and [`Run::stop`] says why.
-    /// Outputs that are set leave with the next frames. The cycle begins at its time: a caller that comes back
+    /// Waits for the next cycle and gives its process data; `None` when the run is over, and [`SteppedRun::stop`] says why.
+    /// OutputsOf that are set leave with the next frames. The cycle begins at its time: a caller that comes back
     /// later is late, and what that means is said at [`RunOptions::allow_misses`](crate::RunOptions::allow_misses).
     ///
     /// Cycles begin before all SubDevices are up: [`Io::is_settled`] tells.
@@ -107,7 +114,7 @@ impl<'a> Run<'a> {
     }
 }
 
-impl Drop for Run<'_> {
+impl Drop for SteppedRun<'_> {
     fn drop(&mut self) {
         // Nobody is there to be told.
         let _ = self.end();

@@ -117,12 +117,6 @@ impl Io<'_> {
         self.main.image_mut()
     }
 
-    /// The same, for a look at them; they count as given anew only if
-    /// [`outputs_are_old`](Self::outputs_are_old) is not called.
-    pub(crate) fn outputs_unchanged(&mut self) -> &mut [u8] {
-        self.main.image_mut()
-    }
-
     /// Says that nobody has given outputs in this cycle. Otherwise an application that returns in time
     /// counts as having given them, changed or not.
     pub fn outputs_are_old(&mut self) {
