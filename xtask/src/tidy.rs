@@ -36,7 +36,10 @@ const FORBIDDEN_WORDS: &[(&str, &str)] = &[
     ("LL", "M"),
 ];
 /// The same for prose alone: code has its own good uses for them.
-const FORBIDDEN_IN_PROSE: &[(&str, &str)] = &[("ses", "sion"), ("ses", "sions"), ("A", "I")];
+const FORBIDDEN_IN_PROSE: &[(&str, &str)] = &[("ses", "sions"), ("A", "I")];
+/// Before "session" in prose: then it is no session of a MainDevice.
+const OF_WORK: &[&str] =
+    &["this", "last", "next", "previous", "earlier", "our", "every", "working"];
 /// Beginnings of paths of one machine.
 const FORBIDDEN_PATHS: &[(&str, &str)] =
     &[("/wo", "rk/"), ("/tmp/w", "t"), ("/tmp/br", "ief"), ("/ro", "ot/"), ("/ho", "me/")];
@@ -48,10 +51,14 @@ const MAY_DEPEND_ON: &[(&str, &[&str])] = &[
     ("maindevice", &["proto", "config"]),
     ("sim", &["proto", "config"]),
     ("diagnosis", &["proto", "config"]),
-    ("lab", &["proto", "config", "maindevice", "sim", "diagnosis"]),
+    ("session", &["proto", "config", "maindevice", "sim", "diagnosis"]),
+    ("lab", &["proto", "config", "maindevice", "sim", "diagnosis", "session"]),
     ("link", &["proto"]),
-    ("runtime", &["proto", "config", "maindevice", "sim", "diagnosis", "link"]),
-    ("linesman", &["proto", "config", "maindevice", "sim", "diagnosis", "link", "runtime"]),
+    ("runtime", &["proto", "config", "maindevice", "sim", "diagnosis", "session", "link"]),
+    (
+        "linesman",
+        &["proto", "config", "maindevice", "sim", "diagnosis", "session", "link", "runtime"],
+    ),
     (
         "cli",
         &[
@@ -60,6 +67,7 @@ const MAY_DEPEND_ON: &[(&str, &[&str])] = &[
             "maindevice",
             "sim",
             "diagnosis",
+            "session",
             "lab",
             "link",
             "runtime",
@@ -104,9 +112,15 @@ fn words(file: &TextFile, broken: &mut Vec<String>) {
     let paths: Vec<String> = FORBIDDEN_PATHS.iter().map(|(a, b)| format!("{a}{b}")).collect();
     for (number, line) in file.text.lines().enumerate() {
         let at = format!("{}:{}", file.path, number + 1);
-        let found = line
-            .split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '_')
-            .find(|word| words.iter().any(|forbidden| same_word(word, forbidden)));
+        let split = || line.split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '_');
+        let of_work = split().zip(split().skip(1)).find_map(|(before, word)| {
+            let is_it = word.eq_ignore_ascii_case("session")
+                && OF_WORK.iter().any(|one| one.eq_ignore_ascii_case(before));
+            (is_it && !prose.is_empty()).then_some(word)
+        });
+        let found = split()
+            .find(|word| words.iter().any(|forbidden| same_word(word, forbidden)))
+            .or(of_work);
         if let Some(word) = found {
             broken.push(format!("{at}: the word {word:?} does not belong here"));
         }
@@ -222,6 +236,7 @@ mod tests {
     fn forbidden_words_are_whole_words() {
         let word = ["ses", "sion"].concat();
         assert_eq!(found(words, "a.md", &format!("in this {}.\n", word.to_uppercase())), 1);
+        assert_eq!(found(words, "a.md", &format!("a {word} of a MainDevice\n")), 0);
         assert_eq!(found(words, "a.md", "obsession, procession\n"), 0);
         assert_eq!(found(words, "a.rs", &format!("let {word} = 1;\n")), 0, "code may");
         assert_eq!(found(words, "a.md", &["see /wo", "rk/x\n"].concat()), 1);

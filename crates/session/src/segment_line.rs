@@ -21,12 +21,12 @@ pub struct SegmentLine {
     now: Instant,
     arrival: Vec<u8>,
     look_at: Instant,
-    cards: [Card; 2],
+    cards: [SegmentCard; 2],
 }
 
 /// A card: what it had counted when it was looked at last.
 #[derive(Clone, Copy, Default)]
-struct Card {
+struct SegmentCard {
     watch: CardWatch,
     counted: HostPort,
 }
@@ -41,7 +41,7 @@ impl SegmentLine {
             now: Instant::ZERO,
             arrival: Vec::with_capacity(FRAME),
             look_at: Instant::ZERO,
-            cards: [Card::default(); 2],
+            cards: [SegmentCard::default(); 2],
         }
     }
 

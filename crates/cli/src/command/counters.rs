@@ -13,7 +13,7 @@ use linesman_proto::time::Span;
 use serde::Serialize;
 
 use super::diagnose;
-use super::service::{DeviceReport, Session, end};
+use super::service::{DeviceReport, ServiceLine, end};
 use crate::amount::{MILLISECOND, SECOND, duration};
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -100,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     if let Some(path) = &arguments.csv {
         files::refuse_to_overwrite(path)?;
     }
-    let mut session = Session::open(&arguments.line)?;
+    let mut session = ServiceLine::open(&arguments.line)?;
     let mut samples = Samples::default();
     if arguments.clear {
         let cleared = samples.clear(&mut session);
@@ -135,7 +135,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 
 /// Reads again and again; for how long it did.
 fn watch(
-    session: &mut Session,
+    session: &mut ServiceLine,
     samples: &mut Samples,
     all: Span,
     every: Span,
@@ -155,7 +155,7 @@ fn watch(
 }
 
 /// What people call the SubDevices.
-pub(super) fn names(session: &Session) -> Names {
+pub(super) fn names(session: &ServiceLine) -> Names {
     let name = |known: &super::service::KnownDevice| {
         (known.name.clone().unwrap_or_default(), known.type_name.clone())
     };
@@ -163,7 +163,7 @@ pub(super) fn names(session: &Session) -> Names {
 }
 
 /// Counters of one SubDevice.
-pub(super) fn of_device(session: &Session, samples: &Samples, id: DeviceId) -> DeviceCounters {
+pub(super) fn of_device(session: &ServiceLine, samples: &Samples, id: DeviceId) -> DeviceCounters {
     let latest = samples.latest(id);
     DeviceCounters {
         device: session.report(id),
@@ -173,7 +173,7 @@ pub(super) fn of_device(session: &Session, samples: &Samples, id: DeviceId) -> D
 }
 
 fn report(
-    session: &Session,
+    session: &ServiceLine,
     samples: &Samples,
     watched: Span,
     diagnosis: Option<Diagnosis>,
@@ -192,7 +192,7 @@ fn report(
 }
 
 /// One row for each SubDevice, one column for each port.
-fn table(session: &Session, samples: &Samples, output: &Output) -> String {
+fn table(session: &ServiceLine, samples: &Samples, output: &Output) -> String {
     let paint = output.paint();
     let mut table = Table::new(&["no", "name", "A", "B", "C", "D", "processing"], paint);
     for known in session.devices() {

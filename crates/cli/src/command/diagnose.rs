@@ -153,20 +153,20 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     match &selector {
         Selector::File(path) => {
             let stop = line_access::stop()?;
-            let mut session = Session::new(arguments, &selector, project);
+            let mut session = DiagnosisRun::new(arguments, &selector, project);
             let judged = file::judge(path, &stop, &mut session, output)?;
             Ok(session.answer(&judged.engine, &judged.names, judged.at, output))
         }
         Selector::Listen(names) => {
-            let session = Session::new(arguments, &selector, project);
+            let session = DiagnosisRun::new(arguments, &selector, project);
             listen::run(names, arguments.questions(), session, output)
         }
         Selector::Cards(names) => {
-            let session = Session::new(arguments, &selector, project);
+            let session = DiagnosisRun::new(arguments, &selector, project);
             cards::run(names, arguments.active, session, output)
         }
         Selector::Segment(path) => {
-            let session = Session::new(arguments, &selector, None);
+            let session = DiagnosisRun::new(arguments, &selector, None);
             let target = arguments.to.unwrap_or_default().into();
             segment::run(path, target, arguments.active, session, output)
         }
@@ -207,7 +207,7 @@ struct Judged {
 }
 
 /// A diagnosis that is being made.
-pub(crate) struct Session {
+pub(crate) struct DiagnosisRun {
     setup: Setup,
     follower: Option<Follower>,
     lasts: Option<Span>,
@@ -223,7 +223,7 @@ pub(crate) struct Session {
     understood: Option<Understood>,
 }
 
-impl Session {
+impl DiagnosisRun {
     fn new(arguments: &Arguments, selector: &Selector, planned: Option<Planned>) -> Self {
         let (project, exchange) =
             planned.map(|Planned { project, exchange }| (project, exchange)).unzip();

@@ -8,7 +8,7 @@ use linesman_proto::address::DeviceId;
 use serde::Serialize;
 
 use super::sdo::value::whole;
-use super::service::{DeviceReport, ServiceError, ServiceTarget, Session, end};
+use super::service::{DeviceReport, ServiceError, ServiceLine, ServiceTarget, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -92,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             Some(files::bytes(&transfer.file, "the file to be sent", LONGEST)?)
         }
     };
-    let mut session = Session::open(&arguments.place.line)?;
+    let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
     let (Action::Read(transfer) | Action::Write(transfer)) = &arguments.action;
     let opened = match transfer.boot {
@@ -110,7 +110,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 }
 
 fn act(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     transfer: &Transfer,
     data: Option<Vec<u8>>,

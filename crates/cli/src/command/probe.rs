@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::counters::names;
 use super::counters::samples::Samples;
 use super::diagnose;
-use super::service::Session;
+use super::service::ServiceLine;
 use crate::amount;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -81,7 +81,7 @@ struct LinkReport {
 
 /// Sends them.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let mut session = Session::open(&arguments.line)?;
+    let mut session = ServiceLine::open(&arguments.line)?;
     let Some(tree) = session.inventory().map(|inventory| inventory.tree().clone()) else {
         let reason = format!("{}: another process drives this line", session.place());
         let advice = "end it first, or watch beside it with `linesman counters --for 60`";
@@ -109,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 
 /// Sends the frames to the last SubDevice of each branch in turn, and tells how many went to each node.
 fn send(
-    session: &mut Session,
+    session: &mut ServiceLine,
     samples: &mut Samples,
     tree: &Tree,
     frames: u64,
@@ -133,7 +133,7 @@ fn send(
     Ok(over)
 }
 
-fn links(session: &Session, samples: &Samples, tree: &Tree, over: &[u64]) -> Vec<LinkReport> {
+fn links(session: &ServiceLine, samples: &Samples, tree: &Tree, over: &[u64]) -> Vec<LinkReport> {
     let count = |node: usize, port: Port| {
         let id = DeviceId(node as u32);
         [ErrorCounter::InvalidFrame(port), ErrorCounter::PhysicalLayer(port)]

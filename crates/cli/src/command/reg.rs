@@ -9,7 +9,7 @@ use linesman_proto::register::{address_by_name, describe, pieces};
 use serde::Serialize;
 
 use super::sdo::value::{bytes, hex, whole};
-use super::service::{DeviceReport, ServiceError, ServiceTarget, Session, end};
+use super::service::{DeviceReport, ServiceError, ServiceLine, ServiceTarget, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -126,14 +126,14 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
         Action::Read { .. } | Action::Dump { .. } => None,
     };
-    let mut session = Session::open(&arguments.place.line)?;
+    let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
     let outcome = act(&mut session, id, arguments, data, output);
     end(outcome, arguments.json, output)
 }
 
 fn act(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     arguments: &Arguments,
     data: Option<Vec<u8>>,

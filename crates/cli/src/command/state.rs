@@ -7,7 +7,7 @@ use linesman_proto::state::transition::steps;
 use linesman_proto::state::{AlState, AlStatusCode};
 use serde::Serialize;
 
-use super::service::{DeviceReport, KnownDevice, ServiceError, Session, end};
+use super::service::{DeviceReport, KnownDevice, ServiceError, ServiceLine, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -88,7 +88,7 @@ type Seen = Option<(AlStatus, AlStatusCode)>;
 
 /// Does what was asked.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let mut session = Session::open(&arguments.line)?;
+    let mut session = ServiceLine::open(&arguments.line)?;
     let chosen: Vec<DeviceId> = match &arguments.device {
         Some(word) => vec![session.device(word)?],
         None => session.devices().iter().map(|known| known.id).collect(),
@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 
 /// Looks at all, then does what was asked; says whether all answer.
 fn act(
-    session: &mut Session,
+    session: &mut ServiceLine,
     chosen: &[DeviceId],
     arguments: &Arguments,
     output: &mut Output,
@@ -169,7 +169,7 @@ fn act(
 }
 
 /// What each is in. That nobody answers at all is no answer.
-fn look_at(session: &mut Session, chosen: &[DeviceId]) -> Result<Vec<Seen>, ServiceError> {
+fn look_at(session: &mut ServiceLine, chosen: &[DeviceId]) -> Result<Vec<Seen>, ServiceError> {
     let (mut all, mut silent) = (Vec::with_capacity(chosen.len()), None);
     for id in chosen {
         all.push(match look(session, *id)? {
@@ -187,7 +187,7 @@ fn look_at(session: &mut Session, chosen: &[DeviceId]) -> Result<Vec<Seen>, Serv
 }
 
 fn look(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
 ) -> Result<Result<(AlStatus, AlStatusCode), ServiceError>, Failure> {
     let answer = session.attempt(id, Service::State)?;
@@ -201,7 +201,7 @@ fn look(
 
 /// Refuses, before anything is written, what cannot be done with all of them.
 fn check(
-    session: &Session,
+    session: &ServiceLine,
     chosen: &[DeviceId],
     seen: &[Seen],
     to: AlState,

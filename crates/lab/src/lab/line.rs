@@ -18,13 +18,13 @@ pub(super) struct LabLine {
     pub(super) line: SegmentLine,
     /// Whether the counters of the cards are shown to the diagnosis.
     counters: bool,
-    pub(super) capture: Capture,
+    pub(super) capture: CaptureTool,
     outgoing: Vec<u8>,
 }
 
 /// What a capture tool sees: what was handed to a card, when it was, and what came back.
 #[derive(Default)]
-pub(super) struct Capture {
+pub(super) struct CaptureTool {
     pub(super) recorder: Option<Tap>,
     /// A diagnosis that listens, and asks for nothing.
     pub(super) listener: Option<Engine>,
@@ -32,7 +32,7 @@ pub(super) struct Capture {
     count: u64,
 }
 
-impl Capture {
+impl CaptureTool {
     const fn is_shown(&self) -> bool {
         self.recorder.is_some() || self.listener.is_some()
     }
@@ -66,7 +66,7 @@ impl LabLine {
         Self {
             line: SegmentLine::new(segment, ring),
             counters,
-            capture: Capture::default(),
+            capture: CaptureTool::default(),
             outgoing: Vec::new(),
         }
     }
@@ -144,7 +144,7 @@ impl Transport for LabLine {
 
 /// What comes back, shown to a capture tool on its way to the MainDevice.
 struct CapturedIntake<'a> {
-    capture: &'a mut Capture,
+    capture: &'a mut CaptureTool,
     intake: &'a mut dyn FrameSink,
 }
 

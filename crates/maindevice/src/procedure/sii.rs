@@ -149,7 +149,7 @@ impl Head {
 /// # Errors
 /// [`SiiAccessError`].
 pub async fn read_head(wire: &Wire, target: Target) -> Result<Head, SiiAccessError> {
-    let mut session = Session::open(wire, target).await?;
+    let mut session = EepromAccess::open(wire, target).await?;
     let read = async {
         let first = session.words(WordAddress(0), HEAD_WORDS).await?;
         let size = session.words(SIZE_GROUP, 4).await?;
@@ -173,7 +173,7 @@ pub async fn read_rest(
     target: Target,
     head: &Head,
 ) -> Result<Vec<u8>, SiiAccessError> {
-    let mut session = Session::open(wire, target).await?;
+    let mut session = EepromAccess::open(wire, target).await?;
     let mut reader = Reader::new();
     reader.supply(&head.first);
     reader.supply(&[0; BOOTSTRAP_MAILBOX.byte() - LEGACY_DELAYS.byte()]);
@@ -203,7 +203,7 @@ pub async fn read_bytes(
     target: Target,
     whole: bool,
 ) -> Result<Vec<u8>, SiiAccessError> {
-    let mut session = Session::open(wire, target).await?;
+    let mut session = EepromAccess::open(wire, target).await?;
     let mut reader = Reader::new();
     let read = async {
         while let Some(words) = reader.needs() {
@@ -228,13 +228,13 @@ pub async fn read_bytes(
 /// # Errors
 /// [`SiiAccessError`].
 pub async fn read_identity(wire: &Wire, target: Target) -> Result<Identity, SiiAccessError> {
-    let mut session = Session::open(wire, target).await?;
+    let mut session = EepromAccess::open(wire, target).await?;
     let outcome = session.identity().await;
     session.close().await;
     outcome
 }
 
-pub(super) struct Session<'a> {
+pub(super) struct EepromAccess<'a> {
     pub(super) wire: &'a Wire,
     pub(super) target: Target,
     /// It was the SubDevice's before and is to be given back.
@@ -245,11 +245,11 @@ pub(super) struct Session<'a> {
     pub(super) idle: bool,
 }
 
-impl<'a> Session<'a> {
+impl<'a> EepromAccess<'a> {
     pub(super) async fn open(
         wire: &'a Wire,
         target: Target,
-    ) -> Result<Session<'a>, SiiAccessError> {
+    ) -> Result<EepromAccess<'a>, SiiAccessError> {
         let access = SII_ACCESS_ECAT.address;
         let failed = |error| SiiAccessError::Exchange { target, error };
         let owner = wire.read_one(target, access, 2).await.map_err(failed)?;

@@ -7,7 +7,7 @@
 use linesman_proto::register::{SII_DATA, SiiCommand, SiiControl};
 use linesman_proto::sii::WordAddress;
 
-use super::sii::{ATTEMPTS, RETRY_AFTER, Session, SiiAccessError};
+use super::sii::{ATTEMPTS, EepromAccess, RETRY_AFTER, SiiAccessError};
 use crate::exchange::Target;
 use crate::executor::Wire;
 
@@ -23,14 +23,14 @@ pub async fn write(
     at: WordAddress,
     data: &[u8],
 ) -> Result<u32, SiiAccessError> {
-    let mut session = Session::open(wire, target).await?;
+    let mut session = EepromAccess::open(wire, target).await?;
     let outcome = write_all(&mut session, at, data).await;
     session.close().await;
     outcome
 }
 
 async fn write_all(
-    session: &mut Session<'_>,
+    session: &mut EepromAccess<'_>,
     at: WordAddress,
     data: &[u8],
 ) -> Result<u32, SiiAccessError> {
@@ -52,7 +52,7 @@ async fn write_all(
     Ok(changed)
 }
 
-impl Session<'_> {
+impl EepromAccess<'_> {
     /// Writes one word, and reads it back.
     async fn write(&mut self, word: WordAddress, value: [u8; 2]) -> Result<(), SiiAccessError> {
         let mut status = SiiControl::default();

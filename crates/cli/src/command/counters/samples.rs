@@ -6,7 +6,7 @@ use linesman_proto::port::Port;
 use linesman_proto::register::{ClearGroup, ErrorCounter, ErrorCounters, table};
 use linesman_proto::time::Span;
 
-use crate::command::service::{ServiceError, Session};
+use crate::command::service::{ServiceError, ServiceLine};
 use crate::failure::Failure;
 
 /// What one SubDevice's counters read at one time.
@@ -34,7 +34,7 @@ pub(crate) struct Samples {
 
 impl Samples {
     /// Clears all error counters of all SubDevices.
-    pub(crate) fn clear(&mut self, session: &mut Session) -> Result<(), ServiceError> {
+    pub(crate) fn clear(&mut self, session: &mut ServiceLine) -> Result<(), ServiceError> {
         let ids: Vec<DeviceId> = session.devices().iter().map(|known| known.id).collect();
         for id in ids {
             for group in ClearGroup::ALL {
@@ -54,7 +54,7 @@ impl Samples {
     }
 
     /// Reads the counters of all SubDevices.
-    pub(crate) fn read(&mut self, session: &mut Session, at: Span) -> Result<(), Failure> {
+    pub(crate) fn read(&mut self, session: &mut ServiceLine, at: Span) -> Result<(), Failure> {
         let ids: Vec<DeviceId> = session.devices().iter().map(|known| known.id).collect();
         for id in ids {
             let len = ErrorCounters::LEN as u16;
@@ -92,7 +92,7 @@ impl Samples {
     }
 
     /// All readings as a table for other programs: one row for each counter of each reading.
-    pub(crate) fn csv(&self, session: &Session) -> String {
+    pub(crate) fn csv(&self, session: &ServiceLine) -> String {
         let mut text = "time_s,no,name,register,port,counter,value\n".to_owned();
         for sample in &self.all {
             let Some(counters) = &sample.counters else { continue };

@@ -7,7 +7,7 @@ use linesman_link::input::Input;
 use linesman_runtime::capture::Capture;
 use linesman_runtime::stop::Stop;
 
-use super::{Judged, Session, names};
+use super::{DiagnosisRun, Judged, names};
 use crate::failure::Failure;
 use crate::output::{Output, Progress};
 use crate::text::finding::percent;
@@ -21,7 +21,7 @@ const FRAMES_BETWEEN_LOOKS: u64 = 32_768;
 pub(super) fn judge(
     input: Input,
     stop: &Stop,
-    session: &mut Session,
+    session: &mut DiagnosisRun,
     output: &mut Output,
 ) -> Result<Judged, Failure> {
     let (path, progress) = (input.name().to_owned(), input.progress());

@@ -8,7 +8,7 @@ use linesman_runtime::drive::Driver;
 use linesman_runtime::record::Recorder;
 use linesman_session::{SessionHooks, probe};
 
-use super::Session;
+use super::DiagnosisRun;
 use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -25,7 +25,7 @@ const LOOK_EVERY: Span = Span::ms(10);
 pub(super) fn run(
     names: &[String],
     active: bool,
-    session: Session,
+    session: DiagnosisRun,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     line_access::refuse(names)?;
@@ -72,7 +72,7 @@ pub(super) fn run(
 /// Looks again and again.
 struct CardPoll<'a> {
     engine: Engine,
-    session: Session,
+    session: DiagnosisRun,
     recorder: Option<Recorder>,
     output: &'a mut Output,
     progress: Progress,

@@ -6,7 +6,7 @@ use linesman_link::capture::CaptureError;
 use linesman_link::input::{Content, Input};
 use linesman_runtime::stop::Stop;
 
-use super::{Judged, Session, capture, observations};
+use super::{DiagnosisRun, Judged, capture, observations};
 use crate::failure::Failure;
 use crate::output::Output;
 
@@ -14,7 +14,7 @@ use crate::output::Output;
 pub(super) fn judge(
     path: &Path,
     stop: &Stop,
-    session: &mut Session,
+    session: &mut DiagnosisRun,
     output: &mut Output,
 ) -> Result<Judged, Failure> {
     let wish = stop.clone();

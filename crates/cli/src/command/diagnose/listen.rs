@@ -11,7 +11,7 @@ use linesman_runtime::listen::{CardListener, ListenEvent, TapCounts};
 use linesman_runtime::question_socket::QuestionSocket;
 use linesman_runtime::record::Recorder;
 
-use super::{Session, questions};
+use super::{DiagnosisRun, questions};
 use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -29,7 +29,7 @@ const NAP: Span = Span::ms(100);
 pub(super) fn run(
     names: &[String],
     questions: Option<AskSetup>,
-    session: Session,
+    session: DiagnosisRun,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     let stop = line_access::stop()?;
@@ -84,7 +84,7 @@ pub(super) fn run(
 
 /// A diagnosis that begins with the first frame.
 struct Listening {
-    session: Session,
+    session: DiagnosisRun,
     clock: HostClock,
     recorder: Option<Recorder>,
     engine: Option<Engine>,
@@ -176,7 +176,7 @@ fn tell_of_tap(card_listener: &mut CardListener, names: &[String], output: &Outp
     ));
 }
 
-fn begin(session: &Session, clock: HostClock, probes: bool) -> Engine {
+fn begin(session: &DiagnosisRun, clock: HostClock, probes: bool) -> Engine {
     let start = clock.started_at().rfc3339();
     let clock = "host, monotonic".to_owned();
     Engine::new(Setup { input: InputKind::Listened, probes, start, clock, ..session.setup.clone() })

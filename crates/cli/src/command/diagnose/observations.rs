@@ -10,7 +10,7 @@ use linesman_link::input::Input;
 use linesman_proto::address::Network;
 use linesman_proto::time::Instant;
 
-use super::{Judged, Session};
+use super::{DiagnosisRun, Judged};
 use crate::failure::Failure;
 use crate::files;
 
@@ -28,7 +28,7 @@ const TABLES: [&str; 9] = [
 ];
 
 /// Judges what the text says.
-pub(super) fn judge(input: Input, session: &mut Session) -> Result<Judged, Failure> {
+pub(super) fn judge(input: Input, session: &mut DiagnosisRun) -> Result<Judged, Failure> {
     let path = input.name().to_owned();
     let bytes = files::bytes_of(input, "observations, in TOML or as other tools print them")?;
     let (file, understood) = read(&path, &pasted::decode(&bytes))?;

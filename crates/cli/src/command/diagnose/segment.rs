@@ -10,7 +10,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment_file::SegmentFile;
 
-use super::Session;
+use super::DiagnosisRun;
 use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -31,7 +31,7 @@ pub(super) fn run(
     path: &Path,
     target: AlState,
     active: bool,
-    mut session: Session,
+    mut session: DiagnosisRun,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     let file = files::segment_file(path)?;
@@ -77,7 +77,7 @@ pub(super) fn run(
     Ok(session.answer(lab.engine(), &names, lab.now(), output))
 }
 
-fn follow(lab: &mut Lab, names: &Names, session: &mut Session, output: &mut Output) {
+fn follow(lab: &mut Lab, names: &Names, session: &mut DiagnosisRun, output: &mut Output) {
     while let Some(event) = lab.poll_finding_event() {
         if let Some(follower) = &mut session.follower {
             follower.tell(event, names, output);

@@ -5,7 +5,7 @@ use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
 use serde::Serialize;
 
-use super::{Arguments, Session, file, line_access, status};
+use super::{Arguments, DiagnosisRun, file, line_access, status};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::files::Planned;
@@ -109,7 +109,7 @@ fn judge(
     if stop.is_set() || output.is_closed() {
         return Err(not_looked_at(selector));
     }
-    let mut session = Session::new(arguments, selector, project);
+    let mut session = DiagnosisRun::new(arguments, selector, project);
     let judged = file::judge(path, stop, &mut session, output)?;
     Ok((session.diagnosis(&judged.engine), judged.names))
 }

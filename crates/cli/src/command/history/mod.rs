@@ -14,7 +14,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 
 use super::sdo::{download, upload};
-use super::service::{ServiceError, ServiceTarget, Session, end};
+use super::service::{ServiceError, ServiceLine, ServiceTarget, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         files::refuse_to_overwrite(path)?;
     }
     let esi = arguments.esi.as_deref().map(description).transpose()?;
-    let mut session = Session::open(&arguments.place.line)?;
+    let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
     let texts = esi.map_or_else(Vec::new, |esi| texts(&esi, &session, id, output));
     let outcome = match session.open_mailbox(id, output) {
@@ -95,7 +95,7 @@ fn description(path: &Path) -> Result<Esi, Failure> {
 }
 
 /// The texts of the SubDevice's own description: of its product, and of its revision if that is there.
-fn texts(esi: &Esi, session: &Session, id: DeviceId, output: &Output) -> Texts {
+fn texts(esi: &Esi, session: &ServiceLine, id: DeviceId, output: &Output) -> Texts {
     let Some(identity) = session.known(id).and_then(|known| known.identity) else {
         return Vec::new();
     };
@@ -115,13 +115,13 @@ fn texts(esi: &Esi, session: &Session, id: DeviceId, output: &Output) -> Texts {
 }
 
 fn read(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     texts: &Texts,
     arguments: &Arguments,
 ) -> Result<Report, ServiceError> {
     let at = |subindex| ObjectAddress { index: ObjectIndex::DIAGNOSIS_HISTORY, subindex };
-    let number = |session: &mut Session, subindex| {
+    let number = |session: &mut ServiceLine, subindex| {
         let bytes = upload(session, id, at(subindex), false)?;
         Ok::<u16, ServiceError>(
             bytes.iter().take(2).rev().fold(0, |n, byte| n << 8 | u16::from(*byte)),

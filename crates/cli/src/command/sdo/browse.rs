@@ -9,7 +9,7 @@ use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use super::dictionary::Dictionary;
 use super::report::{EntryReport, ListReport, ListedObject};
 use super::upload;
-use crate::command::service::{ServiceError, Session};
+use crate::command::service::{ServiceError, ServiceLine};
 
 /// How much of each object is asked for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -24,7 +24,7 @@ pub(super) enum Depth {
 
 /// The objects of one of the SubDevice's lists.
 pub(super) fn list(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     list: ListKind,
     depth: Depth,
@@ -41,7 +41,7 @@ pub(super) fn list(
 
 /// One object with its entries, or one of them, and their values.
 pub(super) fn info(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     index: ObjectIndex,
     subindex: Option<u8>,
@@ -53,7 +53,7 @@ pub(super) fn info(
 }
 
 fn object(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     index: ObjectIndex,
     only: Option<u8>,

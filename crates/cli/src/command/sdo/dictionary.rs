@@ -8,7 +8,7 @@ use linesman_proto::mailbox::coe::information::{
 };
 use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex};
 
-use crate::command::service::{ServiceError, Session};
+use crate::command::service::{ServiceError, ServiceLine};
 
 /// What an object is.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -46,14 +46,14 @@ pub(crate) struct EntryAbout {
 
 /// The dictionary of a SubDevice. One that tells nothing of it is asked once only.
 pub(crate) struct Dictionary<'a> {
-    pub(crate) session: &'a mut Session,
+    pub(crate) session: &'a mut ServiceLine,
     id: DeviceId,
     silent: bool,
 }
 
 impl<'a> Dictionary<'a> {
     /// The dictionary of a SubDevice whose mailbox is open.
-    pub(crate) fn new(session: &'a mut Session, id: DeviceId) -> Self {
+    pub(crate) fn new(session: &'a mut ServiceLine, id: DeviceId) -> Self {
         Self { session, id, silent: false }
     }
 

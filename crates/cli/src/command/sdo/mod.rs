@@ -15,7 +15,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::information::{ListKind, ObjectCode};
 use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex};
 
-use super::service::{ServiceError, ServiceTarget, Session, end};
+use super::service::{ServiceError, ServiceLine, ServiceTarget, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::Output;
@@ -157,7 +157,7 @@ fn transition(letters: &str) -> Result<String, String> {
 
 /// Does what was asked.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let mut session = Session::open(&arguments.place.line)?;
+    let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
     let outcome = match session.open_mailbox(id, output) {
         Ok(opened) => {
@@ -170,7 +170,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 }
 
 fn act(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     arguments: &Arguments,
     output: &mut Output,
@@ -226,7 +226,7 @@ fn act(
 
 /// Fetches one entry, or all with complete access.
 pub(crate) fn upload(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     object: ObjectAddress,
     complete: bool,
@@ -236,7 +236,7 @@ pub(crate) fn upload(
 
 /// Brings one entry, or all with complete access.
 pub(crate) fn download(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     object: ObjectAddress,
     complete: bool,
@@ -246,7 +246,7 @@ pub(crate) fn download(
 }
 
 fn read(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     wanted: Wanted,
     data_type: Option<DataType>,
@@ -290,7 +290,7 @@ fn read(
 }
 
 fn write(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     wanted: Wanted,
     text: &str,

@@ -5,7 +5,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::register::AlStatus;
 use linesman_proto::state::{AlState, StateValue};
 
-use super::{ServiceError, Session};
+use super::{ServiceError, ServiceLine};
 use crate::failure::Failure;
 use crate::output::Output;
 
@@ -17,7 +17,7 @@ pub(crate) struct OpenedMailbox {
     back_to: Option<AlState>,
 }
 
-impl Session {
+impl ServiceLine {
     /// The state of a SubDevice.
     pub(crate) fn state(&mut self, id: DeviceId) -> Result<AlStatus, ServiceError> {
         match self.ask(id, Service::State)? {

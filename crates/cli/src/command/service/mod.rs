@@ -75,7 +75,7 @@ impl From<&ServiceFailure> for ServiceRefused {
 }
 
 /// A line that is served.
-pub(crate) struct Session {
+pub(crate) struct ServiceLine {
     client: Box<dyn ServiceClient>,
     devices: Vec<KnownDevice>,
     place: String,
@@ -133,7 +133,7 @@ impl From<Failure> for ServiceError {
     }
 }
 
-impl Session {
+impl ServiceLine {
     /// Scans the line and begins to serve it.
     pub(crate) fn open(place: &str) -> Result<Self, Failure> {
         if socket::is_one(place) {

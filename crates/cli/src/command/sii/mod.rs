@@ -11,7 +11,7 @@ use linesman_proto::sii::word::{CHECKSUM, STATION_ALIAS};
 use linesman_proto::sii::{Image, WordAddress, checksum};
 
 use super::sdo::value::whole;
-use super::service::{ServiceError, ServiceTarget, Session, end};
+use super::service::{ServiceError, ServiceLine, ServiceTarget, end};
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
         Action::Read { .. } | Action::Alias { .. } => None,
     };
-    let mut session = Session::open(&arguments.place.line)?;
+    let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
     let mut differs = false;
     let outcome = match &arguments.action {
@@ -137,7 +137,7 @@ fn image(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 fn read(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     save: Option<&Path>,
     whole: bool,
@@ -151,7 +151,7 @@ fn read(
 
 /// What is there is saved before anything is written: as much as will be written, or all that is used.
 fn back_up(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     wanted: usize,
     path: Option<&Path>,
@@ -168,7 +168,7 @@ fn back_up(
 }
 
 fn write(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     file: &Path,
     image: &[u8],
@@ -197,7 +197,7 @@ fn write(
 
 /// Writes words, which are read back one by one.
 fn put(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     at: WordAddress,
     data: &[u8],
@@ -208,7 +208,7 @@ fn put(
     }
 }
 
-fn warn_of_power(session: &Session, id: DeviceId, words: u32, output: &Output) {
+fn warn_of_power(session: &ServiceLine, id: DeviceId, words: u32, output: &Output) {
     if session.is_passing() {
         output.warn("this virtual segment ends with the command, and what was written too");
     } else if words > 0 {
@@ -220,7 +220,7 @@ fn warn_of_power(session: &Session, id: DeviceId, words: u32, output: &Output) {
 }
 
 /// An image of another device, or a damaged one, is not written by mistake.
-fn fits(session: &Session, id: DeviceId, file: &Path, image: &[u8]) -> Result<(), Failure> {
+fn fits(session: &ServiceLine, id: DeviceId, file: &Path, image: &[u8]) -> Result<(), Failure> {
     let advice = "check that it is the image of this SubDevice; --force writes it all the same";
     let wrong = |what: String| Failure::new(format!("{}: {what}", file.display()), advice);
     let parsed = Image::parse(image).map_err(|error| wrong(error.to_string()))?;
@@ -248,7 +248,7 @@ fn fits(session: &Session, id: DeviceId, file: &Path, image: &[u8]) -> Result<()
 }
 
 fn verify(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     file: &Path,
     image: &[u8],
@@ -260,7 +260,7 @@ fn verify(
     Ok(Report::verified(session.report(id), &there, image, file))
 }
 
-fn tell_alias(session: &mut Session, id: DeviceId) -> Result<Report, ServiceError> {
+fn tell_alias(session: &mut ServiceLine, id: DeviceId) -> Result<Report, ServiceError> {
     let bytes = session.bytes(id, Service::ReadSii { whole: false })?;
     let at = Service::ReadRegister { address: register::STATION_ALIAS.address, len: 2 };
     let in_use = session.bytes(id, at)?.first_chunk().map(|word| u16::from_le_bytes(*word));
@@ -269,7 +269,7 @@ fn tell_alias(session: &mut Session, id: DeviceId) -> Result<Report, ServiceErro
 
 /// The alias is guarded by the checksum of the first words: both are written.
 fn set_alias(
-    session: &mut Session,
+    session: &mut ServiceLine,
     id: DeviceId,
     alias: u16,
     backup: Option<&Path>,
