@@ -94,24 +94,28 @@ pub use error::Error;
 pub use handle::{DeviceHandle, Input, Output, PlanId};
 pub use io::{Application, Io, Next};
 pub use linesman_config::fault::{Class, FaultName};
-pub use linesman_config::inventory::Inventory;
+pub use linesman_config::inventory::{self, Inventory};
 pub use linesman_config::plan::Plan as PlanData;
+pub use linesman_diagnosis::report;
 pub use linesman_diagnosis::report::{
     AlternativeReport, EndReport, EvidenceKind, EvidenceReport, FindingReport, FindingState,
     PlaceReport, Severity, Verdict,
 };
 pub use linesman_diagnosis::{Diagnosis, Event as FindingEvent, EventKind as FindingChange};
+pub use linesman_link::error::LinkError;
 pub use linesman_maindevice::service::{RefusalKind, ServiceAnswer, ServiceFailure};
 pub use linesman_maindevice::{FrameStatus, Quality, Statistics};
 pub use linesman_proto::address::{DeviceId, RegisterAddress};
 pub use linesman_proto::register::{self, AlStatus};
 pub use linesman_proto::state::{AlState, AlStatusCode, DeviceState, NetworkState, StateValue};
 pub use linesman_proto::time::{Instant, Span};
+pub use linesman_runtime::part::PartFailure;
 pub use linesman_runtime::run::RunError;
-pub use linesman_runtime::run::report::RunReport;
+pub use linesman_runtime::run::report::{self as run_report, RunReport};
+pub use linesman_runtime::selector::SelectorError;
 pub use linesman_runtime::stop::Stop;
 pub use linesman_session::image::{Value, VariableError};
-pub use linesman_sim::segment_file::{FaultEntry, SegmentFile, SegmentFileError};
+pub use linesman_sim::segment_file::{self, FaultEntry, SegmentFile, SegmentFileError};
 pub use linesman_sim::truth::FaultId;
 pub use options::RunOptions;
 pub use plan::{Plan, Scan};

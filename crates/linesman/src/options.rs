@@ -63,7 +63,7 @@ impl RunOptions {
 
     /// The application runs when the cycle begins, and frames leave as soon as it has returned: outputs are
     /// as fresh as they can be, and jitter with the application. What need not go before them runs in
-    /// [`Application::after_outputs`].
+    /// [`Application::after_outputs`](crate::Application::after_outputs).
     #[must_use]
     pub const fn exchange_at_end(mut self) -> Self {
         self.io_at = Some(IoAt::TaskEnd);

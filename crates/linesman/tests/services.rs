@@ -88,6 +88,42 @@ fn registers_sii_and_state_are_read_beside_the_cycle() {
 }
 
 #[test]
+fn file_is_written_and_read_back_by_foe() {
+    let devices = [("K1", "EK1100"), ("Serial", "EL6601")];
+    let mut segment = Segment::simulated(&SegmentFile::in_a_row("files", 1, &devices)).unwrap();
+    let plan = segment.scan().unwrap().plan().unwrap();
+    let (serial, services) = (plan.device("EL6601").unwrap(), segment.services());
+    let mut run = segment.start(plan, RunOptions::us(1_000)).unwrap();
+    let settings = b"baud = 115200".to_vec();
+    answer(&mut run, services.foe_write(serial, "settings.txt", 0, settings.clone())).unwrap();
+    let back = answer(&mut run, services.foe_read(serial, "settings.txt", 0)).unwrap();
+    assert_eq!(back, settings);
+    let missing = answer(&mut run, services.foe_read(serial, "other.txt", 0));
+    let Err(RequestError::Failed(failure)) = missing else { panic!("{missing:?}") };
+    assert_eq!(failure.refusal(), Some((RefusalKind::FoeError, 0x8001)));
+    run.stop().unwrap();
+}
+
+#[test]
+fn words_of_the_sii_and_a_register_are_written_beside_the_cycle() {
+    let (mut segment, plan) = machine();
+    let (lamps, services) = (plan.device("EL2008").unwrap(), segment.services());
+    let mut run = segment.start(plan, RunOptions::us(1_000)).unwrap();
+    let alias = 0x2A_u16;
+    let word = 4;
+    let bytes = alias.to_le_bytes().to_vec();
+    assert!(answer(&mut run, services.sii_write(lamps, word, bytes)).unwrap() >= 1);
+    let sii = answer(&mut run, services.sii_read(lamps)).unwrap();
+    assert_eq!(sii.get(8..10), Some(&alias.to_le_bytes()[..]));
+    let divider = register::WATCHDOG_DIVIDER.address;
+    let other = 0x0400_u16;
+    answer(&mut run, services.register_write(lamps, divider, other)).unwrap();
+    let read: u16 = answer(&mut run, services.register_read(lamps, divider)).unwrap();
+    assert_eq!(read, other);
+    run.stop().unwrap();
+}
+
+#[test]
 fn answer_that_is_not_there_when_the_run_ends_says_so() {
     let (mut segment, plan) = machine();
     let (sensor, services) = (plan.device("EL3104").unwrap(), segment.services());
