@@ -11,7 +11,6 @@ use std::path::Path as FilePath;
 use std::rc::Rc;
 use std::sync::mpsc::sync_channel;
 
-use linesman::{Application, Io, Next};
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::layout::TaskOptions;
 use linesman_config::plan::{IoAt, Plan, PlanOptions, ProcessAccess};
@@ -25,7 +24,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::named_files::NamedFiles;
 use linesman_runtime::plan_file::PlanFile;
-use linesman_runtime::run::{PlanSource, RunControls, SessionOptions, run};
+use linesman_runtime::run::{Application, Io, Next, PlanSource, RunControls, SessionOptions, run};
 use linesman_runtime::stop::Stop;
 use linesman_runtime::transport::{FrameSink, RxFrame, Transport};
 use linesman_runtime::wiring::Wiring;

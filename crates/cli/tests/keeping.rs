@@ -158,7 +158,7 @@ fn start_state_waiting_and_what_is_logged_are_options() {
     let cycle = linesman::RunOptions::us(1_000).wait_for_outputs();
     line.run(plan, cycle, |io| {
         calls += 1;
-        let states = [0, 1, 2].map(|id| io.state(linesman::DeviceId(id)).0 & 0xF);
+        let states: Vec<u16> = io.devices().map(|device| io.state(device).0 & 0xF).collect();
         let toggle = io.frame_status(0, 0).unwrap().input_toggle;
         toggles += u32::from(last.replace(toggle) != Some(toggle));
         if calls < 3_000 {
@@ -170,7 +170,7 @@ fn start_state_waiting_and_what_is_logged_are_options() {
         if calls < 5_000 { linesman::Next::Continue } else { linesman::Next::Stop }
     })
     .unwrap();
-    assert_eq!(waiting.last(), Some(&[2; 3]), "PREOP for three seconds");
+    assert_eq!(waiting.last(), Some(&vec![2; 3]), "PREOP for three seconds");
     assert!(waiting.iter().flatten().all(|state| *state <= 2), "never further");
     assert!(ready_at.is_some_and(|at| at < 4_000), "{ready_at:?}");
     assert!(toggles > 4_000, "the inputs' toggle turns over: {toggles}");

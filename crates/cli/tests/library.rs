@@ -8,7 +8,6 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use linesman::prelude::*;
-use linesman::{DeviceId, RunReport};
 use support::linesman;
 use tempfile::TempDir;
 
@@ -71,7 +70,7 @@ fn while_bad_as(change: impl Fn(String) -> String) -> BTreeSet<u8> {
         io.outputs_mut().fill(0xFF);
         let place = io.plan().unwrap().devices[1].inputs.start;
         let value = io.inputs()[place];
-        if io.quality(DeviceId(1)).valid {
+        if io.quality(io.devices().nth(1).unwrap()).valid {
             was_on |= value == 0xFF;
         } else if was_on {
             seen.insert(value);
@@ -110,7 +109,7 @@ fn inputs_come_with_a_right_counter_only_and_the_old_ones_stay_till_then() {
     let report = place.run(RunOptions::us(250), |io| {
         calls += 1;
         let value = io.inputs()[io.plan().unwrap().devices[1].inputs.start];
-        if io.quality(DeviceId(1)).valid {
+        if io.quality(io.devices().nth(1).unwrap()).valid {
             changes += u32::from(last.replace(value) != Some(value));
             after += u32::from(bad > 0);
         } else if last.is_some() {

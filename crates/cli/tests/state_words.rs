@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+use linesman::DeviceState;
 use linesman::prelude::*;
-use linesman::{DeviceId, DeviceState};
 use tempfile::TempDir;
 
 #[allow(dead_code, unreachable_pub, reason = "it is a program of its own, too")]
@@ -31,15 +31,15 @@ fn the_counter_accuses_all_and_the_state_the_one() {
     std::fs::write(&file, PLANT).unwrap();
     let mut segment = linesman::open(&format!("sim:{}", file.display())).unwrap();
     let plan = segment.scan().unwrap().plan().unwrap();
-    let terminals = [1, 2, 3].map(DeviceId);
+    let terminals = ["2", "3", "4"].map(|no| plan.device(no).unwrap());
     let mut seen: Vec<Seen> = Vec::new();
     segment
         .run(plan, RunOptions::us(1000), |io| {
             let settled = io.is_settled();
             let frame = io.frame_status(0, 0).unwrap();
             let now = (
-                terminals.map(|id| io.wc_state(id)),
-                terminals.map(|id| io.state(id)),
+                terminals.map(|terminal| io.wc_state(terminal)),
+                terminals.map(|terminal| io.state(terminal)),
                 frame.wrong_counter,
                 io.network_state().0,
                 io.present(),
@@ -56,12 +56,12 @@ fn the_counter_accuses_all_and_the_state_the_one() {
         .unwrap();
     let (wc, states, wrong, network, present) = seen[0];
     assert_eq!((wc, wrong, network, present), ([false; 3], 0, 0, 4), "{seen:?}");
-    assert_eq!(states, [DeviceState(8); 3]);
+    assert_eq!(states, [DeviceState::OP; 3]);
     // The first that is otherwise: in that cycle nobody knows yet who it is.
     let (wc, states, wrong, ..) = seen[1];
     assert_eq!(wc, [true; 3], "{seen:?}");
     assert_eq!(wrong.count_ones(), 1, "the bit of its datagram");
-    assert_eq!(states, [DeviceState(8); 3]);
+    assert_eq!(states, [DeviceState::OP; 3]);
     // The last: the others go on, one is not there, and its neighbour misses a link.
     let (wc, states, wrong, network, present) = *seen.last().unwrap();
     assert_eq!((wc, wrong, present), ([false, false, true], 0, 3), "{seen:?}");
@@ -79,7 +79,8 @@ fn the_example_tells_by_the_two_words_that_data_are_missing_and_who_is_to_blame(
     let file = folder.path().join("plant.toml");
     std::fs::write(&file, PLANT).unwrap();
     let mut told = Vec::new();
-    watched::watch(&format!("sim:{}", file.display()), |line| told.push(line)).unwrap();
+    let mut segment = linesman::open(&format!("sim:{}", file.display())).unwrap();
+    watched::watch(&mut segment, |line| told.push(line)).unwrap();
     // First all that share the datagram, then the one, and its neighbour at whose port it was.
     for terminal in ["SubDevice 2 (EL1008)", "SubDevice 3 (EL1008)", "SubDevice 4 (EL1008)"] {
         assert!(told.contains(&format!("{terminal}: data missing, OP")), "{told:#?}");

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
-use linesman::{DeviceId, Next, RunOptions};
+use linesman::{DeviceHandle, Next, RunOptions};
 use serde_json::{Value, json};
 use support::linesman;
 use tempfile::TempDir;
@@ -117,8 +117,8 @@ fn a_drive_that_fails_costs_the_data_of_its_sync_unit_only() {
         line.run(plan, RunOptions::us(2_000), |io| {
             cycles += 1;
             if cycles > 200 {
-                let all = (0..7).map(DeviceId);
-                discarded.extend(all.filter(|id| !io.quality(*id).valid).map(DeviceId::no));
+                let bad = io.devices().filter(|device| !io.quality(*device).valid);
+                discarded.extend(bad.map(DeviceHandle::no));
             }
             if cycles < 400 { Next::Continue } else { Next::Stop }
         })

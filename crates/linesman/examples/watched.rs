@@ -3,32 +3,29 @@
 //!
 //! `cargo run --example watched -- sim:line.toml`, or `eth0`.
 
+use linesman::DeviceState;
 use linesman::prelude::*;
-use linesman::{DeviceId, DeviceState};
 
-/// OP, and nothing wrong.
-const GOOD: DeviceState = DeviceState(8);
-
-fn main() -> Result<(), linesman::Error> {
-    let place = std::env::args().nth(1).unwrap_or_else(|| "sim:line.toml".to_owned());
-    watch(&place, |line| println!("{line}"))
+/// Watches the line that is named.
+pub fn main() -> Result<(), linesman::Error> {
+    let Some(place) = std::env::args().nth(1) else { return Ok(()) };
+    watch(&mut linesman::open(&place)?, |line| println!("{line}"))
 }
 
 /// Runs a line for five seconds and tells what changes.
-pub fn watch(place: &str, mut tell: impl FnMut(String)) -> Result<(), linesman::Error> {
-    let mut segment = linesman::open(place)?;
+pub fn watch(segment: &mut Segment, mut tell: impl FnMut(String)) -> Result<(), linesman::Error> {
     let plan = segment.scan()?.plan()?;
-    let names: Vec<(DeviceId, String)> =
-        plan.as_plan().devices.iter().map(|device| (device.id, device.name.clone())).collect();
-    let mut told: Vec<(bool, DeviceState)> = vec![(false, GOOD); names.len()];
+    let devices: Vec<(DeviceHandle, String)> =
+        plan.devices().map(|(device, name)| (device, name.to_owned())).collect();
+    let mut told = vec![(false, DeviceState::OP); devices.len()];
     let mut cycle = 0;
-    segment.run(plan, RunOptions::us(1000), |io| {
+    segment.run(plan, RunOptions::us(1_000), |io| {
         if !io.is_settled() && cycle == 0 {
             return Next::Continue;
         }
         cycle += 1;
-        for ((id, name), told) in names.iter().zip(&mut told) {
-            let now = (io.wc_state(*id), io.state(*id));
+        for ((device, name), told) in devices.iter().zip(&mut told) {
+            let now = (io.wc_state(*device), io.state(*device));
             if std::mem::replace(told, now) != now {
                 let data = if now.0 { "data missing" } else { "data good" };
                 tell(format!("{name}: {data}, {}", now.1));

@@ -6,6 +6,9 @@ use linesman_link::error::LinkError;
 use linesman_runtime::run::RunError;
 use linesman_runtime::selector::SelectorError;
 use linesman_session::image::VariableError;
+use linesman_sim::segment_file::SegmentFileError;
+
+use crate::{PlanId, RequestError};
 
 /// Each says who, where, what was expected and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -17,7 +20,7 @@ pub enum Error {
     /// Nothing can be driven there.
     #[error("`{given}`: nothing can be driven there. Do: name a card, `eth0`, or `sim:line.toml`")]
     NotDrivable {
-        /// What was named.
+        /// The word.
         given: String,
     },
     /// Another MainDevice drives the line.
@@ -34,7 +37,7 @@ pub enum Error {
         "`{given}` is no virtual segment: faults are injected there alone. Do: open `sim:line.toml`"
     )]
     NotSimulated {
-        /// What is open.
+        /// The line that is open.
         given: String,
     },
     /// A virtual segment cannot be built, or has no place for a fault.
@@ -45,7 +48,7 @@ pub enum Error {
     File {
         /// Which.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         why: String,
     },
     /// The card.
@@ -57,15 +60,38 @@ pub enum Error {
     /// A variable.
     #[error(transparent)]
     Variable(#[from] VariableError),
+    /// A handle belongs to another plan.
+    #[error(
+        "a handle of {found} was used with {running}. Do: find it by `plan.input(…)`, `plan.output(…)` \
+         or `plan.device(…)` of the plan that runs"
+    )]
+    OtherPlan {
+        /// Where the handle was found.
+        found: PlanId,
+        /// The plan that it was used with.
+        running: PlanId,
+    },
+    /// A service for a SubDevice.
+    #[error(transparent)]
+    Service(#[from] RequestError),
+    /// The run was stopped before.
+    #[error("the run was stopped before. Do: start another one")]
+    Stopped,
     /// The line cannot be run.
     #[error(transparent)]
     Run(#[from] RunError),
     /// The system has no more sockets.
     #[error("{doing}: {source}. Do: end other programs")]
     System {
-        /// What was tried.
+        /// The step that failed.
         doing: &'static str,
         /// Why not.
         source: std::io::Error,
     },
+}
+
+impl From<SegmentFileError> for Error {
+    fn from(error: SegmentFileError) -> Self {
+        Self::Segment(error.to_string())
+    }
 }

@@ -1,16 +1,19 @@
 //! Result of a scan, and the plan made of it.
 
+use std::fmt;
 use std::path::Path;
 
 use linesman_config::eni::Eni;
 use linesman_config::inventory::Inventory;
 use linesman_proto::time::Span;
 use linesman_runtime::run::PlanChoices;
-use linesman_session::image::{Input, Output, Value};
+use linesman_session::image::{Value, find_device};
 
-use crate::Error;
+use crate::handle::{DeviceHandle, Input, Output, PlanId};
+use crate::record::{InputRecord, InputsOf, OutputRecord, OutputsOf};
+use crate::{Error, RunOptions};
 
-/// What a scan found.
+/// Result of a scan.
 #[derive(Clone, Debug)]
 pub struct Scan {
     pub(crate) inventory: Inventory,
@@ -23,10 +26,11 @@ impl Scan {
     /// When its process data do not fit.
     pub fn plan(&self) -> Result<Plan, Error> {
         let plan = PlanChoices::default().plan_of(&self.inventory).map_err(Error::Plan)?;
-        Ok(Plan { plan, found: Some(Box::new(self.inventory.clone())) })
+        let found = Some(Box::new(self.inventory.clone()));
+        Ok(Plan { found, ..plan.into() })
     }
 
-    /// What is there.
+    /// The SubDevices that are there.
     #[must_use]
     pub const fn inventory(&self) -> &Inventory {
         &self.inventory
@@ -36,8 +40,9 @@ impl Scan {
 /// Everything that a line is run by.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    pub(crate) plan: linesman_config::plan::Plan,
-    /// What it was made of, if that was a scan.
+    plan: linesman_config::plan::Plan,
+    id: PlanId,
+    /// The scan that it was made of, if it was.
     found: Option<Box<Inventory>>,
 }
 
@@ -55,12 +60,35 @@ impl Plan {
         Ok(eni.plan.into())
     }
 
+    /// A SubDevice by its own name (`Term 2`), by the name of the product (`EL1008`) if there is only one, or by
+    /// its number in the order in which frames pass, from 1.
+    ///
+    /// # Errors
+    /// When there is none, or several; the error lists those that there are.
+    pub fn device(&self, name: &str) -> Result<DeviceHandle, Error> {
+        let id = find_device(&self.plan, name)?.id;
+        Ok(DeviceHandle { id, plan: self.id })
+    }
+
+    /// All SubDevices with their names, in the order in which frames pass.
+    pub fn devices(&self) -> impl Iterator<Item = (DeviceHandle, &str)> {
+        let handle = |id| DeviceHandle { id, plan: self.id };
+        self.plan.devices.iter().map(move |device| (handle(device.id), device.name.as_str()))
+    }
+
+    /// The name of a SubDevice by its number, as a finding names it; `None` when there is no such one.
+    #[must_use]
+    pub fn name(&self, no: u32) -> Option<&str> {
+        let device = self.plan.devices.iter().find(|device| device.id.no() == no)?;
+        Some(&device.name)
+    }
+
     /// An input by its name: `EL1008/1`, `Drive/Status word`, `EL3204/1/Value`.
     ///
     /// # Errors
     /// When there is none, or several, or it is of another type.
     pub fn input<T: Value>(&self, name: &str) -> Result<Input<T>, Error> {
-        Ok(Input::find(&self.plan, name)?)
+        Ok(Input::find(&self.plan, self.id, name)?)
     }
 
     /// An output by its name.
@@ -68,14 +96,76 @@ impl Plan {
     /// # Errors
     /// As [`Plan::input`].
     pub fn output<T: Value>(&self, name: &str) -> Result<Output<T>, Error> {
-        Ok(Output::find(&self.plan, name)?)
+        Ok(Output::find(&self.plan, self.id, name)?)
+    }
+
+    /// An input of a SubDevice by its name there: `1`, `Status word`, `1/Value`.
+    ///
+    /// # Errors
+    /// As [`Plan::input`], or when the SubDevice is one of another plan.
+    pub fn input_of<T: Value>(&self, device: DeviceHandle, name: &str) -> Result<Input<T>, Error> {
+        self.input(&self.whole_name(device, name)?)
+    }
+
+    /// An output of a SubDevice by its name there.
+    ///
+    /// # Errors
+    /// As [`Plan::input_of`].
+    pub fn output_of<T: Value>(
+        &self,
+        device: DeviceHandle,
+        name: &str,
+    ) -> Result<Output<T>, Error> {
+        self.output(&self.whole_name(device, name)?)
+    }
+
+    /// The inputs that a struct of [`inputs!`](crate::inputs) names, of a SubDevice by its name.
+    ///
+    /// # Errors
+    /// When there is no such SubDevice, or a variable is missing or of another type.
+    pub fn inputs<R: InputRecord>(&self, device: &str) -> Result<InputsOf<R>, Error> {
+        Ok(InputsOf { handles: R::find(self, self.device(device)?)? })
+    }
+
+    /// The outputs that a struct of [`outputs!`](crate::outputs) names, of a SubDevice by its name.
+    ///
+    /// # Errors
+    /// As [`Plan::inputs`].
+    pub fn outputs<R: OutputRecord>(&self, device: &str) -> Result<OutputsOf<R>, Error> {
+        Ok(OutputsOf { handles: R::find(self, self.device(device)?)? })
+    }
+
+    fn whole_name(&self, device: DeviceHandle, name: &str) -> Result<String, Error> {
+        let found = self.plan.device(device.id).filter(|_| device.plan == self.id);
+        let other = Error::OtherPlan { found: device.plan, running: self.id };
+        Ok(format!("{}/{name}", found.ok_or(other)?.name))
+    }
+
+    /// Its identity, which its handles carry.
+    #[must_use]
+    pub const fn id(&self) -> PlanId {
+        self.id
+    }
+
+    /// The plan as it is run with these options.
+    ///
+    /// # Errors
+    /// When clocks are asked for and the plan chooses none.
+    pub(crate) fn for_run(
+        self,
+        options: &RunOptions,
+    ) -> Result<linesman_config::plan::Plan, Error> {
+        let mut plan = if options.clocks { self.clocked(options.time)? } else { self.plan };
+        // The first task is the application's; an imported one keeps the times of its others.
+        if let Some(task) = plan.tasks.first_mut() {
+            task.cycle = options.time;
+            task.io_at = options.io_at.unwrap_or(task.io_at);
+        }
+        Ok(plan)
     }
 
     /// The plan with distributed clocks, for a cycle of this time. One that has clocks stays as it is.
-    ///
-    /// # Errors
-    /// When it was not made of a scan, and chooses none.
-    pub(crate) fn clocked(self, cycle: Span) -> Result<linesman_config::plan::Plan, Error> {
+    fn clocked(self, cycle: Span) -> Result<linesman_config::plan::Plan, Error> {
         if self.plan.reference_clock().is_some() {
             return Ok(self.plan);
         }
@@ -96,8 +186,15 @@ impl Plan {
     }
 }
 
+impl fmt::Display for Plan {
+    /// Its identity, as errors write it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.id.fmt(f)
+    }
+}
+
 impl From<linesman_config::plan::Plan> for Plan {
     fn from(plan: linesman_config::plan::Plan) -> Self {
-        Self { plan, found: None }
+        Self { id: PlanId::of(&plan), plan, found: None }
     }
 }

@@ -68,7 +68,7 @@ impl<L: Transport, H: SessionHooks> Driver<L, H> {
         self.line.now()
     }
 
-    /// Drives the line until `until`, `stop`, or the hooks have enough.
+    /// Drives the line until `until`, `stop`, or the hooks have enough or pause; after a pause it goes on where it was.
     ///
     /// # Errors
     /// When an interface vanished, was switched off, or the kernel refuses something else.
@@ -77,6 +77,9 @@ impl<L: Transport, H: SessionHooks> Driver<L, H> {
         loop {
             let now = line.now();
             let goes_on = session.take_in(now, line)?;
+            if session.hooks().is_paused() {
+                return Ok(());
+            }
             session.send(now, line)?;
             if !goes_on || stop.is_set() || now >= until {
                 return Ok(());

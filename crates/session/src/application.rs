@@ -1,6 +1,7 @@
 //! Interface of the application to a cycle.
 
 use linesman_config::plan::Plan;
+use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_maindevice::watch::NetworkStatus;
 use linesman_maindevice::{FrameStatus, MainDevice, Quality, Statistics};
 use linesman_proto::address::DeviceId;
@@ -41,6 +42,9 @@ pub trait Application {
     /// at its begin it is never called: there `cycle` itself runs after the outputs went out.
     fn after_outputs(&mut self, _io: &mut Io<'_>) {}
 
+    /// A service that [`Io::serve`] has begun is done.
+    fn served(&mut self, _ticket: ServiceTicket, _result: &Result<ServiceAnswer, ServiceFailure>) {}
+
     /// Whether it gives outputs at all. One that does not is not watched for being late.
     fn is_idle(&self) -> bool {
         false
@@ -80,6 +84,17 @@ pub struct Io<'a> {
 }
 
 impl Io<'_> {
+    /// The same cycle for a shorter time. That outputs are old has to be said to the first one.
+    pub const fn reborrow(&mut self) -> Io<'_> {
+        let Self { now, missed, withheld, .. } = *self;
+        Io { main: &mut *self.main, now, missed, withheld, old: false }
+    }
+
+    /// Begins a service for one SubDevice beside the cycle; [`Application::served`] has its end.
+    pub fn serve(&mut self, id: DeviceId, service: Service) -> ServiceTicket {
+        self.main.serve(self.now, id, service)
+    }
+
     /// The value of an input.
     #[must_use]
     pub fn get<T: Value>(&self, input: Input<T>) -> T {

@@ -29,6 +29,11 @@ pub trait SessionHooks {
     fn event(&mut self, now: Instant, event: Event, main: &mut MainDevice);
     /// Everything up to `now` is done: time for commands. Says whether to go on.
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool;
+    /// Whether the turn is that of somebody outside, for whom the session waits: nothing is sent until
+    /// [`turn`](Self::turn) is called again.
+    fn is_paused(&self) -> bool {
+        false
+    }
     /// When [`turn`](Self::turn) has something to do.
     fn poll_timeout(&self) -> Option<Instant> {
         None
@@ -169,6 +174,7 @@ impl<H: SessionHooks> Session<H> {
         line.look_at_host(now, &mut |observation| self.hooks.host(observation))?;
         if let Some(due) = self.main.poll_cycle_timeout()
             && due <= now
+            && !self.hooks.is_paused()
         {
             let late = now.since(due);
             line.note_late(late);

@@ -14,6 +14,9 @@ use crate::state::al_state::{AlState, StateValue};
 pub struct DeviceState(pub u16);
 
 impl DeviceState {
+    /// OP, and nothing wrong.
+    pub const OP: Self = Self::new(StateValue::Known(AlState::Op));
+
     /// The SubDevice signals an error in AL status.
     pub const ERROR: u16 = 0x0010;
     /// Vendor, product, revision or serial number read is not the configured one.

@@ -22,5 +22,8 @@ pub use note::{Note, RunError};
 pub use plan_choices::PlanChoices;
 pub use real_time::RealTime;
 pub use scan::scan;
-pub use session::{NOTES, RunControls, RunOutcome, RunSession, SessionOptions, run, run_observed};
+pub use session::{
+    NOTES, RunControls, RunOutcome, RunSession, SessionOptions, StartedRun, run, run_observed,
+    start, start_observed,
+};
 pub use shared::Shared;

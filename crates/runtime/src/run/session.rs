@@ -1,33 +1,32 @@
 //! Run of a line: a session, what the host gives it, and who is told.
 
 mod ending;
+mod started;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{SyncSender, TrySendError};
 
-use linesman_diagnosis::{Diagnosis, Engine, FrameSeen, HostObservation, Setup};
+use linesman_diagnosis::{FrameSeen, HostObservation, Setup};
 use linesman_link::error::LinkError;
-use linesman_maindevice::{Event, MainDevice, Options};
+use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_session::frame::FrameSummary;
 use linesman_session::{Application, PlanRun, PlanSource, SessionHooks};
 
-use super::bring_up::BringUpReport;
-use super::diagnosis_input::{InlineDiagnosis, RunDiagnosis};
-use super::diagnosis_thread::{DiagnosisObserver, DiagnosisOutput, judge};
+use super::diagnosis_input::RunDiagnosis;
+use super::diagnosis_thread::DiagnosisObserver;
 use super::note::{Note, RunError};
 use super::real_time::{GrantedRealTime, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
-use super::tap::tap;
-use crate::drive::Driver;
 use crate::part::PartFailure;
 use crate::serve::lateness::Lateness;
 use crate::service::ServiceSocket;
 use crate::stop::Stop;
 use crate::transport::Transport;
+
+pub use started::{StartedRun, start, start_observed};
 
 /// That the diagnosis does not keep up is told no more often than this.
 const MISSED_EVERY: Span = Span::s(10);
@@ -51,9 +50,6 @@ pub struct SessionOptions {
     /// How the line is judged while it runs; `None`: it is not.
     pub diagnose: Option<Setup>,
 }
-
-/// Room for what the diagnosis would like to have read.
-const PROBES: usize = 64;
 
 /// Room for notes that are on their way to whoever listens.
 pub const NOTES: usize = 65_536;
@@ -167,6 +163,7 @@ impl<A: Application> SessionHooks for RunSession<A> {
             if let Some(socket) = &mut self.socket {
                 socket.served(*ticket, result);
             }
+            self.run.application_mut().served(*ticket, result);
             return;
         }
         self.run.event(now, event, main);
@@ -181,6 +178,10 @@ impl<A: Application> SessionHooks for RunSession<A> {
             self.tell_missed(now, left_out);
         }
         goes_on
+    }
+
+    fn is_paused(&self) -> bool {
+        self.run.is_paused()
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
@@ -226,8 +227,9 @@ pub fn run<L: Transport<Error = LinkError>, A: Application>(
     options: &SessionOptions,
     beside: RunControls<'_>,
 ) -> Result<RunOutcome, RunError> {
-    let observer = |setup| Box::new(Engine::new(setup)) as Box<dyn DiagnosisObserver>;
-    run_observed(line, wanted, application, options, beside, observer)
+    let mut started = start(line, wanted, application, options, beside)?;
+    started.drive();
+    started.end()
 }
 
 /// The same with a diagnosis of one's own, made of [`SessionOptions::diagnose`].
@@ -242,99 +244,7 @@ pub fn run_observed<L: Transport<Error = LinkError>, A: Application>(
     beside: RunControls<'_>,
     observer: impl FnOnce(Setup) -> Box<dyn DiagnosisObserver>,
 ) -> Result<RunOutcome, RunError> {
-    let RunControls { stop, notes, socket } = beside;
-    let untold = Arc::<AtomicU64>::default();
-    let observer = options.diagnose.clone().map(observer);
-    let (diagnosis, judging) = match observer {
-        None => (RunDiagnosis::Nowhere, None),
-        // In virtual time the diagnosis costs the line nothing.
-        Some(observer) if options.real_time.is_none() => {
-            (RunDiagnosis::Inline(InlineDiagnosis::new(observer)), None)
-        }
-        Some(observer) => {
-            let (tap, listener) = tap(false);
-            let (ask, probes) = sync_channel(PROBES);
-            let (notes, untold) = (notes.clone(), Arc::clone(&untold));
-            let told = DiagnosisOutput { notes, untold, probes: ask };
-            let thread = judge(observer, listener, told).map_err(RunError::Thread)?;
-            (RunDiagnosis::Queued { tap, probes }, Some(thread))
-        }
-    };
-    // Threads started from here on would be real-time ones.
-    let granted = options.real_time.map(RealTime::ask).unwrap_or_default();
-    let allowed_misses = options.allowed_misses.filter(|_| !application.is_idle());
-    let hold_at = options.hold.then_some(AlState::PreOp);
-    let settings = Options { allowed_misses, hold_at, ..line.options() };
-    let begun_at = line.now();
-    let hooks = RunSession {
-        run: PlanRun::new(Some(wanted), application, diagnosis, options.hold),
-        notes,
-        untold,
-        lateness: Lateness::default(),
-        socket,
-        missed_told: (0, Instant::ZERO),
-        begun_at,
-        granted,
-        on: options.on.clone(),
-    };
-    let mut driver = Driver::new(line, settings, hooks);
-    let until = options.lasts.map_or(Instant::MAX, |lasts| begun_at + lasts);
-    let ran = driver.drive(until, stop);
-    let now = driver.now();
-    let session = driver.session_mut();
-    let mut report = session.hooks().report(now, session.main());
-    let times = session.hooks().run.plan().zip(session.main().bring_up_times());
-    report.bring_up = times.map(|(plan, times)| BringUpReport::of(plan, &times));
-    let failure = session.hooks_mut().run.take_failure().map(RunError::from);
-    let error = match (failure, ran) {
-        (Some(failure), _) => Some(failure),
-        // Where the interface has failed, nothing can be left in order.
-        (None, Err(error @ RunError::Link(_))) => Some(error),
-        (None, Err(error)) => driver.leave(options.leave).err().or(Some(error)),
-        (None, Ok(())) => driver.leave(options.leave).err(),
-    };
-    if let Some(error) = &error {
-        report.error = Some(error.to_string());
-    }
-    let ended_at = driver.now();
-    let RunSession { run, notes, .. } = driver.into_hooks();
-    let planned = run.plan().is_some();
-    // Ends the tap, and with it the thread that judges.
-    let (diagnosis, failed) = conclude(run.into_diagnosis(), judging, ended_at, &notes);
-    report.diagnosis = diagnosis;
-    report.failed.extend(failed.iter().map(PartFailure::to_string));
-    match error {
-        Some(error) if !planned => Err(error),
-        error => Ok(RunOutcome { report, error, failed }),
-    }
-}
-
-/// The last word of a diagnosis, or why there is none.
-fn conclude(
-    diagnosis: RunDiagnosis,
-    judging: Option<JoinHandle<Result<Diagnosis, PartFailure>>>,
-    at: Instant,
-    notes: &SyncSender<Note>,
-) -> (Option<Diagnosis>, Option<PartFailure>) {
-    let ended = match diagnosis {
-        RunDiagnosis::Nowhere => return (None, None),
-        RunDiagnosis::Inline(inline) => inline.finish(at).map(|(diagnosis, events)| {
-            for event in events {
-                // Whoever listened may have gone.
-                let _ = notes.try_send(Note::Finding(Box::new(event)));
-            }
-            diagnosis
-        }),
-        queued @ RunDiagnosis::Queued { .. } => {
-            drop(queued);
-            let Some(thread) = judging else { return (None, None) };
-            thread.join().unwrap_or_else(|panic| {
-                Err(PartFailure::of_panic("the diagnosis", "nothing was judged", &*panic))
-            })
-        }
-    };
-    match ended {
-        Ok(diagnosis) => (Some(diagnosis), None),
-        Err(failure) => (None, Some(failure)),
-    }
+    let mut started = start_observed(line, wanted, application, options, beside, observer)?;
+    started.drive();
+    started.end()
 }

@@ -12,7 +12,7 @@ use std::marker::PhantomData;
 use linesman_config::plan::Plan;
 use linesman_proto::sii::Direction;
 
-pub use name::VariableError;
+pub use name::{VariableError, find_device};
 pub use value::Value;
 
 /// Where a variable lies.

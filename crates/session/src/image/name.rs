@@ -74,7 +74,7 @@ pub(super) fn resolve<T: Value>(
     direction: Direction,
     name: &str,
 ) -> Result<Place, VariableError> {
-    let (device, rest) = device(plan, direction, name)?;
+    let (device, rest) = device(plan, Some(direction), name)?;
     let mine = |one: &&Variable| one.device == device.id && one.direction == direction;
     let variables: Vec<&Variable> = plan.variables.iter().filter(mine).collect();
     if variables.is_empty() {
@@ -106,10 +106,25 @@ pub(super) fn resolve<T: Value>(
     }
 }
 
+/// The SubDevice of this name, of this type if there is only one, or of this number.
+///
+/// # Errors
+/// When there is none, or several.
+pub fn find_device<'a>(plan: &'a Plan, name: &str) -> Result<&'a DevicePlan, VariableError> {
+    match device(plan, None, name)? {
+        (device, "") => Ok(device),
+        (_, _) => {
+            let known = list(plan.devices.iter().map(|device| device.name.clone()));
+            let (name, device) = (name.to_owned(), name.to_owned());
+            Err(VariableError::NoDevice { name, device, known })
+        }
+    }
+}
+
 /// The SubDevice that a name begins with, by name, type or number, and the rest of the name.
 fn device<'a, 'n>(
     plan: &'a Plan,
-    direction: Direction,
+    direction: Option<Direction>,
     name: &'n str,
 ) -> Result<(&'a DevicePlan, &'n str), VariableError> {
     // Names may contain a slash: the longest one counts.
@@ -143,8 +158,9 @@ fn device<'a, 'n>(
         return Ok((device, rest));
     }
     let has = |device: &&DevicePlan| match direction {
-        Direction::Inputs => !device.inputs.is_empty(),
-        Direction::Outputs => !device.outputs.is_empty(),
+        Some(Direction::Inputs) => !device.inputs.is_empty(),
+        Some(Direction::Outputs) => !device.outputs.is_empty(),
+        None => true,
     };
     let known = list(plan.devices.iter().filter(has).map(|device| device.name.clone()));
     Err(VariableError::NoDevice { name: name.to_owned(), device: first.to_owned(), known })

@@ -42,6 +42,7 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
     /// Ends the run: outputs to zero, then SubDevices to a state. It goes on until that is done, or was not done in
     /// time; the application is not called any more.
     pub fn leave(&mut self, now: Instant, main: &mut MainDevice, to: AlState) {
+        (self.pauses, self.paused) = (false, false);
         let Some(plan) = self.plan.clone() else {
             self.ended = true;
             return;

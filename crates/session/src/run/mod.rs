@@ -78,6 +78,11 @@ pub struct PlanRun<A, D> {
     withheld: bool,
     /// SubDevices wait in PREOP for the first outputs.
     held: bool,
+    /// After each call of the application the turn is the caller's; and it is.
+    pauses: bool,
+    paused: bool,
+    /// The caller has given no outputs.
+    old: bool,
     events: VecDeque<RunEvent>,
 }
 
@@ -99,6 +104,9 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
             ending: None,
             withheld: false,
             held,
+            pauses: false,
+            paused: false,
+            old: false,
             events: VecDeque::new(),
         }
     }
@@ -113,6 +121,18 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
     #[must_use]
     pub const fn reached_at(&self) -> Option<Instant> {
         self.reached_at
+    }
+
+    /// Pauses behind each call of the application, so that the caller gives the outputs; the next turn goes on. Those
+    /// of the pause before count as given anew unless they are `old`.
+    pub const fn pause(&mut self, old: bool) {
+        (self.pauses, self.old) = (true, old);
+    }
+
+    /// The process data of the cycle whose pause it is.
+    pub fn io<'a>(&self, now: Instant, main: &'a mut MainDevice) -> Io<'a> {
+        let missed = main.statistics().cycles_missed;
+        Io { main, now, missed, withheld: self.withheld, old: false }
     }
 
     /// Whether outputs are withheld because they were not given in time.
@@ -215,6 +235,10 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
 
     /// Calls the application when it is its turn.
     fn call(&mut self, now: Instant, main: &mut MainDevice) {
+        if std::mem::take(&mut self.paused) {
+            let old = std::mem::take(&mut self.old);
+            return self.give_outputs(now, main, old);
+        }
         // The first task is that of the application; others exchange beside it.
         let exchanged = main.take_exchanged(0);
         let missed = main.statistics().cycles_missed;
@@ -232,11 +256,20 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
         if !due {
             return;
         }
-        let mut io = Io { main, now, missed, withheld: self.withheld, old: false };
+        let mut io = Io { main: &mut *main, now, missed, withheld: self.withheld, old: false };
         if self.application.cycle(&mut io) == Next::Stop {
             self.ended = true;
         }
-        if !io.old && !self.application.is_idle() {
+        let old = io.old;
+        self.paused = self.pauses && !self.ended;
+        if !self.paused {
+            self.give_outputs(now, main, old);
+        }
+    }
+
+    /// Outputs count as given anew unless they are old.
+    fn give_outputs(&mut self, now: Instant, main: &mut MainDevice, old: bool) {
+        if !old && !self.application.is_idle() {
             main.outputs_mut();
             if std::mem::take(&mut self.held) {
                 main.release(now);
@@ -301,6 +334,10 @@ impl<A: Application, D: DiagnosisInput> SessionHooks for PlanRun<A, D> {
             self.call(now, main);
         }
         self.failure.is_none() && !self.ended
+    }
+
+    fn is_paused(&self) -> bool {
+        self.paused
     }
 
     fn poll_timeout(&self) -> Option<Instant> {

@@ -1,0 +1,194 @@
+//! Interface of an application to the cycle.
+
+use linesman_maindevice::{FrameStatus, Quality, Statistics};
+use linesman_proto::state::{DeviceState, NetworkState};
+use linesman_proto::time::Instant;
+use linesman_runtime::run as running;
+pub use linesman_runtime::run::Next;
+use linesman_session::image::Value;
+
+use crate::application::Handoff;
+use crate::handle::{DeviceHandle, Input, Output, PlanId};
+use crate::record::{InputRecord, InputsOf, OutputRecord, OutputsOf};
+
+/// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
+/// sent.
+pub trait Application {
+    /// One cycle. Where the task exchanges at its begin, it is called when the frames are back: inputs are
+    /// fresh, outputs leave at the next begin, whenever this returns. Where it exchanges at its end
+    /// ([`RunOptions::exchange_at_end`](crate::RunOptions::exchange_at_end)), it is called when the cycle begins:
+    /// inputs are those of the cycle before, outputs leave as soon as this returns (SYN-13).
+    fn cycle(&mut self, io: &mut Io<'_>) -> Next;
+
+    /// A second program of a task that exchanges at its end: called when the outputs of
+    /// [`cycle`](Self::cycle) have gone out and the inputs are back, for what must not delay them (SYN-14).
+    /// OutputsOf that it sets leave with the next cycle, unless that sets them anew. Of a task that exchanges
+    /// at its begin it is never called: there `cycle` itself runs after the outputs went out.
+    fn after_outputs(&mut self, _io: &mut Io<'_>) {}
+}
+
+impl<F: FnMut(&mut Io<'_>) -> Next> Application for F {
+    fn cycle(&mut self, io: &mut Io<'_>) -> Next {
+        self(io)
+    }
+}
+
+/// The process data of a cycle, and how the line is.
+pub struct Io<'a> {
+    inner: running::Io<'a>,
+    plan: PlanId,
+    handoff: &'a Handoff,
+}
+
+impl<'a> Io<'a> {
+    pub(crate) const fn new(inner: running::Io<'a>, plan: PlanId, handoff: &'a Handoff) -> Self {
+        Self { inner, plan, handoff }
+    }
+
+    /// True for a handle of the plan that runs. The first of another plan is noted, and ends the run.
+    #[inline]
+    fn admits(&self, plan: PlanId) -> bool {
+        if plan == self.plan {
+            return true;
+        }
+        self.handoff.foreign.set(self.handoff.foreign.get().or(Some(plan)));
+        false
+    }
+
+    /// The value of an input.
+    #[must_use]
+    pub fn get<T: Value>(&self, input: Input<T>) -> T {
+        let inputs = if self.admits(input.plan) { self.inner.inputs() } else { &[] };
+        input.variable.get(inputs)
+    }
+
+    /// Sets an output.
+    pub fn set<T: Value>(&mut self, output: Output<T>, value: T) {
+        if self.admits(output.plan) {
+            self.inner.set(output.variable, value);
+        }
+    }
+
+    /// The value that an output has been set to.
+    #[must_use]
+    pub fn get_output<T: Value>(&mut self, output: Output<T>) -> T {
+        match self.admits(output.plan) {
+            true => output.variable.get(self.inner.outputs_mut()),
+            false => output.variable.get(&[]),
+        }
+    }
+
+    /// The inputs of a SubDevice that a record names.
+    #[must_use]
+    pub fn read<R: InputRecord>(&self, inputs: InputsOf<R>) -> R {
+        R::read(self, inputs.handles)
+    }
+
+    /// Sets the outputs of a SubDevice that a record names.
+    pub fn write<R: OutputRecord>(&mut self, outputs: OutputsOf<R>, record: R) {
+        record.write(self, outputs.handles);
+    }
+
+    /// All inputs as bytes, laid out as the plan says.
+    #[must_use]
+    pub fn inputs(&self) -> &[u8] {
+        self.inner.inputs()
+    }
+
+    /// All outputs as bytes, laid out as the plan says.
+    pub fn outputs_mut(&mut self) -> &mut [u8] {
+        self.inner.outputs_mut()
+    }
+
+    /// Says that nobody has given outputs in this cycle. Otherwise an application that returns in time
+    /// counts as having given them, changed or not.
+    pub fn outputs_are_old(&mut self) {
+        self.handoff.old.set(true);
+    }
+
+    /// True while outputs are withheld because they were not given in time.
+    #[must_use]
+    pub const fn is_withheld(&self) -> bool {
+        self.inner.is_withheld()
+    }
+
+    /// Validity and age of the process data of a SubDevice.
+    #[must_use]
+    pub fn quality(&self, device: DeviceHandle) -> Quality {
+        match self.admits(device.plan) {
+            true => self.inner.quality(device.id),
+            false => Quality::default(),
+        }
+    }
+
+    /// True when a working counter that a SubDevice has a share in was wrong the last time: for all that
+    /// share the datagram, whoever is to blame (PLC-03). [`Io::state`] tells who that is.
+    #[must_use]
+    pub fn wc_state(&self, device: DeviceHandle) -> bool {
+        !self.quality(device).valid
+    }
+
+    /// The state word of a SubDevice: its software in the low byte, its wiring in the high byte
+    /// (PLC-04 to PLC-06). [`DeviceState::OP`] is OP and nothing wrong.
+    #[must_use]
+    pub fn state(&self, device: DeviceHandle) -> DeviceState {
+        match self.admits(device.plan) {
+            true => self.inner.state(device.id),
+            false => DeviceState::default(),
+        }
+    }
+
+    /// The state word of the network (PLC-07); 0 when all is well.
+    #[must_use]
+    pub fn network_state(&self) -> NetworkState {
+        self.inner.network_state()
+    }
+
+    /// Number of SubDevices that are there, of those that are planned (PLC-08).
+    #[must_use]
+    pub fn present(&self) -> usize {
+        self.inner.present()
+    }
+
+    /// Result of a frame of a task, the last time.
+    #[must_use]
+    pub fn frame_status(&self, task: usize, frame: usize) -> Option<FrameStatus> {
+        self.inner.frame_status(task, frame)
+    }
+
+    /// True when every SubDevice is in its target state.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.inner.is_settled()
+    }
+
+    /// The time of the run, of the line's own clock: virtual in a virtual segment.
+    #[must_use]
+    pub const fn now(&self) -> Instant {
+        self.inner.now()
+    }
+
+    /// Cycles that were left out so far because the host was late.
+    #[must_use]
+    pub const fn missed(&self) -> u64 {
+        self.inner.missed()
+    }
+
+    /// Counts of what has been sent and received so far.
+    #[must_use]
+    pub fn statistics(&self) -> Statistics {
+        self.inner.statistics()
+    }
+
+    /// The SubDevices of the plan that runs, in the order in which frames pass.
+    pub fn devices(&self) -> impl Iterator<Item = DeviceHandle> {
+        let planned = self.inner.plan().into_iter().flat_map(|plan| &plan.devices);
+        planned.map(|device| DeviceHandle { id: device.id, plan: self.plan })
+    }
+
+    /// The plan that runs, as the crates below this one see it.
+    #[must_use]
+    pub fn plan(&self) -> Option<&linesman_config::plan::Plan> {
+        self.inner.plan()
+    }
+}

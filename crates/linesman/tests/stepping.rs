@@ -1,0 +1,121 @@
+//! Runs whose caller takes the cycles one by one.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use linesman::prelude::*;
+use linesman::{FaultEntry, FaultName, FindingChange};
+
+const DEVICES: [(&str, &str); 3] = [("K1", "EK1100"), ("Buttons", "EL1008"), ("Lamps", "EL2008")];
+
+fn machine() -> (Segment, Plan) {
+    let file = SegmentFile::in_a_row("machine", 1, &DEVICES);
+    let mut segment = Segment::simulated(&file).unwrap();
+    let plan = segment.scan().unwrap().plan().unwrap();
+    (segment, plan)
+}
+
+/// InputsOf and time of each of the first cycles, with outputs that count.
+fn stepped(options: RunOptions) -> Vec<(u64, Vec<u8>)> {
+    let (mut segment, plan) = machine();
+    let mut run = segment.start(plan, options).unwrap();
+    let mut seen = Vec::new();
+    while let Some(mut io) = run.cycle() {
+        seen.push((io.now().as_nanos(), io.inputs().to_vec()));
+        io.outputs_mut().fill(seen.len() as u8);
+        if seen.len() == 500 {
+            break;
+        }
+    }
+    run.stop().unwrap();
+    seen
+}
+
+fn called(options: RunOptions) -> Vec<(u64, Vec<u8>)> {
+    let (mut segment, plan) = machine();
+    let mut seen = Vec::new();
+    let run = segment.run(plan, options, |io| {
+        seen.push((io.now().as_nanos(), io.inputs().to_vec()));
+        io.outputs_mut().fill(seen.len() as u8);
+        if seen.len() < 500 { Next::Continue } else { Next::Stop }
+    });
+    run.unwrap();
+    seen
+}
+
+#[test]
+fn stepped_run_sees_the_same_bytes_at_the_same_times_as_one_that_is_called() {
+    for options in [RunOptions::us(1_000), RunOptions::us(1_000).exchange_at_end()] {
+        let (stepped, called) = (stepped(options), called(options));
+        assert!(stepped.iter().any(|(_, inputs)| inputs.iter().any(|byte| *byte != 0)));
+        assert_eq!(stepped, called, "{options:?}");
+    }
+}
+
+#[test]
+fn fault_that_is_injected_between_two_cycles_opens_and_closes_a_finding() {
+    let (mut segment, plan) = machine();
+    let simulation = segment.simulation().unwrap();
+    let mut run = segment.start(plan, RunOptions::us(1_000).diagnosed()).unwrap();
+    let (mut fault, mut changes) = (None, Vec::new());
+    for cycle in 0..6_000 {
+        assert!(run.cycle().is_some());
+        if cycle == 1_000 {
+            let cut = FaultEntry::new(FaultName::LinkOpen).at("Buttons.B-Lamps.A");
+            fault = Some(simulation.inject(&cut).unwrap());
+        }
+        if cycle == 3_000 {
+            simulation.heal(fault.take().unwrap());
+        }
+        changes.extend(run.findings().map(|event| (event.kind, event.finding.cause)));
+    }
+    let report = run.stop().unwrap();
+    assert!(report.diagnosis.is_some());
+    for change in [FindingChange::Opened, FindingChange::Closed] {
+        assert!(changes.contains(&(change, FaultName::LinkOpen)), "{changes:?}");
+    }
+}
+
+#[test]
+fn run_that_is_dropped_leaves_the_line_for_the_next_one() {
+    let (mut segment, plan) = machine();
+    let mut run = segment.start(plan.clone(), RunOptions::us(1_000)).unwrap();
+    for _ in 0..200 {
+        run.cycle();
+    }
+    drop(run);
+    let mut run = segment.start(plan, RunOptions::us(1_000)).unwrap();
+    let mut settled = false;
+    for _ in 0..1_000 {
+        settled |= run.cycle().is_some_and(|io| io.is_settled());
+    }
+    assert!(settled);
+    assert_eq!(run.stop().unwrap().counts.working_counter_errors, 0);
+}
+
+#[test]
+fn wish_to_stop_ends_the_cycles() {
+    let (mut segment, plan) = machine();
+    let stopper = segment.stopper();
+    let mut run = segment.start(plan, RunOptions::us(1_000)).unwrap();
+    assert!(run.cycle().is_some());
+    stopper.set();
+    let more = (0..10).take_while(|_| run.cycle().is_some()).count();
+    assert!(more <= 1, "{more}");
+    assert!(run.stop().is_ok());
+}
+
+#[test]
+fn outputs_that_are_called_old_are_withheld() {
+    let (mut segment, plan) = machine();
+    let mut run = segment.start(plan, RunOptions::us(1_000).allow_misses(3)).unwrap();
+    let mut withheld = 0;
+    for cycle in 0..2_000 {
+        let mut io = run.cycle().unwrap();
+        if cycle > 1_000 {
+            io.outputs_are_old();
+        }
+        withheld += u32::from(io.is_withheld());
+    }
+    assert!(withheld > 900, "{withheld}");
+    run.stop().unwrap();
+}
