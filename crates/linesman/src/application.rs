@@ -18,7 +18,7 @@ use crate::services::ServiceOrders;
 pub(crate) struct Handoff {
     /// The plan of the first handle that belongs to another one; it ends the run.
     pub(crate) foreign: Cell<Option<PlanId>>,
-    /// OutputsOf were not given in this cycle.
+    /// Outputs were not given in this cycle.
     pub(crate) old: Cell<bool>,
 }
 

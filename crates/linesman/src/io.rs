@@ -22,7 +22,7 @@ pub trait Application {
 
     /// A second program of a task that exchanges at its end: called when the outputs of
     /// [`cycle`](Self::cycle) have gone out and the inputs are back, for what must not delay them (SYN-14).
-    /// OutputsOf that it sets leave with the next cycle, unless that sets them anew. Of a task that exchanges
+    /// Outputs that it sets leave with the next cycle, unless that sets them anew. Of a task that exchanges
     /// at its begin it is never called: there `cycle` itself runs after the outputs went out.
     fn after_outputs(&mut self, _io: &mut Io<'_>) {}
 }

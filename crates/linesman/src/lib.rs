@@ -54,7 +54,7 @@
 //!
 //! # Findings
 //!
-//! The diagnosis sees every frame of the run, on a thread of its own. It says place, cause and evidence of what is
+//! The diagnosis sees every frame of the run, on cards in a thread of its own. It says place, cause and evidence of what is
 //! wrong, as it opens and closes (`examples/findings.rs`):
 //!
 //! ```

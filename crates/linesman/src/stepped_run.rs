@@ -72,7 +72,7 @@ impl<'a> SteppedRun<'a> {
     }
 
     /// Waits for the next cycle and gives its process data; `None` when the run is over, and [`SteppedRun::stop`] says why.
-    /// OutputsOf that are set leave with the next frames. The cycle begins at its time: a caller that comes back
+    /// Outputs that are set leave with the next frames. The cycle begins at its time: a caller that comes back
     /// later is late, and what that means is said at [`RunOptions::allow_misses`](crate::RunOptions::allow_misses).
     ///
     /// Cycles begin before all SubDevices are up: [`Io::is_settled`] tells.
